@@ -90,3 +90,9 @@ def receive_exactly(sock, size):
             raise EOFError("the box closed the connection")
         data += piece
     return bytes(data)
+
+
+def submit(box, text, port="secondary"):
+    """Send a program to a port of scripts."""
+    with connect(box, port) as sock:
+        sock.sendall(text.encode())

@@ -5,10 +5,8 @@ import struct
 
 import numpy as np
 import pytest
-from clients_support import PERIOD, connect
+from clients_support import PERIOD
 from strict_rtde import DATA, INPUTS, MESSAGE, OUTPUTS, StrictRtde
-
-from protocol.ur_types import ProgramState
 
 COMMON = (
     "timestamp", "actual_q", "actual_qd", "speed_scaling", "target_speed_fraction", "runtime_state",
@@ -24,11 +22,6 @@ ROBOT_INPUTS = (
     "tool_digital_output", "standard_analog_output_mask", "standard_analog_output_type",
     "standard_analog_output_0", "standard_analog_output_1",
 )  # fmt: skip
-
-
-def submit(box, text, port="secondary"):
-    with connect(box, port) as sock:
-        sock.sendall(text.encode())
 
 
 def test_the_order_of_a_driver(box):
@@ -173,66 +166,3 @@ def test_outputs_set_over_rtde_are_seen_at_once(box):
             seen = [client.data()["actual_digital_output_bits"] & 1 for _ in range(100)]
             assert seen[-1] == level
             assert seen == sorted(seen, reverse=not level)
-
-
-WATCHDOG_PROGRAM = """def example():
-  rtde_set_watchdog("input_int_register_0", 1, "PAUSE")
-  global setp = p[0,0,0,0,0,0]
-  thread copy():
-    while True:
-      local tmp = p[0,0,0,0,0,0]
-      i = 0
-      while i < 6:
-        tmp[i] = read_input_float_register(i)
-        i = i + 1
-      end
-      setp = tmp
-      sync()
-    end
-  end
-  h = run copy()
-  write_output_integer_register(0, 1)
-  while True:
-    if (read_input_integer_register(0) == 1) and (setp != p[0,0,0,0,0,0]):
-      movel(setp, a=3, v=0.5)
-      write_output_integer_register(0, 0)
-      while read_input_integer_register(0) == 1:
-        sync()
-      end
-      write_output_integer_register(0, 1)
-    end
-    sync()
-  end
-end
-"""
-
-
-def test_the_control_loop_of_the_public_example(fresh_box):
-    """Set-points over registers, a watchdog kicked with every package, then no longer: the program pauses."""
-    box = fresh_box
-    with StrictRtde(box) as client:
-        client.want("timestamp", "target_TCP_pose", "output_int_register_0", "runtime_state")
-        setpoint = client.inputs(*(f"input_double_register_{n}" for n in range(6)))
-        watchdog = client.inputs("input_int_register_0")
-        assert (setpoint.number, watchdog.number) == (1, 2)
-        client.start()
-        submit(box, WATCHDOG_PROGRAM)
-
-        def kicked(command, condition):
-            for _ in range(2500):
-                values = client.data()
-                client.write(watchdog, input_int_register_0=command)
-                if condition(values):
-                    return values
-            raise AssertionError("what was waited for did not come")
-
-        start = kicked(0, lambda v: v["output_int_register_0"] == 1)["target_TCP_pose"]
-        for lift in (0.03, 0.0):
-            goal = [*start[:2], start[2] + lift, *start[3:]]
-            client.write(setpoint, **{f"input_double_register_{n}": x for n, x in enumerate(goal)})
-            arrived = kicked(1, lambda v: v["output_int_register_0"] == 0)
-            assert np.allclose(arrived["target_TCP_pose"], goal, atol=1e-5)
-            kicked(0, lambda v: v["output_int_register_0"] == 1)
-        last = client.data()["timestamp"]
-        paused = client.until(lambda v: v["runtime_state"] in (ProgramState.PAUSING, ProgramState.PAUSED))
-        assert 0.9 < paused["timestamp"] - last < 1.2

@@ -1,0 +1,233 @@
+"""The maker's RTDE client for Python, as urpy 1.2.0 on PyPI carries it, in the flows of its examples.
+
+Its home, UniversalRobots/RTDE_Python_Client_Library, is not on PyPI.
+"""
+
+import struct
+from contextlib import contextmanager
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from clients_support import served_box, submit
+from rtde_programs import WATCHDOG_PROGRAM
+from urpy.rtde import rtde, rtde_config
+
+# The recipe of the maker's recorder (examples/record_configuration.xml), and what later ones add to it.
+RECORDED = {
+    "timestamp": "DOUBLE",
+    **dict.fromkeys(
+        (
+            "target_q", "target_qd", "target_qdd", "target_current", "target_moment", "actual_q", "actual_qd",
+            "actual_current", "joint_control_output", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force",
+            "target_TCP_pose", "target_TCP_speed",
+        ),
+        "VECTOR6D",
+    ),
+    "actual_digital_input_bits": "UINT64",
+    "joint_temperatures": "VECTOR6D",
+    "actual_execution_time": "DOUBLE",
+    "robot_mode": "INT32",
+    "joint_mode": "VECTOR6INT32",
+    "safety_mode": "INT32",
+    "actual_tool_accelerometer": "VECTOR3D",
+    **dict.fromkeys(
+        (
+            "speed_scaling", "target_speed_fraction", "actual_momentum", "actual_main_voltage",
+            "actual_robot_voltage", "actual_robot_current",
+        ),
+        "DOUBLE",
+    ),
+    "actual_joint_voltage": "VECTOR6D",
+    "actual_digital_output_bits": "UINT64",
+    "runtime_state": "UINT32",
+}  # fmt: skip
+ADDED = {
+    "safety_status": "INT32",
+    "joint_position_deviation_ratio": "DOUBLE",
+    "payload": "DOUBLE",
+    "payload_cog": "VECTOR3D",
+    "payload_inertia": "VECTOR6D",
+    "ft_raw_wrench": "VECTOR6D",
+    "script_control_line": "UINT32",
+    "tool_output_mode": "UINT8",
+    "output_bit_register_64": "BOOL",
+}
+SIZES = {
+    "VECTOR6D": 48,
+    "VECTOR3D": 24,
+    "VECTOR6INT32": 24,
+    "DOUBLE": 8,
+    "UINT64": 8,
+    "INT32": 4,
+    "UINT32": 4,
+}
+CONTROL_LOOP = {
+    "state": {"target_q": "VECTOR6D", "target_qd": "VECTOR6D", "output_int_register_0": "INT32"},
+    "setp": {f"input_double_register_{n}": "DOUBLE" for n in range(6)},
+    "watchdog": {"input_int_register_0": "INT32"},
+}
+# Robot, software, control cycle [s].
+BOXES = [("ur3", "3.15.8", 0.008)] + [
+    ("ur5e", software, 0.002) for software in ("5.9.4", "5.12.0", "5.15.0", "5.25.1")
+]
+
+
+@pytest.fixture(scope="module", params=BOXES, ids=lambda box: box[1])
+def box(tmp_path_factory, request):
+    robot, software, period = request.param
+    options = ("--robot", robot, "--software", software, "--fidelity", "ideal")
+    with served_box(tmp_path_factory.mktemp("maker"), *options) as served:
+        served.software, served.period = software, period
+        yield served
+
+
+@pytest.fixture
+def recipes(tmp_path):
+    """Write recipes as the configuration file of an example and read it back."""
+
+    def read(**recipes):
+        rows = (
+            f'<recipe key="{key}">'
+            + "".join(f'<field name="{name}" type="{kind}"/>' for name, kind in fields.items())
+            + "</recipe>"
+            for key, fields in recipes.items()
+        )
+        path = tmp_path / "configuration.xml"
+        path.write_text(f'<?xml version="1.0"?>\n<rtde_config>{"".join(rows)}</rtde_config>\n')
+        return rtde_config.ConfigFile(path).get_recipe
+
+    return read
+
+
+@contextmanager
+def connected(box):
+    """Connect and ask for the software, as all examples do."""
+    client = rtde.RTDE(box.host, box.ports.rtde)
+    client.connect()
+    try:
+        assert ".".join(map(str, client.get_controller_version()[:3])) == box.software
+        yield client
+    finally:
+        client.disconnect()
+
+
+def newest(client):
+    """Return the package after all that have come: the client reads 4 kB at a time."""
+    while client.has_data():
+        client.receive()
+    return client.receive()
+
+
+def test_the_recorder_gets_a_row_at_each_package(box, recipes):
+    names, types = recipes(out=RECORDED)("out")
+    with connected(box) as client:
+        assert client.send_output_setup(names, types, frequency=125)
+        assert client.send_start()
+        rows = [client.receive() for _ in range(60)]
+        assert client.send_pause()
+    steps = np.diff([row.timestamp for row in rows]) / 0.008
+    assert steps == pytest.approx(np.round(steps), abs=1e-6)
+    assert steps.min() == pytest.approx(1.0)
+    assert {len(row.actual_q) for row in rows} == {6}
+    assert {row.robot_mode for row in rows} == {7}
+
+
+def test_the_buffered_binary_recorder_gets_every_cycle(box, recipes):
+    names, types = recipes(out=RECORDED)("out")
+    with connected(box) as client:
+        assert client.send_output_setup(names, types, frequency=round(1 / box.period))
+        assert client.send_start()
+        rows = []
+        while len(rows) < 200:
+            if (row := client.receive_buffered(binary=True)) is not None:
+                rows.append(row)
+        assert client.send_pause()
+    assert {len(row) for row in rows} == {sum(SIZES[kind] for kind in types)}
+    stamps = [struct.unpack_from(">d", row)[0] for row in rows]
+    assert np.diff(stamps) == pytest.approx([box.period] * 199, abs=1e-9)
+
+
+def test_receive_skips_what_has_come_meanwhile(box, recipes):
+    names, types = recipes(out={"timestamp": "DOUBLE"})("out")
+    with connected(box) as slow, connected(box) as clock:
+        for client in (slow, clock):
+            assert client.send_output_setup(names, types, frequency=round(1 / box.period))
+            assert client.send_start()
+        before = slow.receive().timestamp
+        while clock.receive().timestamp < before + 20 * box.period:
+            pass
+        assert slow.receive().timestamp > before + 15 * box.period
+        assert slow.skipped_package_count >= 15
+
+
+def test_later_recorders_need_later_software(box, recipes):
+    names, types = recipes(out=RECORDED | ADDED)("out")
+    with connected(box) as client:
+        if box.software in ("3.15.8", "5.9.4"):
+            with pytest.raises(ValueError, match="NOT_FOUND"):
+                client.send_output_setup(names, types, frequency=125)
+        else:
+            assert client.send_output_setup(names, types, frequency=125)
+            assert client.send_start()
+            assert client.receive().output_bit_register_64 is False
+
+
+def test_wrong_types_are_noticed_and_taken_inputs_too(box):
+    with connected(box) as client, connected(box) as other:
+        assert not client.send_output_setup(["timestamp", "robot_mode"], ["DOUBLE", "UINT32"])
+        assert client.send_input_setup(["input_int_register_24"], ["INT32"]).recipe_id == 1
+        assert client.send_input_setup(["input_double_register_24"], ["DOUBLE"]).recipe_id == 2
+        with pytest.raises(ValueError, match="already in use"):
+            other.send_input_setup(["input_int_register_24"], ["INT32"])
+        with pytest.raises(ValueError, match="NOT_FOUND"):
+            other.send_input_setup(["input_nothing"], ["INT32"])
+
+
+def test_a_package_of_a_later_protocol_does_not_end_the_connection(box):
+    """The client of 2026 asks for properties, which software has from 5.26 on; it waits, then says so."""
+    with connected(box) as client:
+        client._RTDE__sendall(ord("R"), b"v1.software.version")
+        assert client.get_controller_version()[0] == int(box.software[0])
+
+
+def test_the_control_loop(box, recipes):
+    """Two poses in turn over registers, a watchdog kicked with each state; without kicks the program pauses."""
+    recipe = recipes(**CONTROL_LOOP)
+    with connected(box) as client, connected(box) as watcher:
+        assert client.send_output_setup(*recipe("state"), frequency=round(1 / box.period))
+        setp, watchdog = (
+            client.send_input_setup(*recipe("setp")),
+            client.send_input_setup(*recipe("watchdog")),
+        )
+        assert client.send_start()
+        assert watcher.send_output_setup(["timestamp", "target_TCP_pose", "runtime_state"])
+        assert watcher.send_start()
+        submit(box, WATCHDOG_PROGRAM)
+        start = newest(watcher).target_TCP_pose
+        goals = [[*start[:2], start[2] + lift, *start[3:]] for lift in (0.03, 0.0)]
+        watchdog.input_int_register_0 = 0
+
+        def until(register):
+            for _ in range(20_000):
+                state = client.receive()
+                client.send(watchdog)
+                if state.output_int_register_0 == register:
+                    return
+            raise AssertionError("what was waited for did not come")
+
+        for goal in goals:
+            until(1)
+            for n, value in enumerate(goal):
+                setattr(setp, f"input_double_register_{n}", value)
+            assert client.send(setp)
+            watchdog.input_int_register_0 = 1
+            until(0)
+            watchdog.input_int_register_0 = 0
+            assert newest(watcher).target_TCP_pose == pytest.approx(goal, abs=1e-5)
+        states = [newest(watcher)]
+        while states[-1].runtime_state == 2:
+            states.append(watcher.receive())
+        assert states[-1].runtime_state in (3, 4)
+        assert all(after.timestamp - before.timestamp < 0.5 for before, after in pairwise(states))
+        assert 0.9 < states[-1].timestamp - states[0].timestamp < 1.3
