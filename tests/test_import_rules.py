@@ -54,7 +54,7 @@ CONTROLLER_ORDER = (
     | {"programs", "robot_mode", "tool_settings"},
     {"io"},
     {"safety"},
-    {"arm_dynamics", "client_inputs", "electrics", "error_settings"},
+    {"arm_dynamics", "client_inputs", "electrics", "error_settings", "world_model"},
     {"energy", "snapshot"},
     {"past_cycles"},
     {"compliance"},

@@ -21,7 +21,7 @@ from the tables in `urscript/catalogue/` by `make docs`.
 * **exact**: does what the manual describes.
 * **approximate**: works; the note states differences and assumptions.
 * **declared only**: programs that name it compile, and the call ends the program with the run-time error
-  `<name> is declared only: this box does not model it yet`.
+  `<name> is declared only: this box does not model it yet`; the remarks say what is missing.
 
 "Undocumented" names are missing in the script manual of their generation, but its controllers
 accept them.

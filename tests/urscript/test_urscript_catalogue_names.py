@@ -208,9 +208,10 @@ BROUGHT = {
         modbus_request_update_signal_value modbus_reset_connection modbus_set_signal_watchdog
         set_base_acceleration set_baselight_off set_baselight_iec set_baselight_solid
     """,
+    "5.16": "eip_writer_factory eip_reader_factory",
     "5.17": "get_gravity get_base_acceleration get_tool_temp time",
     "5.19": "tool_wrench_limit_set tool_wrench_limit_disable",
-    "5.21": "optimovej optimovel eip_writer_factory eip_reader_factory",
+    "5.21": "optimovej optimovel",
     "5.22": "motion_version_set motion_version_get",
     "5.23": """
         direct_torque get_mass_matrix get_jacobian get_jacobian_time_derivative

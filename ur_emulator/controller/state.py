@@ -35,6 +35,7 @@ from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling
 from ur_emulator.controller.tool_settings import ToolSettings
+from ur_emulator.controller.world_model import WorldModel
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
@@ -60,6 +61,7 @@ class ControllerState:
         energy: what the arm has taken.
         dynamics: the model of the arm with that payload.
         planning: how programs want their moves to be planned.
+        world: named frames.
         io: digital and analogue lines.
         registers: general purpose registers.
         io_configuration: which inputs act, which outputs follow the program.
@@ -93,6 +95,7 @@ class ControllerState:
     energy: EnergyMeter
     dynamics: ArmDynamics
     planning: PlanningSettings
+    world: WorldModel
     io: InputOutput
     registers: Registers
     io_configuration: IoConfiguration
@@ -143,6 +146,7 @@ def make_state(
         tool=tool,
         dynamics=ArmDynamics(robot, arm.calibration, tool),
         planning=PlanningSettings(),
+        world=WorldModel(lambda: arm.fk(motion.target.q), tool),
         energy=EnergyMeter(clock.generation),
         io=io,
         registers=registers,

@@ -35,6 +35,7 @@ from ur_emulator.scripting.state_functions import state_functions
 from ur_emulator.scripting.tool_functions import tool_functions
 from ur_emulator.scripting.torque_functions import ProgramTorque
 from ur_emulator.scripting.watchdog_functions import watchdog_functions
+from ur_emulator.scripting.world_functions import world_functions
 from urscript.builtins import pure_builtins
 
 
@@ -51,6 +52,9 @@ class RobotHost:
         random = pure_builtins(state.seed)["random"]
         self.step_time = state.clock.period_s
         arm = ScriptArm(state.robot, state.arm, state.motion, state.tool, state.safety)
+        settings = settings_functions(
+            state.robot, state.tool, state.force_sense, state.requests, self.step_time
+        )
         self._state = state
         self._sockets = ProgramSockets(state.clock, state.events, network)
         self._remotes = ProgramRemotes(network, state.clock)
@@ -65,7 +69,8 @@ class RobotHost:
             **state_functions(arm, state.past, self.step_time),
             **compliance_functions(arm, state.compliance, state.force_sense, state.past),
             **dynamics_functions(arm, state.dynamics, state.past),
-            **settings_functions(state.robot, state.tool, state.force_sense, state.requests, self.step_time),
+            **settings,
+            **world_functions(state.world, settings["set_target_payload"]),
             **tool_functions(state.io),
             **payload_functions(state.tool),
             **rtde_functions(state.past, state.robot.generation.rtde_outputs),

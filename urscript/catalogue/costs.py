@@ -47,6 +47,15 @@ UNITS: Final[Mapping[str, int]] = {
     "pose_dist": 50,
     "rotvec2rpy": 50,
     "rpy2rotvec": 50,
+    "set_payload_from_attached_frames": 20_000,  # 1 ms of 25 frames
+    "delete_frame": 2_000,
+    "get_pose": 1_000,  # 50 µs at the end of a chain of 30 frames
+    "convert_pose": 1_000,
+    "move_frame": 1_000,
+    "attach_frame": 1_000,
+    "add_frame": 1_000,
+    "get_frame_parent": 60,
+    "get_children": 400,
     "inv": 600,  # of a matrix; its size comes on top
     "transpose": 60,
     "normalize": 40,

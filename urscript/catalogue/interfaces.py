@@ -573,11 +573,12 @@ _FACTORIES: tuple[Builtin, ...] = (
     *(
         _row(
             name,
-            (Param("id", ANY), Param("size", INT)),
+            (Param("instance_name", STRING), Param("data_size", INT)),
             "handle",
             summary,
-            since=LATE_E_SERIES,
-            source="maker's EtherNet/IP example for the 5.2x releases",
+            since=releases(None, "5.16", "10.0"),
+            source=f"{MANUAL_LATE}, chapter Flexible Ethernet/IP Adapter",
+            note="this box has no EtherNet/IP adapter, so no scanner can exchange data with the handle",
         )
         for name, summary in (
             ("eip_writer_factory", "a handle that writes EtherNet/IP data"),
@@ -592,6 +593,7 @@ _FACTORIES: tuple[Builtin, ...] = (
             f"a ROS 2 {words}",
             since=releases(None, None, "10.11"),
             source=MANUAL_X,
+            note="this box has no ROS 2",
         )
         for kind, words in (
             ("publisher", "publisher"),

@@ -23,8 +23,10 @@ _A = Param("a", NUMBER, unit="m/s^2")
 _V = Param("v", NUMBER, unit="m/s")
 _R = Param("r", NUMBER, unit="m")
 
+_MISSING = "needs the package Remote TCP, which is not installed: a real box then does not know the name"
+
 ROWS: tuple[Builtin, ...] = tuple(
-    _row(name, params, returns, summary, time=time, since=NOT_CB3, note="needs the Remote TCP package")
+    _row(name, params, returns, summary, time=time, since=NOT_CB3, note=_MISSING)
     for name, params, returns, summary, time in (
         (
             "mc_initialize",
