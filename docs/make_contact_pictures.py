@@ -128,13 +128,11 @@ class Stage:
         world.add_geom(type=cylinder, fromto=[0, 0, TABLE_HEIGHT, 0, 0, 0], size=[0.075, 0, 0], rgba=TOOL)
         world.add_geom(type=cylinder, fromto=[0, 0, 0, 0, 0, 0.075], size=[0.06, 0, 0], rgba=STEEL)
         capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
-        for i, (name, link, row) in enumerate(zip(LINKS, UR3.links, dh, strict=True)):
+        hulls = UR3.outline.hulls(UR3.dh)[1:]
+        for i, (name, hull, row) in enumerate(zip(LINKS, hulls, dh, strict=True)):
             color = STEEL if i in (1, 2) else (TOOL if i == 5 else JOINT)
-            for piece in link.hull:
-                ends = [*to_body(row, piece.start), *to_body(row, piece.end)]
-                spec.body(name).add_geom(
-                    type=capsule, fromto=ends, size=[piece.radius, 0, 0], rgba=color, mass=0
-                )
+            ends = [*to_body(row, hull.start), *to_body(row, hull.end)]
+            spec.body(name).add_geom(type=capsule, fromto=ends, size=[hull.radius, 0, 0], rgba=color, mass=0)
         world.add_light(
             pos=[0.8, -0.9, 1.8], dir=[-0.4, 0.5, -1], diffuse=[0.55] * 3, specular=[0.1] * 3, castshadow=True
         )

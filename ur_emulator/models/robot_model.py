@@ -1,8 +1,8 @@
 """RobotModel: the numbers of one type of arm, frozen.
 
 The physics, the kinematics and the wire read their robot from here and from nowhere else; a new arm is a
-new file of numbers beside `ur3.py` and a row in `robots.py`. This module holds no numbers of any robot
-and no behaviour.
+new file of numbers beside `ur3.py` and a row in `robots.py`. This module holds no numbers of any one
+robot.
 
 Lengths are metres, angles radians, masses kilograms. Sequences of six follow the joints from the base to
 wrist 3. Link frames are the standard (distal) Denavit-Hartenberg frames: link i moves with joint i.
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import pi
 from typing import TYPE_CHECKING
 
 from ur_emulator.errors import ModelError
@@ -50,13 +51,72 @@ class DhRow:
     theta: float = 0.0
 
 
+DhTable = tuple[DhRow, DhRow, DhRow, DhRow, DhRow, DhRow]
+
+
+def dh_table(*, d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> DhTable:
+    """Return the six rows of an arm: all arms differ in these lengths only [m]; `a2`, `a3` are negative."""
+    return (
+        DhRow(a=0.0, d=d1, alpha=pi / 2),
+        DhRow(a=a2, d=0.0, alpha=0.0),
+        DhRow(a=a3, d=0.0, alpha=0.0),
+        DhRow(a=0.0, d=d4, alpha=pi / 2),
+        DhRow(a=0.0, d=d5, alpha=-pi / 2),
+        DhRow(a=0.0, d=d6, alpha=0.0),
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Capsule:
-    """A piece of a link's hull, for collisions: a line segment with a radius, in the link's DH frame [m]."""
+    """The hull of a link, for collisions: a line segment with a radius, in the link's DH frame [m]."""
 
     start: Vector3
     end: Vector3
     radius: float
+
+
+# By how much wrists 1 and 2 pass the axis of the next joint [m].
+_OVERLAP = 0.005
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outline:
+    """Housings of an arm, each with its radius as last number [m].
+
+    Attributes:
+        base: ends along z of the base frame.
+        shoulder: lower end along y of its DH frame, end on the side of the upper arm along z.
+        upper_arm: distance of its axis, the length of the link, from the x axis of its DH frame, along z.
+        forearm: likewise.
+        wrist: length of wrists 1 and 2, from the axis of the next joint back.
+        flange: ends of wrist 3 along z of the flange.
+    """
+
+    base: Vector3
+    shoulder: Vector3
+    upper_arm: tuple[float, float]
+    forearm: tuple[float, float]
+    wrist: tuple[float, float]
+    flange: Vector3
+
+    def hulls(self, dh: DhTable) -> tuple[Capsule, ...]:
+        """Return the hull of the base in the base frame, then those of the six links of an arm."""
+        low, high, radius = self.base
+        bottom, side, shoulder = self.shoulder
+        back, front, flange = self.flange
+        length, wrist = self.wrist
+        tubes = (
+            Capsule((0.0, 0.0, offset), (-row.a, 0.0, offset), tube)
+            for row, (offset, tube) in zip(dh[1:3], (self.upper_arm, self.forearm), strict=True)
+        )
+        return (
+            Capsule((0.0, 0.0, low), (0.0, 0.0, high), radius),
+            Capsule((0.0, bottom, 0.0), (0.0, 0.0, side), shoulder),
+            *tubes,
+            Capsule((0.0, -length, 0.0), (0.0, _OVERLAP, 0.0), wrist),
+            Capsule((0.0, length, 0.0), (0.0, -_OVERLAP, 0.0), wrist),
+            Capsule((0.0, 0.0, back), (0.0, 0.0, front), flange),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +127,12 @@ class Link:
         mass: [kg].
         com: centre of mass in the link's DH frame [m].
         inertia: moments xx, yy, zz about the centre of mass, along the axes of the DH frame [kg m²].
-        hull: capsules that stand for its shape in collisions.
         products: of inertia xy, xz, yz, likewise; 0 where `inertia` has the principal moments [kg m²].
     """
 
     mass: float
     com: Vector3
     inertia: Vector3
-    hull: tuple[Capsule, ...]
     products: Vector3 = (0.0, 0.0, 0.0)
 
     @property
@@ -94,7 +152,7 @@ class RobotModel:
         generation: which one it is of: control cycle, software.
         dh: six nominal rows.
         links: six moving links.
-        base_hull: capsules of the fixed base in the base frame.
+        outline: of its housings.
         tau_max: largest joint torque [Nm].
         qd_max: rated joint speed, which moves are planned with [rad/s].
         q_min: lower end of the joint range of the safety system [rad].
@@ -125,9 +183,9 @@ class RobotModel:
     name: str
     title: str
     generation: RobotGeneration
-    dh: tuple[DhRow, DhRow, DhRow, DhRow, DhRow, DhRow]
+    dh: DhTable
     links: tuple[Link, Link, Link, Link, Link, Link]
-    base_hull: tuple[Capsule, ...]
+    outline: Outline
     tau_max: Vector6
     qd_max: Vector6
     q_min: Vector6

@@ -19,61 +19,55 @@ from math import pi
 
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.joint_ranges import RANGE_END
-from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+from ur_emulator.models.robot_model import Link, Outline, RobotModel, dh_table
 
 UR10 = RobotModel(
     name="ur10",
     title="UR10",
     generation=CB3,
     # A. The vendor's "a" and "d" in metres.
-    dh=(
-        DhRow(a=0.0, d=0.1273, alpha=pi / 2),
-        DhRow(a=-0.612, d=0.0, alpha=0.0),
-        DhRow(a=-0.5723, d=0.0, alpha=0.0),
-        DhRow(a=0.0, d=0.163941, alpha=pi / 2),
-        DhRow(a=0.0, d=0.1157, alpha=-pi / 2),
-        DhRow(a=0.0, d=0.0922, alpha=0.0),
-    ),
-    # A: mass and centre of mass. B: inertia. G: hull.
+    dh=dh_table(d1=0.1273, a2=-0.612, a3=-0.5723, d4=0.163941, d5=0.1157, d6=0.0922),
+    # A: mass and centre of mass. B: inertia.
     links=(
         Link(  # shoulder: the housing stands along y of its frame
             mass=7.1,
             com=(0.021, 0.0, 0.027),
             inertia=(0.03408, 0.03529, 0.02156),
-            hull=(Capsule((0.0, -0.01, 0.0), (0.0, 0.0, 0.09), 0.085),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=12.7,
             com=(0.38, 0.0, 0.158),
             inertia=(0.02814, 0.77068, 0.76943),
-            hull=(Capsule((0.0, 0.0, 0.2), (0.612, 0.0, 0.2), 0.075),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=4.27,
             com=(0.24, 0.0, 0.068),
             inertia=(0.01014, 0.30928, 0.30646),
-            hull=(Capsule((0.0, 0.0, 0.049), (0.5723, 0.0, 0.049), 0.06),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=2.0,
             com=(0.0, 0.007, 0.018),
             inertia=(0.00296, 0.00222, 0.00258),
-            hull=(Capsule((0.0, -0.05, 0.0), (0.0, 0.005, 0.0), 0.048),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=2.0,
             com=(0.0, 0.007, 0.018),
             inertia=(0.00296, 0.00222, 0.00258),
-            hull=(Capsule((0.0, 0.05, 0.0), (0.0, -0.005, 0.0), 0.048),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.365,
             com=(0.0, 0.0, -0.026),
             inertia=(0.0004, 0.00041, 0.00034),
-            hull=(Capsule((0.0, 0.0, -0.05), (0.0, 0.0, -0.046), 0.045),),
         ),
     ),
-    base_hull=(Capsule((0.0, 0.0, 0.01), (0.0, 0.0, 0.03), 0.095),),
+    outline=Outline(  # G
+        base=(0.01, 0.03, 0.095),
+        shoulder=(-0.01, 0.09, 0.085),
+        upper_arm=(0.2, 0.075),
+        forearm=(0.049, 0.06),
+        wrist=(0.05, 0.048),
+        flange=(-0.05, -0.046, 0.045),
+    ),
     tau_max=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),  # C
     qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # C: 120 and 180 deg/s
     q_min=(-RANGE_END,) * 6,  # safety blocks of real installations

@@ -5,80 +5,59 @@ Sources, cited by letter below:
  B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur16e: masses, centres and inertia tensors,
     turned back into the DH frames.
  C  Drives by joint size (4, 4, 3, 2, 2, 2), see `joint_sizes.py`.
- G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 """
 
 from __future__ import annotations
 
-from math import pi
+from dataclasses import replace
 
-from ur_emulator.models.e_series import E_SERIES
-from ur_emulator.models.joint_ranges import RANGE_END
-from ur_emulator.models.joint_sizes import SIZE_2, SIZE_3, SIZE_4, drives
-from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+from ur_emulator.models.robot_model import Link, dh_table
+from ur_emulator.models.ur10e import UR10E
 
-UR16E = RobotModel(
+UR16E = replace(
+    UR10E,
     name="ur16e",
     title="UR16e",
-    generation=E_SERIES,
     # A. The vendor's "a" and "d" in metres.
-    dh=(
-        DhRow(a=0.0, d=0.1807, alpha=pi / 2),
-        DhRow(a=-0.4784, d=0.0, alpha=0.0),
-        DhRow(a=-0.36, d=0.0, alpha=0.0),
-        DhRow(a=0.0, d=0.17415, alpha=pi / 2),
-        DhRow(a=0.0, d=0.11985, alpha=-pi / 2),
-        DhRow(a=0.0, d=0.11655, alpha=0.0),
-    ),
-    # B: mass, centre of mass and inertia. G: hull.
+    dh=dh_table(d1=0.1807, a2=-0.4784, a3=-0.36, d4=0.17415, d5=0.11985, d6=0.11655),
+    # B: mass, centre of mass and inertia.
     links=(
         Link(  # shoulder: the housing stands along y of its frame
             mass=7.369,
             com=(0.0, -0.016, 0.03),
             inertia=(0.03351, 0.03374, 0.021),
             products=(0.00002, -0.00001, 0.00374),
-            hull=(Capsule((0.0, -0.01, 0.0), (0.0, 0.0, 0.09), 0.085),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=10.45,
             com=(0.302, 0.0, 0.16),
             inertia=(0.02796, 0.47558, 0.47635),
             products=(-0.0001, -0.0072, 0.00003),
-            hull=(Capsule((0.0, 0.0, 0.1762), (0.4784, 0.0, 0.1762), 0.075),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=4.321,
             com=(0.194, 0.0, 0.065),
             inertia=(0.01091, 0.1206, 0.11714),
             products=(0.00006, 0.01012, 0.00001),
-            hull=(Capsule((0.0, 0.0, 0.0393), (0.36, 0.0, 0.0393), 0.06),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=2.18,
             com=(0.0, -0.009, 0.011),
             inertia=(0.00609, 0.00245, 0.00579),
             products=(-0.00001, 0.0, 0.00083),
-            hull=(Capsule((0.0, -0.05, 0.0), (0.0, 0.005, 0.0), 0.048),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=2.033,
             com=(0.0, 0.018, 0.012),
             inertia=(0.00389, 0.00219, 0.00363),
             products=(-0.00001, 0.0, -0.00045),
-            hull=(Capsule((0.0, 0.05, 0.0), (0.0, -0.005, 0.0), 0.048),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.907,
             com=(0.0, 0.0, -0.044),
             inertia=(0.00117, 0.00118, 0.00084),
-            hull=(Capsule((0.0, 0.0, -0.05), (0.0, 0.0, -0.046), 0.045),),
         ),
     ),
-    base_hull=(Capsule((0.0, 0.0, 0.01), (0.0, 0.0, 0.03), 0.095),),
-    qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # B: 120 and 180 deg/s
-    q_min=(-RANGE_END,) * 6,
-    q_max=(RANGE_END,) * 6,
-    **drives(SIZE_4, SIZE_4, SIZE_3, SIZE_2, SIZE_2, SIZE_2),  # C
     stop_deceleration=8.0,  # assumed: the UR10's, scaled by the reach
     # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
     servo_inertia=(7.98, 9.11, 2.96, 0.657, 0.618, 0.611),

@@ -14,66 +14,60 @@ from math import pi
 from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.models.joint_ranges import RANGE_END
 from ur_emulator.models.joint_sizes import BASE_OF_UR20, ELBOW_OF_UR20, WRIST_OF_UR20, drives
-from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+from ur_emulator.models.robot_model import Link, Outline, RobotModel, dh_table
 
 UR20 = RobotModel(
     name="ur20",
     title="UR20",
     generation=E_SERIES,
     # A. The vendor's "a" and "d" in metres.
-    dh=(
-        DhRow(a=0.0, d=0.2363, alpha=pi / 2),
-        DhRow(a=-0.862, d=0.0, alpha=0.0),
-        DhRow(a=-0.7287, d=0.0, alpha=0.0),
-        DhRow(a=0.0, d=0.201, alpha=pi / 2),
-        DhRow(a=0.0, d=0.1593, alpha=-pi / 2),
-        DhRow(a=0.0, d=0.1543, alpha=0.0),
-    ),
-    # A: mass and centre of mass. B: inertia. G: hull.
+    dh=dh_table(d1=0.2363, a2=-0.862, a3=-0.7287, d4=0.201, d5=0.1593, d6=0.1543),
+    # A: mass and centre of mass. B: inertia.
     links=(
         Link(  # shoulder: the housing stands along y of its frame
             mass=16.343,
             com=(0.0, -0.061, 0.0062),
             inertia=(0.08866, 0.07632, 0.08418),
             products=(-0.00011, -0.00011, 0.0072),
-            hull=(Capsule((0.0, -0.02, 0.0), (0.0, 0.0, 0.13), 0.11),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=29.632,
             com=(0.5226, 0.0, 0.2098),
             inertia=(0.1467, 4.6659, 4.6348),
             products=(0.00019, -0.05163, 0.00004),
-            hull=(Capsule((0.0, 0.0, 0.26), (0.862, 0.0, 0.26), 0.09),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=7.879,
             com=(0.3234, 0.0, 0.0604),
             inertia=(0.02612, 0.75763, 0.75327),
             products=(-0.00005, -0.02898, -0.00001),
-            hull=(Capsule((0.0, 0.0, 0.043), (0.7287, 0.0, 0.043), 0.07),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=3.054,
             com=(0.0, -0.0026, 0.0393),
             inertia=(0.00555, 0.00537, 0.00402),
             products=(-0.00001, -0.00002, 0.00036),
-            hull=(Capsule((0.0, -0.06, 0.0), (0.0, 0.005, 0.0), 0.055),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=3.126,
             com=(0.0, 0.0024, 0.0379),
             inertia=(0.00586, 0.00578, 0.00427),
             products=(-0.00001, -0.00002, -0.00037),
-            hull=(Capsule((0.0, 0.06, 0.0), (0.0, -0.005, 0.0), 0.055),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.846,
             com=(0.0, -0.0003, -0.0318),
             inertia=(0.00092, 0.00091, 0.00117),
-            hull=(Capsule((0.0, 0.0, -0.056), (0.0, 0.0, -0.052), 0.05),),
         ),
     ),
-    base_hull=(Capsule((0.0, 0.0, 0.02), (0.0, 0.0, 0.04), 0.12),),
+    outline=Outline(  # G
+        base=(0.02, 0.04, 0.12),
+        shoulder=(-0.02, 0.13, 0.11),
+        upper_arm=(0.26, 0.09),
+        forearm=(0.043, 0.07),
+        wrist=(0.06, 0.055),
+        flange=(-0.056, -0.052, 0.05),
+    ),
     qd_max=(2 * pi / 3, 2 * pi / 3, 5 * pi / 6, 7 * pi / 6, 7 * pi / 6, 7 * pi / 6),  # B: 120, 150, 210 deg/s
     q_min=(-RANGE_END,) * 6,
     q_max=(RANGE_END,) * 6,

@@ -19,61 +19,55 @@ from math import pi
 
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.joint_ranges import FIRST_TURN, LAST_TURN, RANGE_END
-from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+from ur_emulator.models.robot_model import Link, Outline, RobotModel, dh_table
 
 UR3 = RobotModel(
     name="ur3",
     title="UR3",
     generation=CB3,
     # A. The vendor's "a" and "d" in metres.
-    dh=(
-        DhRow(a=0.0, d=0.1519, alpha=pi / 2),
-        DhRow(a=-0.24365, d=0.0, alpha=0.0),
-        DhRow(a=-0.21325, d=0.0, alpha=0.0),
-        DhRow(a=0.0, d=0.11235, alpha=pi / 2),
-        DhRow(a=0.0, d=0.08535, alpha=-pi / 2),
-        DhRow(a=0.0, d=0.0819, alpha=0.0),
-    ),
-    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame. G: hull.
+    dh=dh_table(d1=0.1519, a2=-0.24365, a3=-0.21325, d4=0.11235, d5=0.08535, d6=0.0819),
+    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame.
     links=(
         Link(  # shoulder: the cylinder stands along y of its frame
             mass=2.0,
             com=(0.0, -0.02, 0.0),
             inertia=(0.008093, 0.005625, 0.008093),
-            hull=(Capsule((0.0, -0.01, 0.0), (0.0, 0.0, 0.04), 0.055),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=3.42,
             com=(0.13, 0.0, 0.1157),
             inertia=(0.009619, 0.021728, 0.021728),
-            hull=(Capsule((0.0, 0.0, 0.12), (0.24365, 0.0, 0.12), 0.048),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=1.26,
             com=(0.05, 0.0, 0.0238),
             inertia=(0.003544, 0.006547, 0.006547),
-            hull=(Capsule((0.0, 0.0, 0.0275), (0.21325, 0.0, 0.0275), 0.038),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=0.8,
             com=(0.0, 0.0, 0.01),
             inertia=(0.001611, 0.00225, 0.001611),
-            hull=(Capsule((0.0, -0.04, 0.0), (0.0, 0.005, 0.0), 0.034),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=0.8,
             com=(0.0, 0.0, 0.01),
             inertia=(0.001572, 0.00225, 0.001572),
-            hull=(Capsule((0.0, 0.04, 0.0), (0.0, -0.005, 0.0), 0.034),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.35,
             com=(0.0, 0.0, -0.02),
             inertia=(0.000136, 0.000136, 0.000179),
-            hull=(Capsule((0.0, 0.0, -0.036), (0.0, 0.0, -0.032), 0.032),),
         ),
     ),
-    base_hull=(Capsule((0.0, 0.0, 0.06), (0.0, 0.0, 0.075), 0.06),),
+    outline=Outline(  # G
+        base=(0.06, 0.075, 0.06),
+        shoulder=(-0.01, 0.04, 0.055),
+        upper_arm=(0.12, 0.048),
+        forearm=(0.0275, 0.038),
+        wrist=(0.04, 0.034),
+        flange=(-0.036, -0.032, 0.032),
+    ),
     tau_max=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),  # C
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # C: 180 and 360 deg/s
     q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # H: wrist 3 has no position limit

@@ -6,80 +6,59 @@ Sources, cited by letter below:
     DH frames. Its tensors are a copy of another arm's and not used.
  D  Assumed: the tensors of the UR20; those of the arm's tubes scaled by mass and length, of wrist 3 by mass.
  C  Drives: assumed, see `joint_sizes.py`.
- G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 """
 
 from __future__ import annotations
 
-from math import pi
+from dataclasses import replace
 
-from ur_emulator.models.e_series import E_SERIES
-from ur_emulator.models.joint_ranges import RANGE_END
-from ur_emulator.models.joint_sizes import BASE_OF_UR20, ELBOW_OF_UR20, WRIST_OF_UR20, drives
-from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+from ur_emulator.models.robot_model import Link, dh_table
+from ur_emulator.models.ur20 import UR20
 
-UR30 = RobotModel(
+UR30 = replace(
+    UR20,
     name="ur30",
     title="UR30",
-    generation=E_SERIES,
     # A. The vendor's "a" and "d" in metres.
-    dh=(
-        DhRow(a=0.0, d=0.2363, alpha=pi / 2),
-        DhRow(a=-0.637, d=0.0, alpha=0.0),
-        DhRow(a=-0.5037, d=0.0, alpha=0.0),
-        DhRow(a=0.0, d=0.201, alpha=pi / 2),
-        DhRow(a=0.0, d=0.1593, alpha=-pi / 2),
-        DhRow(a=0.0, d=0.1543, alpha=0.0),
-    ),
-    # B: mass, centre of mass. D: inertia. G: hull.
+    dh=dh_table(d1=0.2363, a2=-0.637, a3=-0.5037, d4=0.201, d5=0.1593, d6=0.1543),
+    # B: mass, centre of mass. D: inertia.
     links=(
         Link(  # shoulder: the housing stands along y of its frame
             mass=16.343,
             com=(-0.0001, -0.06, 0.0069),
             inertia=(0.08866, 0.07632, 0.08418),
             products=(-0.00011, -0.00011, 0.0072),
-            hull=(Capsule((0.0, -0.02, 0.0), (0.0, 0.0, 0.13), 0.11),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=28.542,
             com=(0.3894, 0.0, 0.2103),
             inertia=(0.1413, 2.4543, 2.4379),
             products=(0.00014, -0.03675, 0.00003),
-            hull=(Capsule((0.0, 0.0, 0.26), (0.637, 0.0, 0.26), 0.09),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=7.156,
             com=(0.2257, 0.0, 0.0629),
             inertia=(0.02372, 0.3288, 0.3269),
             products=(-0.00003, -0.01819, -0.00001),
-            hull=(Capsule((0.0, 0.0, 0.043), (0.5037, 0.0, 0.043), 0.07),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=3.054,
             com=(0.0, -0.0048, 0.0353),
             inertia=(0.00555, 0.00537, 0.00402),
             products=(-0.00001, -0.00002, 0.00036),
-            hull=(Capsule((0.0, -0.06, 0.0), (0.0, 0.005, 0.0), 0.055),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=3.126,
             com=(0.0, 0.0046, 0.0341),
             inertia=(0.00586, 0.00578, 0.00427),
             products=(-0.00001, -0.00002, -0.00037),
-            hull=(Capsule((0.0, 0.06, 0.0), (0.0, -0.005, 0.0), 0.055),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.926,
             com=(0.0, 0.0, -0.0293),
             inertia=(0.00101, 0.001, 0.00128),
-            hull=(Capsule((0.0, 0.0, -0.056), (0.0, 0.0, -0.052), 0.05),),
         ),
     ),
-    base_hull=(Capsule((0.0, 0.0, 0.02), (0.0, 0.0, 0.04), 0.12),),
-    qd_max=(2 * pi / 3, 2 * pi / 3, 5 * pi / 6, 7 * pi / 6, 7 * pi / 6, 7 * pi / 6),  # B: as the UR20
-    q_min=(-RANGE_END,) * 6,
-    q_max=(RANGE_END,) * 6,
-    **drives(BASE_OF_UR20, BASE_OF_UR20, ELBOW_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20),  # C
     stop_deceleration=6.0,  # assumed: as for the UR10, of the same reach
     # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
     servo_inertia=(21.9, 26.2, 11.4, 1.57, 1.46, 1.44),

@@ -20,61 +20,55 @@ from math import pi
 
 from ur_emulator.models.cb3 import CB3
 from ur_emulator.models.joint_ranges import RANGE_END
-from ur_emulator.models.robot_model import Capsule, DhRow, Link, RobotModel
+from ur_emulator.models.robot_model import Link, Outline, RobotModel, dh_table
 
 UR5 = RobotModel(
     name="ur5",
     title="UR5",
     generation=CB3,
     # A. The vendor's "a" and "d" in metres.
-    dh=(
-        DhRow(a=0.0, d=0.089159, alpha=pi / 2),
-        DhRow(a=-0.425, d=0.0, alpha=0.0),
-        DhRow(a=-0.39225, d=0.0, alpha=0.0),
-        DhRow(a=0.0, d=0.10915, alpha=pi / 2),
-        DhRow(a=0.0, d=0.09465, alpha=-pi / 2),
-        DhRow(a=0.0, d=0.0823, alpha=0.0),
-    ),
-    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame. G: hull.
+    dh=dh_table(d1=0.089159, a2=-0.425, a3=-0.39225, d4=0.10915, d5=0.09465, d6=0.0823),
+    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame.
     links=(
         Link(  # shoulder: the cylinder stands along y of its frame
             mass=3.7,
             com=(0.0, -0.02561, 0.00193),
             inertia=(0.014972, 0.010406, 0.014972),
-            hull=(Capsule((0.0, -0.01, 0.0), (0.0, 0.0, 0.05), 0.065),),
         ),
         Link(  # upper arm: from the elbow (origin) back to the shoulder along +x
             mass=8.393,
             com=(0.2125, 0.0, 0.11336),
             inertia=(0.015107, 0.133886, 0.133886),
-            hull=(Capsule((0.0, 0.0, 0.136), (0.425, 0.0, 0.136), 0.06),),
         ),
         Link(  # forearm: from wrist 1 (origin) back to the elbow along +x
             mass=2.33,
             com=(0.15, 0.0, 0.0265),
             inertia=(0.004095, 0.031217, 0.031217),
-            hull=(Capsule((0.0, 0.0, 0.0165), (0.39225, 0.0, 0.0165), 0.048),),
         ),
         Link(  # wrist 1: from the forearm along +y to the axis of wrist 2
             mass=1.219,
             com=(0.0, -0.0018, 0.01634),
             inertia=(0.002014, 0.002194, 0.002014),
-            hull=(Capsule((0.0, -0.04, 0.0), (0.0, 0.005, 0.0), 0.04),),
         ),
         Link(  # wrist 2: from wrist 1 along -y to the axis of wrist 3
             mass=1.219,
             com=(0.0, 0.0018, 0.01634),
             inertia=(0.001831, 0.002194, 0.001831),
-            hull=(Capsule((0.0, 0.04, 0.0), (0.0, -0.005, 0.0), 0.04),),
         ),
         Link(  # wrist 3 with the tool flange at the origin, facing +z
             mass=0.1879,
             com=(0.0, 0.0, -0.001159),
             inertia=(0.0000806, 0.0000806, 0.0001321),
-            hull=(Capsule((0.0, 0.0, -0.044), (0.0, 0.0, -0.04), 0.038),),
         ),
     ),
-    base_hull=(Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.01), 0.075),),
+    outline=Outline(  # G
+        base=(0.0, 0.01, 0.075),
+        shoulder=(-0.01, 0.05, 0.065),
+        upper_arm=(0.136, 0.06),
+        forearm=(0.0165, 0.048),
+        wrist=(0.04, 0.04),
+        flange=(-0.044, -0.04, 0.038),
+    ),
     tau_max=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),  # C
     qd_max=(pi,) * 6,  # C: 180 deg/s
     q_min=(-RANGE_END,) * 6,  # safety blocks of real installations

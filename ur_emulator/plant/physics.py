@@ -143,12 +143,10 @@ def _add_hulls(spec: mujoco.MjSpec, robot: RobotModel, dh: Sequence[DhRow]) -> N
         name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=[0.0, 0.0, TABLE_HEIGHT]
     )
     add_slots(spec)
-    for piece in robot.base_hull:
-        _add_capsule(world, piece.start, piece.end, piece.radius)
-    for name, link, row in zip(LINKS, robot.links, dh, strict=True):
-        body = spec.body(name)
-        for piece in link.hull:
-            _add_capsule(body, to_body(row, piece.start), to_body(row, piece.end), piece.radius)
+    base, *hulls = robot.outline.hulls(robot.dh)
+    _add_capsule(world, base.start, base.end, base.radius)
+    for name, hull, row in zip(LINKS, hulls, dh, strict=True):
+        _add_capsule(spec.body(name), to_body(row, hull.start), to_body(row, hull.end), hull.radius)
     # Neighbours touch in their common joint by construction; in the wrist the next but one is out of reach.
     neighbours = [*pairwise(("world", *LINKS)), (LINKS[2], LINKS[4]), (LINKS[3], LINKS[5])]
     for geom in spec.geoms:
