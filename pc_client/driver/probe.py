@@ -12,7 +12,7 @@ import numpy as np
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
-from pc_client.driver.robot_report import RobotReport, make_report, read_payload
+from pc_client.driver.robot_report import RobotReport, make_report
 from pc_client.driver.transport import Network
 from pc_client.errors import DriverError, UnknownHostError
 from protocol.realtime.layout import RealtimeFrame
@@ -98,7 +98,7 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
             info = read_robot_info(network, host, ports.dashboard, primary)
             rhythm, frame = _listen(network, host, ports.realtime, seconds)
             primary.poll()
-            report = make_report(info, frame, primary, read_payload(network, host, ports))
+            report = make_report(network, host, ports, info, frame, primary)
         finally:
             primary.close()
     except DriverError as error:

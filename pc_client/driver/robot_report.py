@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pc_client.driver.dashboard_query import ask_dashboard
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import UNKNOWN, RobotInfo, arm_name, read_robot_info
@@ -16,6 +17,10 @@ from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports, RobotType
 
 _CONNECT_TIMEOUT = 2.0
+
+_REMOTE, _MODE = "is in remote control", "get operational mode"
+_ANSWERS = {"true": True, "false": False}
+_OPERATIONAL_MODES = ("NONE", "MANUAL", "AUTOMATIC")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +35,8 @@ class RobotReport:
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
         payload: mass [kg], by RTDE, since software 3.11.
         calibration: name of the arm's calibration in the maker's drivers, from port 30001.
+        remote_control: clients may command the robot, from the dashboard server; e-Series, since 5.6.
+        operational_mode: `NONE`, `MANUAL` or `AUTOMATIC`, from the dashboard server; e-Series, since 5.6.
     """
 
     info: RobotInfo
@@ -39,6 +46,8 @@ class RobotReport:
     tcp_offset: tuple[float, ...] | None
     payload: float | None
     calibration: str | None
+    remote_control: bool | None
+    operational_mode: str | None
 
 
 def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
@@ -55,21 +64,28 @@ def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
             frame = frames.receive().latest
         finally:
             frames.close()
-        return make_report(info, frame, primary, read_payload(network, host, ports))
+        return make_report(network, host, ports, info, frame, primary)
     finally:
         primary.close()
 
 
 def make_report(
-    info: RobotInfo, frame: RealtimeFrame, primary: PackageStream, payload: float | None
+    network: Network,
+    host: str,
+    ports: Ports,
+    info: RobotInfo,
+    frame: RealtimeFrame,
+    primary: PackageStream,
 ) -> RobotReport:
-    """Put together what open connections have reported.
+    """Put together what open connections have reported, and ask RTDE and dashboard server for the rest.
 
     Args:
+        network: makes the connections.
+        host: the robot.
+        ports: its ports.
         info: which robot it is.
         frame: its state.
         primary: its primary port; what has come is to be polled by the caller.
-        payload: from `read_payload`.
 
     Raises:
         DriverError: a state on the primary port makes no sense.
@@ -77,14 +93,19 @@ def make_report(
     configuration = primary.newest(ConfigurationData)
     cartesian = primary.newest(CartesianInfo)
     kinematics = primary.newest(KinematicsInfo)
+    asked = (_REMOTE, _MODE) if info.version.major == 5 else ()
+    answers = ask_dashboard(network, host, ports.dashboard, asked) if asked else {}
+    mode = answers.get(_MODE, "").upper()
     return RobotReport(
         info=info,
         configured=None if configuration is None else _configured(configuration, info),
         frame=frame,
         slider=reported_slider(primary),
         tcp_offset=None if cartesian is None else cartesian.tcp_offset,
-        payload=payload,
+        payload=_read_payload(network, host, ports),
         calibration=None if kinematics is None else kinematics.calibration,
+        remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
+        operational_mode=mode if mode in _OPERATIONAL_MODES else None,
     )
 
 
@@ -109,7 +130,7 @@ def reported_slider(primary: PackageStream) -> float | None:
     return None if mode is None else mode.target_speed_fraction
 
 
-def read_payload(network: Network, host: str, ports: Ports) -> float | None:
+def _read_payload(network: Network, host: str, ports: Ports) -> float | None:
     """Ask for the mass of the payload [kg]; None when the robot does not report it.
 
     Only RTDE reports it on a CB3: frames of port 30003 have it from 5.10 on.

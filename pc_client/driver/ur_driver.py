@@ -20,7 +20,7 @@ from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.receiver_script import receiver_script
 from pc_client.driver.reverse_server import DIAL_TIMEOUT, ReverseServer
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
-from pc_client.driver.robot_report import RobotReport, check_arm, make_report, read_payload, reported_slider
+from pc_client.driver.robot_report import RobotReport, check_arm, make_report, reported_slider
 from pc_client.driver.stop_script import STOP_WORD, stop_script
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import (
@@ -38,12 +38,13 @@ from pc_client.driver.watchdog import (
     check_idle,
     check_safety,
     check_slider,
+    control,
     has_ended,
     is_stopped,
     software,
 )
-from pc_client.errors import DriverError
-from protocol.primary.messages import TextMessage
+from pc_client.errors import DriverError, RobotStoppedError
+from protocol.primary.messages import ErrorCodeMessage, TextMessage
 from protocol.realtime.layout import RealtimeFrame, RealtimeLayout
 from protocol.ur_types import Ports
 from protocol.velocity_stream import VelocityMode, encode_velocity
@@ -51,6 +52,8 @@ from protocol.velocity_stream import VelocityMode, encode_velocity
 CONNECT_TIMEOUT = 5.0
 _START_TIMEOUT = 5.0
 """A program that does not show as running within this [s] was not accepted."""
+_READ_ONLY = 210
+"""Error code for a program that came in local control. Source: test of the maker's client library."""
 
 
 class UrDriver:
@@ -94,6 +97,7 @@ class UrDriver:
         self._in_motion = False
         self.time_waits = True
         self._program = self._last_text = ""
+        self._is_read_only = False
         try:
             self._connect()
         except BaseException:
@@ -145,8 +149,9 @@ class UrDriver:
             DriverError: no frames come, or a connection broke.
         """
         self._primary.poll()
-        payload = read_payload(self._network, self._host, self._ports)
-        return make_report(self.info, self.read_frame(), self._primary, payload)
+        return make_report(
+            self._network, self._host, self._ports, self.info, self.read_frame(), self._primary
+        )
 
     def check_ready(self) -> RealtimeFrame:
         """Refuse a robot that may not move now; returns its state.
@@ -284,13 +289,16 @@ class UrDriver:
         self._frames.drain()
         self._primary.poll()
         self._scripts.poll()
-        self._program, self._last_text = text, ""
+        self._program, self._last_text, self._is_read_only = text, "", False
         self._scripts.send_program(text)
         self._wait(
-            lambda frame: not is_stopped(frame),
-            _START_TIMEOUT,
-            "the robot did not start the program in time: is it in local control?",
+            self._has_started, _START_TIMEOUT, "the robot did not start the program in time: see its log"
         )
+
+    def _has_started(self, frame: RealtimeFrame) -> bool:
+        if self._is_read_only:
+            raise RobotStoppedError(control(remote=False).complaint)
+        return not is_stopped(frame)
 
     def _raise_robot_errors(self) -> None:
         """Read both script ports; raise what the robot reports about our program, or a moved speed slider."""
@@ -299,6 +307,7 @@ class UrDriver:
         for message in messages:
             if isinstance(message, TextMessage):
                 self._last_text = message.text
+            self._is_read_only |= isinstance(message, ErrorCodeMessage) and message.code == _READ_ONLY
         raise_on_error(messages, self._program)
         check_slider(reported_slider(self._primary))
 

@@ -49,6 +49,23 @@ def software(version: SoftwareVersion) -> Condition:
     )
 
 
+def control(remote: bool | None, *, obeys_in_local: bool = False) -> Condition:
+    """Programs from the network have an effect.
+
+    Args:
+        remote: the robot is in remote control; None when it does not report it.
+        obeys_in_local: they have one in local control, too.
+    """
+    return Condition(
+        "control",
+        "" if remote is None else "remote" if remote else "local",
+        "remote or local (simulator)" if obeys_in_local else "remote",
+        "in local control it ignores programs from the network: enable remote control in its settings, "
+        "and switch to it on the pendant",
+        None if remote is None else remote or obeys_in_local,
+    )
+
+
 def safety_mode(frame: RealtimeFrame) -> Condition:
     """The safety system lets the arm move."""
     value = frame.safety_mode

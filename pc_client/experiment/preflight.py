@@ -15,6 +15,7 @@ from pc_client.driver.condition import Condition
 from pc_client.driver.robot_info import UNKNOWN
 from pc_client.driver.robot_report import RobotReport
 from pc_client.driver.watchdog import (
+    control,
     program_state,
     robot_mode,
     safety_mode,
@@ -51,7 +52,8 @@ def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition,
     generation = software(report.info.version)
     if not generation.holds:
         return (generation,)
-    return generation, *(condition(report, model) for condition in CONDITIONS)
+    conditions = E_SERIES_CONDITIONS + CONDITIONS if report.info.version.major == 5 else CONDITIONS
+    return generation, *(condition(report, model) for condition in conditions)
 
 
 def refusal(conditions: Sequence[Condition]) -> str:
@@ -149,6 +151,28 @@ def _joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
         bool(beyond[joint] <= 0.0),
     )
 
+
+def _control(report: RobotReport, model: RobotModel | None) -> Condition:
+    """Clients may command the robot; the maker's simulator obeys them in local control, too."""
+    is_makers = bool(report.info.simulated) and report.info.seed is None
+    return control(report.remote_control, obeys_in_local=is_makers)
+
+
+def operational_mode(report: RobotReport, model: RobotModel | None) -> Condition:
+    """The robot is not in manual mode, which is slow and stops without the enabling device."""
+    mode = report.operational_mode
+    return Condition(
+        "operational mode",
+        mode or "",
+        "AUTOMATIC or NONE",
+        "in manual mode programs are slow and need the enabling device: switch to automatic mode on the "
+        "pendant, or with the selector",
+        None if mode is None else mode != "MANUAL",
+    )
+
+
+E_SERIES_CONDITIONS: tuple[Check, ...] = (_control, operational_mode)
+"""What only a robot of the e-Series reports; shown before the others."""
 
 CONDITIONS: tuple[Check, ...] = (
     _arm_type,

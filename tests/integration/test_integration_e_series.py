@@ -1,5 +1,7 @@
 """The client on arms of the e-Series: it finds out which arm answers, runs at 500 Hz, and learns from run to run."""
 
+import re
+
 import numpy as np
 import pytest
 from integration_support import at, free_port_base
@@ -30,8 +32,34 @@ def test_doctor_names_the_arm_and_finds_it_ready(ur_client, robot, version, name
         doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
     assert doctor.code == 0, doctor.out
     assert f"robot       {name}, software {version}, " in doctor.out
-    assert f"arm            {name} " in doctor.out
+    assert re.search(rf"^arm +{name} ", doctor.out, re.MULTILINE)
     assert "streaming   ready" in doctor.out
+
+
+@pytest.mark.parametrize(
+    ("local", "mode", "line"),
+    [
+        (True, "automatic", "the robot's control is local, must be remote; in local control it ignores"),
+        (
+            False,
+            "manual",
+            "the robot's operational mode is MANUAL, must be AUTOMATIC or NONE; in manual mode",
+        ),
+    ],
+    ids=["local control", "manual mode"],
+)
+def test_local_control_and_manual_mode_are_refused_before_anything_moves(
+    ur_client, tmp_path, local, mode, line
+):
+    with e_series_box("ur3e") as box:
+        box.set_operational_mode(mode)
+        box.remote_control(not local)
+        doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
+        run = ur_client("run", "uniform_4_1", *at(box), "--out", tmp_path / "out")
+    assert (doctor.code, run.code) == (1, 1)
+    assert line in run.complaint()
+    assert f"streaming   NOT NOW: {line}" in doctor.out
+    assert doctor.out.count("NOT OK") == 1
 
 
 @pytest.fixture(scope="module", params=["ur3e", "ur5e"])

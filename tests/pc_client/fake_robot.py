@@ -19,6 +19,7 @@ from protocol.pose import T_to_pose, pose_trans
 from protocol.primary.layout import CartesianInfo, RobotModeData
 from protocol.primary.messages import (
     ErrorCodeMessage,
+    ReportLevel,
     RuntimeExceptionMessage,
     encode_message,
     version_message,
@@ -109,6 +110,7 @@ class FakeRobot:
         self.qd = [0.0] * 6
         self.robot_mode, self.safety_mode = 7, 1
         self.serial = "20993000007"  # None: software that does not know the question
+        self.remote = self.operational = None  # None: software that does not know the question
         self.version = VERSION
         self.greeting = None  # instead of the version message: bytes
         self.slider, self.scaling = 1.0, 1.0
@@ -179,7 +181,12 @@ class FakeRobot:
             if pipe.rtde.encoder is not None:
                 pipe.incoming.append(pipe.rtde.encoder(self))
         elif pipe.kind == "dashboard":
-            answers = {"get serial number": self.serial, "get robot model": self.model}
+            answers = {
+                "get serial number": self.serial,
+                "get robot model": self.model,
+                "is in remote control": self.remote,
+                "get operational mode": self.operational,
+            }
             answer = answers.get(data.decode().strip())
             if answer:
                 pipe.incoming.append(answer.encode() + b"\n")
@@ -203,6 +210,8 @@ class FakeRobot:
         assert text.endswith("end\n"), text
         self.programs.append(text)
         if self.refuses:
+            if self.remote == "false":
+                self.report(ErrorCodeMessage(code=210, report_level=ReportLevel.WARNING))
             return
         if self.error_in and self.error_in in text:
             self.report(RuntimeExceptionMessage(line=2, column=3, text="compile_error_name_not_found:foo:"))

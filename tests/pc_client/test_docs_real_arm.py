@@ -15,6 +15,7 @@ from pc_client.control.controller import APPROACH, CONTROLLERS
 from pc_client.driver.receiver_script import MISSED_ALLOWED
 from pc_client.driver.reverse_server import REVERSE_PORT
 from pc_client.driver.watchdog import (
+    control,
     program_state,
     robot_mode,
     safety_mode,
@@ -24,7 +25,7 @@ from pc_client.driver.watchdog import (
 )
 from pc_client.errors import CellError
 from pc_client.experiment.experiment_text import experiment_text
-from pc_client.experiment.preflight import payload, tcp_offset
+from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.kinematics.cell_file import load_cell, parse_cell
 from pc_client.kinematics.robot_model import robot_model
@@ -74,12 +75,16 @@ def conditions():
         speed_scaling=0.6,
     )
     protective = SimpleNamespace(safety_mode=float(SafetyMode.PROTECTIVE_STOP))
-    report = SimpleNamespace(tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0)
+    report = SimpleNamespace(
+        tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0, operational_mode="MANUAL"
+    )
     model = robot_model("ur3", CELL)
     return [
         software(SoftwareVersion(10, 11, 0)),
         safety_mode(frame),
         safety_mode(protective),
+        control(remote=False),
+        operational_mode(report, model),
         robot_mode(frame),
         program_state(frame),
         speed_slider(0.5),

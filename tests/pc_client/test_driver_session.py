@@ -130,9 +130,16 @@ def test_a_reduced_robot_may_move():
 def test_program_that_does_not_start_is_reported_and_replaced():
     robot = FakeRobot()
     robot.refuses = True
-    with pytest.raises(DriverError, match="local control"):
+    with pytest.raises(DriverError, match="the robot did not start the program in time: see its log"):
         stream_nothing(robot)
     assert "stopj" in robot.programs[-1]
+
+
+def test_a_program_that_came_in_local_control_is_reported_at_once():
+    robot = FakeRobot()
+    robot.refuses, robot.remote = True, "false"
+    with pytest.raises(RobotStoppedError, match="the robot's control is local, must be remote; in local"):
+        stream_nothing(robot)
 
 
 def test_script_error_is_reported_with_its_line():

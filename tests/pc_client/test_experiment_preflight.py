@@ -142,6 +142,54 @@ def test_no_session_is_opened_with_another_generation(major, words):
     assert set(fake.closed) == set(fake.pipes)
 
 
+E_SERIES = SoftwareVersion(5, 12)
+
+
+def e_series_rows(**reported):
+    fake = robot(version=E_SERIES, **reported)
+    return {c.name: c for c in preflight(report(fake), UR3) if c.name in ("control", "operational mode")}
+
+
+@pytest.mark.parametrize(
+    ("reported", "name", "line"),
+    [
+        (
+            {"remote": "false", "operational": "AUTOMATIC"},
+            "control",
+            "the robot's control is local, must be remote; in local control it ignores programs from the network: "
+            "enable remote control in its settings, and switch to it on the pendant",
+        ),
+        (
+            {"remote": "true", "operational": "MANUAL"},
+            "operational mode",
+            "the robot's operational mode is MANUAL, must be AUTOMATIC or NONE; in manual mode programs are slow "
+            "and need the enabling device: switch to automatic mode on the pendant, or with the selector",
+        ),
+    ],
+)
+def test_local_control_and_manual_mode_of_an_e_series_robot_are_refused(reported, name, line):
+    rows = e_series_rows(**reported)
+    assert rows[name].complaint == line
+    assert [row.name for row in rows.values() if not row.holds] == [name]
+
+
+def test_an_e_series_robot_in_remote_control_without_modes_passes():
+    assert all(row.holds for row in e_series_rows(remote="true", operational="NONE").values())
+
+
+def test_the_makers_simulator_may_stay_in_local_control():
+    fake = robot(version=E_SERIES, remote="false", operational="NONE", serial="20175599999")
+    fake.state = encode_state([ConfigurationData(masterboard_version=2099)], E_SERIES)
+    (row,) = (c for c in preflight(report(fake), UR3) if c.name == "control")
+    assert (row.reported, row.needed, row.holds) == ("local", "remote or local (simulator)", True)
+
+
+def test_software_before_5_6_does_not_report_control_and_mode():
+    question = "could not understand: 'is in remote control'"
+    rows = e_series_rows(remote=question, operational=question)
+    assert [row.verdict for row in rows.values()] == ["not reported"] * 2
+
+
 def test_an_arm_that_dashboard_and_configuration_data_name_differently_is_refused():
     fake = robot()
     fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR5)], fake.version)
