@@ -125,6 +125,6 @@ def state(number: int, word: Word) -> bytes:
 
 
 def _line(text: str) -> bytes:
-    if "\n" in text or "\r" in text:
+    if "\n" in text:
         raise LocalProtocolError(f"an answer of the interpreter cannot hold a line break: {text!r}")
     return text.encode("latin-1", "replace") + b"\n"

@@ -20,16 +20,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "ur_emulator"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pc_client"))
 
 from dashboard_support import write_programs
-from fuzz_box import run
+from fuzz_box import CB3, E_SERIES, POLYSCOPE_X, run
 from fuzz_cases import run_cases
 from fuzz_targets import TARGETS
 
-# Kinds of boxes, one after the other: most cases between few cycles, some with time for programs and stops.
-BOXES = (
-    (4000, {"lively": False}),
-    (20_000, {"lively": False, "cycle_share": 0.015}),
-    (4000, {"lively": True}),
-    (20_000, {"lively": True, "cycle_share": 0.015}),
+# Boxes, one after the other: most cases between few cycles, some with time for programs and stops.
+BOXES = tuple(
+    (n_cases, {"lively": lively, "cycle_share": cycle_share, "kind": kind})
+    for lively in (False, True)
+    for n_cases, cycle_share in ((4000, 0.1), (20_000, 0.015))
+    for kind in (CB3, E_SERIES, POLYSCOPE_X)
 )
 # Cases of a reader until the next target has its turn.
 _BATCH = 2000
@@ -38,10 +38,10 @@ FOUND = Path("out") / "fuzz"
 
 def box_round(seed):
     """Fuzz a box; return its cases by port, and the number of failures."""
-    n_cases, kind = BOXES[seed % len(BOXES)]
+    n_cases, options = BOXES[seed % len(BOXES)]
     with tempfile.TemporaryDirectory() as folder:
         try:
-            return run(random.Random(seed), write_programs(Path(folder)), n_cases, **kind), 0
+            return run(random.Random(seed), write_programs(Path(folder)), n_cases, **options), 0
         except Exception:
             print(f"box {seed} failed:\n{traceback.format_exc()}", flush=True)
             return Counter(box=1), 1

@@ -23,10 +23,12 @@ from fuzz_replies import READERS
 from fuzz_wire import Wire
 from states_support import check_wires
 
+from protocol.robot_api import BASE
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.messages import RequestProtocolVersion, SetupOutputs, Start
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
+from ur_emulator.commands.operational import MoveEnablingDevice, SetOperationalMode, SwitchRemoteControl
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.commands.push import AttachPayload, Push
@@ -43,19 +45,21 @@ from ur_emulator.commands.safety import (
 from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS
 from urscript import compile_program
 
+# Kinds of boxes, as options.
+CB3 = {"robot": "ur3", "version": "3.15.8"}
+E_SERIES = {"robot": "ur5e", "version": "5.25.1"}
+POLYSCOPE_X = {"robot": "ur5e", "version": "10.14.0", "services": ("primary", "rtde")}
 # Hostile clients of one port at a time.
 MAX_HOSTILE = 5
-_PERIOD = 0.008  # s
 # How far an arm at rest may give way when brakes close and open or a stop brakes it [rad].
 _GIVES_WAY = 0.02
-# Cycles in which an honest question has to be answered.
-_PATIENCE = 200
+_PATIENCE = 1.6  # s; an honest question has to be answered in this time
 # Looks at a box that does not work until it is repaired.
 _OUT_OF_WORK = 15
 SIGN_OF_LIFE = compile_program("def alive():\n  sync()\nend\n")
-# Cycles in which all that a client may have waiting is answered: dashboard lines that take one each, and
-# `wait_until` with its longest time.
-_LONGEST_QUEUE = 10_000
+# In this time all that a client may have waiting is answered: dashboard lines that take a cycle each, and
+# `wait_until` with its longest time [s].
+_LONGEST_QUEUE = 80.0
 _CHECK_EVERY = 40  # cycles between the slower checks
 _READ_EVERY = 16  # cycles until honest clients read; the buffers of the kernel must not fill
 _NEVER = 60.0  # s; no service is due
@@ -64,8 +68,13 @@ _MOST_GROWTH = 120 << 20
 _MOST_OF_WORKER = 300 << 20
 # How the box reports an error of its own (ur_emulator/realtime/barrier.py).
 _DEFECT = re.compile(r" line \d+ of \w+\.py$")
-ASK_MODBUS = bytes.fromhex("000700000006010301020001")  # register 258, robot mode
-ASK_HTTP = b"GET /v1/state HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+QUESTIONS = {
+    "dashboard": b"robotmode\n",
+    "modbus": bytes.fromhex("000700000006010301020001"),  # register 258, robot mode
+    "interpreter": b"statelastcleared\n",
+    "control": b"GET /v1/state HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+    "robot_api": f"GET {BASE}/robotstate/v1/robotmode HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode(),
+}
 
 
 class _Pacer:
@@ -74,19 +83,22 @@ class _Pacer:
     ticks = True
     publish_at = 0.0
 
+    def __init__(self, period):
+        self._period = period
+
     def may_tick(self, now, situation):
         return self.ticks
 
     def next_call(self, now):
-        return now + _PERIOD
+        return now + self._period
 
 
 class RtdeWitness:
     """An honest RTDE client: every value comes, every cycle."""
 
-    def __init__(self, wire, turn):
+    def __init__(self, wire, turn, rate):
         self.protocol, self.n_packages = RtdeClientConnection(), 0
-        for request in (RequestProtocolVersion(2), SetupOutputs(("timestamp", "robot_mode"), 125.0), Start()):
+        for request in (RequestProtocolVersion(2), SetupOutputs(("timestamp", "robot_mode"), rate), Start()):
             wire.send(self.protocol.send(request))
             turn()
             self.feed(wire.take())
@@ -105,7 +117,7 @@ class FuzzBox:
         trail: the last steps, for the report of a failure.
     """
 
-    def __init__(self, rng, folder, *, lively, cycle_share=0.1):
+    def __init__(self, rng, folder, *, lively, cycle_share=0.1, kind=CB3):
         """Make a box.
 
         Args:
@@ -113,30 +125,40 @@ class FuzzBox:
             folder: of program files.
             lively: programs may move the arm; False: nothing that is sent may.
             cycle_share: how many of the steps are cycles; these cost the time.
+            kind: options of the box.
         """
         self.rng, self.lively, self.cycle_share = rng, lively, cycle_share
         self.cases, self.trail = Counter(), deque(maxlen=300)
         self.now = 0.0
         self.box = box = ControlBox(
-            pace="lockstep", port_base=None, seed=rng.randrange(100), programs=folder, control_port=0
+            **kind,
+            pace="lockstep",
+            port_base=None,
+            seed=rng.randrange(100),
+            programs=folder,
+            control_port=0,
         )
         box.on_end = lambda: None
-        self.served, self.pacer, self.loop = box._box, _Pacer(), box._loop
-        self.served._pacer = self.pacer
+        self.served, self.loop = box._box, box._loop
         self.controller = self.served.controller
+        self.generation = self.controller.state.robot.generation
+        self.period = self.generation.period_s
+        self.served._pacer = self.pacer = _Pacer(self.period)
         box._operations._context.clock = lambda: self.now
         self.defects = []
         box.follow_log(self._look_at_log)
         box.listen()
         self.loop.remove(self.served)  # its time is ours
         self.loop._thread = threading.get_ident()
-        self.hostile = {name: {} for name in MESSAGES}
+        self.version = SoftwareVersion.parse(kind["version"])
+        self.ports = tuple(name for name in MESSAGES if name == "control" or getattr(box.ports, name))
+        self.hostile = {name: {} for name in self.ports}
         self.n_published = self.n_out_of_work = self.n_repairs = 0
-        self.witnesses = {name: self._connect(name) for name in MESSAGES}
-        self.readers = {name: READERS[name]() for name in MESSAGES}
+        self.witnesses = {name: self._connect(name) for name in self.ports}
+        self.readers = {name: READERS[name](self.version) for name in self.ports}
         for name in ("primary", "primary_ro", "secondary", "secondary_ro"):
             self.readers[name].feed(self.witnesses[name].take())
-        self.readers["rtde"] = RtdeWitness(self.witnesses["rtde"], self.turn)
+        self.readers["rtde"] = RtdeWitness(self.witnesses["rtde"], self.turn, 1.0 / self.period)
         self.asked_at = {}
         self.rest = self.controller.snapshot.target_q
         self.server = socket.create_server(("127.0.0.1", 0), backlog=64)
@@ -155,7 +177,7 @@ class FuzzBox:
     def join(self, name):
         """Add a hostile client of a port; return it and the reader of what it gets."""
         wire = self._connect(name)
-        reader = self.hostile[name][wire] = READERS[name]()
+        reader = self.hostile[name][wire] = READERS[name](self.version)
         return wire, reader
 
     def close(self):
@@ -199,7 +221,7 @@ class FuzzBox:
         elif kind < 1.1 * self.cycle_share:
             self.heartbeat()
         elif kind < 0.95:
-            self.attack(self.rng.choice(tuple(MESSAGES)))
+            self.attack(self.rng.choice(self.ports))
         else:
             self.attack_as_peer()
 
@@ -215,7 +237,7 @@ class FuzzBox:
         if kind < 0.91:
             data = MESSAGES[name](rng, self.lively)
             if rng.random() < 0.55:
-                others = rng.choice(tuple(MESSAGES))
+                others = rng.choice(self.ports)
                 data = mutate_bytes(rng, data, lambda: MESSAGES[others](rng, self.lively))
             self.send(name, wire, data)
         elif kind < 0.93:
@@ -244,7 +266,7 @@ class FuzzBox:
             if not self.controller.programs.is_running:
                 program = self.rng.choice(DIALLING_PROGRAMS)
                 self._order(
-                    2, StartProgram(_compiled(program.replace("PEER", str(self.server.getsockname()[1]))))
+                    0.016, StartProgram(_compiled(program.replace("PEER", str(self.server.getsockname()[1]))))
                 )
             return
         wire, kind = self.rng.choice(self.peers), self.rng.random()
@@ -302,12 +324,8 @@ class FuzzBox:
         """Do what an operator does until the arm works again, and let a program run."""
         self.n_out_of_work = 0
         self.n_repairs += 1
-        for name in (
-            "dashboard",
-            "control",
-            "modbus",
-        ):  # a thousand lines that wait to be obeyed are not over yet
-            for wire in self.hostile[name]:
+        for name in QUESTIONS.keys() & self.hostile.keys():
+            for wire in self.hostile[name]:  # a thousand lines that wait to be obeyed are not over yet
                 wire.reset()
         self.turn()
         commands = [
@@ -320,29 +338,37 @@ class FuzzBox:
             Push((0.0, 0.0, 0.0)),
             AttachPayload(0.0, (0.0, 0.0, 0.0)),
         ]
-        self._order(20, *commands)
+        if self.generation.has_operational_modes:
+            commands += [
+                SafeguardStop(False, "automatic mode"),
+                RequireSafeguardReset(False, "automatic mode"),
+                SetOperationalMode("none"),
+                MoveEnablingDevice("none"),
+                SwitchRemoteControl(True),
+            ]
+        self._order(0.16, *commands)
         if self.controller.snapshot.safety_mode == SafetyMode.PROTECTIVE_STOP:
-            self._order(640)
-            self._order(20, UnlockProtectiveStop())
+            self._order(5.12)
+            self._order(0.16, UnlockProtectiveStop())
         if self.controller.snapshot.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
-            self._order(200, RestartSafety())
-        self._order(20, ConfirmSafety())
-        self._order(300, PowerOn())
-        self._order(100, ReleaseBrakes())
+            self._order(1.6, RestartSafety())
+        self._order(0.16, ConfirmSafety())
+        self._order(2.4, PowerOn())
+        self._order(0.8, ReleaseBrakes())
         if not self.lively:  # a moved arm may stand where it cannot work
             now = self.controller.snapshot
             assert now.robot_mode == RobotMode.RUNNING, (
                 f"it cannot be repaired: {RobotMode(now.robot_mode).name}, {SafetyMode(now.safety_mode).name}, "
                 f"{[entry.text for entry in self.served.log.entries[-8:]]}"
             )
-            self._order(1, StartProgram(SIGN_OF_LIFE))
+            self._order(self.period, StartProgram(SIGN_OF_LIFE))
             assert self.controller.programs.latest.program is SIGN_OF_LIFE, "no program starts any more"
 
-    def _order(self, n_cycles, *commands):
+    def _order(self, seconds, *commands):
         for command in commands:
             self.trail.append(("order", command))
             self.served.submit(command)
-        for _ in range(n_cycles):
+        for _ in range(round(seconds / self.period)):
             self._advance(ticks=True)
         self._look()
 
@@ -353,7 +379,7 @@ class FuzzBox:
     def _advance(self, ticks):
         self.trail.append(("cycle" if ticks else "heartbeat",))
         self.pacer.ticks = ticks
-        self.now += _PERIOD + 1e-6
+        self.now += self.period + 1e-6
         self.served.advance(self.now)
         self.n_published += 1
         self.turn()
@@ -385,7 +411,10 @@ class FuzzBox:
         for name in ("primary", "primary_ro", "secondary", "secondary_ro"):
             reader = self.readers[name]
             reader.finish()
-            assert reader.n_states == self.n_published * 10 // 125 + 1, (name, reader.n_states)
+            assert reader.n_states == self.n_published * 10 // round(1 / self.period) + 1, (
+                name,
+                reader.n_states,
+            )
         for wires in self.hostile.values():
             for wire, reader in tuple(wires.items()):
                 reader.feed(wire.take())
@@ -405,39 +434,35 @@ class FuzzBox:
             assert not any(self.controller.state.motion.target.qd), "an arm without power is told to move"
 
     def _ask(self):
-        questions = {"dashboard": b"robotmode\n", "modbus": ASK_MODBUS, "control": ASK_HTTP}
-        for name, question in questions.items():
-            if name not in self.asked_at:
+        for name, question in QUESTIONS.items():
+            if name in self.witnesses and name not in self.asked_at:
                 self.asked_at[name] = self.n_published
                 self.witnesses[name].send(question)
 
     def _check_answers(self):
-        answered = {
-            "dashboard": self.readers["dashboard"].lines,
-            "modbus": self.readers["modbus"].answers,
-            "control": self.readers["control"].answers,
-        }
-        for name, answers in answered.items():
-            if name not in self.asked_at:
-                continue
+        for name, asked_at in tuple(self.asked_at.items()):
+            answers = self.readers[name].answers
             if not answers:
-                waited = self.n_published - self.asked_at[name]
-                assert waited < _PATIENCE, f"{name} has not answered for {waited} cycles"
+                waited = (self.n_published - asked_at) * self.period
+                assert waited < _PATIENCE, f"{name} has not answered for {waited:.2f} s"
                 continue
             answer = answers.pop()
-            if name == "dashboard":
-                RobotMode[answer.removeprefix("Robotmode: ")]
-            elif name == "modbus":
-                assert answer.pdu[:2] == b"\3\2", answer
-                RobotMode(int.from_bytes(answer.pdu[2:], "big", signed=True))
-            else:
-                assert answer[0] == 200, answer
+            match name:
+                case "dashboard":
+                    RobotMode[answer.removeprefix("Robotmode: ")]
+                case "modbus":
+                    assert answer.pdu[:2] == b"\3\2", answer
+                    RobotMode(int.from_bytes(answer.pdu[2:], "big", signed=True))
+                case "interpreter":
+                    assert answer.startswith("state: "), answer
+                case _:
+                    assert answer[0] == 200, answer
             del self.asked_at[name]
 
     def _check_modes(self):
         """All ports say the same, and it makes sense."""
         snapshot = self.controller.snapshot
-        check_wires(SimpleNamespace(controller=self.controller, now=snapshot))
+        check_wires(SimpleNamespace(controller=self.controller, now=snapshot), self.version)
         RobotMode(snapshot.robot_mode), SafetyMode(snapshot.safety_mode), ProgramState(snapshot.runtime_state)
         assert 0.0 <= snapshot.speed_scaling <= 1.0
 
@@ -455,15 +480,14 @@ class FuzzBox:
             for wire in wires:
                 wire.reset()
         self.turn()
-        for _ in range(300):
-            self._advance(ticks=True)
-        self._look()
+        # Lines of port 30020 wait for interpreter mode as long as a program runs.
+        self._order(2.4, *(StopProgram(),) * ("interpreter" in self.ports))
         self._ask()
         for _ in range(20):
             self._advance(ticks=True)
             self._look()
         # One that ended before it was reset is heard of again when all that it asked for is answered.
-        for _ in range(_LONGEST_QUEUE):
+        for _ in range(round(_LONGEST_QUEUE / self.period)):
             self._end_peers()
             if self._in_use() <= self.in_use:
                 break

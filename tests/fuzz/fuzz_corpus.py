@@ -5,8 +5,10 @@ import struct
 
 from protocol.controller_words import CONTROLLER_WORDS
 from protocol.dashboard.commands import COMMANDS
+from protocol.interpreter import Word
+from protocol.robot_api import BASE, CALLS
 from protocol.rtde.codec import encode_message
-from protocol.rtde.fields import input_fields, output_fields
+from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.rtde.messages import (
     GetControllerVersion,
     Pause,
@@ -17,11 +19,9 @@ from protocol.rtde.messages import (
     SetupOutputs,
     Start,
 )
-from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.parameters import Kind
 from ur_emulator.control.operations import OPERATIONS
 
-VERSION = SoftwareVersion(3, 15, 8)
 # Words and operations by which something else than a program may move the arm.
 MOVING_WORDS = {"set robotmode freedrive"}
 MOVING_OPERATIONS = {"push", "attach_payload"}
@@ -42,6 +42,7 @@ STILL_PROGRAMS = (
     'textmsg("line")\n',
     "def labels():\n  $ 1 \"one\"\n  sleep(0.01)\n  $ 2 \"two\"\n  sleep(0.01)\nend\n",
     "def halts():\n  halt\nend\n",
+    "def interprets():\n  while True:\n    interpreter_mode(clearQueueOnEnter=False)\n  end\nend\n",
 )  # fmt: skip
 # They dial a peer of the test; PEER stands for its port.
 DIALLING_PROGRAMS = (
@@ -77,6 +78,14 @@ MOVING_PROGRAMS = (
 )
 
 
+# What port 30020 gets beside words; some hundred of the first kind are too many.
+STILL_STATEMENTS = (
+    "x = 1", 'textmsg("said ", x)', "sleep(0.01)", "sync()", "set_digital_out(1, True)", "clear_interpreter()",
+    "end_interpreter()", "x = [1, 2", "def f(): return 1 end y = f()", "while True: sync() end", "x = nothing()",
+    "if x > 0: z = 2 end", "halt", "x = 1 / 0",
+)  # fmt: skip
+
+
 def script_message(rng, lively):
     if rng.random() < 0.35:
         word = rng.choice([w for w in CONTROLLER_WORDS if lively or w.text not in MOVING_WORDS])
@@ -86,8 +95,8 @@ def script_message(rng, lively):
     return rng.choice(programs).encode()
 
 
-_OUTPUTS = [*output_fields(VERSION), "nope", ""]
-_INPUTS = [*input_fields(VERSION), "nope", "timestamp"]
+_OUTPUTS = [*(field.name for field in OUTPUTS), "nope", ""]
+_INPUTS = [*(field.name for field in INPUTS), "nope", "timestamp"]
 _NASTY = (b"\x7f\xf8", b"\x7f\xf0", b"\xff\xf0", b"\0\0", b"\xff\xff", b"\x80\0", b"\x3f\xf0")
 
 
@@ -208,6 +217,34 @@ def peer_message(rng):
     return rng.randbytes(rng.choice((1, 40, 4000, 60_000)))
 
 
+def interpreter_message(rng, lively):
+    if rng.random() < 0.3:
+        return rng.choice(tuple(Word)).value.encode() + b"\n"
+    lines = STILL_STATEMENTS + (tuple(p for p in MOVING_PROGRAMS if p.count("\n") == 1) if lively else ())
+    ends = rng.choice(("\n", "\r\n", "\n\n"))
+    return "".join(rng.choice(lines).rstrip() + ends for _ in range(rng.choice((1, 1, 1, 5, 60)))).encode()
+
+
+_API_WORDS = ("POWER_ON", "POWER_OFF", "BRAKE_RELEASE", "UNLOCK_PROTECTIVE_STOP", "RESTART_SAFETY", "play", "pause",
+              "resume", "stop", "hello", "wait", "strange", "../../etc/passwd", "", None, 7, [], {})  # fmt: skip
+_FORM = '--cut\r\nContent-Disposition: form-data; name="file"; filename="{}"\r\n\r\n{}\r\n--cut--\r\n'
+
+
+def robot_api_message(rng, lively):
+    call = rng.choice(CALLS)
+    path = BASE + call.path.replace("{name}", rng.choice(("wait", "hello.urp", "..%2f..", "%00", "x" * 300)))
+    host, kind = rng.choice(("127.0.0.1", "localhost", "evil.example", "")), "application/json"
+    keys = ("action", "name", "programName", "title", "message")
+    body = json.dumps({key: rng.choice(_API_WORDS) for key in rng.sample(keys, rng.choice((0, 1, 1, 5)))})
+    if call.path == "/programs/v1" and call.method != "GET":
+        name = rng.choice(("a.urpx", "b.urp", "c.script", "../d.urpx", "", "hello.urp"))
+        kind, body = "multipart/form-data; boundary=cut", _FORM.format(name, rng.choice(STILL_PROGRAMS))
+    head = f"{call.method} {path} HTTP/1.1\r\nHost: {host}\r\n"
+    if call.method == "GET":
+        return f"{head}\r\n".encode()
+    return f"{head}Content-Type: {kind}\r\nContent-Length: {len(body.encode())}\r\n\r\n{body}".encode()
+
+
 MESSAGES = {
     "realtime": script_message,
     "realtime_ro": script_message,
@@ -219,4 +256,6 @@ MESSAGES = {
     "dashboard": dashboard_message,
     "modbus": modbus_message,
     "control": control_message,
+    "interpreter": interpreter_message,
+    "robot_api": robot_api_message,
 }

@@ -3,7 +3,6 @@
 import json
 import re
 
-from box_support import VERSION
 from pymodbus.pdu import DecodePDU
 
 from protocol.dashboard.commands import GREETING
@@ -18,7 +17,6 @@ from protocol.rtde.codec import decode_message
 from protocol.rtde.messages import Role
 from protocol.rtde.messages import RtdePackageType as RtdeType
 
-REALTIME = layout_for_version(VERSION)
 # pymodbus's decoder of answers.
 _MODBUS = DecodePDU(is_server=False)
 
@@ -26,8 +24,9 @@ _MODBUS = DecodePDU(is_server=False)
 class RealtimeReader:
     """Counts frames, decodes every tenth."""
 
-    def __init__(self):
+    def __init__(self, version):
         self.buffer = FrameBuffer(2000)
+        self.layout = layout_for_version(version)
         self.n_frames = 0
 
     def feed(self, data):
@@ -35,7 +34,7 @@ class RealtimeReader:
         while (frame := self.buffer.next_frame()) is not None:
             self.n_frames += 1
             if self.n_frames % 10 == 1:
-                REALTIME.decode(frame)
+                self.layout.decode(frame)
 
     def finish(self):
         assert not self.buffer.pending
@@ -44,7 +43,8 @@ class RealtimeReader:
 class PrimaryReader:
     """Decodes every message, and every fourth state: those of a box differ little."""
 
-    def __init__(self):
+    def __init__(self, version):
+        self.version = version
         self.buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
         self.n_states = 0
         self.messages = []
@@ -56,7 +56,7 @@ class PrimaryReader:
                 self.n_states += 1
                 if self.n_states % 4:
                     continue
-            package = decode_package(frame, VERSION)
+            package = decode_package(frame, self.version)
             if not isinstance(package, RobotState):
                 self.messages.append(package)
                 del self.messages[:-50]
@@ -68,7 +68,7 @@ class PrimaryReader:
 class RtdeReader:
     """Takes packages apart without knowing what was asked."""
 
-    def __init__(self):
+    def __init__(self, version):
         self.buffer = bytearray()
         self.n_replies = 0
 
@@ -100,9 +100,9 @@ def _decodes(kind, payload, version):
 class DashboardReader:
     """Keeps the last lines after the greeting."""
 
-    def __init__(self):
+    def __init__(self, version):
         self.buffer = b""
-        self.lines = []
+        self.answers = []
         self.n_lines = 0
 
     def feed(self, data):
@@ -113,9 +113,31 @@ class DashboardReader:
             if not self.n_lines:
                 assert line.decode() == GREETING
             else:
-                self.lines.append(line.decode("latin-1"))
-                del self.lines[:-50]
+                self.answers.append(line.decode("latin-1"))
+                del self.answers[:-50]
             self.n_lines += 1
+
+    def finish(self):
+        assert not self.buffer
+
+
+_INTERPRETER = re.compile(r"(ack: \d+: .*|discard: .*: .*|state: -?\d+: \w+)", re.DOTALL)
+
+
+class InterpreterReader:
+    """Keeps the last lines."""
+
+    def __init__(self, version):
+        self.buffer = b""
+        self.answers = []
+
+    def feed(self, data):
+        *lines, self.buffer = (self.buffer + data).split(b"\n")
+        for line in lines:
+            text = line.decode("latin-1")
+            assert _INTERPRETER.fullmatch(text), text
+            self.answers.append(text)
+            del self.answers[:-50]
 
     def finish(self):
         assert not self.buffer
@@ -124,7 +146,7 @@ class DashboardReader:
 class ModbusReader:
     """Takes answers apart; every one is a value, an echo or an exception."""
 
-    def __init__(self):
+    def __init__(self, version):
         self.buffer = bytearray()
         self.answers = []
 
@@ -147,9 +169,9 @@ _STATUS = re.compile(rb"HTTP/1\.1 (\d{3}) [\x20-\x7e]*\r\n")
 
 
 class HttpReader:
-    """Takes responses apart; each is JSON, or says that the rest may be sent."""
+    """Takes responses apart; each is JSON or a file, or says that the rest may be sent."""
 
-    def __init__(self):
+    def __init__(self, version):
         self.buffer = b""
         self.answers = []
 
@@ -167,7 +189,8 @@ class HttpReader:
             if status == 100:
                 continue
             assert status < 500 or status in NOT_OURS, (status, body)
-            self.answers.append((status, json.loads(body)))
+            is_json = b"application/json" in head
+            self.answers.append((status, json.loads(body) if is_json else body))
             del self.answers[:-20]
 
     def finish(self):
@@ -185,4 +208,6 @@ READERS = {
     "dashboard": DashboardReader,
     "modbus": ModbusReader,
     "control": HttpReader,
+    "interpreter": InterpreterReader,
+    "robot_api": HttpReader,
 }

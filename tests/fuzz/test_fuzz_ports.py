@@ -9,7 +9,7 @@ import socket
 import fuzz_box
 import pytest
 from dashboard_support import write_programs
-from fuzz_box import FuzzBox, run
+from fuzz_box import CB3, E_SERIES, POLYSCOPE_X, FuzzBox, run
 from fuzz_corpus import MESSAGES
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -17,7 +17,10 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 from ur_emulator.budgets import BUDGETS
 
-PORTS = sorted(MESSAGES)
+KINDS = {"cb3": CB3, "e-series": E_SERIES, "polyscope-x": POLYSCOPE_X}
+# Ports that a box does not have.
+NOT_THERE = {"cb3": {"interpreter", "robot_api"}, "e-series": {"robot_api"}, "polyscope-x": {"dashboard"}}
+PORTS = sorted(MESSAGES.keys() - NOT_THERE["cb3"])
 
 
 @pytest.fixture(scope="module")
@@ -30,15 +33,17 @@ def repeat(do, n_times):
         do()
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(2))
-def test_no_bytes_move_the_arm_or_harm_others(folder, seed):
-    cases = run(random.Random(seed), folder, 1500, lively=False)
-    assert set(cases) >= set(PORTS)
+def test_no_bytes_move_the_arm_or_harm_others(folder, seed, kind):
+    cases = run(random.Random(seed), folder, 1500, lively=False, kind=KINDS[kind])
+    assert set(cases) >= set(MESSAGES) - NOT_THERE[kind]
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(2))
-def test_no_bytes_harm_a_box_that_works(folder, seed):
-    run(random.Random(seed), folder, 1500, lively=True)
+def test_no_bytes_harm_a_box_that_works(folder, seed, kind):
+    run(random.Random(seed), folder, 1500, lively=True, kind=KINDS[kind])
 
 
 def test_the_harness_notices_an_arm_that_moves(folder):
@@ -60,7 +65,7 @@ def test_the_harness_notices_an_error_of_a_port(folder, monkeypatch):
 
 def test_the_harness_notices_what_is_not_released(folder, monkeypatch):
     fuzz = FuzzBox(random.Random(1), folder, lively=False)
-    monkeypatch.setattr(fuzz_box, "_LONGEST_QUEUE", 10)
+    monkeypatch.setattr(fuzz_box, "_LONGEST_QUEUE", 0.08)
     kept = socket.socket()
     with pytest.raises(AssertionError, match="descriptors"):
         fuzz.settle()

@@ -25,7 +25,7 @@ HELPER = re.compile(r"(\w+):\W+(\d+)?")
 BLANKS = " \t\r\n\f\v"
 LINES = st.one_of(
     st.sampled_from([word.value for word in Word]),
-    st.text(st.characters(min_codepoint=1, max_codepoint=255, exclude_characters="\r\n"), max_size=40),
+    st.text(st.characters(min_codepoint=1, max_codepoint=255, exclude_characters="\n"), max_size=40),
 )
 
 

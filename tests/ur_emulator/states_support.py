@@ -1,5 +1,7 @@
 """What the tests of the state machines share: how to bring a box into any safety mode, and a moving arm."""
 
+from functools import cache
+
 from box_support import VERSION, Bench
 
 from protocol.primary.layout import JointData, MasterboardData, RobotModeData
@@ -29,8 +31,6 @@ ENDLESS = (
     "def endless():\n  q = get_actual_joint_positions()\n  while True:\n"
     "    movej([q[0] + 0.5, q[1], q[2], q[3], q[4], q[5]], a=3, v=1)\n    movej(q, a=3, v=1)\n  end\nend\n"
 )
-LAYOUT = layout_for_version(VERSION)
-encode_frame = LAYOUT.encoder()
 BRAKING = 150  # cycles, more than any arm needs to come to rest and lose its power
 
 # How each event is made to happen from outside, where it can be.
@@ -91,7 +91,13 @@ def power_up(bench):
     return bench.now
 
 
-def check_wires(bench):
+@cache
+def _realtime(version):
+    layout = layout_for_version(version)
+    return layout, layout.encoder()
+
+
+def check_wires(bench, version=VERSION):
     """What the ports say of the modes in this cycle agrees, each in its own encoding."""
     controller, now = bench.controller, bench.now
     state, safety = controller.state, SafetyMode(now.safety_mode)
@@ -100,13 +106,14 @@ def check_wires(bench):
     stops = safety not in (SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.RECOVERY)
     powered = now.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
 
-    frame = LAYOUT.decode(encode_frame(now))
+    layout, encode_frame = _realtime(version)
+    frame = layout.decode(encode_frame(now))
     assert frame.safety_mode == safety
     assert frame.safety_status == now.safety_status
     assert frame.robot_mode == now.robot_mode
     assert tuple(frame.joint_mode) == now.joint_mode
 
-    package = decode_package(encode_state(state_records(now), VERSION), VERSION)
+    package = decode_package(encode_state(state_records(now), version), version)
     mode_data, joints, board = (package.find(kind) for kind in (RobotModeData, JointData, MasterboardData))
     assert (mode_data.is_emergency_stopped, mode_data.is_protective_stopped) == (emergency, protective)
     assert (mode_data.is_robot_power_on, mode_data.robot_mode) == (powered, now.robot_mode)
