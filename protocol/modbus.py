@@ -1,4 +1,4 @@
-"""Modbus TCP: frames, the requests of functions 1 to 6, 15 and 16, their answers, and exceptions.
+"""Modbus TCP: frames, the requests of functions 1 to 6, 15, 16 and 23, their answers, and exceptions.
 
     frame: u16 transaction | u16 protocol = 0 | u16 length of what follows | u8 unit | PDU       big-endian
     PDU:   u8 function code | data, at most 253 bytes together
@@ -10,6 +10,7 @@
 | 5 write a bit         | u16 address, u16 0xFF00 or 0     | the request              |
 | 6 write a register    | u16 address, u16 value           | the request              |
 | 15, 16 write several  | u16 address, u16 count, u8 size, values | u16 address, u16 count |
+| 23 write, then read   | u16 address, u16 count (twice), u8 size, values | u8 size, u16 values |
 | an exception          |                                  | code of the function + 0x80, u8 exception code |
 
 Sources: Modbus application protocol V1.1b3, sections 4.1, 6 and 7; Modbus messaging on TCP/IP V1.0b,
@@ -34,11 +35,12 @@ __all__ = [
     "ModbusRequest",
     "ModbusRequestError",
     "decode_request",
-    "decode_value",
+    "decode_values",
     "encode_answer",
     "encode_exception",
     "encode_frame",
     "encode_read",
+    "encode_read_write",
     "encode_write",
     "take_frame",
 ]
@@ -65,6 +67,7 @@ class ModbusFunction(IntEnum):
     WRITE_REGISTER = 6
     WRITE_COILS = 15
     WRITE_REGISTERS = 16
+    READ_WRITE_REGISTERS = 23
 
     @property
     def is_bits(self) -> bool:
@@ -83,7 +86,7 @@ class ModbusFunction(IntEnum):
 
     @property
     def max_count(self) -> int:
-        """Most addresses of one request."""
+        """Most addresses of one request; of the functions that a server has."""
         return _MAX_COUNTS[self]
 
     def size(self, count: int) -> int:
@@ -179,34 +182,44 @@ def take_frame(inbox: bytearray) -> ModbusFrame | None:
 # --- PDUs of a client
 
 
-def encode_read(function: ModbusFunction, address: int) -> bytes:
-    """Return the request that reads one address."""
-    return _SHORT.pack(function, address, 1)
+def encode_read(function: ModbusFunction, address: int, count: int = 1) -> bytes:
+    """Return the request that reads neighbouring addresses."""
+    return _SHORT.pack(function, address, count)
 
 
-def encode_write(function: ModbusFunction, address: int, value: int) -> bytes:
-    """Return the request that writes one bit (function 5) or register (function 6)."""
-    return _SHORT.pack(function, address, _ON * bool(value) if function.is_bits else value)
+def encode_write(function: ModbusFunction, address: int, values: Sequence[int]) -> bytes:
+    """Return the request that writes one value (functions 5 and 6) or several (15 and 16)."""
+    if function.is_single_write:
+        (value,) = values
+        return _SHORT.pack(function, address, _ON * bool(value) if function.is_bits else value)
+    return _SHORT.pack(function, address, len(values)) + _packed(function, values)
 
 
-def decode_value(request: bytes, answer: bytes) -> int | None:
-    """Return the value that an answer reads or confirms; None if it does not answer the request.
+def encode_read_write(address: int, count: int, write_address: int, values: Sequence[int]) -> bytes:
+    """Return the request that writes some registers and reads others."""
+    function = ModbusFunction.READ_WRITE_REGISTERS
+    places = struct.pack(">HHHH", address, count, write_address, len(values))
+    return bytes((function,)) + places + _packed(function, values)
+
+
+def decode_values(request: bytes, answer: bytes) -> tuple[int, ...] | None:
+    """Return the values that an answer reads or confirms; None if it does not answer the request.
 
     Args:
-        request: made by `encode_read` or `encode_write`.
+        request: made by `encode_read`, `encode_write` or `encode_read_write`.
         answer: PDU of the frame with the same transaction.
     """
     function = ModbusFunction(request[0])
-    if not function.is_read:
-        if answer != request:
-            return None
-        word = int.from_bytes(answer[3:], "big")
-        return int(word == _ON) if function.is_bits else word
-    size = function.size(1)
+    _, _, word = _SHORT.unpack_from(request)
+    if function.is_single_write:
+        return _written(function, word, 1, b"") if answer == request else None
+    if function in (ModbusFunction.WRITE_COILS, ModbusFunction.WRITE_REGISTERS):
+        is_right = answer == request[: _SHORT.size]
+        return _written(function, word, word, request[_SHORT.size + 1 :]) if is_right else None
+    size = function.size(word)
     if answer[:2] != bytes((function, size)) or len(answer) != 2 + size:
         return None
-    word = int.from_bytes(answer[2:], "big")
-    return word & 1 if function.is_bits else word
+    return _unpacked(function, word, answer[2:])
 
 
 # --- PDUs of a server
@@ -218,10 +231,9 @@ def decode_request(pdu: bytes) -> ModbusRequest:
     Raises:
         ModbusRequestError: the function is unknown, or count, sizes, values or addresses are not allowed.
     """
-    try:
-        function = ModbusFunction(pdu[0])
-    except ValueError:
-        raise ModbusRequestError(ExceptionCode.ILLEGAL_FUNCTION) from None
+    if pdu[0] not in _MAX_COUNTS:
+        raise ModbusRequestError(ExceptionCode.ILLEGAL_FUNCTION)
+    function = ModbusFunction(pdu[0])
     if len(pdu) < _SHORT.size:
         raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_VALUE)
     _, address, word = _SHORT.unpack_from(pdu)
@@ -247,13 +259,27 @@ def _written(function: ModbusFunction, word: int, count: int, data: bytes) -> tu
             return (int(word == _ON),)
         case ModbusFunction.WRITE_REGISTER:
             return (word,)
-        case ModbusFunction.WRITE_COILS:
-            bits = int.from_bytes(data, "little")
-            return tuple(bits >> i & 1 for i in range(count))
-        case ModbusFunction.WRITE_REGISTERS:
-            return struct.unpack(f">{count}H", data)
+        case ModbusFunction.WRITE_COILS | ModbusFunction.WRITE_REGISTERS:
+            return _unpacked(function, count, data)
         case _:
             return ()
+
+
+def _packed(function: ModbusFunction, values: Sequence[int]) -> bytes:
+    """Return several values as they travel, with their size before them."""
+    size = function.size(len(values))
+    if function.is_bits:
+        data = sum(bool(value) << i for i, value in enumerate(values)).to_bytes(size, "little")
+    else:
+        data = struct.pack(f">{len(values)}H", *values)
+    return bytes((size,)) + data
+
+
+def _unpacked(function: ModbusFunction, count: int, data: bytes) -> tuple[int, ...]:
+    if function.is_bits:
+        bits = int.from_bytes(data, "little")
+        return tuple(bits >> i & 1 for i in range(count))
+    return struct.unpack(f">{count}H", data)
 
 
 def encode_answer(request: ModbusRequest, values: Sequence[int] = ()) -> bytes:
@@ -265,15 +291,10 @@ def encode_answer(request: ModbusRequest, values: Sequence[int] = ()) -> bytes:
     """
     function = request.function
     if function.is_single_write:
-        return encode_write(function, request.address, request.values[0])
+        return encode_write(function, request.address, request.values)
     if not function.is_read:
         return _SHORT.pack(function, request.address, request.count)
-    size = function.size(request.count)
-    if function.is_bits:
-        data = sum(bool(value) << i for i, value in enumerate(values)).to_bytes(size, "little")
-    else:
-        data = struct.pack(f">{request.count}H", *values)
-    return bytes((function, size)) + data
+    return bytes((function,)) + _packed(function, values)
 
 
 def encode_exception(function: int, code: ExceptionCode) -> bytes:

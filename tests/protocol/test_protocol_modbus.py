@@ -18,11 +18,12 @@ from protocol.modbus import (
     ModbusRequest,
     ModbusRequestError,
     decode_request,
-    decode_value,
+    decode_values,
     encode_answer,
     encode_exception,
     encode_frame,
     encode_read,
+    encode_read_write,
     encode_write,
     take_frame,
 )
@@ -41,8 +42,8 @@ REQUESTS = {
 FRAMES = [
     (ModbusFrame(1, 255, encode_read(F.READ_COILS, 16)), "0001 0000 0006 ff 01 0010 0001"),
     (ModbusFrame(0xFFFF, 0, encode_read(F.READ_INPUT_REGISTERS, 258)), "ffff 0000 0006 00 04 0102 0001"),
-    (ModbusFrame(2, 1, encode_write(F.WRITE_COIL, 5, 1)), "0002 0000 0006 01 05 0005 ff00"),
-    (ModbusFrame(3, 1, encode_write(F.WRITE_REGISTER, 128, 4711)), "0003 0000 0006 01 06 0080 1267"),
+    (ModbusFrame(2, 1, encode_write(F.WRITE_COIL, 5, (1,))), "0002 0000 0006 01 05 0005 ff00"),
+    (ModbusFrame(3, 1, encode_write(F.WRITE_REGISTER, 128, (4711,))), "0003 0000 0006 01 06 0080 1267"),
     (
         ModbusFrame(4, 1, encode_answer(ModbusRequest(F.READ_COILS, 0, 9), [1, 0, 1] + [0] * 5 + [1])),
         "0004 0000 0005 01 01 02 05 01",
@@ -105,7 +106,7 @@ def request_of_pymodbus(function, address, values):
 @st.composite
 def conversations(draw):
     """Function, address, and the values that are read or written."""
-    function = draw(st.sampled_from(F))
+    function = draw(st.sampled_from(sorted(REQUESTS)))
     size = draw(st.integers(1, function.max_count))
     top = 1 if function.is_bits else 0xFFFF
     edge = draw(st.lists(st.integers(0, top), min_size=1, max_size=4))
@@ -134,23 +135,40 @@ def test_requests_of_pymodbus_are_understood_and_our_answers_by_pymodbus(convers
         assert (answer.address, answer.count) == (address, len(values))
 
 
-@given(st.sampled_from(list(F)[:6]), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF))
-def test_our_requests_are_understood_by_pymodbus_and_its_answers_by_us(function, address, value):
-    value = value & 1 if function.is_bits else value
-    pdu = encode_read(function, address) if function.is_read else encode_write(function, address, value)
+@given(conversations())
+def test_our_requests_are_understood_by_pymodbus_and_its_answers_by_us(conversation):
+    function, address, values = conversation
+    n = len(values)
+    pdu = encode_read(function, address, n) if function.is_read else encode_write(function, address, values)
     asked = DecodePDU(True).decode(pdu)
     assert (asked.function_code, asked.address) == (function, address)
     if function.is_read:
-        assert asked.count == 1
+        assert asked.count == n
         kind = {1: bits.ReadCoilsResponse, 2: bits.ReadDiscreteInputsResponse,
                 3: registers.ReadHoldingRegistersResponse, 4: registers.ReadInputRegistersResponse}[function]  # fmt: skip
-        answer = kind(bits=[bool(value)]) if function.is_bits else kind(registers=[value])
+        answer = kind(bits=list(map(bool, values))) if function.is_bits else kind(registers=values)
     else:
-        assert list(map(int, asked.bits if function.is_bits else asked.registers)) == [value]
-        answer = asked
-    assert decode_value(pdu, bytes((function,)) + answer.encode()) == value
+        assert list(map(int, asked.bits if function.is_bits else asked.registers))[:n] == values
+        several = {15: bits.WriteMultipleCoilsResponse, 16: registers.WriteMultipleRegistersResponse}
+        answer = several[function](address=address, count=n) if function in several else asked
+    assert decode_values(pdu, bytes((function,)) + answer.encode()) == tuple(values)
     refusal = ExceptionResponse(function, exception_code=2)
-    assert decode_value(pdu, bytes((refusal.function_code,)) + refusal.encode()) is None
+    assert decode_values(pdu, bytes((refusal.function_code,)) + refusal.encode()) is None
+
+
+@given(
+    st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=121),
+    st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=123),
+)
+def test_pymodbus_understands_that_we_write_and_read_in_one_request(written, read):
+    pdu = encode_read_write(5, len(read), 15, written)
+    asked = DecodePDU(True).decode(pdu)
+    assert (asked.read_address, asked.read_count, asked.write_address, asked.write_count) == (
+        (5, len(read), 15, len(written))
+    )
+    assert asked.write_registers == written
+    answer = registers.ReadWriteMultipleRegistersResponse(registers=read)
+    assert decode_values(pdu, bytes((F.READ_WRITE_REGISTERS,)) + answer.encode()) == tuple(read)
 
 
 @pytest.mark.parametrize("code", ExceptionCode)
@@ -170,5 +188,6 @@ def test_any_pdu_is_a_request_or_an_exception(pdu):
 
 @given(st.sampled_from([F.READ_COILS, F.READ_INPUT_REGISTERS]), st.binary(max_size=253))
 def test_any_answer_has_a_value_or_none(function, answer):
-    value = decode_value(encode_read(function, 5), answer)
-    assert value is None or 0 <= value <= (1 if function.is_bits else 0xFFFF)
+    values = decode_values(encode_read(function, 5, 3), answer)
+    top = 1 if function.is_bits else 0xFFFF
+    assert values is None or (len(values) == 3 and all(0 <= value <= top for value in values))

@@ -61,16 +61,18 @@ class FakeModbusUnit:
         self.is_released = False
 
     def want(self, signal):
-        where = (int(signal.type), signal.address)
+        kind = int(signal.type.single)
+        first = signal.write_address if signal.reads_back else signal.address
         signal.trouble = self.trouble
         signal.connection_error = -2 if self.trouble else 0
         self.log.append((signal.name, "read" if signal.output is None else signal.output))
         if self.trouble:
             return
-        if signal.output is None:
-            signal.value = self.memory.get(where, 0)
-        else:
-            self.memory[where] = signal.output
+        if signal.output is not None:
+            self.memory.update({(kind, first + i): value for i, value in enumerate(signal.output)})
+        if signal.output is None or signal.reads_back:
+            read = range(signal.address, signal.address + signal.count)
+            signal.values = tuple(self.memory.get((kind, address), 0) for address in read)
 
     def forget(self, signal):
         self.log.append((signal.name, "forgotten"))

@@ -116,20 +116,68 @@ def test_each_type_is_read_with_its_function(wire, kind, request_hex, answer_hex
     [(transaction, request)] = wire.asked()
     assert request.hex() == request_hex
     wire.answer(transaction, bytes.fromhex(answer_hex))
-    assert s.value == value
+    assert s.values == (value,)
 
 
 @pytest.mark.parametrize(
     ("kind", "output", "pdu"), [(1, 1, "050005ff00"), (1, 0, "0500050000"), (3, 513, "0600050201")]
 )
 def test_outputs_are_written_with_their_function(wire, kind, output, pdu):
-    s = signal(kind, output=output)
+    s = signal(kind, output=(output,))
     wire.want(s)
     [(transaction, request)] = wire.asked()
     assert request.hex() == "ff" + pdu
     wire.answer(transaction, bytes.fromhex(pdu))
     wire.advance(2 * TOLERANCE)
     assert not s.trouble
+
+
+@pytest.mark.parametrize(
+    ("kind", "count", "request_hex", "answer_hex", "values"),
+    [
+        (0, 3, "ff0200050003", "020105", (1, 0, 1)),
+        (2, 2, "ff0400050002", "040400010002", (1, 2)),
+        (15, 1, "ff0100050001", "010101", (1,)),
+        (16, 2, "ff0300050002", "0304000affff", (10, 65535)),
+        (23, 2, "ff0300050002", "0304000affff", (10, 65535)),
+    ],
+)
+def test_several_addresses_are_read_in_one_request(wire, kind, count, request_hex, answer_hex, values):
+    s = signal(kind, count=count)
+    assert s.values == (0,) * count
+    wire.want(s)
+    [(transaction, request)] = wire.asked()
+    assert request.hex() == request_hex
+    wire.answer(transaction, bytes.fromhex(answer_hex))
+    assert s.values == values
+
+
+@pytest.mark.parametrize(
+    ("kind", "output", "pdu", "answer"),
+    [
+        (1, (1, 0, 1), "0f000500030105", "0f00050003"),
+        (15, (1,), "0f000500010101", "0f00050001"),
+        (3, (1, 2), "10000500020400010002", "1000050002"),
+        (16, (7,), "1000050001020007", "1000050001"),
+    ],
+)
+def test_several_outputs_are_written_in_one_request(wire, kind, output, pdu, answer):
+    s = signal(kind, output=output, count=len(output))
+    wire.want(s)
+    [(transaction, request)] = wire.asked()
+    assert request.hex() == "ff" + pdu
+    wire.answer(transaction, bytes.fromhex(answer))
+    wire.advance(2 * TOLERANCE)
+    assert not s.trouble
+
+
+def test_once_set_a_signal_that_writes_and_reads_does_both_in_one_request(wire):
+    s = signal(23, output=(513,), count=2, write_address=9, write_count=1)
+    wire.want(s)
+    [(transaction, request)] = wire.asked()
+    assert request.hex() == "ff170005000200090001020201"
+    wire.answer(transaction, bytes.fromhex("170400010002"))
+    assert s.values == (1, 2)
 
 
 def test_the_slave_number_is_sent(wire):
@@ -153,9 +201,9 @@ def test_a_signal_is_asked_for_once_while_its_answer_is_awaited(wire):
 
 
 def test_an_output_that_changes_while_it_is_written_is_written_again(wire):
-    s = signal(3, output=1)
+    s = signal(3, output=(1,))
     wire.want(s)
-    s.output = 2
+    s.output = (2,)
     wire.want(s)
     [(transaction, _)] = wire.asked()
     wire.answer(transaction, bytes.fromhex("0600050001"))
@@ -166,9 +214,9 @@ def test_an_answer_to_a_read_does_not_undo_an_output_that_was_set_meanwhile(wire
     s = signal(3)
     wire.want(s)
     [(transaction, _)] = wire.asked()
-    s.output = s.value = 9
+    s.output = s.values = (9,)
     wire.answer(transaction, bytes.fromhex("03020001"))
-    assert s.value == 9
+    assert s.values == (9,)
 
 
 def test_signals_of_a_unit_share_one_connection_and_are_served_in_order(wire):
@@ -178,7 +226,7 @@ def test_signals_of_a_unit_share_one_connection_and_are_served_in_order(wire):
         [(transaction, request)] = wire.asked()
         assert request[3] == i
         wire.answer(transaction, bytes([4, 2, 0, 40 + i]))
-        assert s.value == 40 + i
+        assert s.values == (40 + i,)
     assert len(wire.sockets) == 1
 
 
@@ -189,7 +237,7 @@ def test_a_slow_unit_gets_the_next_request_after_a_cycle_and_may_answer_in_any_o
     first, second = (transaction for transaction, _ in wire.asked())
     wire.answer(second, bytes([4, 2, 0, 22]))
     wire.answer(first, bytes([4, 2, 0, 11]))
-    assert (a.value, b.value) == (11, 22)
+    assert (a.values, b.values) == ((11,), (22,))
 
 
 def test_in_sequential_mode_it_gets_one_request_at_a_time(wire):
@@ -224,7 +272,7 @@ def test_a_forgotten_signal_takes_no_answer(wire):
     [(transaction, _)] = wire.asked()
     wire.link.forget(s)
     wire.answer(transaction, bytes.fromhex("04020009"))
-    assert s.value == 0
+    assert s.values == (0,)
     wire.want(other)
     assert len(wire.asked()) == 1
     assert len(wire.sockets) == 1
@@ -287,7 +335,7 @@ def test_a_connection_that_is_refused_is_tried_again_and_again_more_and_more_rar
     wire.advance(LAST_RETRY)
     [(transaction, _)] = wire.asked()
     wire.answer(transaction, bytes.fromhex("04020007"))
-    assert (s.value, s.trouble) == (7, "")
+    assert (s.values, s.trouble) == ((7,), "")
 
 
 def test_a_connection_that_nobody_takes_is_given_up():
@@ -320,9 +368,9 @@ def test_a_value_stays_while_its_unit_is_away(wire):
     wire.refuse = True
     wire.want(s)
     wire.advance(0.9 * TOLERANCE)
-    assert (s.value, s.trouble) == (7, "")
+    assert (s.values, s.trouble) == ((7,), "")
     wire.advance(0.2 * TOLERANCE)
-    assert s.value == 7
+    assert s.values == (7,)
     assert s.trouble == "10.0.0.2:502 refuses the connection"
 
 
@@ -345,7 +393,7 @@ def test_an_answer_counts_although_the_unit_has_closed_behind_it(wire):
     [(transaction, _)] = wire.asked()
     wire.sock.is_open = False
     wire.answer(transaction, bytes.fromhex("04020007"))
-    assert s.value == 7
+    assert s.values == (7,)
 
 
 def test_a_frame_cut_off_by_the_end_of_the_connection_is_no_answer(wire):
@@ -354,11 +402,11 @@ def test_a_frame_cut_off_by_the_end_of_the_connection_is_no_answer(wire):
     wire.sock.inbox += bytes.fromhex("000100000005ff04")
     wire.sock.close()
     wire.advance()
-    assert s.value == 0
+    assert s.values == (0,)
     wire.advance(FIRST_RETRY)
     [(transaction, _)] = wire.asked()
     wire.answer(transaction, bytes.fromhex("04020007"))
-    assert s.value == 7
+    assert s.values == (7,)
 
 
 def test_an_answer_may_come_in_pieces(wire):
@@ -366,10 +414,10 @@ def test_an_answer_may_come_in_pieces(wire):
     wire.want(s)
     [(transaction, _)] = wire.asked()
     for byte in transaction.to_bytes(2, "big") + bytes.fromhex("00000005ff0402002a"):
-        assert s.value == 0
+        assert s.values == (0,)
         wire.sock.inbox.append(byte)
         wire.advance(0.05)
-    assert s.value == 42
+    assert s.values == (42,)
 
 
 def test_one_lost_answer_does_not_cost_the_connection(wire):
@@ -382,9 +430,9 @@ def test_one_lost_answer_does_not_cost_the_connection(wire):
     [(again, request)] = wire.asked()
     assert request[3] == 1
     wire.answer(lost, bytes([4, 2, 0, 99]))  # too late
-    assert a.value == 0
+    assert a.values == (0,)
     wire.answer(again, bytes([4, 2, 0, 11]))
-    assert (a.value, b.value) == (11, 22)
+    assert (a.values, b.values) == ((11,), (22,))
     assert len(wire.sockets) == 1
 
 
@@ -409,12 +457,12 @@ def test_what_is_no_modbus_ends_the_connection(wire, garbage):
     wire.sock.inbox += garbage
     wire.advance()
     assert not wire.sock.is_open
-    assert s.value == 0
+    assert s.values == (0,)
     wire.refuse = False
     wire.advance(FIRST_RETRY)
     [(transaction, _)] = wire.asked()
     wire.answer(transaction, bytes.fromhex("04020007"))
-    assert s.value == 7
+    assert s.values == (7,)
 
 
 def test_answers_with_wrong_transaction_numbers_are_dropped_then_end_the_connection(wire):
@@ -423,14 +471,14 @@ def test_answers_with_wrong_transaction_numbers_are_dropped_then_end_the_connect
     [(transaction, _)] = wire.asked()
     for i in range(MAX_UNEXPECTED):
         wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
-    assert s.value == 0
+    assert s.values == (0,)
     assert wire.sock.is_open
     wire.answer(transaction, bytes.fromhex("04020007"))
-    assert s.value == 7
+    assert s.values == (7,)
     for i in range(MAX_UNEXPECTED + 1):
         wire.answer(transaction + 1 + i, bytes.fromhex("04020063"))
     assert not wire.sock.is_open
-    assert s.value == 7
+    assert s.values == (7,)
 
 
 @pytest.mark.parametrize(
@@ -455,7 +503,7 @@ def test_an_exception_is_named_once_the_tolerance_is_over_and_forgiven_by_an_ans
     assert len(wire.sockets) == 1
     wire.want(s)
     wire.answer(wire.asked()[0][0], bytes.fromhex("04020007"))
-    assert (s.value, s.trouble) == (7, "")
+    assert (s.values, s.trouble) == ((7,), "")
 
 
 @pytest.mark.parametrize(
@@ -478,17 +526,17 @@ def test_a_wrong_answer_spoils_one_answer_and_no_more(wire, pdu):
     s = signal()
     wire.want(s)
     wire.answer(wire.asked()[0][0], bytes.fromhex(pdu))
-    assert s.value == 0
+    assert s.values == (0,)
     assert wire.sock.is_open
     assert lose(wire, s) == "10.0.0.2:502 gives an answer that makes no sense"
     wire.want(s)
     wire.answer(wire.asked()[0][0], bytes.fromhex("04020007"))
-    assert (s.value, s.trouble) == (7, "")
+    assert (s.values, s.trouble) == ((7,), "")
 
 
 @pytest.mark.parametrize("echo", ["0600050002", "0600060001", "06", "0600", "8602", "050005ff00"])
 def test_an_output_that_is_not_confirmed_is_lost(wire, echo):
-    s = signal(3, output=1)
+    s = signal(3, output=(1,))
     wire.want(s)
     wire.answer(wire.asked()[0][0], bytes.fromhex(echo))
     assert lose(wire, s).startswith("10.0.0.2:502 ")
@@ -510,7 +558,7 @@ def test_no_bytes_break_it_and_a_good_unit_is_heard_afterwards(pieces):
         wire.sock.inbox.clear()
         for transaction, _ in wire.asked():
             wire.answer(transaction, bytes.fromhex("040204d2"))
-    assert (s.value, s.trouble) == (1234, "")
+    assert (s.values, s.trouble) == ((1234,), "")
 
 
 def test_errors_of_a_signal_are_codes_until_an_answer_is_valid(wire):
@@ -526,7 +574,7 @@ def test_errors_of_a_signal_are_codes_until_an_answer_is_valid(wire):
     wire.advance(LAST_RETRY)
     ((transaction, _),) = wire.asked()
     wire.answer(transaction, b"\x04\x02\x00\x07")
-    assert (it.device_error, it.connection_error, it.value) == (0, 0, 7)
+    assert (it.device_error, it.connection_error, it.values) == (0, 0, (7,))
 
 
 def test_a_silent_unit_is_an_error_of_its_own(wire):
@@ -567,4 +615,4 @@ def test_a_reset_connects_anew_and_asks_again(wire):
     assert len(wire.sockets) == 2
     ((transaction, _),) = wire.asked()
     wire.answer(transaction, b"\x04\x02\x00\x05")
-    assert (it.connection_error, it.value) == (0, 5)
+    assert (it.connection_error, it.values) == (0, (5,))

@@ -2,7 +2,8 @@
 
 Reading or setting a signal whose unit has given no valid answer for too long is a run-time error, as with the
 watchdog of later controllers; before that a signal has its last value, at first 0.
-Source: URScript manual CB3 3.15, module interfaces.
+Source: URScript manuals CB3 3.15 and e-Series 5.2x, module interfaces. Chosen: one value for a signal of
+several sets its first one.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ Function = Callable[..., Any]
 # Source: URScript manual, modbus_add_signal.
 MAX_NAME = 20
 WORD_MAX = 0xFFFF
+ADDRESSES = 0x10000
 BYTE_MAX = 0xFF
 # Function code and data of a request. Source: Modbus application protocol, section 4.1.
 MAX_DATA = 252
@@ -71,23 +73,66 @@ def _definitions(modbus: ModbusSignals, network: Network) -> dict[str, Function]
         register_count: float = 1,
     ) -> None:
         builtin = "modbus_add_signal"
-        if kind not in tuple(SignalType):
-            raise ScriptRuntimeError(f"{builtin}: signal_type {kind:g} is not modelled; allowed: 0 to 3")
-        if register_count != 1:
+        if kind not in tuple(SignalType) or kind == SignalType.READ_WRITE_REGISTERS:
             raise ScriptRuntimeError(
-                f"{builtin}: register_count {register_count:g} is not modelled; allowed: 1"
+                f"{builtin}: signal_type {kind:g} is not known; allowed: 0 to 3, 15 and 16"
             )
+        unit = _unit_address(builtin, ip)
+        add(
+            builtin,
+            ModbusSignal(
+                name,
+                unit,
+                int(slave),
+                int(address),
+                SignalType(int(kind)),
+                sequential,
+                count=int(register_count),
+            ),
+        )
+
+    def add_rw_signal(
+        thread: object,
+        ip: str,
+        slave: float,
+        read_address: float,
+        read_count: float,
+        write_address: float,
+        write_count: float,
+        name: str,
+        sequential: bool,
+    ) -> None:
+        builtin = "modbus_add_rw_signal"
+        unit = _unit_address(builtin, ip)
+        add(
+            builtin,
+            ModbusSignal(
+                name,
+                unit,
+                int(slave),
+                int(read_address),
+                SignalType.READ_WRITE_REGISTERS,
+                sequential,
+                count=int(read_count),
+                write_address=int(write_address),
+                write_count=int(write_count),
+            ),
+        )
+
+    def add(builtin: str, signal: ModbusSignal) -> None:
+        name = signal.name
         if not 0 < len(name) <= MAX_NAME:
             raise ScriptRuntimeError(
                 f'{builtin}: "{name}" is not a signal name; allowed: 1 to {MAX_NAME} characters'
             )
         if name not in modbus.signals and len(modbus.signals) >= MAX_SIGNALS:
             raise ScriptRuntimeError(f"{builtin}: there are {MAX_SIGNALS} signals already, delete one first")
-        unit = _unit_address(builtin, ip)
-        modbus.add(
-            ModbusSignal(name, unit, int(slave), int(address), SignalType(int(kind)), sequential),
-            network.modbus_unit,
-        )
+        for first, count in ((signal.address, signal.count), (signal.write_address, signal.write_count)):
+            if first + count > ADDRESSES:
+                raise ScriptRuntimeError(
+                    f"{builtin}: address {first} with {count} registers; allowed: addresses below {ADDRESSES}"
+                )
+        modbus.add(signal, network.modbus_unit)
 
     def send_custom_command(thread: object, ip: str, slave: float, code: float, data: list[Any]) -> None:
         builtin = "modbus_send_custom_command"
@@ -99,36 +144,51 @@ def _definitions(modbus: ModbusSignals, network: Network) -> dict[str, Function]
 
     return {
         "modbus_add_signal": add_signal,
+        "modbus_add_rw_signal": add_rw_signal,
         "modbus_delete_signal": lambda thread, name: modbus.delete(name),
         "modbus_send_custom_command": send_custom_command,
     }
 
 
 def _values(modbus: ModbusSignals) -> dict[str, Function]:
-    def get_signal_status(thread: object, name: str, is_secondary: bool) -> bool | int:
+    def get_signal_status(thread: object, name: str, is_secondary: bool) -> bool | int | list[Any]:
         builtin = "modbus_get_signal_status"
         signal = _signal(modbus, builtin, name)
         if not signal.frequency:
             modbus.refresh(signal)
         _require_answers(builtin, signal)
-        return bool(signal.value) if signal.type.is_digital else signal.value
+        values = list(map(bool, signal.values)) if signal.type.is_digital else list(signal.values)
+        return values if signal.count > 1 else values[0]
 
     def set_output_signal(thread: object, name: str, value: Any, is_secondary: bool) -> None:
         builtin = "modbus_set_output_signal"
-        if not isinstance(value, bool):
+        signal = _signal(modbus, builtin, name, SignalType.DIGITAL_OUTPUT)
+        values = _values_for(builtin, signal, value)
+        if not all(isinstance(item, bool) for item in values):
             raise ScriptRuntimeError(f"{builtin}: {log_form(value)} is not modelled; allowed: True or False")
-        _set(builtin, _signal(modbus, builtin, name, SignalType.DIGITAL_OUTPUT), int(value))
+        _set(builtin, signal, values)
 
     def set_output_register(thread: object, name: str, value: Any, is_secondary: bool) -> None:
         builtin = "modbus_set_output_register"
-        if not is_number(value) or not 0 <= value <= WORD_MAX:
+        signal = _signal(modbus, builtin, name, SignalType.REGISTER_OUTPUT)
+        values = _values_for(builtin, signal, value)
+        if not all(is_number(item) and 0 <= item <= WORD_MAX for item in values):
             raise ScriptRuntimeError(
                 f"{builtin}: {log_form(value)} does not fit into a register; allowed: 0 to {WORD_MAX}"
             )
-        _set(builtin, _signal(modbus, builtin, name, SignalType.REGISTER_OUTPUT), int(value))
+        _set(builtin, signal, values)
 
-    def _set(builtin: str, signal: ModbusSignal, value: int) -> None:
-        modbus.set_output(signal, value)
+    def _values_for(builtin: str, signal: ModbusSignal, value: Any) -> list[Any]:
+        values = value if isinstance(value, list) else [value]
+        most = len(signal.outputs)
+        if not 1 <= len(values) <= most:
+            raise ScriptRuntimeError(
+                f'{builtin}: {len(values)} values for signal "{signal.name}"; allowed: 1 to {most}'
+            )
+        return values
+
+    def _set(builtin: str, signal: ModbusSignal, values: list[Any]) -> None:
+        modbus.set_output(signal, tuple(map(int, values)))
         _require_answers(builtin, signal)
 
     return {
@@ -204,7 +264,7 @@ def _signal(modbus: ModbusSignals, builtin: str, name: str, wanted: SignalType |
         raise ScriptRuntimeError(
             f'{builtin}: there is no Modbus signal "{name}", add it with modbus_add_signal'
         )
-    if wanted is not None and signal.type is not wanted:
+    if wanted is not None and signal.type.single is not wanted:
         raise ScriptRuntimeError(f'{builtin}: signal "{name}" is a {signal.type.title}, not a {wanted.title}')
     return signal
 

@@ -118,6 +118,7 @@ UNITS: Final[Mapping[str, int]] = {
     "set_gp_boolean_input_action": 20,
     "rpc_factory": 400,
     "modbus_add_signal": 400,
+    "modbus_add_rw_signal": 400,
     "modbus_send_custom_command": 400,
 }
 """Builtin -> units of a call, without its long arguments."""

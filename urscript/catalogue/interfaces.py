@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .chapter import DRIVER_SCRIPT, FIELD_USE, MANUAL_E, MANUAL_LATE, MANUAL_X, POLYSCOPE_EXPORT, Chapter
 from .types import Builtin, BuiltinArray, Param, ParamType, Support, TimeClass
-from .versions import CB3_ONLY, EVERYWHERE, LATE_E_SERIES, NOT_CB3, Generation, releases
+from .versions import CB3_ONLY, EVERYWHERE, NOT_CB3, Generation, releases
 
 _row = Chapter("interfaces").row
 
@@ -368,8 +368,9 @@ _SOCKETS: tuple[Builtin, ...] = (
 _SIGNAL = Param("signal_name", STRING)
 _SECONDARY = Param("is_secondary_program", BOOL)
 _SECONDARY_OPTIONAL = Param("is_secondary_program", BOOL, False)
-_UNTIL_LATE = releases(None, "5.21")
 _FIRST = releases("3.0", "5.0")
+# Signals of several registers came with modbus_add_rw_signal, which needs lists of values (inferred).
+_UNTIL_LISTS = releases(None, "5.15")
 _SIGNALS_5_15 = releases(None, "5.15", "10.0")
 
 
@@ -392,7 +393,7 @@ _MODBUS: tuple[Builtin, ...] = (
         "None",
         "supervise a signal of a Modbus server",
         since=_FIRST,
-        until=_UNTIL_LATE,
+        until=_UNTIL_LISTS,
         support=APPROXIMATE,
         note="one connection a server; the IP may be a name and may have a :port",
     ),
@@ -401,10 +402,10 @@ _MODBUS: tuple[Builtin, ...] = (
         _add_signal(16, Param("register_count", INT, 1, low=1, high=123)),
         "None",
         "supervise a signal of a Modbus server",
-        since=LATE_E_SERIES,
+        since=_SIGNALS_5_15,
         source=MANUAL_LATE,
         support=APPROXIMATE,
-        note="one register a signal; one connection a server; the IP may be a name and may have a :port",
+        note="one connection a server; the IP may be a name and may have a :port",
     ),
     _row("modbus_delete_signal", (_SIGNAL,), "None", "forget a signal", support=EXACT),
     *(
@@ -418,14 +419,14 @@ _MODBUS: tuple[Builtin, ...] = (
             until=until,
             source=source,
             support=APPROXIMATE,
-            note="a run-time error once no valid answer has come for 2 s" + more,
+            note="a run-time error once no valid answer has come for 2 s",
         )
-        for since, until, secondary, source, value, more in (
-            (_FIRST, _UNTIL_LATE, _SECONDARY, "", None, ""),
-            (LATE_E_SERIES, releases(), _SECONDARY_OPTIONAL, MANUAL_LATE, ANY, "; one value, no lists"),
+        for since, until, secondary, source, value, result in (
+            (_FIRST, _UNTIL_LISTS, _SECONDARY, "", None, "bool or int"),
+            (_SIGNALS_5_15, releases(), _SECONDARY_OPTIONAL, MANUAL_LATE, ANY, "value"),
         )
         for name, params, returns, summary in (
-            ("modbus_get_signal_status", (), "bool or int", "last value of a signal"),
+            ("modbus_get_signal_status", (), result, "last value of a signal"),
             (
                 "modbus_set_output_register",
                 (Param("register_value", value or INT),),
@@ -485,7 +486,7 @@ _MODBUS: tuple[Builtin, ...] = (
             time=time,
             since=_SIGNALS_5_15,
             source=MANUAL_LATE,
-            support=APPROXIMATE if note else Support.DECLARED_ONLY,
+            support=APPROXIMATE,
             note=note,
         )
         for name, params, returns, summary, time, note in (
@@ -502,9 +503,9 @@ _MODBUS: tuple[Builtin, ...] = (
                     Param("sequential_mode", BOOL, False),
                 ),
                 "None",
-                "read and write registers in one request",
+                "supervise registers that are read and written in one request",
                 TimeClass.ZERO,
-                "",
+                "what it reads and what it writes are kept apart; zeros for outputs that were never set",
             ),
             (
                 "modbus_get_error",

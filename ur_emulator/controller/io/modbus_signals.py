@@ -38,16 +38,26 @@ class SignalType(IntEnum):
     DIGITAL_OUTPUT = 1
     REGISTER_INPUT = 2
     REGISTER_OUTPUT = 3
+    MULTIPLE_DIGITAL_OUTPUTS = 15
+    MULTIPLE_REGISTER_OUTPUTS = 16
+    READ_WRITE_REGISTERS = 23
+
+    @property
+    def single(self) -> SignalType:
+        """What one of its coils or registers is."""
+        if self is SignalType.MULTIPLE_DIGITAL_OUTPUTS:
+            return SignalType.DIGITAL_OUTPUT
+        return min(self, SignalType.REGISTER_OUTPUT)
 
     @property
     def is_output(self) -> bool:
         """Whether it can be written."""
-        return self in (SignalType.DIGITAL_OUTPUT, SignalType.REGISTER_OUTPUT)
+        return self.single in (SignalType.DIGITAL_OUTPUT, SignalType.REGISTER_OUTPUT)
 
     @property
     def is_digital(self) -> bool:
-        """Whether it is one bit; the others are words of 16."""
-        return self in (SignalType.DIGITAL_INPUT, SignalType.DIGITAL_OUTPUT)
+        """Whether it consists of bits; the others are words of 16."""
+        return self.single in (SignalType.DIGITAL_INPUT, SignalType.DIGITAL_OUTPUT)
 
     @property
     def title(self) -> str:
@@ -67,19 +77,21 @@ class UnitAddress(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class ModbusSignal:
-    """One signal.
+    """One signal: a coil or register, or neighbouring ones.
 
     Attributes:
         name: as programs call it.
         unit: where its unit listens.
         slave: number of the unit behind that address, 0 to 255.
-        address: of the coil or register, 0 to 65535.
+        address: of the first coil or register, 0 to 65535.
         type: what it is.
+        count: how many coils or registers are read.
+        write_address, write_count: of the registers that READ_WRITE_REGISTERS writes.
         sequential: the unit takes one request at a time.
         frequency: how often it is refreshed [Hz]; 0 only on demand.
         action: action of a digital input.
         rule: what an output does when programs start and stop.
-        value: last one known: of the unit, or what a program has set; 0 before.
+        values: last ones known: of the unit, or what a program has set; 0 before.
         output: what a program has set, to be written; None while the signal is only read.
         tolerance: how long there may be no valid answer [s]; None for the usual time.
         trouble: why there has been no valid answer for longer; empty while answers come. The unit sets it.
@@ -98,23 +110,42 @@ class ModbusSignal:
     frequency: float = DEFAULT_FREQUENCY
     action: str = DEFAULT_ACTION
     rule: RunState = RunState.KEEP
-    value: int = 0
-    output: int | None = None
+    values: tuple[int, ...] = ()
+    output: tuple[int, ...] | None = None
     tolerance: float | None = None
     trouble: str = ""
     device_error: int = 0
     connection_error: int = 0
     invalid_cycles: int = 0
     due: float = 0.0
+    count: int = 1
+    write_address: int = 0
+    write_count: int = 0
+
+    def __post_init__(self) -> None:
+        """Begin with zeros."""
+        self.values = self.values or (0,) * self.count
+
+    @property
+    def reads_back(self) -> bool:
+        """Whether what it reads is another thing than what it writes."""
+        return self.type is SignalType.READ_WRITE_REGISTERS
+
+    @property
+    def outputs(self) -> tuple[int, ...]:
+        """What it writes, or would write: what was set, else what was read, else zeros."""
+        if self.output is not None:
+            return self.output
+        return (0,) * self.write_count if self.reads_back else self.values
 
     def is_same_place(self, other: ModbusSignal) -> bool:
         """Whether both stand for the same thing."""
-        return (self.unit, self.slave, self.address, self.type) == (
-            other.unit,
-            other.slave,
-            other.address,
-            other.type,
-        )
+        return self._place == other._place
+
+    @property
+    def _place(self) -> tuple[object, ...]:
+        write = self.write_address, self.write_count
+        return self.unit, self.slave, self.address, self.type, self.count, *write
 
 
 class ModbusUnit(Protocol):
@@ -156,7 +187,7 @@ class ModbusSignals:
             self._units[signal.unit] = open_unit(signal.unit)
         old = self.signals.pop(signal.name, None)
         if old is not None and old.is_same_place(signal):
-            signal.value = old.value
+            signal.values = old.values
         self.signals[signal.name] = signal
         if old is not None:
             self._drop(old)
@@ -191,10 +222,13 @@ class ModbusSignals:
                 self.refresh(signal)
         return signals
 
-    def set_output(self, signal: ModbusSignal, value: int) -> None:
-        """Set an output: it is written from now on."""
-        is_news = signal.output != value or not signal.frequency
-        signal.output = signal.value = value
+    def set_output(self, signal: ModbusSignal, values: tuple[int, ...]) -> None:
+        """Set the first outputs of a signal, the others stay: all are written from now on."""
+        output = values + signal.outputs[len(values) :]
+        is_news = signal.output != output or not signal.frequency
+        signal.output = output
+        if not signal.reads_back:
+            signal.values = output
         if is_news:
             self.refresh(signal)
 
@@ -227,11 +261,13 @@ class ModbusSignals:
     @property
     def requests_freedrive(self) -> bool:
         """True while a digital input with the action "freedrive" is high, and its unit answers."""
-        return any(s.action == FREEDRIVE_ACTION and s.value and not s.trouble for s in self.signals.values())
+        return any(
+            s.action == FREEDRIVE_ACTION and any(s.values) and not s.trouble for s in self.signals.values()
+        )
 
     def _set_level(self, signal: ModbusSignal, is_high: bool | None) -> None:
         if is_high is not None:
-            self.set_output(signal, int(is_high))
+            self.set_output(signal, (int(is_high),) * len(signal.outputs))
 
     def _drop(self, signal: ModbusSignal) -> None:
         self._units[signal.unit].forget(signal)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from protocol.errors import RemoteProtocolError
-from protocol.modbus import ModbusFrame, decode_value, encode_frame, take_frame
+from protocol.modbus import ModbusFrame, decode_values, encode_frame, take_frame
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import DISCONNECTED, NO_ANSWER, ModbusSignal
 from ur_emulator.scripting.network import ScriptSocket
@@ -203,8 +203,8 @@ class ModbusLink:
         signal = request.signal
         if signal is None:
             return
-        value = decode_value(request.pdu, frame.pdu)
-        if value is None:
+        values = decode_values(request.pdu, frame.pdu)
+        if values is None:
             self._waiting[signal].why = problem_of(frame.pdu, request.pdu)
             signal.device_error, signal.connection_error = error_of(frame.pdu, request.pdu), 0
             return
@@ -214,8 +214,8 @@ class ModbusLink:
             self._waiting[signal] = _Waiting(now)
         else:
             self._waiting.pop(signal, None)
-        if signal.output is None:
-            signal.value = value
+        if signal.output is None or signal.reads_back:
+            signal.values = values
 
     def _give_up_silent(self, now: float) -> None:
         """End what has waited too long: the request if the unit has answered another since, else the link."""

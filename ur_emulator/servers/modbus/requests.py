@@ -1,13 +1,21 @@
 """The requests that signals need, and the values of their answers.
 
-Source: UR3 user manual CB3, section "MODBUS client I/O setup": functions by type, names of the exceptions.
+Source: UR3 user manual CB3, section "MODBUS client I/O setup": functions by type, names of the exceptions;
+script manual e-Series 5.2x, modbus_add_signal and modbus_add_rw_signal: functions of several addresses.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from protocol.modbus import EXCEPTION_BIT, ExceptionCode, ModbusFunction, encode_read, encode_write
+from protocol.modbus import (
+    EXCEPTION_BIT,
+    ExceptionCode,
+    ModbusFunction,
+    encode_read,
+    encode_read_write,
+    encode_write,
+)
 from ur_emulator.controller.io.modbus_signals import ModbusSignal, SignalType
 
 _READ = {
@@ -16,9 +24,13 @@ _READ = {
     SignalType.REGISTER_INPUT: ModbusFunction.READ_INPUT_REGISTERS,
     SignalType.REGISTER_OUTPUT: ModbusFunction.READ_HOLDING_REGISTERS,
 }
-_WRITE = {
+_WRITE_ONE = {
     SignalType.DIGITAL_OUTPUT: ModbusFunction.WRITE_COIL,
     SignalType.REGISTER_OUTPUT: ModbusFunction.WRITE_REGISTER,
+}
+_WRITE = {
+    SignalType.DIGITAL_OUTPUT: ModbusFunction.WRITE_COILS,
+    SignalType.REGISTER_OUTPUT: ModbusFunction.WRITE_REGISTERS,
 }
 
 
@@ -40,8 +52,12 @@ class SentRequest:
 def request_for(signal: ModbusSignal) -> bytes:
     """Return the request that a signal needs: write its output if a program has set it, else read."""
     if signal.output is None:
-        return encode_read(_READ[signal.type], signal.address)
-    return encode_write(_WRITE[signal.type], signal.address, signal.output)
+        return encode_read(_READ[signal.type.single], signal.address, signal.count)
+    if signal.reads_back:
+        return encode_read_write(signal.address, signal.count, signal.write_address, signal.output)
+    is_one = signal.count == 1 and signal.type in _WRITE_ONE
+    function = _WRITE_ONE[signal.type] if is_one else _WRITE[signal.type.single]
+    return encode_write(function, signal.address, signal.output)
 
 
 def error_of(answer: bytes, request: bytes) -> int:
