@@ -70,6 +70,8 @@ BASE_OF_UR20 = JointSize(
     tau_max=738.0, torque_constant=12.0, armature=16.4, coulomb=37.0, viscous=55.0, viscous_fast=24.0
 )
 
+_REVERSAL_SPEED = 0.006  # rad/s; A: the sign has changed within .01-.015 rad/s
+
 
 class DriveNumbers(TypedDict):
     """Those fields of `RobotModel` that follow from the sizes of its joints."""
@@ -82,6 +84,7 @@ class DriveNumbers(TypedDict):
     viscous_kink: float
     viscous_fast: Vector6
     reversal_speed: float
+    friction_rise: float
     coulomb_standstill: float
     coulomb_speed: float
     servo_frequency: float
@@ -98,7 +101,10 @@ def drives(*sizes: JointSize) -> DriveNumbers:
         viscous=six([size.viscous for size in sizes]),
         viscous_kink=0.5,  # A
         viscous_fast=six([size.viscous_fast for size in sizes]),
-        reversal_speed=0.006,  # A: the sign has changed within .01-.015 rad/s
+        reversal_speed=_REVERSAL_SPEED,
+        # As fast as the compensation: that would push the joint ahead wherever friction lags behind it, and
+        # A, which is within .12 mrad of its target, shows no such thing.
+        friction_rise=_REVERSAL_SPEED,
         coulomb_standstill=1.0,  # A
         coulomb_speed=1.0,  # without effect, as nothing is lost at standstill
         servo_frequency=25.0,  # at 12 Hz the arm is further from its target than a real UR3e

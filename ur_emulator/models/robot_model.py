@@ -175,6 +175,8 @@ class RobotModel:
         home_q: a pose clear of the table, away from singularities [rad].
         first_version: oldest software that the maker has released for it; None: the generation's first.
         reversal_speed: friction changes its sign over about this, in the controller's model [rad/s].
+        friction_rise: speed over which the true dry friction grows from zero to its size [rad/s]; None: over
+            what suits MuJoCo's friction (`physics.py`), slower than the model.
         viscous_kink: joint speed beyond which viscous friction has another slope [rad/s]; None: it has one.
         viscous_fast: that slope [Nm s/rad].
         has_point_masses: the controller's model takes the links for points, without inertia tensors.
@@ -207,6 +209,7 @@ class RobotModel:
     home_q: Vector6
     first_version: str | None = None
     reversal_speed: float = 0.012
+    friction_rise: float | None = None
     viscous_kink: float | None = None
     viscous_fast: Vector6 = ZERO6
     has_point_masses: bool = False

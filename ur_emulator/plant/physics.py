@@ -22,8 +22,9 @@ from ur_emulator.plant.obstacles import add_slots
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
 # MuJoCo's Coulomb friction is a soft constraint. These numbers make it set in like a steep viscous friction,
-# over .01-.02 rad/s, instead of holding the joint against its servo: measured friction rises from small
-# values at rest, and real arms neither stick nor hunt around a target.
+# over some hundredths of a radian a second, instead of holding the joint against its servo: measured friction
+# rises from small values at rest, and real arms neither stick nor hunt around a target. Arms whose model of
+# friction changes its sign faster say over which speed it sets in, see `RobotModel.friction_rise`.
 _FRICTION_SOLREF = (0.02, 1.0)
 _FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
 
@@ -77,13 +78,14 @@ class JointServos:
         self._law = model.actuator_biasprm
         self._servo_gain, self._servo_law = self._gain.copy(), self._law.copy()
         self._solimp = model.dof_solimp
+        self._servo_solimp = model.dof_solimp.copy()
         self.bias: NDArray[np.float64] = self._law[:, 0]
 
     def set_free(self, free: bool) -> None:
         """Free the joints, or return them to servo control."""
         self._gain[:, 0] = 1.0 if free else self._servo_gain[:, 0]
         self._law[:] = 0.0 if free else self._servo_law
-        self._solimp[:] = _STICTION_SOLIMP if free else _FRICTION_SOLIMP
+        self._solimp[:] = _STICTION_SOLIMP if free else self._servo_solimp
 
 
 def build_physics(
@@ -112,7 +114,24 @@ def build_physics(
     _add_drives(spec, robot, gains)
     _add_hulls(spec, robot, dh)
     _add_sensors(spec)
-    return spec.compile()
+    model = spec.compile()
+    if robot.friction_rise is not None:
+        _set_friction_rise(model, robot.friction_rise)
+    return model
+
+
+def _set_friction_rise(model: mujoco.MjModel, speed: float) -> None:
+    """Let dry friction grow from zero to its size over a speed [rad/s], by backward Euler.
+
+    With w a joint's inverse inertia, MuJoCo solves f (w + R) = -2 v / (d t) - a for the force f, where a is
+    the acceleration without it, R = w (1 - d) / d, and d, t are the impedance and time constant set here.
+    R = speed / (size step) and d t = 2 step make that f = -size / speed times the speed after the step.
+    """
+    step = model.opt.timestep
+    slope = step * model.dof_invweight0 * model.dof_frictionloss / speed
+    impedance = slope / (1.0 + slope)
+    model.dof_solimp[:, :2] = impedance[:, None]
+    model.dof_solref[:, 0] = 2.0 * step / impedance
 
 
 def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
