@@ -1,10 +1,12 @@
 """Lengths of the e-Series arms, which example-robot-data does not have.
 
-Source: UR's article "DH parameters for calculations of kinematics and dynamics"; offsets from UR's ROS
-description (config/*/physical_parameters.yaml, "measured from model"). The foot is half of the footprint in
-the data sheet. Radii go by joint size, from the meshes of the CB3 arms, whose housings are as large: 32 mm
+Source: UR's article "DH parameters for calculations of kinematics and dynamics"; UR8 Long, UR15 and UR18 by
+ros-industrial/universal_robot (ur_description/config/*/default_kinematics.yaml); offsets from UR's ROS
+description (config/*/physical_parameters.yaml, "measured from model"; of UR8 Long, UR15 and UR18 it has the
+faces between two links, in the middle between their planes). The foot is half of the footprint in the data
+sheet. Radii go by joint size, from the meshes of the CB3 arms, whose housings are as large: 32 mm
 for size 0, 38 for 1, 46 for 2, 60 for 3, 75 for 4. Those of UR20 and UR30 are assumed, in proportion to the
-offsets.
+offsets; those of a UR15 are half of the widths of a UR8 Long's parts, by public notes on their STL files.
 """
 
 from __future__ import annotations
@@ -63,3 +65,17 @@ UR20 = DhArm(
     radii=(0.11, 0.095, 0.064),
 )
 UR30 = replace(UR20, a2=-0.637, a3=-0.5037)
+UR15 = DhArm(
+    d1=0.2186,
+    a2=-0.6475,
+    a3=-0.5164,
+    d4=0.1824,
+    d5=0.1361,
+    d6=0.1434,
+    shoulder_offset=0.218,
+    elbow_offset=0.0505,
+    foot=0.102,
+    radii=(0.075, 0.062, 0.045),
+)
+UR18 = replace(UR15, a2=-0.475, a3=-0.3389)
+UR8LONG = replace(UR15, a2=-0.8989, a3=-0.7149)

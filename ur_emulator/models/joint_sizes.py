@@ -5,8 +5,9 @@ Sources, cited by letter below:
     real UR3e (dsn-2022-rad-artifact): target torque against target current. Size 2 is in both and agrees
     within 1 %.
  B  UniversalRobots/Universal_Robots_ROS2_Description, config/*/joint_limits.yaml.
- C  Assumed for the joints of the UR20 and UR30, of which no log is known: the other sizes extrapolated by the
-    rated torque. Rotor inertia grows with its power of 1.26; friction is proportional to it.
+ C  Assumed for the joints of the UR8 Long, UR15, UR18, UR20 and UR30, of which no log is known: the other
+    sizes extrapolated by the rated torque. Rotor inertia grows with its power of 1.26; friction is
+    proportional to it.
 """
 
 from __future__ import annotations
@@ -60,10 +61,16 @@ SIZE_4 = JointSize(
 )
 
 # B: torque. C: the rest.
+WRIST_OF_UR15 = JointSize(
+    tau_max=70.0, torque_constant=10.8, armature=0.85, coulomb=4.1, viscous=4.9, viscous_fast=3.4
+)
+ELBOW_OF_UR15 = JointSize(
+    tau_max=204.0, torque_constant=9.8, armature=2.84, coulomb=8.7, viscous=16.6, viscous_fast=9.8
+)
 WRIST_OF_UR20 = JointSize(
     tau_max=107.0, torque_constant=10.8, armature=1.44, coulomb=5.5, viscous=8.0, viscous_fast=4.0
 )
-ELBOW_OF_UR20 = JointSize(
+ELBOW_OF_UR20 = JointSize(  # base and shoulder of a UR15 have the same torque
     tau_max=433.0, torque_constant=12.0, armature=8.4, coulomb=22.0, viscous=32.0, viscous_fast=15.0
 )
 BASE_OF_UR20 = JointSize(
