@@ -30,11 +30,11 @@ from ur_emulator.realtime.worker_process import prestart_process
 from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.box_ports import SendingPorts, answering_ports
-from ur_emulator.servers.dashboard.reports import ReportFolder
 from ur_emulator.servers.port_set import CONTROL, PortSet
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.programs.start_up import start_up
+from ur_emulator.servers.reports.report_writer import ReportWriter
 from ur_emulator.servers.scripts.closed_ports import close_to_scripts, give_back
 from ur_emulator.servers.scripts.loop_network import LoopNetwork
 
@@ -152,7 +152,7 @@ class Box(BoxOperations):
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         folder = ProgramFolder(None if programs is None else Path(programs))
         self._player = player = ProgramPlayer(self._access, folder, skip_unknown=skip_unknown_nodes)
-        self._reports = ReportFolder(player.folder)
+        self._reports = ReportWriter(self._access, player)
         sending = SendingPorts.make(self._access, self._intake)
         self._box.attach(
             (*sending.in_order, self._intake, self._access.steps),

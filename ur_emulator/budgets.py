@@ -72,6 +72,8 @@ class Budgets:
     control_clients: int = _budget(32, "clients", "a control port", "the most silent one is closed")
     # 64 KiB of JSON take up to 1 ms to be read; the longest program in the field has 50 kB.
     body_bytes: int = _budget(64 * KIB, "bytes", "a body", "it is refused with status 413")
+    # Programs of PolyScope X: 100 kB with a single node, 200 kB in the field.
+    upload_bytes: int = _budget(MIB, "bytes", "a program for the Robot API", "it is refused with status 413")
     log_entries: int = _budget(100, "entries", "an answer of `log`", "they come with the next call")
 
     # --- scripts sent: text of unfinished programs and of those that wait for the compiler ---

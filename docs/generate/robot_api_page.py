@@ -5,6 +5,7 @@ from __future__ import annotations
 from docs.generate.page_parts import table
 from protocol.robot_api import API_VERSIONS, BASE, CALLS
 from protocol.ur_types import Ports
+from ur_emulator.budgets import BUDGETS, KIB
 
 _INTRODUCTION = f"""\
 # Robot API of PolyScope X: port {Ports().robot_api}
@@ -19,13 +20,16 @@ The ports of two services stay closed until somebody enables the service, as on 
 `--services primary,rtde`. The service `primary` opens 30001, 30002, 30003 and their read-only
 twins, `rtde` opens 30004. Modbus and interpreter mode are open.
 
-Answers: 200 with the fields of the table; 400 for a body that is not JSON, 403 for a call marked
-with R in local control, 404 for a path or a program that does not exist, 405 for another method,
-409 for what the robot cannot do now, 422 for a field that is missing or has another value. An error
-is `{{"error": "..."}}`. A call is answered when it is complete: POWER_ON when the robot is IDLE.
+Answers: 200 with the fields of the table; 403 for a call marked with R in local control, 404 for a
+path or a program that does not exist, 405 for another method, 409 for what the robot cannot do now,
+422 for a body that is not JSON or lacks a field. The body of an error is
+`{{"message": "Forbidden", "details": "..."}}`, that of 422 `{{"detail": [{{"msg": "..."}}]}}`. A call is
+answered when it is complete: POWER_ON when the robot is IDLE.
 
-Programs are the files `NAME.urp`, `NAME.script` and `NAME.urpx` of the folder `--programs`. The
-format of `.urpx` is not known: such files are stored, listed and sent, but not played.
+Programs are the files `NAME.urpx`, `NAME.urp` and `NAME.script` of the folder `--programs`. A `.urpx`
+is JSON; the box plays the script that PolyScope X has stored in it, first that of the application,
+then that of the program. A `.urpx` that a client sends gets the name that stands in it, whatever the
+name of the file; 400 if there is one already. At most {BUDGETS.upload_bytes // KIB} KiB.
 """
 
 
@@ -41,7 +45,7 @@ def render() -> str:
                         f"`{row.method} {row.path}`",
                         row.does,
                         f"{row.since.major}.{row.since.minor}",
-                        "R" * row.changes,
+                        "R" * row.needs_remote,
                     )
                     for row in CALLS
                 ),

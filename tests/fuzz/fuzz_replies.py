@@ -182,7 +182,7 @@ class HttpReader:
             match = _STATUS.match(head + b"\r\n")
             assert match, head
             status = int(match[1])
-            size = int(re.search(rb"(?i)content-length: *(\d+)", head)[1]) if status != 100 else 0
+            size = 0 if status in (100, 204) else int(re.search(rb"(?i)content-length: *(\d+)", head)[1])
             if len(rest) < size:
                 return
             body, self.buffer = rest[:size], rest[size:]

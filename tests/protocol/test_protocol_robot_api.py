@@ -21,6 +21,7 @@ def test_every_call_is_found_with_and_without_a_slash_at_its_end(call):
 
 
 def test_other_methods_and_paths_are_told_apart():
+    assert match_call("GET", f"{BASE}/programs/v1/a%20b", CALLS)[1] == "a b"
     assert match_call("DELETE", f"{BASE}/program/v1/state", CALLS) == (None, "PUT, GET")
     assert match_call("GET", f"{BASE}/programs/v1/a/b", CALLS) == (None, "")
     assert match_call("GET", "/program/v1/state", CALLS) == (None, "")
@@ -37,8 +38,9 @@ def test_each_software_has_its_calls_and_its_version():
     ]
 
 
-def test_what_only_reads_needs_no_remote_control():
-    assert {call.method for call in CALLS if not call.changes} == {"GET"}
+def test_local_control_forbids_changes_but_for_files_of_programs():
+    free = {(call.method, call.path) for call in CALLS if not call.needs_remote and call.method != "GET"}
+    assert free == {("POST", "/programs/v1"), ("PUT", "/programs/v1")}
 
 
 @given(st.text(max_size=40), st.sampled_from(["GET", "PUT", "PATCH", ""]))

@@ -130,7 +130,7 @@ def test_script_files_that_are_none(tmp_path, data, problem):
 def test_files_of_other_kinds_are_no_programs(tmp_path):
     (tmp_path / "notes.txt").write_text("x = 1")
     with pytest.raises(
-        ProgramFileError, match=r"notes\.txt is not a program: its name must end in \.urp or \.script"
+        ProgramFileError, match=r"notes\.txt is not a program: its name must end in \.urp, \.script or \.urpx"
     ):
         load_program(ProgramFolder(tmp_path), "notes.txt")
 

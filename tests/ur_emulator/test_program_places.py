@@ -18,9 +18,9 @@ from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
 from ur_emulator.programs.inner_files import PART_NAME
 from ur_emulator.programs.loading import load_program
-from ur_emulator.servers.dashboard import reports
-from ur_emulator.servers.dashboard.reports import BoxFacts, flight_report, save_log, support_file
-from ur_emulator.servers.dashboard.temporary_folder import TemporaryFolder
+from ur_emulator.servers.reports import report_files
+from ur_emulator.servers.reports.report_files import BoxFacts, flight_report, save_log, support_file
+from ur_emulator.servers.reports.temporary_folder import TemporaryFolder
 
 SECRET = 'def secret():\n  textmsg("secret of another user")\nend\n'
 FACTS = BoxFacts("20193000007", {"software": "3.15"}, 12.0, {"actual_q": [0.0]}, "the log\n")
@@ -156,7 +156,7 @@ def test_a_pipe_that_is_put_there_after_the_check_does_not_block(folder):
 
 
 def test_reports_are_counted_and_the_next_is_refused(folder, monkeypatch):
-    monkeypatch.setattr(reports, "BUDGETS", replace(BUDGETS, report_files=4))
+    monkeypatch.setattr(report_files, "BUDGETS", replace(BUDGETS, report_files=4))
     place = ProgramFolder(folder)
     assert [flight_report(place, "", FACTS) for _ in range(2)] == ["1", "2"]
     support_file(place, "cell", FACTS)  # with a third report
@@ -169,7 +169,7 @@ def test_reports_are_counted_and_the_next_is_refused(folder, monkeypatch):
 
 
 def test_the_bytes_of_reports_are_bounded(folder, monkeypatch):
-    monkeypatch.setattr(reports, "BUDGETS", replace(BUDGETS, report_bytes=20_000))
+    monkeypatch.setattr(report_files, "BUDGETS", replace(BUDGETS, report_bytes=20_000))
     noise = replace(FACTS, log=os.urandom(2000).hex())
 
     def write_many():
@@ -248,7 +248,7 @@ def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
 def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     code = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}\n" + (
-        "import os, signal\nfrom ur_emulator.servers.dashboard.temporary_folder import TemporaryFolder\n"
+        "import os, signal\nfrom ur_emulator.servers.reports.temporary_folder import TemporaryFolder\n"
         "folder = TemporaryFolder()\n(folder.path / 'log_history.txt').touch()\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], check=False)

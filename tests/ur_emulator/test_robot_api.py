@@ -1,9 +1,11 @@
 """The Robot API of a PolyScope X box, as its clients use it: status codes, fields, local control, files."""
 
+import io
 import json
 import socket
 import urllib.error
 import urllib.request
+import zipfile
 from contextlib import contextmanager
 
 import pytest
@@ -18,6 +20,17 @@ PROGRAM = 'def dance():\n  textmsg("dancing")\n  while True:\n    sync()\n  end\
 FORM = "multipart/form-data; boundary=XX"
 
 
+def urpx(name, script, **information):
+    """Return a program of PolyScope X, without nodes."""
+    information = {"name": name, "createdDate": 1771239851763, "programState": "FINAL"} | information
+    application = {"urscript": {"script": 'global base_name = "base"\nset_gravity([0, 0, 9.82])'}}
+    program = {
+        "programInformation": information,
+        "urscript": {"script": f'$ 1 "ur-program"\n$ 2 "ur-code"\n{script}'},
+    }
+    return json.dumps({"application": application, "program": program}).encode()
+
+
 @contextmanager
 def x_box(version="10.12.0", **options):
     with ControlBox(robot="ur5e", version=version, pace="lockstep", port_base=None, seed=7, **options) as box:
@@ -29,15 +42,19 @@ def box(tmp_path_factory):
     folder = tmp_path_factory.mktemp("programs")
     (folder / "dance.script").write_text(PROGRAM)
     (folder / "odd.urpx").write_text("{}")
+    (folder / "slow.urpx").write_bytes(urpx("slow", "textmsg(base_name)\nsleep(100)"))
     with x_box("10.14.0", programs=folder) as box:
         yield box
+
+
+def address(box, path):
+    return f"http://{box.host}:{box.ports.robot_api}{path if path.startswith('/univ') else BASE + path}"
 
 
 def ask(box, method, path, body=None, content_type="application/json"):
     """Return status and answer of a request."""
     data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-    url = f"http://{box.host}:{box.ports.robot_api}{path if path.startswith('/univ') else BASE + path}"
-    request = urllib.request.Request(url, data, {"Content-Type": content_type}, method=method)
+    request = urllib.request.Request(address(box, path), data, {"Content-Type": content_type}, method=method)
     try:
         with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
             content = answer.read()
@@ -133,12 +150,12 @@ def test_a_program_is_loaded_played_paused_resumed_and_stopped(box):
 
 def test_programs_are_listed_stored_replaced_and_sent(box):
     names = [entry["name"] for entry in ask(box, "GET", "/programs/v1/")[1]["programs"]]
-    assert names == ["dance", "odd"]
+    assert names == ["dance", "odd", "slow"]
     text = PROGRAM.replace("dancing", "again").encode()
     assert ask(box, "PUT", "/programs/v1", form("again.script", text), FORM)[0] == 404
     assert ask(box, "POST", "/programs/v1", form("again.script", text), FORM) == (
         200,
-        {"programName": "again"},
+        {"message": "done", "programName": "again"},
     )
     assert ask(box, "POST", "/programs/v1", form("again.script", text), FORM)[0] == 400
     assert ask(box, "PUT", "/programs/v1", form("again.script", text + b"\n"), FORM)[0] == 200
@@ -158,11 +175,54 @@ def box_folder(box):
     return box._player.folder._root
 
 
-def test_the_form_of_a_program_of_polyscope_x_is_not_known(box):
+def test_a_program_of_polyscope_x_plays_the_script_that_it_contains(box):
+    loaded = ask(box, "PUT", "/program/v1/loaded", {"name": "slow"})
+    assert loaded == (200, {"message": "Program loaded successfully", "name": "slow"})
+    assert ask(box, "PUT", "/program/v1/state", {"action": "play"})[0] == 200
+    assert ask(box, "GET", "/program/v1/state")[1]["state"] == "PLAYING"
+    box.wait_until(log="base")
+    stop(box)
+
+
+def test_a_program_of_polyscope_x_has_the_name_that_stands_in_it(box):
+    """The maker's client library sends every program under the file name `filename`."""
+    odd_name = form("filename", urpx("with blank", "sync()", description="none", lastSavedDate=None))
+    assert ask(box, "PUT", "/programs/v1/", odd_name, FORM)[0] == 404
+    assert ask(box, "POST", "/programs/v1/", odd_name, FORM)[1]["programName"] == "with blank"
+    assert ask(box, "POST", "/programs/v1/", odd_name, FORM)[0] == 400
+    assert ask(box, "GET", "/programs/v1/with%20blank")[0] == 200
+    entries = {entry["name"]: entry for entry in ask(box, "GET", "/programs/v1/")[1]["programs"]}
+    assert entries["with blank"] == {
+        "name": "with blank",
+        "description": "none",
+        "createdDate": 1771239851763,
+        "lastModifiedDate": None,
+        "lastSavedDate": None,
+        "programState": "FINAL",
+    }
+    assert entries["dance"]["createdDate"] is None
+
+
+def test_a_program_as_large_as_the_makers_is_taken_and_sent(box):
+    data = urpx("large", "#" + "x" * 200_000 + "\nsync()")
+    assert ask(box, "POST", "/programs/v1/", form("filename", data), FORM)[0] == 200
+    assert ask(box, "GET", "/programs/v1/large")[1] == data
+    assert ask(box, "POST", "/programs/v1/", form("filename", data * 6), FORM)[0] == 413
+    assert ask(box, "PUT", "/program/v1/state", b'{"action":"' + b" " * 70_000 + b'"}')[0] == 422
+
+
+@pytest.mark.parametrize(
+    "data", [b"{", b"[1]", b'{"program": 3}', b'{"a":' * 5000, urpx("", "sync()"), urpx("x", "")[:-9]]
+)
+def test_what_is_no_program_of_polyscope_x_is_not_taken(box, data):
+    assert ask(box, "POST", "/programs/v1/", form("x.urpx", data), FORM)[0] in (404, 422)
+
+
+def test_a_file_that_is_no_program_is_sent_but_not_loaded(box):
     assert ask(box, "GET", "/programs/v1/odd") == (200, b"{}")
     status, answer = ask(box, "PUT", "/program/v1/loaded", {"name": "odd"})
     assert status == 409
-    assert "odd" in answer["error"]
+    assert "odd" in answer["details"]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +230,7 @@ def test_the_form_of_a_program_of_polyscope_x_is_not_known(box):
     [
         ("PUT", "/robotstate/v1/state", {"action": "FLY"}, 422),
         ("PUT", "/robotstate/v1/state", {}, 422),
-        ("PUT", "/robotstate/v1/state", b"{", 400),
+        ("PUT", "/robotstate/v1/state", b"{", 422),
         ("PUT", "/robotstate/v1/state", {"action": 3}, 422),
         ("PUT", "/program/v1/state", {"action": "PLAY"}, 422),
         ("POST", "/programs/v1", {"file": "x"}, 422),
@@ -182,18 +242,50 @@ def test_the_form_of_a_program_of_polyscope_x_is_not_known(box):
 def test_wrong_requests_say_what_is_allowed(box, method, path, body, status):
     found, answer = ask(box, method, path, body)
     assert found == status
-    assert answer["error"]
+    assert answer["detail"][0]["msg"] if status == 422 else answer["details"]
 
 
 def test_popups_log_and_names(box):
-    assert ask(box, "POST", "/popup/v1", {"title": "t", "message": "hello"})[0] == 200
+    for path in ("/popup/v1", "/popup/v1/safety"):
+        status, answer = ask(box, "DELETE", path)
+        assert (status, answer["closed"]) == (409, False)
+    opened = ask(box, "POST", "/popup/v1", {"title": "t", "message": "hello"})
+    assert opened == (200, {"message": "Popup opened successfully"})
     assert box.state.popups == ("hello",)
-    assert ask(box, "DELETE", "/popup/v1")[0] == 200
+    assert ask(box, "DELETE", "/popup/v1")[1]["closed"] is True
     assert not box.state.popups
-    assert ask(box, "POST", "/system/v1/log", {"message": "noted"})[0] == 200
+    assert ask(box, "POST", "/system/v1/log", {"message": "noted"}) == (200, {"message": "Log entry added"})
     assert any("noted" in entry.text for entry in box.log)
     assert ask(box, "GET", "/versions/v1")[1]["marketingVersion"].startswith("10.14.0")
-    assert ask(box, "GET", "/system/v1/information")[1]["serialNumber"] == box.serial_number
+    assert ask(box, "GET", "/system/v1/information")[1] == {
+        "robotType": "UR5",
+        "serialNumber": box.serial_number,
+    }
+    assert ask(box, "GET", "/system/v1/system-time")[1]["time"].startswith("2021-11-30T")
+
+
+def test_flight_reports(box):
+    with urllib.request.urlopen(address(box, "/supportfiles/v1/"), timeout=TIMEOUT) as nothing:
+        assert (nothing.status, nothing.read()) == (204, b"")
+    status, answer = ask(box, "POST", "/supportfiles/v1")
+    assert (status, answer) == (200, {"message": "Flight report generated successfully.", "details": None})
+    with urllib.request.urlopen(address(box, "/supportfiles/v1"), timeout=TIMEOUT) as archive:
+        assert archive.headers["Content-Type"] == "application/zip"
+        assert zipfile.ZipFile(io.BytesIO(archive.read())).namelist() == ["flightreports/flightreport_1.zip"]
+
+
+def test_the_page_for_people_names_all_calls(box):
+    with urllib.request.urlopen(address(box, "/docs"), timeout=TIMEOUT) as page:
+        assert page.headers["Content-Type"].startswith("text/html")
+        text = page.read().decode()
+    assert text.count("<code>") == len(CALLS) + 1
+
+
+def test_answers_have_no_blanks_between_their_fields(box):
+    """The maker's client library looks for `"closed":false` in the text."""
+    with socket.create_connection((box.host, box.ports.robot_api), timeout=TIMEOUT) as sock:
+        sock.sendall(f"DELETE {BASE}/popup/v1 HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        assert b'"closed":false' in sock.recv(4096)
 
 
 def test_in_local_control_nothing_changes(box):
@@ -203,10 +295,13 @@ def test_in_local_control_nothing_changes(box):
     try:
         assert ask(box, "GET", "/system/v1/controlmode")[1]["mode"] == "LOCAL"
         for call in CALLS:
-            path = call.path.replace("{name}", "dance")
-            assert ask(box, call.method, path, {} if call.changes else None)[0] == (
-                403 if call.changes else 200
-            )
+            if call.needs_remote:
+                status, answer = ask(box, call.method, call.path, {})
+                assert (status, answer["message"]) == (403, "Forbidden")
+            elif call.method == "GET":
+                assert ask(box, "GET", call.path.replace("{name}", "dance"))[0] in (200, 204)
+        stored = ask(box, "POST", "/programs/v1", form("local.script", b"sync()"), FORM)
+        assert stored[0] == 200
     finally:
         box.remote_control(True)
 
@@ -219,13 +314,13 @@ def test_pages_of_other_sites_may_not_call_it(box):
 
 def test_shutdown_closes_the_box(tmp_path):
     with x_box("10.14.0", programs=tmp_path) as box:
-        assert ask(box, "PUT", "/system/v1/shutdown", b"")[0] == 200
+        assert ask(box, "PUT", "/system/v1/shutdown", b"") == (202, {"message": None})
         assert box.is_shut_down
 
 
 def test_a_box_without_a_programs_folder():
     with x_box() as box:
-        assert ask(box, "GET", "/programs/v1")[1] == {"programs": []}
+        assert ask(box, "GET", "/programs/v1")[1] == {"programs": [], "message": ""}
         assert ask(box, "GET", "/program/v1/loaded")[1]["name"] == "Default program"
         assert ask(box, "PUT", "/program/v1/loaded", {"name": "x"})[0] == 404
         assert ask(box, "POST", "/programs/v1", form("a.script", b""), FORM)[0] == 404

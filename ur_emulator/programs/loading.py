@@ -18,6 +18,7 @@ from ur_emulator.programs.script_text import as_one_program
 from ur_emulator.programs.script_writer import Gap, Header, Part
 from ur_emulator.programs.twin import is_twin, software_of
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
+from ur_emulator.programs.urpx_program import URPX_SUFFIX
 from ur_emulator.programs.xml_tree import XmlTree
 from urscript.values import to_script_text
 
@@ -119,11 +120,14 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
     """
     file = folder.find(name)
     reader = ProgramReader(folder)
-    if file.inside.suffix == SCRIPT_SUFFIX:
-        return LoadedProgram(file.wire_path, None, (_script(reader, file),))
-    if file.inside.suffix != PROGRAM_SUFFIX:
+    suffix = file.inside.suffix
+    if suffix in (SCRIPT_SUFFIX, URPX_SUFFIX):
+        text = reader.script(file) if suffix == SCRIPT_SUFFIX else reader.urpx(file).script
+        return LoadedProgram(file.wire_path, None, (as_one_program(text, identifier(file.inside.stem)),))
+    if suffix != PROGRAM_SUFFIX:
         raise ProgramFileError(
-            f"{file.name} is not a program: its name must end in {PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
+            f"{file.name} is not a program: its name must end in {PROGRAM_SUFFIX}, {SCRIPT_SUFFIX} or "
+            f"{URPX_SUFFIX}"
         )
     tree = reader.xml(file)
     if tree.root.tag != ROOT:
@@ -151,7 +155,7 @@ def _twin_instead(
     if not reader.folder.has(saved):
         raise unknown
     twin = reader.folder.find(saved)
-    text = _script(reader, twin)
+    text = as_one_program(reader.script(twin), identifier(twin.inside.stem))
     if not is_twin(text):
         raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} is not a script that PolyScope saved")
     if uses_external_control(tree):
@@ -159,10 +163,6 @@ def _twin_instead(
     origin = f"{twin.name}, saved by software {software_of(text)}"
     note = f"{_cause(unknown)}: instead of the nodes runs {origin}"
     return LoadedProgram(file.wire_path, installation, (text,), (note,), origin)
-
-
-def _script(reader: ProgramReader, file: FoundFile) -> str:
-    return as_one_program(reader.script(file), identifier(file.inside.stem))
 
 
 def _cause(error: object) -> str:

@@ -6,6 +6,7 @@ from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.urpx_program import UrpxProgram, read_urpx
 from ur_emulator.programs.xml_tree import XmlTree, count_marks, parse_xml, unpack
 from urscript.source import as_utf8, program_text
 
@@ -53,6 +54,14 @@ class ProgramReader:
                 f"{name}: the program has more than {BUDGETS.program_marks} tags and attributes"
             )
         return parse_xml(name, data, self._take_steps)
+
+    def urpx(self, file: FoundFile) -> UrpxProgram:
+        """Read a program of PolyScope X.
+
+        Raises:
+            ProgramFileError: it cannot be read, or has another form.
+        """
+        return read_urpx(file.name, self.unpacked(file))
 
     def script(self, file: FoundFile) -> str:
         """Read a text file, UTF-8 or else Latin-1.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
-from ur_emulator.servers.dashboard.reports import ReportFolder
 from ur_emulator.servers.interpreter.intake import InterpreterIntake
 from ur_emulator.servers.interpreter.port import InterpreterPort
 from ur_emulator.servers.modbus.server import ModbusPort
@@ -18,6 +18,7 @@ from ur_emulator.servers.primary.robot_state import StateEncoder
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.realtime_port import RealtimePort
+from ur_emulator.servers.reports.report_writer import ReportWriter
 from ur_emulator.servers.rtde_port import RtdePort
 from ur_emulator.servers.tcp.listener import Port
 
@@ -68,7 +69,7 @@ class SendingPorts:
 def answering_ports(
     access: BoxAccess,
     player: ProgramPlayer,
-    reports: ReportFolder,
+    reports: ReportWriter,
     shut_down: Callable[[], None],
     host: str,
 ) -> dict[str, Port]:
@@ -92,5 +93,6 @@ def answering_ports(
         from ur_emulator.servers.http.port import HttpPort
         from ur_emulator.servers.robot_api.answers import RobotApiAnswers
 
-        ports[ROBOT_API] = HttpPort(access, RobotApiAnswers(access, player, shut_down, host))
+        answers = RobotApiAnswers(access, player, reports, shut_down, host)
+        ports[ROBOT_API] = HttpPort(access, answers, BUDGETS.upload_bytes)
     return ports

@@ -5,7 +5,6 @@ An answer is a reply, or steps that end in one (see `servers.steps`).
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -21,16 +20,9 @@ from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.safety.operational_mode import OperationalMode
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
-from ur_emulator.servers.dashboard.reports import (
-    BoxFacts,
-    ReportFolder,
-    flight_report,
-    save_log,
-    support_file,
-)
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
+from ur_emulator.servers.reports.report_writer import ReportWriter
 from ur_emulator.servers.steps import Steps
-from ur_hil import tool_version
 
 # Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
 # library expects them.
@@ -43,7 +35,7 @@ class DashboardAnswers:
     """Finds the answer to a command."""
 
     def __init__(
-        self, access: BoxAccess, player: ProgramPlayer, reports: ReportFolder, shut_down: Callable[[], None]
+        self, access: BoxAccess, player: ProgramPlayer, reports: ReportWriter, shut_down: Callable[[], None]
     ) -> None:
         """Bind the commands to a box.
 
@@ -58,13 +50,6 @@ class DashboardAnswers:
         self._shut_down = shut_down
         self._reports = reports
         self._user_role = "NONE"
-        # Looked up now: a process without descriptors cannot do it later.
-        self._versions = {
-            "software": str(access.identity.software.version),
-            "robot": access.identity.model,
-            "emulator": tool_version(),
-            "python": platform.python_version(),
-        }
         self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
             "load": self._load,
             "play": lambda row, _, client: self._done(row, player.play(client)),
@@ -220,46 +205,25 @@ class DashboardAnswers:
     # --- files
 
     def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps[str]:
-        facts = self._facts()
         try:
-            number = yield from self._access.in_worker(flight_report, self._reports.folder, kind, facts)
+            return row.reply(id=(yield from self._reports.flight_report(kind)))
         except EmulatorError as error:
             return row.reply("failed", reason=error)
-        return row.reply(id=number)
 
     def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps[str]:
-        facts = self._facts()
         try:
-            name = yield from self._access.in_worker(support_file, self._reports.folder, directory, facts)
+            return row.reply(file=(yield from self._reports.support_file(directory)))
         except EmulatorError as error:
             return row.reply("failed", reason=error)
-        return row.reply(file=name)
 
     def _save_log(self, row: DashboardCommand, *_: str) -> Steps[str]:
-        facts = self._facts()
         try:
-            path = yield from self._access.in_worker(save_log, self._reports.folder, facts)
+            path = yield from self._reports.save_log()
         except EmulatorError as error:
             self._access.note(f"saveLog failed: {error}")
             return row.reply("failed")
         self._access.note(f"Log saved to {path}")
         return row.reply()
-
-    def _facts(self) -> BoxFacts:
-        access, player = self._access, self._player
-        return BoxFacts(
-            serial_number=access.identity.serial_number,
-            versions=self._versions,
-            timestamp=access.snapshot.timestamp,
-            state=access.snapshot.as_dict(),
-            log="".join(f"{entry}\n" for entry in access.log.entries),
-            programs={
-                "program": _path_of(player.loaded),
-                "installation": _path_of(player.installation),
-            },
-            script=player.script,
-            interpreter=access.controller.state.interpreter.log.files,
-        )
 
 
 def _path_of(thing: object) -> str:

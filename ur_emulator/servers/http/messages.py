@@ -11,6 +11,8 @@ from typing import Any, NoReturn
 
 import h11
 
+from ur_emulator.budgets import BUDGETS
+
 MAX_HEADER = 16 * 1024
 JSON = "application/json"
 # A name or an address, and a port; nothing else that a URL may have there.
@@ -69,6 +71,8 @@ class HttpRequest:
             raise HttpError(400, f"content type {ascii(content_type)[:60]} given: the body must be {JSON}")
         if not self.body:
             return {}
+        if len(self.body) > BUDGETS.body_bytes:
+            raise too_long(BUDGETS.body_bytes)
         try:
             arguments = json.loads(self.body, parse_constant=_refuse)
         except (ValueError, RecursionError) as error:
@@ -83,7 +87,10 @@ class HttpRequest:
         Raises:
             HttpError: there is none.
         """
-        text = self.json_object().get(key)
+        try:
+            text = self.json_object().get(key)
+        except HttpError as error:
+            raise HttpError(422, str(error)) from None
         if not isinstance(text, str):
             raise HttpError(422, f'the body needs a text {key!r}: {{"{key}": "..."}}')
         return text
@@ -106,13 +113,20 @@ class HttpAnswer:
 
     Attributes:
         status: code.
-        result: sent as JSON; bytes are sent as they are.
+        result: sent as JSON; bytes are sent as they are, and nothing with status 204.
         headers: beside the usual ones.
+        content_type: of bytes.
     """
 
     status: int
     result: Any
     headers: tuple[tuple[str, str], ...] = ()
+    content_type: str = "application/octet-stream"
+
+
+def too_long(limit: int) -> HttpError:
+    """Return the error about a body with more bytes than `limit`."""
+    return HttpError(413, f"the body is longer than {limit} bytes")
 
 
 def check_head(request: h11.Request) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, fields, is_dataclass
+from http import HTTPStatus
 from typing import Any, Protocol
 
 import h11
@@ -25,6 +26,7 @@ from ur_emulator.servers.http.messages import (
     HttpError,
     HttpRequest,
     check_head,
+    too_long,
 )
 from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps
@@ -52,11 +54,13 @@ class HttpPort:
     Args:
         access: to the box.
         answers: to requests.
+        most_bytes: of a body.
     """
 
-    def __init__(self, access: BoxAccess, answers: Answers) -> None:
+    def __init__(self, access: BoxAccess, answers: Answers, most_bytes: int = BUDGETS.body_bytes) -> None:
         self._access = access
         self._answers = answers
+        self._most_bytes = most_bytes
         # The one that has been silent longest first.
         self._sessions: dict[Connection, _HttpSession] = {}
 
@@ -66,7 +70,7 @@ class HttpPort:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
         self._sessions[connection] = _HttpSession(
-            connection, self._access, self._answers, self._is_not_silent
+            connection, self._access, self._answers, self._most_bytes, self._is_not_silent
         )
         connection.allow_half_close(self.ended)
 
@@ -99,10 +103,12 @@ class _HttpSession(Session):
         connection: Connection,
         access: BoxAccess,
         answers: Answers,
+        most_bytes: int,
         on_request: Callable[[Connection], None],
     ) -> None:
         super().__init__(connection, access)
         self._answers = answers
+        self._most_bytes = most_bytes
         self._on_request = on_request
         self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
         self._request: h11.Request | None = None
@@ -143,8 +149,8 @@ class _HttpSession(Session):
                 self._send(h11.InformationalResponse(status_code=100, headers=[]))
         elif isinstance(event, h11.Data):
             self._body += event.data
-            if len(self._body) > BUDGETS.body_bytes:
-                raise HttpError(413, f"the body is longer than {BUDGETS.body_bytes} bytes")
+            if len(self._body) > self._most_bytes:
+                raise too_long(self._most_bytes)
         else:
             if event is not h11.NEED_DATA:
                 self.connection.close_when_sent()
@@ -180,20 +186,16 @@ class _HttpSession(Session):
         self.connection.close_when_sent()
 
     def _respond(self, answer: HttpAnswer) -> None:
-        content_type, body = JSON, answer.result
-        if isinstance(body, bytes):
-            content_type = "application/octet-stream"
-        else:
-            body = json.dumps(body, default=_as_json).encode() + b"\n"
-        headers = [
-            ("Content-Type", content_type),
-            ("Content-Length", str(len(body))),
-            ("Cache-Control", "no-store"),
-            ("X-Content-Type-Options", "nosniff"),
-            *answer.headers,
-        ]
+        content_type, body = answer.content_type, answer.result
+        headers = [("Cache-Control", "no-store"), ("X-Content-Type-Options", "nosniff"), *answer.headers]
+        has_body = answer.status != HTTPStatus.NO_CONTENT
+        if has_body:
+            if not isinstance(body, bytes):
+                content_type = JSON
+                body = json.dumps(body, default=_as_json, separators=(",", ":")).encode() + b"\n"
+            headers += [("Content-Type", content_type), ("Content-Length", str(len(body)))]
         events: list[h11.Event] = [h11.Response(status_code=answer.status, headers=headers)]
-        if self._request is None or self._request.method != b"HEAD":
+        if has_body and (self._request is None or self._request.method != b"HEAD"):
             events.append(h11.Data(data=body))
         self._send(*events, h11.EndOfMessage())
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from http import HTTPStatus
 from typing import Any
 
+from protocol.primary.messages import RequestedType
 from protocol.robot_api import (
     BASE,
     ROBOT_MODE_NAMES,
     SAFETY_MODE_NAMES,
-    ApiCall,
     api_version,
     match_call,
 )
@@ -26,12 +28,16 @@ from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
+from ur_emulator.servers.reports.report_files import clock_time
+from ur_emulator.servers.reports.report_writer import ReportWriter
+from ur_emulator.servers.robot_api.description import openapi, page
 from ur_emulator.servers.robot_api.program_calls import ProgramCalls
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
 
-_DONE = HttpAnswer(200, {"message": "done"})
-_LOCAL = "the robot is in local control: switch to remote control first"
+# Source: the maker's API document as the client library's tests quote it.
+_LOCAL = "Not authorized to perform this operation under the current robot control mode."
+_NOT_CLOSED = {"closed": False, "message": "there is no such popup"}
 # Modes from which an action starts, and the effect; in the modes behind it has happened already.
 _POWER: dict[str, tuple[frozenset[RobotMode], frozenset[RobotMode], type[Command]]] = {
     "POWER_ON": (
@@ -49,20 +55,32 @@ class RobotApiAnswers:
     Args:
         access: to the box.
         player: holds the loaded program.
+        reports: writes flight reports.
         shut_down: closes the box.
         own_host: address that the port is bound to.
     """
 
     def __init__(
-        self, access: BoxAccess, player: ProgramPlayer, shut_down: Callable[[], None], own_host: str
+        self,
+        access: BoxAccess,
+        player: ProgramPlayer,
+        reports: ReportWriter,
+        shut_down: Callable[[], None],
+        own_host: str,
     ) -> None:
         self._access = access
         programs = ProgramCalls(access, player)
+        self._reports = reports
         self._shut_down = shut_down
         self._own_host = own_host
         self._calls = access.identity.software.robot_api
+        version = api_version(access.identity.software.version)
         self._methods: dict[str, Callable[[HttpRequest, str], Steps[HttpAnswer]]] = {
-            "GET /openapi.json": lambda *_: _at_once(self._describe()),
+            "GET /openapi.json": lambda *_: _at_once(openapi(self._calls, version)),
+            "GET /docs": lambda *_: _at_once(page(self._calls, version), "text/html; charset=utf-8"),
+            "GET /system/v1/system-time": lambda *_: _at_once(
+                {"time": clock_time(access.snapshot.timestamp).isoformat()}
+            ),
             "PUT /robotstate/v1/state": self._change_robot_state,
             "GET /robotstate/v1/robotmode": lambda *_: _at_once(
                 {"mode": ROBOT_MODE_NAMES[RobotMode(access.snapshot.robot_mode)], "message": ""}
@@ -86,43 +104,47 @@ class RobotApiAnswers:
             "PUT /programs/v1": lambda request, _: programs.store(request, is_new=False),
             "GET /programs/v1/{name}": lambda _, name: programs.send(name),
             "POST /popup/v1": self._show_popup,
-            "DELETE /popup/v1": lambda *_: self._applied(ClosePopup()),
-            "DELETE /popup/v1/safety": lambda *_: _at_once({"message": "done"}),
+            "DELETE /popup/v1": self._close_popups,
+            "DELETE /popup/v1/safety": lambda *_: _at_once(_NOT_CLOSED, status=409),
             "GET /versions/v1": lambda *_: _at_once(
                 {"marketingVersion": str(access.identity.software.version), "baselineVersion": ""}
             ),
             "GET /system/v1/information": lambda *_: _at_once(
-                {"robotType": access.identity.model, "serialNumber": access.identity.serial_number}
+                {"robotType": access.identity.wire_model, "serialNumber": access.identity.serial_number}
             ),
             "PUT /system/v1/shutdown": self._shutdown,
             "POST /system/v1/log": self._add_to_log,
+            "POST /supportfiles/v1": self._flight_report,
+            "GET /supportfiles/v1": self._support_files,
         }
 
     def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
-        """Answer a request; one that changes something is refused in local control."""
+        """Answer a request; local control forbids some."""
+        try:
+            return (yield from self._answer(request))
+        except HttpError as error:
+            return HttpAnswer(error.status, _error_body(error.status, str(error)), error.headers)
+
+    def _answer(self, request: HttpRequest) -> Steps[HttpAnswer]:
         check_origin(request.headers, self._own_host)
         call, argument = match_call(request.method, request.path, self._calls)
         if call is None:
             if argument:
                 raise HttpError(405, f"{request.path} is asked with {argument}", ("Allow", argument))
             raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {BASE}/openapi.json")
-        if call.changes and not self._access.controller.state.operator.remote_period:
+        if call.needs_remote and not self._access.controller.state.operator.remote_period:
             raise HttpError(403, _LOCAL)
         try:
-            return (yield from self._methods[f"{call.method} {call.path}"](request, argument))
+            answer = yield from self._methods[f"{call.method} {call.path}"](request, argument)
         except (MissingFileRefusal, FileMissingError) as error:
             raise HttpError(404, str(error)) from None
         except RefusedError as error:
             raise HttpError(409, str(error)) from None
         except EmulatorError as error:
             raise HttpError(422, str(error)) from None
-
-    def _describe(self) -> dict[str, Any]:
-        paths: dict[str, dict[str, Any]] = {}
-        for call in self._calls:
-            paths.setdefault(call.path, {})[call.method.lower()] = _described(call)
-        info = {"title": "Robot API", "version": api_version(self._access.identity.software.version)}
-        return {"openapi": "3.0.3", "info": info, "servers": [{"url": BASE}], "paths": paths}
+        if call.message:
+            answer = replace(answer, result={"message": call.message} | answer.result)
+        return answer
 
     # --- robot
 
@@ -130,7 +152,7 @@ class RobotApiAnswers:
         actions: dict[str, Callable[[], Steps[HttpAnswer]]] = {
             **{action: partial(self._power, action) for action in _POWER},
             "POWER_OFF": lambda: self._applied(PowerOff()),
-            "UNLOCK_PROTECTIVE_STOP": self._unlock,
+            "UNLOCK_PROTECTIVE_STOP": lambda: self._applied(UnlockProtectiveStop()),
             "RESTART_SAFETY": lambda: self._applied(RestartSafety()),
         }
         action = request.word("action", actions)
@@ -144,21 +166,13 @@ class RobotApiAnswers:
         if not ROW[safety.mode].may_have_power:
             raise RefusedError(f"{action} given: the safety mode is {safety.mode.name}")
         if mode in done:
-            return _DONE
+            return HttpAnswer(200, {})
         if mode not in start:
             raise RefusedError(f"{action} given: the robot is in {mode.name}")
         yield from self._access.apply(command())
         while self._access.controller.state.mode.is_changing:
             yield
-        return _DONE
-
-    def _unlock(self) -> Steps[HttpAnswer]:
-        safety = self._access.controller.state.safety
-        if safety.mode is SafetyMode.PROTECTIVE_STOP and not safety.may_unlock(
-            self._access.snapshot.timestamp
-        ):
-            raise RefusedError("a protective stop can be unlocked 5 s after it came")
-        return (yield from self._applied(UnlockProtectiveStop()))
+        return HttpAnswer(200, {})
 
     def _operational_mode(self) -> str:
         mode = self._access.controller.state.operational.mode
@@ -167,33 +181,45 @@ class RobotApiAnswers:
     def _shutdown(self, *_: object) -> Steps[HttpAnswer]:
         yield from self._access.apply(PowerOff())
         self._shut_down()
-        return _DONE
+        return HttpAnswer(202, {"message": None})
 
-    # --- popups and log
+    # --- popups, log, reports
 
     def _show_popup(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
         return (yield from self._applied(ShowPopup(request.text("message"))))
 
+    def _close_popups(self, *_: object) -> Steps[HttpAnswer]:
+        operator = self._access.controller.state.operator
+        if not operator.shown and not any(popup.kind is RequestedType.NONE for popup in operator.requests):
+            return HttpAnswer(409, _NOT_CLOSED)
+        yield from self._access.apply(ClosePopup())
+        return HttpAnswer(200, {"closed": True})
+
     def _add_to_log(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
         self._access.announce(LogAdded("Robot API", request.text("message")))
-        return (yield from _at_once({"message": "done"}))
+        return (yield from _at_once({}))
+
+    def _flight_report(self, *_: object) -> Steps[HttpAnswer]:
+        yield from self._reports.flight_report()
+        return HttpAnswer(200, {"details": None})
+
+    def _support_files(self, *_: object) -> Steps[HttpAnswer]:
+        archive = yield from self._reports.archive()
+        return HttpAnswer(200 if archive else 204, archive, content_type="application/zip")
 
     def _applied(self, command: Command) -> Steps[HttpAnswer]:
         yield from self._access.apply(command)
-        return _DONE
+        return HttpAnswer(200, {})
 
 
-def _at_once(result: object) -> Steps[HttpAnswer]:
+def _at_once(result: object, content_type: str = "", status: int = 200) -> Steps[HttpAnswer]:
     """Answer without a wait."""
-    return HttpAnswer(200, result)
+    return HttpAnswer(status, result, content_type=content_type)
     yield
 
 
-def _described(call: ApiCall) -> dict[str, Any]:
-    name = call.path.partition("{")[2].rstrip("}")
-    parameter = {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
-    return {
-        "summary": call.does,
-        **({"parameters": [parameter]} if name else {}),
-        "responses": {"200": {"description": "done"}},
-    }
+def _error_body(status: int, text: str) -> dict[str, Any]:
+    """Return the body of an error; 422 has the form of the web library that the maker uses."""
+    if status == HTTPStatus.UNPROCESSABLE_ENTITY:
+        return {"detail": [{"loc": ["body"], "msg": text, "type": "value_error"}]}
+    return {"message": HTTPStatus(status).phrase, "details": text}

@@ -9,8 +9,8 @@ from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest
 from ur_emulator.servers.programs.player import ProgramPlayer
 from ur_emulator.servers.robot_api.program_files import (
+    Outcome,
     find_program,
-    form_file,
     list_programs,
     read_program,
     write_program,
@@ -56,7 +56,7 @@ class ProgramCalls:
             "stop": player.stop,
         }
         yield from actions[request.word("action", actions)]()
-        return HttpAnswer(200, {"state": self.state(), "message": "", "details": ""})
+        return HttpAnswer(200, {"state": self.state(), "details": ""})
 
     def _resume(self) -> Steps[None]:
         if not self._player.is_paused:
@@ -68,30 +68,14 @@ class ProgramCalls:
         name = request.text(key)
         file = find_program(self._player.folder, name)
         yield from self._player.load(file.wire_path)
-        return HttpAnswer(200, {"name": name, "message": ""})
+        return HttpAnswer(200, {"name": name})
 
     # --- files
 
     def list_all(self) -> Steps[HttpAnswer]:
         """Name all programs."""
-        names = yield from self._access.in_worker(list_programs, self._player.folder)
-        loaded, state = self.loaded_name(), self.state()
-        return HttpAnswer(
-            200,
-            {
-                "programs": [
-                    {
-                        "name": name,
-                        "description": None,
-                        "createdDate": None,
-                        "lastModifiedDate": None,
-                        "lastSavedDate": None,
-                        "programState": state if name == loaded else None,
-                    }
-                    for name in names
-                ]
-            },
-        )
+        programs = yield from self._access.in_worker(list_programs, self._player.folder)
+        return HttpAnswer(200, {"programs": programs, "message": ""})
 
     def send(self, name: str) -> Steps[HttpAnswer]:
         """Send the file of a program."""
@@ -100,15 +84,20 @@ class ProgramCalls:
 
     def store(self, request: HttpRequest, *, is_new: bool) -> Steps[HttpAnswer]:
         """Take the file of a program, a new one or one that exists."""
-        form = form_file(request.headers.get("content-type", ""), request.body)
-        if form is None:
-            raise HttpError(422, "the body has no form field 'file': send multipart/form-data")
-        file_name, data = form
-        if file_name.rpartition(".")[0] == self.loaded_name() and self._player.is_running:
-            raise RefusedError(f"{file_name} is loaded and plays: stop it first")
-        name = yield from self._access.in_worker(write_program, self._player.folder, file_name, data, is_new)
-        if name is None and is_new:
-            raise HttpError(400, f"there is a program {file_name!r} already: PUT replaces it")
-        if name is None:
-            raise HttpError(404, f"there is no program {file_name!r} yet: POST makes it")
+        in_use = self.loaded_name() if self._player.is_running else ""
+        name, outcome = yield from self._access.in_worker(
+            write_program,
+            self._player.folder,
+            request.headers.get("content-type", ""),
+            request.body,
+            is_new,
+            in_use,
+        )
+        match outcome:
+            case Outcome.EXISTS:
+                raise HttpError(400, f"there is a program {name!r} already: PUT replaces it")
+            case Outcome.MISSING:
+                raise HttpError(404, f"there is no program {name!r} yet: POST makes it")
+            case Outcome.IN_USE:
+                raise RefusedError(f"{name} is loaded and plays: stop it first")
         return HttpAnswer(200, {"programName": name})

@@ -1,17 +1,34 @@
-"""Programs of a PolyScope X box: files of the programs folder, named without their extension."""
+"""Programs of a PolyScope X box: files of the programs folder, named without their extension.
+
+All functions but `find_program` may take a while: they run in the worker process.
+"""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from email.parser import BytesParser
 from email.policy import HTTP
+from enum import Enum, auto
 from pathlib import PurePosixPath
 
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.programs.loading import PROGRAM_SUFFIX, SCRIPT_SUFFIX
+from ur_emulator.programs.reading import ProgramReader
+from ur_emulator.programs.urpx_program import URPX_SUFFIX, Information, information_of, read_urpx
 
-# The box runs those of the first two kinds. How a file of PolyScope X is made is not known: it is kept.
-KINDS = (".urp", ".script", ".urpx")
-MAX_FILE = 4 * 1024 * 1024
+
+class Outcome(Enum):
+    """What came of a program that a client has sent."""
+
+    WRITTEN = auto()
+    EXISTS = auto()
+    MISSING = auto()
+    IN_USE = auto()
+
+
+KINDS = (URPX_SUFFIX, PROGRAM_SUFFIX, SCRIPT_SUFFIX)
 
 
 def find_program(folder: ProgramFolder, name: str) -> FoundFile:
@@ -23,15 +40,24 @@ def find_program(folder: ProgramFolder, name: str) -> FoundFile:
     for kind in KINDS:
         if folder.has(name + kind):
             return folder.find(name + kind)
-    raise FileMissingError(f"there is no program {name!r}: its file would be {name}{KINDS[0]}, or {KINDS[1]}")
+    raise FileMissingError(f"there is no program {name!r}: its file would be {name} with {', '.join(KINDS)}")
 
 
-def list_programs(folder: ProgramFolder) -> list[str]:
-    """Return the names of all programs of the folder itself, in alphabetical order."""
+def list_programs(folder: ProgramFolder) -> list[Information]:
+    """Return what is known of all programs of the folder itself, in alphabetical order of their names."""
     if not folder.exists:
         return []
     files = (path for path, _ in folder.sizes())
-    return sorted({path.stem for path in files if len(path.parts) == 1 and path.suffix in KINDS})
+    names = sorted({path.stem for path in files if len(path.parts) == 1 and path.suffix in KINDS})
+    return [_information(folder, name) for name in names]
+
+
+def _information(folder: ProgramFolder, name: str) -> Information:
+    file = find_program(folder, name)
+    if file.inside.suffix == URPX_SUFFIX:
+        with suppress(ProgramFileError):
+            return ProgramReader(folder).urpx(file).information | {"name": name}
+    return information_of(name)
 
 
 def read_program(folder: ProgramFolder, name: str) -> bytes:
@@ -41,36 +67,59 @@ def read_program(folder: ProgramFolder, name: str) -> bytes:
         FileMissingError: there is none of that name.
         ProgramFileError: it cannot be read.
     """
-    return folder.read(find_program(folder, name), MAX_FILE)
+    return folder.read(find_program(folder, name), BUDGETS.program_bytes)
 
 
-def write_program(folder: ProgramFolder, file_name: str, data: bytes, is_new: bool) -> str | None:
+def write_program(
+    folder: ProgramFolder, content_type: str, body: bytes, is_new: bool, in_use: str
+) -> tuple[str, Outcome]:
     """Write the file of a program, a new one or one that exists.
 
+    A `.urpx` program says itself what it is called; clients send it under any file name. Programs of other
+    kinds have the name of their file.
+
+    Args:
+        folder: of all programs.
+        content_type: of the body.
+        body: of a form with the field `file`.
+        is_new: it must be one that does not exist, otherwise one that exists.
+        in_use: name of a program that must stay as it is.
+
     Returns:
-        Its name; None: there is one already, or none yet.
+        Its name, and what came of it.
 
     Raises:
         FileMissingError: the name leads out of the folder, or the box has none.
         ProgramFileError: it cannot be written, or is no program.
     """
+    file_name, data = _form_file(content_type, body)
+    if data.lstrip().startswith(b"{") or file_name.endswith(URPX_SUFFIX):
+        file_name = read_urpx(file_name, data).name + URPX_SUFFIX
     inside = folder.locate(PurePosixPath(file_name).name)
     if inside.suffix not in KINDS:
-        raise ProgramFileError(f"file name {file_name!r} given: a program ends in {', '.join(KINDS)}")
+        raise ProgramFileError(
+            f"file name {file_name!r} given: a program is JSON, as a .urpx, or its name ends in "
+            f"{PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
+        )
+    if inside.stem == in_use:
+        return inside.stem, Outcome.IN_USE
     if folder.has(str(inside)) is is_new:
-        return None
+        return inside.stem, Outcome.EXISTS if is_new else Outcome.MISSING
     folder.write(inside, data)
-    return inside.stem
+    return inside.stem, Outcome.WRITTEN
 
 
-def form_file(content_type: str, body: bytes) -> tuple[str, bytes] | None:
-    """Return name and content of the form field `file` of a multipart body; None if it has no such field."""
-    if not content_type.lower().startswith("multipart/form-data"):
-        return None
-    head = f"Content-Type: {content_type}\r\n\r\n".encode("latin-1", "replace")
-    form = BytesParser(policy=HTTP).parsebytes(head + body)
-    for part in form.iter_parts() if form.is_multipart() else ():
-        if part.get_param("name", header="content-disposition") == "file":
-            content = part.get_payload(decode=True)
-            return part.get_filename() or "", content if isinstance(content, bytes) else b""
-    return None
+def _form_file(content_type: str, body: bytes) -> tuple[str, bytes]:
+    """Return name and content of the form field `file` of a multipart body.
+
+    Raises:
+        ProgramFileError: it has no such field.
+    """
+    if content_type.lower().startswith("multipart/form-data"):
+        head = f"Content-Type: {content_type}\r\n\r\n".encode("latin-1", "replace")
+        form = BytesParser(policy=HTTP).parsebytes(head + body)
+        for part in form.iter_parts() if form.is_multipart() else ():
+            if part.get_param("name", header="content-disposition") == "file":
+                content = part.get_payload(decode=True)
+                return part.get_filename() or "", content if isinstance(content, bytes) else b""
+    raise ProgramFileError("the body has no form field 'file': send multipart/form-data")

@@ -18,7 +18,7 @@ from typing import Any
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
-from ur_emulator.servers.dashboard.temporary_folder import TemporaryFolder, remove_left_folders
+from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove_left_folders
 
 REPORT_KINDS = ("controller", "software", "system")
 LOG_NAME = "log_history.txt"
@@ -58,7 +58,12 @@ class BoxFacts:
     @property
     def time(self) -> datetime:
         """Date and time of the controller, to the second."""
-        return CLOCK_EPOCH + timedelta(seconds=int(self.timestamp))
+        return clock_time(self.timestamp)
+
+
+def clock_time(timestamp: float) -> datetime:
+    """Return date and time of the controller, to the second, from the time of a cycle [s]."""
+    return CLOCK_EPOCH + timedelta(seconds=int(timestamp))
 
 
 class ReportFolder:
@@ -140,9 +145,7 @@ def support_file(folder: ProgramFolder, directory: str, facts: BoxFacts) -> str:
     except FileMissingError:
         raise ProgramFileError(f"Directory not found: {directory}") from None
     flight_report(folder, "", facts)
-    reports = _flight_reports(folder, folder.make_folder(REPORT_FOLDER)).values()
-    contents = {f"{REPORT_FOLDER}/{file.name}": folder.read(file, BUDGETS.report_bytes) for file in reports}
-    contents |= _contents(facts)
+    contents = _all_flight_reports(folder) | _contents(facts)
     for later in range(_MAX_SAME_SECOND):  # no file takes the place of another
         stamp = f"{facts.time + timedelta(seconds=later):%Y-%m-%d_%H-%M-%S}"
         inside = place / f"ur_{facts.serial_number}_{stamp}.zip"
@@ -150,6 +153,22 @@ def support_file(folder: ProgramFolder, directory: str, facts: BoxFacts) -> str:
             break
     _write_report(folder, inside, _zip(contents, facts.time))
     return inside.name
+
+
+def flight_report_archive(folder: ProgramFolder, facts: BoxFacts) -> bytes:
+    """Return an archive of all flight reports, b"" without one.
+
+    Raises:
+        ProgramFileError: one cannot be read.
+    """
+    reports = _all_flight_reports(folder)
+    return _zip(reports, facts.time) if reports else b""
+
+
+def _all_flight_reports(folder: ProgramFolder) -> dict[str, bytes]:
+    """Return the contents of all flight reports by their names in an archive."""
+    reports = _flight_reports(folder, folder.make_folder(REPORT_FOLDER)).values()
+    return {f"{REPORT_FOLDER}/{file.name}": folder.read(file, BUDGETS.report_bytes) for file in reports}
 
 
 def _flight_reports(folder: ProgramFolder, place: PurePosixPath) -> dict[int, FoundFile]:
