@@ -17,10 +17,12 @@ unexport PYTHONDONTWRITEBYTECODE
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
+# pip would compile with one core.
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -qq --upgrade pip
-	$(BIN)/python -m pip install -qq --editable '.[dev]'
+	$(BIN)/python -m pip install -qq --no-compile --editable '.[dev]'
+	-$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib
 	@touch $@
 
 setup: $(STAMP) ## install everything that the other targets use
@@ -34,7 +36,7 @@ ablation: $(STAMP) ## what each piece of the controller brings, into out/ablatio
 draw: $(STAMP) ## drawings of people on the emulated arm: extracted, executed, compared, into out/draw
 	$(BIN)/python examples/draw.py
 
-test: $(STAMP) ## all tests, in as many processes as there are cores, at most four
+test: $(STAMP) ## all tests, in one process more than there are cores, at most four
 	$(PYTEST)
 
 explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
