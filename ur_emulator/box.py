@@ -147,7 +147,7 @@ class Box(BoxOperations):
             self._loop.expect_soon,
             self._fail,
         )
-        self._intake = ProgramIntake(self._loop.tasks, software.catalogue, self._box)
+        self._intake = ProgramIntake(self._loop.tasks, software.catalogue, self._box, controller.period_s)
         identity = BoxIdentity(software, model.title, RobotType(model.robot_type).name, self.serial_number)
         self._access = BoxAccess(identity, self._box, self._loop, self._network)
         folder = ProgramFolder(None if programs is None else Path(programs))

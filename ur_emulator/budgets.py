@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
 CYCLE: Final = 0.008
-"""Control cycle that the work of programs is limited for [s]: a shorter cycle gets its part of the budget."""
+"""Time that the budgets of cycles are written for [s]: a control cycle has its part, see `of_cycle`."""
 KIB: Final = 1 << 10
 MIB: Final = 1 << 20
 
@@ -36,8 +36,18 @@ class BudgetRow:
     beyond: str
 
 
+def of_cycle(limit: int, period_s: float) -> int:
+    """Return the part of a budget for 8 ms that a control cycle of so many seconds has; at least 1."""
+    return max(1, round(limit * period_s / CYCLE))
+
+
 def _budget(limit: float, unit: str, scope: str, beyond: str) -> Any:
     return field(default=limit, metadata={"unit": unit, "scope": scope, "beyond": beyond})
+
+
+def _cycle_budget(limit: float, unit: str, scope: str, beyond: str) -> Any:
+    """A limit for 8 ms; those who keep it ask `of_cycle`."""
+    return _budget(limit, unit, f"{scope}, 8 ms", beyond)
 
 
 _REFUSED: Final = "it is closed at once"
@@ -63,7 +73,7 @@ class Budgets:
     read_bytes: int = _budget(512, "bytes", "a turn of a client", "the rest is read in its next turn")
     # A unit is about 4 us: a turn takes a quarter of a millisecond, and never less than a whole request.
     client_work: int = _budget(64, "units of work", "a turn of a client", "the rest waits for its next turn")
-    commands: int = _budget(256, "commands", "a cycle of a box", "RTDE clients wait for the next cycle")
+    commands: int = _cycle_budget(256, "commands", "a box", "RTDE clients wait for the next cycle")
 
     # --- control API ---
 
@@ -90,8 +100,8 @@ class Budgets:
         "the longest aside, the newest of who has left most is dropped",
     )
     # More than any client sends; each costs the cycle up to 0.5 ms.
-    programs_per_cycle: int = _budget(4, "programs", "started or refused in a cycle", "the others wait")
-    script_warnings_per_cycle: int = _budget(4, "warnings", "about scripts in a cycle", "no further ones")
+    programs_per_cycle: int = _cycle_budget(4, "programs", "started or refused", "the others wait")
+    script_warnings_per_cycle: int = _cycle_budget(4, "warnings", "about scripts", "no further ones")
     # A program with this much starts within 10 ms; 10,000 poses have room, or 3,300 waypoints of a .urp.
     program_functions: int = _budget(3_000, "functions", "a program", "it is refused")
     program_values: int = _budget(10_000, "global variables and poses", "a program", "it is refused")
@@ -101,19 +111,21 @@ class Budgets:
 
     # Units of `urscript.run.metering`, 50 ns: 2 ms of a cycle of 8 ms, 4 ms on a machine half as fast.
     # What is saved is for the thousands of assignments with which programs begin.
-    program_units: int = _budget(
-        30_000, "units", "the program of a box, 8 ms", "the program goes on in the next cycle"
+    program_units: int = _cycle_budget(
+        30_000, "units", "the program of a box", "the program goes on in the next cycle"
     )
-    program_units_saved: int = _budget(
-        120_000, "units", "8 ms after a rest", "the program goes on in the next cycle"
+    program_units_saved: int = _cycle_budget(
+        120_000, "units", "the program of a box after a rest", "the program goes on in the next cycle"
     )
     secondary_programs: int = _budget(
         32, "secondary programs", "a box, not ended yet", "the newest is not started"
     )
-    secondary_units: int = _budget(
-        10_000, "units", "all secondary programs of a box, 8 ms", "they go on in the next cycle"
+    secondary_units: int = _cycle_budget(
+        10_000, "units", "all secondary programs of a box", "they go on in the next cycle"
     )
-    secondary_units_saved: int = _budget(30_000, "units", "8 ms after a rest", "they go on in the next cycle")
+    secondary_units_saved: int = _cycle_budget(
+        30_000, "units", "all secondary programs of a box after a rest", "they go on in the next cycle"
+    )
 
     # --- variables and labels of running programs, as port 30001 reports them ---
 
@@ -160,16 +172,13 @@ class Budgets:
     all_unsent_bytes: int = _budget(
         4 * MIB, "bytes", "all sockets of the scripts of a box", "a send returns False"
     )
-    # They take 2 ms of a cycle of 8.
-    received_bytes: int = _budget(
-        512 * KIB, "bytes in 8 ms", "all sockets of the scripts of a box", "the rest is read later"
+    # They take 2 ms. This one is counted in real time, whatever the control cycle is.
+    received_bytes: int = _cycle_budget(
+        512 * KIB, "bytes", "all sockets of the scripts of a box", "the rest is read later"
     )
     # A read of a line looks at each byte once; a script that asks for more ends waits for the next cycle.
-    search_bytes: int = _budget(
-        128 * KIB,
-        "bytes searched",
-        "a cycle of a program",
-        "the read goes on in the next cycle",
+    search_bytes: int = _cycle_budget(
+        128 * KIB, "bytes searched", "a program", "the read goes on in the next cycle"
     )
     remote_connections: int = _budget(
         16, "connections", "the remote procedure handles of a box", "the one that was idle longest is closed"
@@ -181,11 +190,9 @@ class Budgets:
         30.0, "s from its first byte", "an answer of a remote procedure", "the call fails"
     )
     # 5,000 numbers take 10 ms, in pieces.
-    remote_values: int = _budget(
-        5_000,
-        "values",
-        "a call or an answer of a remote procedure, all calls of a cycle",
-        "it fails or waits",
+    remote_values: int = _budget(5_000, "values", "a call or an answer of a remote procedure", "it fails")
+    remote_values_sent: int = _cycle_budget(
+        5_000, "values", "all calls of remote procedures of a program", "the call waits"
     )
     external_control_time: float = _budget(
         30.0, "s", "a PC that sends a program", "a program is played that shows what is wrong"

@@ -42,7 +42,7 @@ with socket.create_connection(("127.0.0.1", 30002)) as robot:
 * Programs begin in the order of arrival. If one client sends many at once, the programs of other
   clients go first. A program waits at most a second for the compilation of a long program of
   another client; the long one does not begin any more if a newer one has begun. At most
-  {BUDGETS.programs_per_cycle} programs begin in a control cycle, the others wait. The number of
+  {BUDGETS.programs_per_cycle} programs begin in 8 ms, the others wait. The number of
   waiting programs and the time of a compilation are limited ([SECURITY.md](../../SECURITY.md));
   programs beyond a limit are refused with a warning.
 * A program that arrives while the robot is not RUNNING, or is stopped for safety, is not run; a

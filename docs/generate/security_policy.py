@@ -111,6 +111,8 @@ def render() -> str:
             _PROMISES,
             "## Limits of a box",
             "",
+            "A control cycle has its part of a limit for 8 ms, at least 1: a quarter on an e-Series.",
+            "",
             *table(("limit", "of", "beyond it", "name"), _budgets()),
             "",
             "## Files that the client reads",

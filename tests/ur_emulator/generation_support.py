@@ -48,6 +48,7 @@ SECOND = RobotGeneration(
         control_rate=9.0,
         most_averaging=0.2,
     ),
+    execution_time=1.5,
     gravity=9.82,
     reports_control_as_target=True,
     has_operational_modes=True,

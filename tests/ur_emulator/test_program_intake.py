@@ -11,6 +11,8 @@ from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import PauseProgram, SetSpeedSlider, StartProgram, StopProgram
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.errors import WorkerError
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.servers.programs import intake as module
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.sender import Sender
@@ -73,7 +75,7 @@ def box():
 
 @pytest.fixture
 def intake(tasks, box):
-    return ProgramIntake(tasks, None, box)
+    return ProgramIntake(tasks, None, box, CB3.period_s)
 
 
 @pytest.fixture
@@ -234,6 +236,15 @@ def test_only_so_many_programs_start_in_a_cycle_and_the_others_wait(intake, task
         assert len(box.take()) <= 2
         intake.publish(None)
     assert intake._held == len(box.take()) == 0
+
+
+def test_a_shorter_cycle_starts_fewer_programs(tasks, box, one):
+    intake = ProgramIntake(tasks, None, box, E_SERIES.period_s)
+    intake.received(one, b"a()\n" * 3)
+    for _ in range(3):
+        tasks.finish()
+        assert len(box.take()) == 1
+        intake.publish(None)
 
 
 def test_a_million_mistakes_are_few_warnings(intake, box, one):

@@ -4,6 +4,8 @@ import pytest
 from box_support import Bench
 
 from ur_emulator.commands.programs import StopProgram
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.scripting.network import RemoteCallError
 
 
@@ -44,8 +46,8 @@ class FakeServer:
 class RpcBench(Bench):
     """A bench whose network knows servers."""
 
-    def __init__(self):
-        super().__init__()
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
         self.servers = []
         self.network.remote_server = self._remote_server
 
@@ -168,3 +170,21 @@ def test_arguments_that_cannot_be_sent(arguments, words):
     bench = RpcBench()
     bench.call(arguments)
     assert any(words in text for text in bench.texts)
+
+
+@pytest.mark.parametrize(("generation", "cycles"), [(CB3, 1), (E_SERIES, 4)])
+def test_so_many_values_are_sent_in_8_ms_and_a_longer_call_takes_the_room_of_the_next_cycles(
+    generation, cycles
+):
+    bench = RpcBench(generation=generation)
+    bench.start(
+        'def p():\n  thread t():\n    h.second([1])\n  end\n  h = rpc_factory("xmlrpc", "http://10.0.0.1/")\n'
+        "  x = [0" + ", 0" * 4_998 + "]\n  sync()\n  run t()\n  h.first(x)\nend\n"
+    )
+    bench.tick()
+    [server] = bench.servers
+    assert [call.method for call in server.calls] == ["first"]
+    bench.tick(cycles - 1)
+    assert len(server.calls) == 1
+    bench.tick()
+    assert [call.method for call in server.calls] == ["first", "second"]

@@ -5,9 +5,11 @@ from dataclasses import replace
 import pytest
 from box_support import Bench
 
-from ur_emulator.budgets import BUDGETS
+from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.events import ScriptFailed, TextPrinted
+from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.e_series import E_SERIES
 from urscript import ProgramStatus, RecordingHost, compile_program
 from urscript.dialect import STATEMENT_BUDGET
 from urscript.recording_host import FakeSocket
@@ -155,6 +157,50 @@ def test_messages_of_a_flood_are_bounded(call):
     bench.events.clear()
     bench.tick(20)
     assert 20 * 25 < len(bench.events) < 20 * 35
+
+
+@pytest.mark.parametrize(("generation", "units"), [(CB3, 30_000), (E_SERIES, 7_500)])
+def test_a_cycle_has_its_part_of_the_units_of_8_ms(generation, units):
+    bench = Bench(fidelity="ideal", generation=generation)
+    bench.start(forever("x = i", 50_000))
+    bench.tick(20)
+    used = []
+    for _ in range(20):
+        bench.tick()
+        used.append(bench.controller.programs.work)
+    assert sum(used) / len(used) == pytest.approx(units, rel=0.02)
+
+
+@pytest.mark.parametrize(("period", "part"), [(0.008, 256), (0.002, 64), (0.00001, 1)])
+def test_a_cycle_has_its_part_of_a_budget_and_at_least_one(period, part):
+    assert of_cycle(256, period) == part
+
+
+def test_on_an_e_series_a_cycle_takes_the_longer_the_more_programs_do():
+    def times(body):
+        bench = Bench(fidelity="ideal", robot="ur5e", generation=E_SERIES)
+        own = bench.now.actual_execution_time
+        bench.start(f"def p():\n  while True:\n{body}    sync()\n  end\nend\n")
+        bench.tick(5)
+        seen = []
+        for _ in range(5):
+            bench.tick()
+            seen.append(bench.now.actual_execution_time)
+        return own, seen
+
+    own, idle = times("")
+    _, busy = times(LOOP.format(n=1_000, body="x = i"))
+    assert own == E_SERIES.execution_time
+    assert own < min(idle) <= max(idle) < own + 0.01
+    assert min(busy) > own + 0.05
+    assert times(LOOP.format(n=1_000, body="x = i")) == (own, busy)
+
+
+def test_on_cb3_no_execution_time_is_reported():
+    bench = Bench(fidelity="ideal")
+    bench.start(forever("x = i", 100))
+    bench.tick(5)
+    assert bench.now.actual_execution_time == 0.0
 
 
 def test_secondary_programs_share_units_of_their_own_and_come_in_turn(monkeypatch):

@@ -20,6 +20,8 @@ ALIVE = (ValueOrigin.MEASURED, ValueOrigin.MODELLED)
 # Vectors are looked at element by element, but for these: the last of them is a radius; and a motor that does
 # little stays as warm as it is.
 ANY_ELEMENT = {"target_base_acceleration", "elbow_sphere", "joint_temperatures", "temperature_motor"}
+# Modelled on an e-Series only; the stories run with the control cycle of CB3.
+ZERO_ON_CB3 = {"actual_execution_time"}
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +38,9 @@ def check(name, origin, values):
     """Check one mark against all values that were sent."""
     columns = list(zip(*(value if isinstance(value, tuple) else (value,) for value in values), strict=True))
     changes = [len(set(column)) > 1 for column in columns]
-    if origin in ALIVE:
+    if name in ZERO_ON_CB3:
+        assert not any(map(any, columns)), name
+    elif origin in ALIVE:
         assert any(changes) if name in ANY_ELEMENT else all(changes), f"{name} is {origin.value}: {changes}"
     else:
         assert not any(changes), f"{name} is {origin.value}, but changes: {changes}"
@@ -99,5 +103,5 @@ def test_every_field_of_the_tables_has_a_mark():
 def test_what_is_constant_is_little():
     constants = {f.name for f in output_fields(V3_15).values() if f.origin is ValueOrigin.CONSTANT}
     assert constants == {
-        "actual_execution_time", "actual_main_voltage", "euromap67_24V_voltage", "euromap67_24V_current"
+        "actual_main_voltage", "euromap67_24V_voltage", "euromap67_24V_current"
     }  # fmt: skip

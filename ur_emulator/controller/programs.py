@@ -17,11 +17,13 @@ class Programs(Protocol):
         name: of the primary program, or of the last one.
         latest: the primary program or the last one, whose variables can still be read; None before the first.
         reports_line: a client reads the line that the program executes.
+        work: units that all programs have used in this cycle (`urscript.run.metering`).
     """
 
     name: str
     latest: RunningProgram | None
     reports_line: bool
+    work: float
 
     @property
     def is_running(self) -> bool:

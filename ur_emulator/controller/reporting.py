@@ -13,6 +13,8 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.plant.plant_state import PlantState
 
+# Run time of a unit of work [ms]. Source: urscript.catalogue.costs.
+_UNIT_TIME = 50e-6
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
@@ -43,7 +45,7 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
     )
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io, compliance = state.speed, state.tool, state.io, state.compliance
-    payload = tool.payload
+    payload, own_time = tool.payload, clock.generation.execution_time
     analog, euromap = io.analog, io.euromap
     return Snapshot(
         clock.tick,
@@ -81,6 +83,7 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
         gravity=tool.gravity,
         base_acceleration=tool.base_acceleration,
         energy_consumed=state.energy.consumed,
+        actual_execution_time=own_time + _UNIT_TIME * programs.work if own_time else 0.0,
         space=space,
         supply=arm.robot.generation.electrics,
     )

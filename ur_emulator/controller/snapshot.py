@@ -78,6 +78,7 @@ class _Fields(NamedTuple):
     gravity: Vector3
     base_acceleration: Vector3
     energy_consumed: float
+    actual_execution_time: float
     # --- computed when it is read
     space: ArmInSpace
     supply: Electrics
@@ -87,8 +88,6 @@ class Snapshot(_Fields):
     """State of the box at the end of a control cycle; SI units, base frame, vectors as tuples of floats."""
 
     __slots__ = ()
-
-    actual_execution_time = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return all fields and all columns of the realtime interface by name."""

@@ -63,6 +63,7 @@ CB3 = RobotGeneration(
         # and scaling 2 is still stable.
         control_rate=8.0,
     ),
+    execution_time=0.0,  # chosen: the unit is not known
     gravity=9.81,
     reports_control_as_target=False,
     has_operational_modes=False,

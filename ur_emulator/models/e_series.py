@@ -103,6 +103,7 @@ E_SERIES = RobotGeneration(
         filter_time=0.008,  # C: a third of a CB3's, whose noise is twenty times as great
         control_rate=24.0,  # C: the loop takes a third of the time of a CB3's, about 20 ms
     ),
+    execution_time=0.82,  # A: mean while a program runs; .59 to 1.04
     gravity=9.82,  # B: `target_moment` at rest
     reports_control_as_target=True,  # A
     has_operational_modes=True,

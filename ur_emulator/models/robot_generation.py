@@ -48,6 +48,8 @@ class RobotGeneration:
         limits: of the safety system.
         electrics: of the box and its arms.
         force_sensing: how its arms know the wrench at the flange.
+        execution_time: run time of a control cycle without programs, as the box reports it [ms]; 0: it is
+            always reported as 0.
         gravity: that the controller's model of the arm has [m/s²].
         reports_control_as_target: `joint_control_output` is `target_current`, not what the servos ask for.
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
@@ -78,6 +80,7 @@ class RobotGeneration:
     limits: SafetyLimits
     electrics: Electrics
     force_sensing: ForceSensing
+    execution_time: float
     gravity: float
     reports_control_as_target: bool
     has_operational_modes: bool

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import BoxLog
-from ur_emulator.budgets import BUDGETS
+from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.commands.safety import PressEmergencyStop, UnlockProtectiveStop
@@ -100,7 +100,7 @@ class ServedBox:
     @property
     def takes_commands(self) -> bool:
         """Whether the next cycle takes further commands; for clients that can wait."""
-        return len(self._commands) < BUDGETS.commands
+        return len(self._commands) < of_cycle(BUDGETS.commands, self.controller.generation.period_s)
 
     @property
     def remote_period(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from protocol.ur_types import ProgramState
-from ur_emulator.budgets import BUDGETS, CYCLE
+from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.events import (
     ProgramPaused,
     ProgramResumed,
@@ -36,6 +36,7 @@ class ProgramSlot:
         name: of the primary program, or of the last one.
         latest: the primary program or the last one, whose variables can still be read; None before the first.
         reports_line: a client reads the line that the program executes.
+        work: units that all programs have used in this cycle.
     """
 
     def __init__(self, state: ControllerState, network: Network) -> None:
@@ -43,11 +44,10 @@ class ProgramSlot:
         self._network = network
         self._primary: RunningProgram | None = None
         self._secondaries: deque[RunningProgram] = deque()
-        share = state.clock.period_s / CYCLE
-        self._work = WorkBudget(share * BUDGETS.program_units, share * BUDGETS.program_units_saved)
-        self._secondary_work = WorkBudget(
-            share * BUDGETS.secondary_units, share * BUDGETS.secondary_units_saved
-        )
+        limits = BUDGETS.program_units, BUDGETS.program_units_saved
+        self._work = WorkBudget(*(of_cycle(limit, state.clock.period_s) for limit in limits))
+        limits = BUDGETS.secondary_units, BUDGETS.secondary_units_saved
+        self._secondary_work = WorkBudget(*(of_cycle(limit, state.clock.period_s) for limit in limits))
         self._ran = False
         self._phase = ProgramState.PLAYING
         self._phase_since = 0
@@ -55,6 +55,7 @@ class ProgramSlot:
         self._is_unscheduled = False
         self.name = ""
         self.reports_line = False
+        self.work = 0.0
         self.latest: RunningProgram | None = None
 
     @property
@@ -177,6 +178,11 @@ class ProgramSlot:
         self._ran = self._primary is not None
         self._work.renew()
         self._secondary_work.renew()
+        granted = self._work.left + self._secondary_work.left
+        self._run()
+        self.work = granted - self._work.left - self._secondary_work.left
+
+    def _run(self) -> None:
         while self._secondaries and self._secondary_work.left > 0:
             program = self._secondaries[0]
             status = program.step()

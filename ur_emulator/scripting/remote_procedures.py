@@ -8,11 +8,12 @@ Source: URScript manual CB3 3.15, rpc_factory, and UR's XML-RPC article; e-Serie
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 from weakref import WeakSet
 
-from ur_emulator.budgets import BUDGETS
+from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.clock import Clock
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
 from urscript.dialect import LONGEST_STRING
@@ -43,8 +44,8 @@ class ProgramRemotes:
         self.has_structs = clock.generation.major > 3
         # Those whose handle the program still has, or that are connected.
         self._servers: WeakSet[RemoteServer] = WeakSet()
-        self._sent = 0
-        self._sent_in = -1
+        # Values sent, since which cycle, and the cycle that counts anew.
+        self._sent = self._since = self._renewed_at = 0
 
     def functions(self) -> Mapping[str, Callable[..., Any]]:
         """Return the builtins by URScript name."""
@@ -57,12 +58,17 @@ class ProgramRemotes:
         self._servers.clear()
 
     def may_send(self, n_values: int) -> bool:
-        """Count values that a call is about to send; False if the program has sent enough in this cycle."""
-        if self._sent_in != self._clock.tick:
-            self._sent_in, self._sent = self._clock.tick, 0
-        if self._sent + n_values > BUDGETS.remote_values:
+        """Count values that a call is about to send; False if the program has sent enough for now.
+
+        A call of more values than a cycle has room for is sent, and takes the room of the next cycles too.
+        """
+        room = of_cycle(BUDGETS.remote_values_sent, self._clock.period_s)
+        if self._clock.tick >= self._renewed_at:
+            self._sent, self._since = 0, self._clock.tick
+        if self._sent and self._sent + n_values > room:
             return False
         self._sent += n_values
+        self._renewed_at = self._since + max(1, math.ceil(self._sent / room))
         return True
 
     def _rpc_factory(self, thread: object, kind: str, url: str) -> RemoteHandle:

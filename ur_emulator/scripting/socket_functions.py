@@ -11,7 +11,7 @@ import struct
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
-from ur_emulator.budgets import BUDGETS
+from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.scripting.network import Network
@@ -163,7 +163,7 @@ class ProgramSockets:
         """Whether this program may look for the end of a text in this cycle."""
         if self._searched_in != self._clock.tick:
             self._searched_in, self._searched = self._clock.tick, 0
-        return self._searched < BUDGETS.search_bytes
+        return self._searched < of_cycle(BUDGETS.search_bytes, self._clock.period_s)
 
     def _find(self, search: TextSearch, reader: SocketReader) -> int:
         before = search.n_searched

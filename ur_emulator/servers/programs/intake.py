@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from protocol.primary.messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText
-from ur_emulator.budgets import BUDGETS, KIB
+from ur_emulator.budgets import BUDGETS, KIB, of_cycle
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
@@ -65,17 +65,19 @@ class Box(Protocol):
 class ProgramIntake:
     """Turns script text into commands for one box."""
 
-    def __init__(self, tasks: TaskQueue, catalogue: Catalogue, box: Box) -> None:
+    def __init__(self, tasks: TaskQueue, catalogue: Catalogue, box: Box, period_s: float) -> None:
         """Prepare.
 
         Args:
             tasks: where programs are compiled.
             catalogue: the builtins of the software.
             box: takes what comes of them.
+            period_s: control cycle [s].
         """
         self._tasks = tasks
         self._catalogue = catalogue
         self._box = box
+        self._period = period_s
         # Those with programs that have not begun.
         self._senders: dict[Sender, None] = {}
         self._ready: deque[Program] = deque()
@@ -180,14 +182,18 @@ class ProgramIntake:
 
     def _warn(self, text: str, code: int = 0) -> None:
         self._n_warnings += 1
-        if self._n_warnings <= BUDGETS.script_warnings_per_cycle:
+        if self._n_warnings <= of_cycle(BUDGETS.script_warnings_per_cycle, self._period):
             self._box.announce(ErrorReported(code, 0, ReportLevel.WARNING, text))
 
     # --- programs
 
+    @property
+    def _programs_per_cycle(self) -> int:
+        return of_cycle(BUDGETS.programs_per_cycle, self._period)
+
     def _begin(self, sender: Sender) -> None:
         """Have the next program of a client compiled, unless there are enough for this cycle."""
-        if sender.compiling is None and sender.waiting and len(self._ready) < BUDGETS.programs_per_cycle:
+        if sender.compiling is None and sender.waiting and len(self._ready) < self._programs_per_cycle:
             program = sender.compiling = sender.waiting.popleft()
             program.task = self._tasks.submit(
                 partial(self._compiled, program),
@@ -213,7 +219,7 @@ class ProgramIntake:
 
     def _hand_over(self) -> None:
         """Hand over what is compiled, as much as a cycle takes, and go on with compiling."""
-        while self._ready and self._n_programs < BUDGETS.programs_per_cycle:
+        while self._ready and self._n_programs < self._programs_per_cycle:
             self._n_programs += 1
             program = self._ready.popleft()
             self._start(program)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Final, Protocol
 from weakref import WeakSet
 
-from ur_emulator.budgets import BUDGETS, KIB
+from ur_emulator.budgets import BUDGETS, CYCLE, KIB
 from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
 
@@ -17,8 +17,6 @@ SHARE: Final = 4 * KIB
 _FREE_PART = 0.25
 # How often a full box looks whether its scripts have read [s].
 _LOOK_EVERY = 0.004
-# In such a time [s] all connections read no more than their budget.
-_WINDOW = 0.008
 
 
 class Buffered(Protocol):
@@ -65,7 +63,7 @@ class Buffers:
         """Count bytes that have come; if they are too many all connections stop reading for a while."""
         now = time.monotonic()
         if now >= self._window_end:
-            self._window_end, self._in_window = now + _WINDOW, 0
+            self._window_end, self._in_window = now + CYCLE, 0
         self._in_window += n_bytes
         self._received += n_bytes
         if self._received >= BUDGETS.all_inboxes_bytes:
