@@ -8,6 +8,8 @@ from integration_support import Messages, port_base_of, programs_since
 
 from pc_client.driver import robot_info
 
+pytestmark = pytest.mark.usefixtures("without_page")
+
 PLAN = (
     "UR3, software 3.15.8",
     "speed slider",

@@ -64,7 +64,7 @@ def test_local_control_and_manual_mode_are_refused_before_anything_moves(
 
 
 @pytest.fixture(scope="module", params=["ur3e", "ur5e"])
-def recordings(request, tmp_path_factory):
+def recordings(request, tmp_path_factory, without_page):
     """Two runs of one movement by the controller that learns."""
     from pc_client import cli
 

@@ -3,14 +3,11 @@
 import resource
 import threading
 from contextlib import contextmanager, nullcontext
-from functools import partial
-
 import pytest
 from integration_support import (
     Frames,
     Messages,
     at,
-    command,
     finish,
     free_port_base,
     programs_since,
@@ -40,19 +37,19 @@ def bystander(box):
     thread.join()
 
 
-def recorded(run, out, seed, *, watched=False):
+def recorded(ur_client, out, seed, *, watched=False):
     with (
         ControlBox(pace="lockstep", port_base=free_port_base(), seed=seed) as box,
         bystander(box) if watched else nullcontext(),
     ):
-        done = run("run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
+        done = ur_client("run", "uniform_4_1", *at(box), "--repeat", "1", "--out", out)
     assert done.code == 0, done.err
     return (out / "uniform_4_1_r1.mcap").read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("without_page")
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(ur_client, tmp_path):
-    first = recorded(partial(command, "pc_client"), tmp_path / "a", 7)
+    first = recorded(ur_client, tmp_path / "a", 7)
     assert recorded(ur_client, tmp_path / "b", 7, watched=True) == first
     other = load_recording_of(tmp_path / "c", recorded(ur_client, tmp_path / "c", 8))
     ours = load_recording_of(tmp_path / "a", first)

@@ -8,6 +8,8 @@ from integration_support import at
 
 from pc_client.movements import library_names
 
+pytestmark = [pytest.mark.usefixtures("without_page"), pytest.mark.timeout(360)]  # on a busy machine
+
 
 def table(ur_client, box, out, *options):
     done = ur_client("experiment", *at(box), "--out", out, *options)
