@@ -3,6 +3,7 @@
 import resource
 import threading
 from contextlib import contextmanager, nullcontext
+
 import pytest
 from integration_support import (
     Frames,
