@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from plant_support import HOME, SpeedRamp
 
 from protocol.ur_types import ControlMode
+from ur_emulator.models.e_series import E_SERIES
 from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
 from ur_emulator.models.ur3 import UR3
+from ur_emulator.models.ur5e import UR5E
 from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import Plant
 
@@ -61,10 +63,16 @@ def states(plant, cycles, *, ahead):
     return [*said, plant.q_true.tolist(), plant.qd_true.tolist(), plant.flange_position.tolist()]
 
 
-@given(CYCLES, st.sampled_from([TYPICAL, POOR, IDEAL]))
-@settings(max_examples=40)
-def test_running_ahead_changes_no_bit(cycles, fidelity):
-    plain, ahead = (states(Plant(UR3, fidelity, 3), cycles, ahead=on) for on in (False, True))
+ARMS = [
+    *((UR3, fidelity) for fidelity in (TYPICAL, POOR, IDEAL)),
+    *((UR5E, E_SERIES.fidelity(name)) for name in ("typical", "poor", "ideal")),
+]
+
+
+@given(CYCLES, st.sampled_from(ARMS))
+@settings(max_examples=60)
+def test_running_ahead_changes_no_bit(cycles, arm):
+    plain, ahead = (states(Plant(*arm, 3), cycles, ahead=on) for on in (False, True))
     assert plain == ahead
 
 
@@ -80,6 +88,20 @@ def test_it_runs_ahead_where_the_dead_time_is_a_cycle(fidelity, moves):
     assert np.any(plant._physics.q != before) == moves
     assert plant.q_true is not None
     assert np.all(plant._physics.q == before)
+
+
+def test_an_arm_that_acts_at_once_moves_after_its_report():
+    plant = Plant(UR5E, E_SERIES.fidelity("typical"), 3)
+    ramp = SpeedRamp(UR5E.home_q)
+    for _ in range(10):
+        plant.step(ramp.next(0.3))
+    reported, before = plant.sense(), plant._physics.q.copy()
+    plant.run_ahead()
+    moved = plant._physics.q.copy()
+    assert np.all(moved != before)
+    assert plant.sense() == reported
+    assert plant.q_true is not None
+    assert np.all(plant._physics.q == moved)
 
 
 def test_an_arm_without_physics_does_not_run_ahead():

@@ -19,6 +19,7 @@ from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
 from ur_emulator.plant.presliding import Presliding
+from ur_emulator.plant.sensors import REC_Q, REC_QD
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 
@@ -118,7 +119,8 @@ class ArmPhysics:
 
         Args:
             drives: of the joints.
-            capture_at: number of the sub-step whose raw sensors are wanted.
+            capture_at: number of the sub-step whose raw sensors are wanted, which they are at its beginning;
+                the number of sub-steps: those of the last one, with positions and speeds at its end.
             captured: takes them, see `sensors.REC_SIMULATED`.
         """
         model, data, ctrl, step = self.model, self.data, self._ctrl, mujoco.mj_step
@@ -136,6 +138,10 @@ class ArmPhysics:
             if not capture_at:
                 captured[:] = self._raw
             capture_at -= 1
+        if not capture_at:
+            captured[:] = self._raw
+            captured[REC_Q] = self.q
+            captured[REC_QD] = self.qd
 
     def store_state(self) -> None:
         """Store the present state for `restore_state`."""

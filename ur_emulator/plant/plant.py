@@ -5,8 +5,14 @@ and physics in sub-steps -> a record of true values -> sensors. The plant knows 
 safety; it follows its targets or raises `PlantError`. It reads no clock, and all randomness comes from the
 seed: equal seeds and equal targets give bit-identical states.
 
-Where the dead time is at least a cycle, no target acts within its own cycle: the arm can move before the
-target is known (`run_ahead`), while a client computes it. A change of the loads meanwhile undoes that.
+Part of the work needs not wait for the next target: `run_ahead` does it while a client computes that target.
+
+| arm                                               | what runs ahead                                        |
+|---------------------------------------------------|--------------------------------------------------------|
+| no target acts within its own cycle (dead time)   | the next cycle; a change of the loads meanwhile        |
+|                                                   | undoes it                                              |
+| measurements are a cycle old when they are        | the present cycle: its report did not need it, so the  |
+| reported, and targets act at once                 | step of the next cycle computes it, or `run_ahead`     |
 
 The arm has four control modes (`ControlMode`): position; force, with the slow outer loop of the servos held;
 freedrive and torque control, where no joint holds a position.
@@ -17,9 +23,9 @@ gear's transmission error. Links move with the hinge: collisions leave out that 
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from operator import ge, truediv
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,23 +34,29 @@ from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import calibrated_dh, draw_calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives
-from ur_emulator.plant.gear import GearRipple, GearWithPlay
+from ur_emulator.plant.feedback import Feedback
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import PlantState, Target
-from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
 from ur_emulator.plant.thermometers import Thermometers
 
 # Control modes in which no joint holds a position.
 _FREE = (ControlMode.TEACH, ControlMode.TORQUE)
 _WANDER_LEVELS = 64
 """A dead time that wanders goes through so many values: steps of 30 us for 2 ms."""
+
+
+class _Command(NamedTuple):
+    """Arguments of `Plant.step`."""
+
+    target: Target | None
+    mode: ControlMode
+    torque: TorqueCommand | None
 
 
 class Plant:
@@ -70,7 +82,6 @@ class Plant:
         self.seed = seed
         self.period_s = generation.period_s
         self.calibration = draw_calibration(fidelity, seed)
-        self._n_substeps = generation.n_substeps
         substep = generation.substep_us * 1e-6
 
         spread = fidelity.dead_time_spread * float(random_stream(seed, "delay").uniform())
@@ -96,16 +107,15 @@ class Plant:
             substep,
             self.period_s,
         )
-        self._gear = (GearWithPlay if fidelity.backlash else GearRipple)(fidelity, seed)
-        self._sensors = Sensors(robot, fidelity, seed, self.period_s)
-        self._thermometers = Thermometers(generation)
-
-        # The measurement is taken in this sub-step of a cycle and reported so many cycles later.
+        # The measurement is taken in a sub-step of a cycle and reported so many sub-steps later.
         age_substeps = max(1, round(fidelity.feedback_age / substep))
-        self._capture_at = -age_substeps % self._n_substeps
-        # The first record is that of this cycle; the next one, which is the oldest, is read.
-        self._records = deque(Record() for _ in range(1 + (age_substeps - 1) // self._n_substeps))
-        self._read_at = 1 % len(self._records)
+        # See the table above: whether the arm moves by a command only when the cycle has been reported.
+        self._moves_later = age_substeps >= generation.n_substeps and not self._drives.target_acts_later
+        if self._moves_later:
+            age_substeps -= generation.n_substeps
+        self._feedback = Feedback(robot, fidelity, seed, age_substeps)
+        self._gear = self._feedback.gear
+        self._thermometers = Thermometers(generation)
 
         self._reports_control_as_target = generation.reports_control_as_target
         self._per_torque = 1.0 / np.array(robot.torque_constant)
@@ -119,10 +129,11 @@ class Plant:
         self._braked = True
         self._saturated_before = self._saturated_now = False
         self._control_current = ZERO6
-        self._rest = Record()
         self._state: PlantState | None = None
         # The next cycle is computed, but not completed.
         self._is_ahead = False
+        # The command of the present cycle, by which the arm has not moved yet.
+        self._command: _Command | None = None
         self.reset(robot.home_q)
 
     # --- state for tests and for the control API ---
@@ -130,39 +141,39 @@ class Plant:
     @property
     def obstacles(self) -> Obstacles:
         """Obstacles around the arm."""
-        self._undo_run_ahead()
+        self._be_current()
         return self._physics.obstacles
 
     @property
     def q_true(self) -> NDArray[np.float64]:
         """True joint angles (6,) now [rad]; no real controller knows them."""
-        self._undo_run_ahead()
+        self._be_current()
         self._gear.evaluate(self._physics.q)
         return self._physics.q + self._gear.error
 
     @property
     def qd_true(self) -> NDArray[np.float64]:
         """True joint speeds (6,) now [rad/s]."""
-        self._undo_run_ahead()
+        self._be_current()
         self._gear.evaluate(self._physics.q)
         return self._physics.qd * (1.0 + self._gear.slope)
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
-        self._undo_run_ahead()
+        self._be_current()
         return self._physics.n_contacts
 
     @property
     def flange_position(self) -> NDArray[np.float64]:
         """True position of the flange (3,) in the base frame [m], at the start of the last sub-step."""
-        self._undo_run_ahead()
+        self._be_current()
         return self._physics.flange_position.copy()
 
     @property
     def contact_wrench(self) -> NDArray[np.float64]:
         """True contact wrench of table and base on the arm (6,), at the flange in base axes [N, Nm]."""
-        self._undo_run_ahead()
+        self._be_current()
         return self._physics.contact_wrench
 
     def reset(self, q: Sequence[float]) -> None:
@@ -174,14 +185,11 @@ class Plant:
         angles = np.array(q, dtype=np.float64)
         if angles.shape != (6,) or not np.isfinite(angles).all():
             raise PlantError(f"joint angles {list(q)} given: six finite numbers are needed")
+        self._be_current()
         self.cycle = 0
-        self._undo_run_ahead()
         self._physics.place(self._gear.motor_position(angles))
-        self._sensors.reset()
         self._engage_brakes()
-        for record in self._records:
-            record.values[:] = self._rest.values
-        self._reading = self._sensors.read(self._records[self._read_at])
+        self._feedback.reset()
         self._state = None
 
     def touches(self, q: Sequence[float]) -> bool:
@@ -199,12 +207,13 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        self._undo_run_ahead()
+        self._be_current()
         self._physics.loads.declare(mass, cog, inertia)
         self._drives.set_payload(mass, cog, inertia)
 
     def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
         """Set the joint ranges that freedrive keeps [rad]."""
+        self._be_current()
         self._drives.set_range(q_min, q_max)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
@@ -219,7 +228,7 @@ class Plant:
         Raises:
             PlantError: when the mass is negative or a number is not finite.
         """
-        self._undo_run_ahead()
+        self._be_current()
         self._physics.loads.attach(mass, cog)
 
     def hold_trim(self) -> None:
@@ -227,6 +236,7 @@ class Plant:
 
         Otherwise its integral would raise the contact force more and more.
         """
+        self._be_current()
         self._trim_is_held = True
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
@@ -239,7 +249,7 @@ class Plant:
         Raises:
             PlantError: when a number is not finite.
         """
-        self._undo_run_ahead()
+        self._be_current()
         self._physics.loads.push(force, point)
 
     # --- the cycle ---
@@ -264,6 +274,16 @@ class Plant:
         """
         self._state = None
         self.cycle += 1
+        command = _Command(target, mode, torque)
+        if self._moves_later:
+            self._finish()
+            self._command = command
+        else:
+            self._advance(command)
+
+    def _advance(self, command: _Command) -> None:
+        """Advance the arm by a cycle."""
+        target, mode, torque = command
         if target is None:
             self._stand_still()
             return
@@ -290,10 +310,8 @@ class Plant:
         self._keep()
 
     def run_ahead(self) -> None:
-        """Compute the arm's next cycle, if nothing that is still unknown acts in it.
-
-        `step` completes the cycle; the results are the same to the last bit.
-        """
+        """Compute what the next target cannot change; the results are the same to the last bit."""
+        self._finish()
         drives = self._drives
         if not (drives.target_acts_later and self._state) or self._braked or self._is_ahead:
             return
@@ -302,18 +320,25 @@ class Plant:
             self._run()
             self._is_ahead = True
 
-    def _undo_run_ahead(self) -> None:
-        """Undo `run_ahead`."""
+    def _be_current(self) -> None:
+        """Let the arm be where the commands so far have moved it: neither behind nor ahead."""
+        self._finish()
         if self._is_ahead:
             self._is_ahead = False
             self._physics.restore_state()
-            self._gear.undo()
+            self._feedback.undo()
+
+    def _finish(self) -> None:
+        """Advance by the command that waits, if one does."""
+        command, self._command = self._command, None
+        if command is not None:
+            self._advance(command)
 
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
         if self._state is None:
             self._state = PlantState(
-                *self._reading,
+                *self._feedback.reading,
                 self._thermometers.reading,
                 self._drives.target_current,
                 self._drives.target_moment,
@@ -331,7 +356,10 @@ class Plant:
         Args:
             before: what `sense` gave in the cycle before.
         """
-        now, current = self.sense(), before.target_current
+        now = self.sense()
+        if self._moves_later:
+            before = now
+        current = before.target_current
         control = current if self._reports_control_as_target else now.joint_control_output
         return now._replace(
             target_current=current, target_moment=before.target_moment, joint_control_output=control
@@ -339,25 +367,21 @@ class Plant:
 
     def _run(self) -> None:
         """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""
-        physics, drives, gear = self._physics, self._drives, self._gear
-        record, error = self._records[0], self._error
+        physics, drives, feedback = self._physics, self._drives, self._feedback
         is_free = self._mode in _FREE
         if not is_free:
             drives.actual_speed[:] = physics.qd
             drives.advance()
-        physics.run(drives, self._capture_at, record.simulated)
+        physics.run(drives, feedback.capture_at, feedback.captured)
         np.multiply(physics.torque, self._per_torque, self._currents)
         self._control_current = six(self._currents.tolist())
-        gear.apply(record)
-        record.wrench[:] = physics.loads.wrench if physics.loads.is_unexpected else 0.0
-        if physics.data.ncon:
-            record.wrench += physics.contact_wrench
+        feedback.take(physics)
+        error = self._error
         if is_free:
             error[:] = 0.0
         else:
-            np.add(physics.q, gear.error, error)
+            np.add(physics.q, self._gear.error, error)
             np.subtract(drives.q_final, error, error)
-        self._reading = self._sensors.read(self._records[self._read_at])
 
     def _keep(self) -> None:
         """Complete the cycle that was computed."""
@@ -378,9 +402,8 @@ class Plant:
         self._keep_reading()
 
     def _keep_reading(self) -> None:
-        self._records.rotate(-1)
-        self._sensors.keep()
-        self._thermometers.step(self._reading.actual_current)
+        self._feedback.keep()
+        self._thermometers.step(self._feedback.reading.actual_current)
 
     @property
     def _is_pressing(self) -> bool:
@@ -391,7 +414,7 @@ class Plant:
 
     def _switch(self, mode: ControlMode, target: Target) -> None:
         """Change the control mode without a jump of the torques."""
-        self._undo_run_ahead()
+        self._be_current()
         was_free, self._mode = self._mode in _FREE, mode
         self._physics.servos.set_free(mode in _FREE)
         if was_free:
@@ -402,11 +425,10 @@ class Plant:
 
     def _stand_still(self) -> None:
         """Advance by a cycle with the brakes on."""
-        self._undo_run_ahead()
+        self._be_current()
         if not self._braked:
             self._engage_brakes()
-        self._records[0].values[:] = self._rest.values
-        self._reading = self._sensors.read(self._records[self._read_at])
+        self._feedback.take_rest()
         self._keep_reading()
 
     def _engage_brakes(self) -> None:
@@ -421,13 +443,12 @@ class Plant:
         self._control_current = ZERO6
         self._drives.release()
         self._physics.stop()
-        self._rest.q[:] = self.q_true
-        self._rest.values[REC_ACCELERATION] = GRAVITY * self._physics.flange_rotation[2]
+        self._feedback.stop(self._physics)
 
     def _release_brakes(self) -> None:
         """Let the drives hold the arm, at the pose in which the brakes hold it."""
         self._braked = False
-        self._drives.hold(self._rest.q, self._physics.q)
+        self._drives.hold(self._feedback.q_rest, self._physics.q)
 
 
 def _dead_times(
