@@ -29,6 +29,10 @@ def undefined(name: str) -> Any:
     raise ScriptRuntimeError(f"variable '{name}' is used before a value is assigned to it")
 
 
+# Types of values without parts: two of one of these agree.
+_SCALARS = frozenset({int, float, bool, str})
+
+
 def same_kind(old: type, value: Any) -> bool:
     """Whether a variable or element of type `old` may receive `value`; int and float are one kind, number."""
     new = type(value)
@@ -91,6 +95,9 @@ def assign_resizing(value: Any, old: Any, name: str) -> Any:
 
 def assign_within_capacity(value: Any, old: Any, name: str) -> Any:
     """`assign` for software in which a list has a capacity, which it keeps (D); so it can get shorter."""
+    if type(value) is list and type(old) is list and len(value) == len(old):
+        if value and type(value[0]) is type(old[0]) and type(value[0]) in _SCALARS:  # nearly always
+            return value
     return fitted(value, old, "variable", name)
 
 
