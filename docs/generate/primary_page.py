@@ -9,7 +9,8 @@ from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import StreamDecoder
 from protocol.layout_text import type_name
 from protocol.primary.layout import SUB_PACKAGES
-from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
+from protocol.primary.message_codec import version_message
+from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType
 from protocol.primary.packages import SECONDARY_MESSAGES, SafetyTolerances, encode_message_package
 from protocol.primary.state import state_size
 from protocol.primary.values import value_codes
@@ -82,6 +83,7 @@ _WHEN = {
     "RuntimeExceptionMessage": "a program did not compile, failed or could not be started",
     "StartupMessage": "on connection",
     "ProgramThreadsMessage": "from 3.3: a thread has passed a `$` line",
+    "HardwareInfoMessage": "from 5.26: on connection, 30001 and 30011 only",
 }
 
 _ORDER = """\

@@ -19,13 +19,8 @@ from protocol.primary.framing import (
     PackageType,
     encode_package,
 )
-from protocol.primary.messages import (
-    RobotMessage,
-    StartupMessage,
-    VersionMessage,
-    decode_message,
-    encode_message,
-)
+from protocol.primary.message_codec import decode_message, encode_message
+from protocol.primary.messages import RobotMessage, StartupMessage, VersionMessage
 from protocol.primary.program import ProgramStateMessage, decode_program_state
 from protocol.primary.state import (
     RobotState,

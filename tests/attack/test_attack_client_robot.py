@@ -34,7 +34,8 @@ from pc_client.experiment.preflight import model_of, preflight, refusal
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary.messages import TextMessage, encode_message
+from protocol.primary.message_codec import encode_message
+from protocol.primary.messages import TextMessage
 from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
 from ur_emulator import ControlBox

@@ -25,7 +25,7 @@ from pc_client.control.controller import CONTROLLERS  # noqa: E402
 from pc_client.driver.ur_driver import UrDriver  # noqa: E402
 from pc_client.experiment.prepare import load_movements, prepare_experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
-from protocol.primary.messages import encode_message  # noqa: E402
+from protocol.primary.message_codec import encode_message  # noqa: E402
 from protocol.realtime.layout import layout_for_version  # noqa: E402
 from protocol.rtde.fields import output_fields  # noqa: E402
 from protocol.rtde.recipe import snapshot_encoder  # noqa: E402

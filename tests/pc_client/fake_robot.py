@@ -17,13 +17,8 @@ from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from protocol.pose import T_to_pose, pose_trans
 from protocol.primary.layout import CartesianInfo, RobotModeData
-from protocol.primary.messages import (
-    ErrorCodeMessage,
-    ReportLevel,
-    RuntimeExceptionMessage,
-    encode_message,
-    version_message,
-)
+from protocol.primary.message_codec import encode_message, version_message
+from protocol.primary.messages import ErrorCodeMessage, ReportLevel, RuntimeExceptionMessage
 from protocol.primary.setup import ConfigurationData
 from protocol.primary.state import encode_state
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version

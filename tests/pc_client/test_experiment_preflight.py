@@ -18,7 +18,7 @@ from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
-from protocol.primary.messages import encode_message, version_message
+from protocol.primary.message_codec import encode_message, version_message
 from protocol.primary.setup import ConfigurationData
 from protocol.primary.state import encode_state
 from protocol.ur_types import Ports, RobotType, SoftwareVersion

@@ -11,7 +11,7 @@ import pytest
 from protocol.__main__ import main
 from protocol.primary.framing import encode_package
 from protocol.primary.layout import SUB_PACKAGES
-from protocol.primary.messages import version_message
+from protocol.primary.message_codec import version_message
 from protocol.primary.packages import encode_message_package
 from protocol.primary.state import encode_state
 from protocol.realtime.columns import COLUMNS

@@ -17,6 +17,7 @@ from protocol.primary import packages as P
 from protocol.primary import setup as U
 from protocol.primary import state as S
 from protocol.primary import tool as T
+from protocol.primary.message_codec import encode_message, version_message
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_codec import codec_for
 from protocol.wire_record import wire_fields
@@ -68,6 +69,9 @@ MESSAGES = [
      f"0000003b 14 {'00' * 8} fd 0a 00000003 00000001 {b'compile_error_name_not_found:txtmsg:'.hex()}"),
     ("3.10", M.StartupMessage(first=510, second=259),
      f"00000018 14 {NO_TIME_HEX} fe 0c 000001fe 00000103 01"),
+    # as UR's client library reads it
+    ("5.26", M.HardwareInfoMessage(robot_type=7, box_series=7, tool_flange_type=2),
+     f"0000001b 14 {NO_TIME_HEX} fe 12 00000007 0000 0007 0000 0002"),
     ("3.15.8", M.TextMessage(timestamp=16_634_482_000, text="hello\xe9"),
      f"00000015 14 {16_634_482_000:016x} fd 00 {b'hello'.hex()} e9"),
     ("3.15.8", M.ErrorCodeMessage(source=20, code=210, report_level=3, data_type=4, data=0xC0FFEE, text="x"),
@@ -106,7 +110,7 @@ def test_a_version_message_is_read_without_knowing_the_version():
 
 
 def test_the_version_message_of_3_15_fits_old_clients():
-    message = M.version_message(V3_15)
+    message = version_message(V3_15)
     data = P.encode_message_package(message, V3_15)
     assert len(data) == 55
     assert data[0:5].hex() == "0000003714"
@@ -139,7 +143,7 @@ def test_unknown_messages_and_packages_come_out_as_they_are():
     (message,) = read(F.encode_package(20, bytes.fromhex(f"{header} 08 00112233")))
     assert message == M.UnknownMessage(message_type=8, body=b"\x00\x11\x22\x33")
     with pytest.raises(LocalProtocolError, match="UnknownMessage has no table"):
-        M.encode_message(message, V3_15)
+        encode_message(message, V3_15)
     # a 5.4 simulator's type 5
     assert read(bytes.fromhex("00000009 05 00000000")) == [P.UnknownPackage(5, bytes(4))]
 
@@ -163,7 +167,7 @@ def test_safety_tolerances_have_the_captured_size():
 )
 def test_values_that_do_not_fit_are_named(message, problem):
     with pytest.raises(LocalProtocolError, match=problem):
-        M.encode_message(message, V3_15)
+        encode_message(message, V3_15)
 
 
 # --- robot state ---
@@ -388,6 +392,6 @@ def test_software_before_3_0_has_no_table():
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0: use 3\.0\.0 or later"):
         S.encode_state([T.ToolData()], old)
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0 had other layouts"):
-        M.encode_message(M.TextMessage(text="x"), old)
+        encode_message(M.TextMessage(text="x"), old)
     data = P.encode_message_package(M.TextMessage(text="x"), V3_15)
     assert read(data, old) == [M.TextMessage(text="x")]  # a reader makes the best of it

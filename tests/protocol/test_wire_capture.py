@@ -8,7 +8,7 @@ from protocol.__main__ import main
 from protocol.capture import RtdeDecoder, StreamDecoder
 from protocol.errors import RemoteProtocolError
 from protocol.primary.layout import RobotModeData
-from protocol.primary.messages import version_message
+from protocol.primary.message_codec import version_message
 from protocol.primary.packages import encode_message_package
 from protocol.primary.state import encode_state
 from protocol.rtde import messages as R

@@ -118,6 +118,7 @@ def test_the_greeting_of_every_version(version):
             (M.VersionMessage, greeting_size(version)),
             (M.StartupMessage, 24),
             *([(SafetyTolerances, 181)] if (3, 10) <= version < (5, 11) else []),
+            *([(M.HardwareInfoMessage, 27)] if is_primary and version >= (5, 26) else []),
             (RobotState, state_size(version, first=True)),
         ]
         assert [(type(package), size) for package, size in packages[: len(expected)]] == expected

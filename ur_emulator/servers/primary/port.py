@@ -9,7 +9,8 @@ its threads stand in PolyScope's tree.
 
 from __future__ import annotations
 
-from protocol.primary.messages import RobotMessage, StartupMessage, version_message
+from protocol.primary.message_codec import version_message
+from protocol.primary.messages import HardwareInfoMessage, RobotMessage, StartupMessage
 from protocol.primary.packages import (
     encode_message_package,
     encode_safety_tolerances,
@@ -66,6 +67,10 @@ class PrimaryPort(ScriptPort):
         self._second_greeting = encode_message_package(StartupMessage(), version)
         if sends_safety_tolerances(version):
             self._second_greeting += encode_safety_tolerances()
+        if all_messages and HardwareInfoMessage.SINCE.covers(version):
+            self._second_greeting += self._package(
+                HardwareInfoMessage(robot_type=controller.state.robot.robot_type)
+            )
 
     def opened(self, connection: Connection) -> None:
         """Greet: the version message in a segment of its own, the first, long state, then variables."""
