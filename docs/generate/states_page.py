@@ -11,6 +11,13 @@ from typing import NamedTuple
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
+from ur_emulator.controller.safety.boundaries import (
+    DIRECTION_TOLERANCE,
+    MOST_PLANES,
+    PLANE_TOLERANCE,
+    TRIGGER_BAND,
+    BoundaryMode,
+)
 from ur_emulator.controller.safety.enabling_device import ACTIVE, STOPPING, EnablingState
 from ur_emulator.controller.safety.enabling_device import TRANSITIONS as ENABLING_TRANSITIONS
 from ur_emulator.controller.safety.inputs import SafetyInput
@@ -95,7 +102,35 @@ how much. With
 `set_safety_mode_transition_hardness(0)`, the default, the arm slows down, and stops for the
 safeguard, with its full deceleration; with `(1)` it does so gently, within 0.25 s. What stays above
 a limit for more than 0.5 s causes a protective stop. Recovery mode begins when the brakes open while
-a joint is out of its range, and ends when all joints are back.
+a joint is out of its range or the tool beyond a boundary, and ends when all are back.
+"""
+
+_STOP = SafetyMode.PROTECTIVE_STOP.name
+_BOUNDARIES = f"""
+### Safety planes and tool direction
+
+An installation or the control API (`set_safety_plane`, `limit_tool_direction`) sets up as many as
+{MOST_PLANES} planes, in the base frame, with normals towards the allowed side, and a cone for the
+z axis of the TCP. A plane holds the TCP, and the elbow too where it restricts it. Without them
+nothing is computed.
+"""
+
+# What happens at a boundary: what, then, code.
+_AT_A_BOUNDARY = (
+    (f"the set-point, with the way to stop, is {PLANE_TOLERANCE * 1e3:.0f} mm from a plane", _STOP, "C152"),
+    (f"the same, {degrees(DIRECTION_TOLERANCE):.2f}° from the end of the cone", _STOP, "C151"),
+    ("the arm is beyond a plane", SafetyMode.VIOLATION.name, "C191A4"),
+    ("the tool is outside the cone", SafetyMode.VIOLATION.name, "C191A5"),
+    ("the brakes open beyond one of them", "RECOVERY, in which none of them is a limit", ""),
+    (
+        "the arm is beyond a plane that triggers reduced mode",
+        f"REDUCED, until it is {TRIGGER_BAND * 1e3:.0f} mm back behind the plane",
+        "",
+    ),
+)
+
+_AWAY = """
+What moves away from a boundary is not stopped.
 """
 
 _INPUTS = """
@@ -203,6 +238,17 @@ def render() -> str:
             ("generation", "mode", "joints", "TCP and elbow", "force", "power", "momentum", "programs"),
             _limit_rows(),
         ),
+        _BOUNDARIES,
+        *_table(
+            ("mode of a boundary", "a limit in normal mode", "a limit in reduced mode"),
+            (
+                (mode.value, *("yes" if mode.limits(reduced) else "" for reduced in (False, True)))
+                for mode in BoundaryMode
+            ),
+        ),
+        "",
+        *_table(("what", "then", "code"), _AT_A_BOUNDARY),
+        _AWAY,
         _INPUTS.format(
             all=", ".join(it.value for it in SafetyInput if not it.needs_operational_modes),
             e_series=", ".join(it.value for it in SafetyInput if it.needs_operational_modes),

@@ -248,7 +248,8 @@ def test_reduced_mode_allows_no_more_than_normal_mode():
 
 LIMITS = SAFETY.replace("[1, 1, 1,", "[0, 1, 1,") + (
     "[SafetyLimits Normal Values]\nmaxTcpSpeed = 0.25\nmaxForce = 150.0\nmaxPower = 300.0\nmaxMomentum = 25.0\n"
-    "[SafetyLimits BoundaryPlane0]\nmode = 1\n[SafetyLimits ToolOrientation]\nmaximumTcpOrientationDeviation = 0.5\n"
+    "[SafetyLimits BoundaryPlane0]\nmode = FAR\n"
+    "[SafetyLimits BoundaryPlane1]\nmode = NORMAL\nplaneNormal = [0, 0, 1]\ndistanceToOrigin = -3\n"
 )
 
 
@@ -264,8 +265,11 @@ def test_inverse_kinematics_and_what_clients_are_told_keep_the_limits_of_an_inst
         dashboard.ask_all("load p.urp", "play")
         assert reader.message(TextMessage).text == "True"
     texts = " ".join(entry.text for entry in box.log)
-    assert "/programs/cell.installation: 1 safety plane is not watched" in texts
-    assert "/programs/cell.installation: the limit of the tool's direction is not watched" in texts
+    unknown = "SafetyLimits BoundaryPlane0 with the unknown mode FAR is not watched"
+    assert f"/programs/cell.installation: {unknown}" in texts
+    assert [plane.name for plane in box._box.controller.state.safety.limits.boundaries.planes] == [
+        "BoundaryPlane1"
+    ]
     with connect(box, "primary") as sock:
         first = MessageReader(sock).state()
     assert first.find(ConfigurationData).joint_max_limit[0] == pytest.approx(0.0524, abs=1e-4)

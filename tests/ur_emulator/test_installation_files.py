@@ -19,6 +19,7 @@ from installation_support import (
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.controller.safety.boundaries import NO_BOUNDARIES, BoundaryMode, ToolDirection
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.safety_limits import ArmLimits
 from ur_emulator.programs.folder import ProgramFolder
@@ -150,16 +151,65 @@ def test_other_safety_limits(tmp_path):
         "[SafetyLimits {} Values]\nmaxTcpSpeed = 1.5\nmaxElbowSpeed = 1.0\nmaxForce = 150.0\nmaxElbowForce = 200.0\n"
         "maxPower = 300.0\nmaxMomentum = 25.0\nmaxStoppingTime = 0.4\nmaxStoppingDistance = 0.5\n"
     )
-    plane = "[SafetyLimits BoundaryPlane{}]\nmode = {}\nplaneNormal = [0.0, 0.0, 1.0]\n"
-    planes = "".join(plane.format(n, mode) for n, mode in enumerate((1, '"BOTH"', 0, "DISABLED")))
-    tool = "[SafetyLimits ToolOrientation]\nmaximumTcpOrientationDeviation = {}\n"
-    text = values.format("Normal") + values.format("Reduced").replace("1.0", "0.75") + planes
-    safety = read(tmp_path, f"<SafetySettings>{text}{tool.format(0.5)}</SafetySettings>").safety
+    text = values.format("Normal") + values.format("Reduced").replace("1.0", "0.75")
+    safety = read(tmp_path, f"<SafetySettings>{text}</SafetySettings>").safety
     assert safety.arm == ArmLimits(tool_speed=1.0, force=150.0, power=300.0, momentum=25.0)
     assert safety.reduced_arm == ArmLimits(tool_speed=0.75, force=150.0, power=300.0, momentum=25.0)
-    assert safety.unwatched == ("2 safety planes are", "the limit of the tool's direction is")
-    usual = read(tmp_path, f"<SafetySettings>{SAFETY}{tool.format(3.159)}</SafetySettings>").safety
+    usual = read(tmp_path, f"<SafetySettings>{SAFETY}</SafetySettings>").safety
     assert (usual.arm, usual.reduced_arm, usual.unwatched) == (None, None, ())
+
+
+PLANE = (
+    "[SafetyLimits BoundaryPlane{}]\nname = 'wall {}'\ndisplacement = 0.0\nmode = {}\n"
+    "planeNormal = [0.0, 0.0, 2.0]\ndistanceToOrigin = -0.1\nelbowRestricted = {}\n"
+)
+CONE = (
+    "[SafetyLimits ToolOrientation]\ntcpOrientationVector = [0.0, 0.0, -1.0]\n"
+    "maximumTcpOrientationDeviation = {}\nmode = {}\n"
+)
+
+
+def boundaries(tmp_path, *texts):
+    return read(tmp_path, f"<SafetySettings>{''.join(texts)}</SafetySettings>").safety
+
+
+def test_safety_planes(tmp_path):
+    words = ("1", '"BOTH"', "0", "DISABLED", "TRIGGER_REDUCED_MODE", "Reduced")
+    planes = [PLANE.format(n, n, word, "true" if n == 1 else "false") for n, word in enumerate(words)]
+    safety = boundaries(tmp_path, *planes)
+    assert safety.unwatched == ()
+    assert [(p.name, p.mode, p.restricts_elbow) for p in safety.boundaries.planes] == [
+        ("wall 0", BoundaryMode.NORMAL, False),
+        ("wall 1", BoundaryMode.BOTH, True),
+        ("wall 4", BoundaryMode.TRIGGER, False),
+        ("wall 5", BoundaryMode.REDUCED, False),
+    ]
+    assert {(p.position, p.normal) for p in safety.boundaries.planes} == {((0, 0, -0.1), (0, 0, 1))}
+
+
+def test_the_limit_of_the_tools_direction(tmp_path):
+    cone = ToolDirection((0.0, 0.0, -1.0), 0.5, BoundaryMode.BOTH)
+    assert boundaries(tmp_path, CONE.format(0.5, "BOTH")).boundaries.tool_direction == cone
+    for off in (CONE.format(3.159, "BOTH"), CONE.format(0.5, "DISABLED")):
+        assert boundaries(tmp_path, off).boundaries == NO_BOUNDARIES
+
+
+def test_boundaries_of_unknown_modes_are_named_and_those_without_a_place_are_errors(tmp_path):
+    safety = boundaries(tmp_path, PLANE.format(0, 0, "SOMETIMES", "true"), CONE.format(0.5, "SOMETIMES"))
+    assert safety.boundaries == NO_BOUNDARIES
+    assert safety.unwatched == (
+        "SafetyLimits BoundaryPlane0 with the unknown mode SOMETIMES is",
+        "SafetyLimits ToolOrientation with the unknown mode SOMETIMES is",
+    )
+    whole = PLANE.format(0, 0, "NORMAL", "true")
+    for spoilt in (
+        whole.replace("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"),
+        whole.replace("[0.0, 0.0, 2.0]", "[0.0, 2.0]"),
+        whole.replace("distanceToOrigin", "distance"),
+        whole.replace("-0.1", "nan"),
+    ):
+        with pytest.raises(ProgramFileError, match=r"(planeNormal|distanceToOrigin) of the safety settings"):
+            boundaries(tmp_path, spoilt)
 
 
 def test_start_up_and_safe_home(tmp_path):

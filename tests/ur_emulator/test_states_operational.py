@@ -285,7 +285,7 @@ def test_no_program_starts_in_recovery_mode():
     ("wrench", "moment", "code", "text"),
     [
         ((120.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0, "Force limit violated: 120.000 N, limit 100"),
-        ((0.0,) * 6, 500.0, 195, "Power limit violated: 100.000 W, limit 80"),
+        ((0.0,) * 6, 500.0, 191, "Power limit violated: 100.000 W, limit 80"),
     ],
 )
 def test_force_and_power_are_limited_in_recovery_mode(bench, wrench, moment, code, text):

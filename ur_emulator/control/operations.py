@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
 
 from ur_emulator.box_log import LogEntry
+from ur_emulator.commands.boundaries import LimitToolDirection, SetSafetyPlane
 from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
 from ur_emulator.commands.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.commands.operation import Operation
@@ -135,6 +136,8 @@ class BoxOperations:
     release_emergency_stop = method(ReleaseEmergencyStop)
     safeguard_stop = method(SafeguardStop)
     reduced_mode = method(ReducedMode)
+    set_safety_plane = method(SetSafetyPlane)
+    limit_tool_direction = method(LimitToolDirection)
     protective_stop = method(TriggerProtectiveStop)
     unlock_protective_stop = method(UnlockProtectiveStop)
     trigger_violation = method(TriggerViolation)

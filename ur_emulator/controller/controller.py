@@ -267,6 +267,10 @@ class Controller:
             if target is before or state.safety.is_stopped or state.motion.torque is not None:
                 return target
             violation = self._setpoints.find_invalid(state.safety.limits, before, target)
+            if violation is None and state.safety.boundaries:
+                arm = state.arm.state(target.q, target.qd, state.tool.tcp_offset)
+                near = state.safety.boundaries.find_near(arm, self._setpoints.braking_time(target))
+                violation = None if near is None else Violation(near)
         except UnreachableError:
             violation = UNREACHABLE_PATH
         if violation is None:

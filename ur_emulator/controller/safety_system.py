@@ -11,6 +11,7 @@ from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
+from ur_emulator.controller.safety.boundaries import TRIGGER_BAND
 from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.inputs import Guard, SafetyInput, SafetyInputs
 from ur_emulator.controller.safety.limit_checks import Violation
@@ -47,6 +48,7 @@ class SafetySystem:
         self._cut_after: int | None = None
         self._rests_since: int | None = None
         self._is_waiting = False
+        self._is_beyond_trigger = False
         self.is_busy = False
 
     @property
@@ -70,7 +72,7 @@ class SafetySystem:
         self._update()
 
     def set_limits(self, limits: ConfiguredLimits) -> None:
-        """Set the limits of the joints, also those of the mode that is in force."""
+        """Set the limits of joints and space, also those of the mode that is in force."""
         self._state.safety.set_limits(limits)
         self._set_limits(self._state.safety.mode)
         self._update()
@@ -100,7 +102,7 @@ class SafetySystem:
         self.handle(SafetyEvent.POWERED_OFF)
 
     def check_range(self) -> None:
-        """Check the joint ranges when the brakes have opened."""
+        """Check joint ranges and boundaries when the brakes have opened."""
         if not self._is_in_range():
             self.handle(SafetyEvent.RANGE_LEFT)
 
@@ -111,6 +113,8 @@ class SafetySystem:
         state = self._state
         if self.inputs.assigned:
             self.inputs.step(state.io.digital_in)
+        if self._watches_space:
+            self._watch_space()
         if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
             self.handle(SafetyEvent.RANGE_KEPT)
         if self._cut_after is not None:
@@ -130,6 +134,25 @@ class SafetySystem:
         state = self._state
         limiter, space = state.speed.limiter, state.past.snapshot.space
         return None if limiter is None else limiter.find_violation(sensed, space, state.clock.period_s)
+
+    # --- space
+
+    @property
+    def _watches_space(self) -> bool:
+        return self._is_beyond_trigger or bool(self._state.safety.limits.boundaries)
+
+    def _watch_space(self) -> None:
+        """Let planes trigger reduced mode, and a boundary that is crossed be a violation."""
+        state, arm = self._state, self._state.past.snapshot.space.actual
+        gap = state.safety.limits.boundaries.trigger_gap(arm)
+        if gap < 0.0 if not self._is_beyond_trigger else gap > TRIGGER_BAND:
+            self._is_beyond_trigger = not self._is_beyond_trigger
+            self.inputs.reduce(self._is_beyond_trigger, "plane")
+        if state.mode.mode is RobotMode.RUNNING and state.safety.is_watched:
+            crossed = state.safety.boundaries.find_crossed(arm)
+            if crossed is not None:
+                state.events.append(crossed)
+                self.handle(SafetyEvent.VIOLATION)
 
     # --- effects
 
@@ -182,15 +205,18 @@ class SafetySystem:
         state.speed.set_limiter(None if limits is None else SpeedLimiter(limits, state.motion.scale, hard))
 
     def _is_in_range(self) -> bool:
-        limits, actual_q = self._state.safety.limits, self._state.past.sensed.actual_q
+        safety, past = self._state.safety, self._state.past
+        limits, in_space = safety.limits, safety.limits_in_space()
         return all(
-            low <= q <= high for low, q, high in zip(limits.q_min, actual_q, limits.q_max, strict=True)
-        )
+            low <= q <= high
+            for low, q, high in zip(limits.q_min, past.sensed.actual_q, limits.q_max, strict=True)
+        ) and not (in_space and in_space.find_crossed(past.snapshot.space.actual))
 
     def _update(self) -> None:
         self.is_busy = (
             self._cut_after is not None
             or bool(self.inputs.assigned)
             or self._state.speed.limiter is not None
+            or self._watches_space
             or self._state.safety.has(SafetyMode.RECOVERY)
         )

@@ -6,17 +6,29 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 
+from ur_emulator.controller.safety.boundaries import Boundaries, BoundaryMode, SafetyPlane, ToolDirection
 from ur_emulator.controller.safety.configured_limits import SafetySettings
 from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.robot_model import Vector3, Vector6, six
 from ur_emulator.models.safety_limits import ArmLimits
 
 _NORMAL, _REDUCED = "SafetyLimits Normal Values", "SafetyLimits Reduced Values"
 _NORMAL_JOINTS, _REDUCED_JOINTS = "SafetyLimits Normal Joints", "SafetyLimits Reduced Joints"
 _SETUP, _PLANE, _TOOL = "SafetySetup", "SafetyLimits BoundaryPlane", "SafetyLimits ToolOrientation"
-# Modes of a plane that limits nothing; the words are chosen.
-_OFF = frozenset({"", "0", "disabled", "off", "none"})
+# Modes of a boundary. DISABLED is in a public reader of installations; the numbers are those of a maker of
+# other robots who has the same keys; the other words are chosen.
+_BOUNDARY_MODES = {
+    word: mode
+    for mode, words in (
+        (BoundaryMode.DISABLED, "disabled 0 off none"),
+        (BoundaryMode.NORMAL, "normal 1"),
+        (BoundaryMode.REDUCED, "reduced 2"),
+        (BoundaryMode.BOTH, "both 3 normal_and_reduced normal_reduced"),
+        (BoundaryMode.TRIGGER, "trigger 4 trigger_reduced trigger_reduced_mode"),
+    )
+    for word in words.split()
+}
 # Key -> the limit that the safety system watches.
 _ARM_LIMITS = {
     "maxTcpSpeed": "tool_speed",
@@ -38,6 +50,8 @@ _FUNCTIONS = {
 _PAIRS: dict[tuple[str | None, ...], int] = {
     (str(2 * pair), str(2 * pair + 1)): pair for pair in range(N_INPUT_PAIRS)
 }
+_COUNTS = {1: "one number", 3: "three numbers", 6: "six numbers"}
+_LEAST_LENGTH = 1e-6
 _SECTION = re.compile(r"\[(.*)\]")
 
 
@@ -59,6 +73,7 @@ def safety_settings(file_name: str, texts: Iterable[str]) -> SafetySettings:
         text.speeds(_REDUCED_JOINTS),
         text.arm_limits(_NORMAL),
         text.arm_limits(_REDUCED),
+        Boundaries(tuple(text.planes()), text.tool_direction()),
         tuple(text.unwatched()),
         dict(text.inputs()),
     )
@@ -110,19 +125,59 @@ class _SafetyText:
 
     def unwatched(self) -> Iterator[str]:
         """Yield what is set up and not watched."""
-        sections = {section for section, _ in self._values}
-        n_planes = sum(
-            self._values.get((section, "mode"), "").strip('"').lower() not in _OFF
-            for section in sections
-            if section.startswith(_PLANE)
-        )
-        if n_planes:
-            yield "1 safety plane is" if n_planes == 1 else f"{n_planes} safety planes are"
+        for section in (*self._plane_sections(), _TOOL):
+            if self._mode(section) is None:
+                yield f"{section} with the unknown mode {self._values[section, 'mode'][:40]} is"
+
+    def planes(self) -> Iterator[SafetyPlane]:
+        """Yield the safety planes that are set up."""
+        for section in self._plane_sections():
+            mode = self._mode(section)
+            if mode is None or mode is BoundaryMode.DISABLED:
+                continue
+            normal = self._direction(section, "planeNormal")
+            distance = self._numbers(section, "distanceToOrigin", 1)
+            if distance is None:
+                raise self._error("distanceToOrigin", f"is missing for {section}")
+            # Chosen: the points x of the plane have normal * x = distanceToOrigin.
+            x, y, z = (distance[0] * part for part in normal)
+            name = self._values.get((section, "name"), "").strip("\"'") or section.rpartition(" ")[2]
+            elbow = self._values.get((section, "elbowRestricted")) == "true"
+            yield SafetyPlane(name, (x, y, z), normal, mode, elbow)
+
+    def tool_direction(self) -> ToolDirection | None:
+        """Return the limit of the tool's direction; None where there is none."""
+        mode = self._mode(_TOOL)
         deviation = self._values.get((_TOOL, "maximumTcpOrientationDeviation"))
-        if deviation is not None and self._positive("maximumTcpOrientationDeviation", deviation) < math.pi:
-            yield "the limit of the tool's direction is"
+        if mode in (None, BoundaryMode.DISABLED, BoundaryMode.TRIGGER) or deviation is None:
+            return None
+        angle = self._positive("maximumTcpOrientationDeviation", deviation)
+        if angle >= math.pi:
+            return None
+        return ToolDirection(self._direction(_TOOL, "tcpOrientationVector"), angle, mode)
+
+    def _plane_sections(self) -> list[str]:
+        return sorted({section for section, _ in self._values if section.startswith(_PLANE)})
+
+    def _mode(self, section: str) -> BoundaryMode | None:
+        """Return the mode of a boundary; None for one that is not known."""
+        word = self._values.get((section, "mode"), "disabled").strip("\"'").lower().replace(" ", "_")
+        return _BOUNDARY_MODES.get(word)
+
+    def _direction(self, section: str, key: str) -> Vector3:
+        """Return a vector with the length 1."""
+        given = self._numbers(section, key, 3)
+        length = math.hypot(*given or ())
+        if given is None or length < _LEAST_LENGTH:
+            raise self._error(key, f"of {section} is missing or has no length")
+        x, y, z = (part / length for part in given)
+        return x, y, z
 
     def _six(self, section: str, key: str) -> Vector6 | None:
+        given = self._numbers(section, key, 6)
+        return None if given is None else six(given)
+
+    def _numbers(self, section: str, key: str, count: int) -> list[float] | None:
         text = self._values.get((section, key))
         if text is None:
             return None
@@ -130,9 +185,9 @@ class _SafetyText:
             given = [float(part) for part in text.strip("[]").split(",")]
         except ValueError:
             given = []
-        if len(given) != 6 or not all(map(math.isfinite, given)):
-            raise self._error(key, "has not six numbers")
-        return six(given)
+        if len(given) != count or not all(map(math.isfinite, given)):
+            raise self._error(key, f"has not {_COUNTS[count]}")
+        return given
 
     def _positive(self, key: str, text: str) -> float:
         try:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ur_emulator.controller.past_cycles import PastCycles
-from ur_emulator.models.robot_model import six
+from ur_emulator.models.robot_model import ZERO6, six
 from ur_emulator.scripting.script_arm import ScriptArm
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
@@ -67,10 +67,12 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
 
     def is_within_safety_limits(thread: object, pose: Any, qnear: Any) -> bool:
         q = inverse(pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
-        limits = arm.safety.limits
-        return q is not None and all(
+        limits, boundaries = arm.safety.limits, arm.safety.boundaries
+        if q is None or not all(
             low <= x <= high for x, low, high in zip(q, limits.q_min, limits.q_max, strict=True)
-        )
+        ):
+            return False
+        return not boundaries or boundaries.find_crossed(model.state(q, ZERO6, settings.tcp_offset)) is None
 
     def get_actual_joint_positions_history(thread: object, steps: float) -> list[float]:
         if not steps < len(past.q_history):

@@ -178,7 +178,7 @@ _STATE: tuple[Builtin, ...] = (
         "bool",
         "whether a pose or joint position is reachable inside the safety limits",
         support=APPROXIMATE,
-        note="checks reach and joint ranges; safety planes and tool orientation limits are not modelled",
+        note="checks reach, joint ranges, safety planes and tool direction",
     ),
     _row(
         "tool_contact",

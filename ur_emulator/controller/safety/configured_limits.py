@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from ur_emulator.controller.safety.boundaries import NO_BOUNDARIES, Boundaries
 from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits
@@ -21,6 +22,7 @@ class SafetySettings:
         reduced_joint_speed: in reduced mode [rad/s].
         arm: the others.
         reduced_arm: in reduced mode.
+        boundaries: safety planes and tool direction.
         unwatched: settings that the safety system does not watch, for the log.
         inputs: pairs of configurable inputs with functions that need operational modes.
     """
@@ -31,6 +33,7 @@ class SafetySettings:
     reduced_joint_speed: Vector6 | None = None
     arm: ArmLimits | None = None
     reduced_arm: ArmLimits | None = None
+    boundaries: Boundaries = NO_BOUNDARIES
     unwatched: tuple[str, ...] = ()
     inputs: Mapping[int, SafetyInput] = field(default_factory=dict)
 
@@ -50,6 +53,7 @@ class ConfiguredLimits:
         recovery_speed: allowed in recovery mode [rad/s].
         arm: beside those of the joints.
         reduced_arm: in reduced mode.
+        boundaries: safety planes and tool direction.
     """
 
     q_min: Vector6
@@ -59,6 +63,7 @@ class ConfiguredLimits:
     recovery_speed: Vector6
     arm: ArmLimits
     reduced_arm: ArmLimits
+    boundaries: Boundaries = NO_BOUNDARIES
 
     def within(self, settings: SafetySettings) -> ConfiguredLimits:
         """Return the limits with those of an installation, which cannot widen those of the joints."""
@@ -74,6 +79,7 @@ class ConfiguredLimits:
             self.recovery_speed,
             arm,
             arm.within(settings.reduced_arm or self.reduced_arm),
+            settings.boundaries,
         )
 
 

@@ -88,6 +88,10 @@ class SetpointCheck:
             return None
         return find_invalid_setpoint(limits, before, target, self._stop_deceleration, self._period_s)
 
+    def braking_time(self, target: JointTarget) -> float:
+        """Return the time at the present speed that a stop takes as long a way as [s]."""
+        return max(map(abs, target.qd)) * self._braking
+
 
 def find_invalid_setpoint(
     limits: ConfiguredLimits,

@@ -172,8 +172,8 @@ class SafetyEvent(Enum):
     SYSTEM_EMERGENCY_RELEASED = "system emergency stop released"
     REDUCED_ON = "reduced mode on"
     REDUCED_OFF = "reduced mode off"
-    RANGE_LEFT = "joint out of range when the brakes open"
-    RANGE_KEPT = "joints back in range"
+    RANGE_LEFT = "joint or tool out of range when the brakes open"
+    RANGE_KEPT = "joints and tool back in range"
     VIOLATION = "violation"
     FAULT = "fault"
     RESTART = "restart safety"
@@ -233,11 +233,11 @@ EVENTS: dict[SafetyEvent, EventRow] = {
     _E.SYSTEM_EMERGENCY_PRESSED: _brings(Mode.SYSTEM_EMERGENCY_STOP, "configurable input"),
     _E.ROBOT_EMERGENCY_RELEASED: _takes("button on the pendant, input EI", Mode.ROBOT_EMERGENCY_STOP),
     _E.SYSTEM_EMERGENCY_RELEASED: _takes("configurable input", Mode.SYSTEM_EMERGENCY_STOP),
-    _E.REDUCED_ON: _brings(Mode.REDUCED, "configurable input"),
-    _E.REDUCED_OFF: _takes("configurable input", Mode.REDUCED),
-    _E.RANGE_LEFT: _brings(Mode.RECOVERY, "the controller, when the brakes open"),
+    _E.REDUCED_ON: _brings(Mode.REDUCED, "configurable input; a plane that triggers it"),
+    _E.REDUCED_OFF: _takes("configurable input; 20 mm back behind the plane", Mode.REDUCED),
+    _E.RANGE_LEFT: _brings(Mode.RECOVERY, "the controller, when the brakes open; also beyond a plane"),
     _E.RANGE_KEPT: _takes("the controller, in every cycle of recovery", Mode.RECOVERY),
-    _E.VIOLATION: _brings(Mode.VIOLATION, "the control API"),
+    _E.VIOLATION: _brings(Mode.VIOLATION, "a safety plane or the tool's cone is crossed; the control API"),
     _E.FAULT: _brings(Mode.FAULT, "the control API"),
     _E.RESTART: _takes(
         "dashboard", Mode.FAULT, Mode.VIOLATION, Mode.PROTECTIVE_STOP, Mode.RECOVERY, cuts_power=True

@@ -145,15 +145,15 @@ class SpeedLimiter:
         power = sum(
             abs(moment * qd) for moment, qd in zip(sensed.target_moment, sensed.actual_qd, strict=True)
         )
-        for code, name, unit, value, limit in (
-            (192, "TCP speed", "m/s", _tool_speed(space.actual), limits.tool_speed),
-            (0, "Force", "N", hypot(*space.tcp_force[:3]), limits.force),
-            (195, "Power", "W", power, limits.power),
-            (0, "Momentum", "kg m/s", space.actual.momentum, limits.momentum),
+        for code, argument, name, unit, value, limit in (
+            (191, 3, "TCP speed", "m/s", _tool_speed(space.actual), limits.tool_speed),
+            (0, 0, "Force", "N", hypot(*space.tcp_force[:3]), limits.force),
+            (191, 6, "Power", "W", power, limits.power),
+            (191, 12, "Momentum", "kg m/s", space.actual.momentum, limits.momentum),
         ):
             if value > limit * (1.0 + ARM_TOLERANCE):
                 text = f"Protective Stop: {name} limit violated: {value:.3f} {unit}, limit {limit:g}"
-                return ErrorReported(code, 0, ReportLevel.WARNING, text)
+                return ErrorReported(code, argument, ReportLevel.WARNING, text)
         return None
 
 

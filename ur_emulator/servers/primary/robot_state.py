@@ -55,7 +55,8 @@ _TEACH = int(RobotStatusBits.TEACH_BUTTON_PRESSED)
 def safety_checksum(robot: RobotModel, limits: ConfiguredLimits) -> int:
     """Return a checksum of the safety settings: those of the arm and its installation."""
     values = (limits.q_min, limits.q_max, limits.speed, robot.tau_max, robot.payload_max)
-    return zlib.crc32(repr(values).encode())
+    in_space = repr(limits.boundaries) if limits.boundaries else ""
+    return zlib.crc32((repr(values) + in_space).encode())
 
 
 def dexterity(arm: ArmModel, snapshot: Snapshot) -> float:

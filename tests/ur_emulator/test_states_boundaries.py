@@ -1,0 +1,312 @@
+"""Safety planes and the cone of the tool: what they hold, what they trigger, and how the arm gets out again."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from box_support import Bench
+from hypothesis import given
+from hypothesis import strategies as st
+from states_support import BRAKING, power_up
+
+from protocol.pose import rotvec_to_matrix
+from protocol.primary.messages import ReportLevel
+from protocol.ur_types import RobotMode, SafetyMode
+from ur_emulator.commands.boundaries import LimitToolDirection, SetSafetyPlane
+from ur_emulator.commands.power import PowerOn, ReleaseBrakes
+from ur_emulator.commands.safety import ReducedMode, RestartSafety, UnlockProtectiveStop
+from ur_emulator.controller.events import ErrorReported, SafetyModeChanged
+from ur_emulator.controller.safety.boundaries import (
+    DIRECTION_TOLERANCE,
+    MOST_PLANES,
+    PLANE_TOLERANCE,
+    TRIGGER_BAND,
+    BoundaryMode,
+    SafetyPlane,
+    ToolDirection,
+)
+from ur_emulator.errors import ArgumentError, RefusedError
+from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.robots import robot_by_name
+
+GENERATIONS = pytest.mark.parametrize(
+    "arm", [{}, {"robot": "ur5e", "generation": E_SERIES}], ids=["CB3", "e"]
+)
+TURN = "movej([q[0] {}, q[1], q[2], q[3], q[4], q[5]], a=3, v={})\n"
+
+
+def turn(angle, speed=1.0):
+    return "q = get_actual_joint_positions()\n" + TURN.format(f"+ {angle}", speed)
+
+
+def codes(bench):
+    return [(e.code, e.argument, e.level) for e in bench.events if isinstance(e, ErrorReported) and e.code]
+
+
+def modes(bench):
+    return [SafetyMode(e.safety_mode).name for e in bench.events if isinstance(e, SafetyModeChanged)]
+
+
+def tcp(bench):
+    return np.array(bench.now.actual_tcp_pose[:3])
+
+
+def ahead(bench, distance):
+    """A point so far from the TCP along its way when joint 1 turns in the positive sense, and the way back."""
+    x, y, _ = tcp(bench)
+    way = np.array([-y, x, 0.0]) / math.hypot(x, y)
+    return (tcp(bench) + distance * way).tolist(), (-way).tolist()
+
+
+def plane(position, normal, mode="normal", name="wall", **more):
+    return SetSafetyPlane(name, position, normal, mode, **more)
+
+
+def gap(bench, command, snapshot):
+    normal = np.array(command.normal) / np.linalg.norm(command.normal)
+    return float(normal @ (np.array(snapshot.actual_tcp_pose[:3]) - command.position))
+
+
+# --- strict limits
+
+
+@GENERATIONS
+@pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
+def test_a_program_ends_before_the_tool_reaches_a_plane(arm, speed):
+    bench = Bench(**arm)
+    wall = plane(*ahead(bench, 0.15))
+    bench.tick(1, wall)
+    bench.run(turn(1.0, speed))
+    assert modes(bench) == ["PROTECTIVE_STOP"]
+    assert codes(bench) == [(152, 0, ReportLevel.WARNING)]
+    least = min(gap(bench, wall, snapshot) for snapshot in bench.snapshots)
+    assert 0.5 * PLANE_TOLERANCE < least < 2.0 * PLANE_TOLERANCE
+
+
+def test_the_arm_may_go_back_from_a_plane_and_along_it():
+    bench = Bench()
+    wall = plane(*ahead(bench, 0.1))
+    bench.tick(1, wall)
+    bench.run(turn(1.0, 0.3))
+    bench.tick(1, UnlockProtectiveStop())
+    bench.run(turn(-0.3, 0.3))
+    assert modes(bench) == ["PROTECTIVE_STOP", "NORMAL"]
+    assert gap(bench, wall, bench.now) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("mode", "is_reduced", "stops"),
+    [
+        ("disabled", False, False),
+        ("disabled", True, False),
+        ("normal", False, True),
+        ("normal", True, False),
+        ("reduced", False, False),
+        ("reduced", True, True),
+        ("normal and reduced", False, True),
+        ("normal and reduced", True, True),
+    ],
+)
+def test_a_plane_is_a_limit_in_its_mode_only(mode, is_reduced, stops):
+    bench = Bench(fidelity="ideal")
+    bench.tick(1, plane(*ahead(bench, 0.05), mode), ReducedMode(is_reduced))
+    bench.run(turn(0.5))
+    assert ("PROTECTIVE_STOP" in modes(bench)) is stops
+
+
+@GENERATIONS
+def test_a_tool_beyond_a_plane_is_a_violation_that_ends_in_recovery(arm):
+    bench = Bench(**arm)
+    wall = plane(*ahead(bench, -0.03))
+    bench.tick(2, wall)
+    assert codes(bench) == [(191, 4, ReportLevel.VIOLATION)]
+    (text,) = (e.text for e in bench.events if isinstance(e, ErrorReported))
+    assert re.search(r"TCP position limit violated: TCP (29|30)\.\d mm beyond plane 'wall'", text)
+    bench.tick(BRAKING * 4)
+    assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.VIOLATION, RobotMode.POWER_OFF)
+    bench.tick(1, RestartSafety())
+    a_second = round(1.0 / bench.controller.period_s)
+    bench.tick(2 * a_second, PowerOn())
+    bench.tick(a_second, ReleaseBrakes())
+    assert (bench.now.robot_mode, bench.now.safety_mode) == (RobotMode.RUNNING, SafetyMode.RECOVERY)
+
+
+def test_recovery_ends_when_the_tool_is_back():
+    bench = Bench()
+    bench.tick(2, plane(*ahead(bench, -0.03)))
+    bench.tick(BRAKING)
+    bench.tick(1, RestartSafety())
+    power_up(bench)
+    assert bench.now.safety_mode == SafetyMode.RECOVERY
+    bench.run(turn(-0.4, 0.3))  # CB3: programs run in recovery
+    assert modes(bench)[-2:] == ["RECOVERY", "NORMAL"]
+    assert bench.now.robot_mode == RobotMode.RUNNING
+
+
+@pytest.mark.parametrize("restricts", [False, True])
+def test_the_elbow_is_held_where_the_plane_restricts_it(restricts):
+    bench = Bench(fidelity="ideal")
+    elbow = np.array(bench.now.space.actual.elbow_position)
+    way = (elbow - tcp(bench)) * (1.0, 1.0, 0.0)  # the TCP is on the other side, and stays behind
+    way /= np.linalg.norm(way)
+    rate = ARM.state(bench.now.actual_q, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)).elbow_velocity
+    bench.tick(1, plane((elbow + 0.05 * way).tolist(), (-way).tolist(), restrict_elbow=restricts))
+    move = TURN.replace("q[1]", f"q[1] + {math.copysign(0.4, way @ rate)}").format("", 1.0)
+    bench.run("q = get_actual_joint_positions()\n" + move)
+    texts = [e.text for e in bench.events if isinstance(e, ErrorReported) and e.code == 152]
+    assert [("elbow" in text, "plane 'wall'" in text) for text in texts] == [(True, True)] * restricts
+
+
+# --- the trigger
+
+
+@GENERATIONS
+def test_a_plane_triggers_reduced_mode_and_gives_it_back_20_mm_behind_it(arm):
+    bench = Bench(**arm)
+    wall = plane(*ahead(bench, 0.1), "trigger reduced mode")
+    bench.tick(1, wall)
+    bench.run(turn(0.5, 0.4))
+    assert modes(bench) == ["REDUCED"]
+    entered = next(s for s in bench.snapshots if s.safety_mode == SafetyMode.REDUCED)
+    assert -0.02 < gap(bench, wall, entered) <= 0.001
+    first = len(bench.snapshots)
+    bench.run(turn(-0.5, 0.4))
+    assert modes(bench) == ["REDUCED", "NORMAL"]
+    left = next(s for s in bench.snapshots[first:] if s.safety_mode == SafetyMode.NORMAL)
+    assert TRIGGER_BAND - 0.001 < gap(bench, wall, left) < TRIGGER_BAND + 0.02
+
+
+def test_reduced_mode_of_a_plane_ends_when_the_plane_goes_and_stays_for_an_input():
+    bench = Bench()
+    beyond = plane(*ahead(bench, -0.05), "trigger reduced mode")
+    bench.tick(2, beyond)
+    assert bench.now.safety_mode == SafetyMode.REDUCED
+    bench.tick(1, ReducedMode(True))
+    bench.tick(2, replace(beyond, mode="disabled"))
+    assert bench.now.safety_mode == SafetyMode.REDUCED
+    bench.tick(1, ReducedMode(False))
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+
+
+def test_beyond_the_trigger_the_arm_is_slow():
+    bench = Bench(fidelity="ideal")
+    bench.tick(2, plane(*ahead(bench, -0.05), "trigger reduced mode"))
+    bench.run(turn(2.0, 3.0))
+    assert bench.now.safety_mode == SafetyMode.REDUCED
+    assert max(abs(s.target_qd[0]) for s in bench.snapshots) <= math.pi / 2
+
+
+# --- the tool's direction
+
+
+def axis_of(bench):
+    return rotvec_to_matrix(bench.now.actual_tcp_pose[3:])[:, 2]
+
+
+@GENERATIONS
+def test_a_program_ends_before_the_tool_leaves_its_cone(arm):
+    bench = Bench(**arm)
+    axis = axis_of(bench)
+    bench.tick(1, LimitToolDirection(axis.tolist(), 0.5))
+    bench.run(
+        "q = get_actual_joint_positions()\nmovej([q[0], q[1], q[2], q[3] + 1.0, q[4], q[5]], a=3, v=1)\n"
+    )
+    assert codes(bench) == [(151, 0, ReportLevel.WARNING)]
+    angles = [
+        math.acos(min(1.0, axis @ rotvec_to_matrix(s.actual_tcp_pose[3:])[:, 2])) for s in bench.snapshots
+    ]
+    assert 0.5 - 2.0 * DIRECTION_TOLERANCE < max(angles) < 0.5
+
+
+def test_a_tool_outside_its_cone_is_a_violation():
+    bench = Bench()
+    bench.tick(2, LimitToolDirection((-axis_of(bench)).tolist(), 0.5))
+    assert codes(bench) == [(191, 5, ReportLevel.VIOLATION)]
+    assert bench.now.safety_mode == SafetyMode.VIOLATION
+
+
+# --- programs, costs, arguments
+
+
+def test_programs_can_ask_whether_a_pose_is_within_the_boundaries():
+    bench = Bench()
+    bench.tick(1, plane(*ahead(bench, 0.1)))
+    x, y, z = ahead(bench, 0.15)[0]
+    said = bench.run(
+        "p = get_actual_tcp_pose()\n"
+        "textmsg(is_within_safety_limits(p))\n"
+        f"textmsg(is_within_safety_limits(p[{x}, {y}, {z}, p[3], p[4], p[5]]))\n"
+    )
+    assert said == ["True", "False"]
+
+
+def test_a_box_without_boundaries_computes_nothing_for_them(monkeypatch):
+    bench = Bench()
+    calls = []
+    state = ArmModel.state
+    monkeypatch.setattr(ArmModel, "state", lambda *args: calls.append(1) or state(*args))
+    bench.run(turn(0.3))
+    assert not bench.controller.safety.is_busy
+    none = len(calls)
+    bench.tick(1, plane(*ahead(bench, 2.0)))
+    bench.run(turn(-0.3))
+    assert len(calls) - none > 0.9 * (len(bench.snapshots) - 2) / 2
+    assert none == 0
+
+
+def test_a_box_has_eight_planes_by_name():
+    bench = Bench()
+    far = ahead(bench, 2.0)
+    bench.tick(1, *(plane(*far, name=f"p{n}") for n in range(MOST_PLANES)))
+    limits = bench.controller.state.safety.limits
+    assert [row.name for row in limits.boundaries.planes] == [f"p{n}" for n in range(MOST_PLANES)]
+    with pytest.raises(RefusedError, match="there are 8 planes, no more are possible: give the name of one"):
+        plane(*far, name="one more").apply(bench.controller)
+    plane(*far, "disabled", name="p3").apply(bench.controller)
+    named = {row.name: row.mode for row in bench.controller.state.safety.limits.boundaries.planes}
+    assert (len(named), named["p3"]) == (MOST_PLANES, BoundaryMode.DISABLED)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: plane((0, 0, 0), (0, 0, 0)), r"direction \[.*\] given: its length must be at least 1e-06"),
+        (lambda: plane((0, 0, 0), (0, 0, 1), name=""), "safety plane without a name"),
+        (lambda: plane((0, 0), (0, 0, 1)), "three"),
+        (lambda: plane((0, 0, 0), (0, 0, 1), "sometimes"), "trigger reduced mode"),
+        (lambda: LimitToolDirection((0, 0, 1), 0.01), "deviation"),
+        (lambda: LimitToolDirection((0, 0, 0), 1.0), "its length must be"),
+        (lambda: LimitToolDirection((0, 0, 1), 1.0, "trigger reduced mode"), "mode"),
+    ],
+)
+def test_what_makes_no_boundary_is_refused(make, words):
+    with pytest.raises(ArgumentError, match=words):
+        make()
+
+
+UR3 = robot_by_name("ur3")
+ARM = ArmModel(UR3)
+angles = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6)
+units = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1)).filter(lambda v: math.hypot(*v) > 0.1)
+
+
+@given(q=angles, qd=angles, direction=units, point=units)
+def test_gaps_and_their_rates_are_those_of_the_arm_a_moment_later(q, qd, direction, point):
+    length = math.hypot(*direction)
+    unit = tuple(part / length for part in direction)
+    h = 1e-6
+    now, later = ARM.state(q, qd), ARM.state([a + h * v for a, v in zip(q, qd, strict=True)], qd)
+    wall = SafetyPlane("w", point, unit, BoundaryMode.NORMAL, restricts_elbow=True)
+    for (what, here, rate), (_, there, _) in zip(wall.gaps(now), wall.gaps(later), strict=True):
+        place = now.tcp_pose[:3] if what == "TCP" else now.elbow_position
+        assert here == pytest.approx(np.dot(unit, np.subtract(place, point)), abs=1e-12)
+        assert there - here == pytest.approx(rate * h, abs=1e-9)
+    cone = ToolDirection(unit, 1.0, BoundaryMode.NORMAL)
+    left, rate = cone.gap(now)
+    cosine = float(np.dot(unit, rotvec_to_matrix(now.tcp_pose[3:])[:, 2]))
+    assert left == pytest.approx(1.0 - math.acos(max(-1.0, min(1.0, cosine))), abs=1e-7)
+    if abs(cosine) < 0.99:
+        assert cone.gap(later)[0] - left == pytest.approx(rate * h, abs=1e-8)

@@ -1,0 +1,174 @@
+"""Boundaries of the tool in space: safety planes, and a cone for its direction.
+
+Sources: UR3 and UR10/CB3 user manuals 3.x, boundaries and safety modes: the normal of a plane points to its
+allowed side, what is about to cross it ends the program, what has crossed it is a violation, on the way back
+both modes are allowed within 20 mm of a plane that triggers reduced mode; PolyScope 5.20 user manual, safety
+planes: the modes, the elbow. Codes and the first words of their texts: a public list of error codes. What a
+boundary holds is the TCP; tool spheres are not modelled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from math import acos, fsum, inf, radians, sqrt
+from operator import mul
+from typing import TYPE_CHECKING
+
+from protocol.primary.messages import ReportLevel
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.models.robot_model import Vector3
+
+if TYPE_CHECKING:
+    from ur_emulator.kinematics.arm_model import CartesianState
+
+MOST_PLANES = 8
+# A program is ended this far before a boundary [m, rad]; the manuals name such a tolerance without a number.
+# Source of the numbers: UR5/CB3 manual 3.1, trueness of TCP position and orientation.
+PLANE_TOLERANCE, DIRECTION_TOLERANCE = 0.020, radians(1.15)
+# So far back behind a plane reduced mode ends [m].
+TRIGGER_BAND = 0.020
+# Sine of the least angle between tool and axis of the cone at which its rate is computed.
+_LEAST_SINE = 1e-9
+
+
+class BoundaryMode(Enum):
+    """When a boundary is active; the values are those of the control API."""
+
+    DISABLED = "disabled"
+    NORMAL = "normal"
+    REDUCED = "reduced"
+    BOTH = "normal and reduced"
+    TRIGGER = "trigger reduced mode"
+
+    def limits(self, is_reduced: bool) -> bool:
+        """True where the boundary is a strict limit, in reduced mode or in normal mode."""
+        return self is self.BOTH or self is (self.REDUCED if is_reduced else self.NORMAL)
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyPlane:
+    """A safety plane in the base frame.
+
+    Attributes:
+        name: that somebody gave it.
+        position: a point of the plane [m].
+        normal: unit vector, towards the allowed side.
+        mode: when it is active, and as what.
+        restricts_elbow: it holds the elbow, too.
+    """
+
+    name: str
+    position: Vector3
+    normal: Vector3
+    mode: BoundaryMode
+    restricts_elbow: bool = False
+
+    def gaps(self, arm: CartesianState) -> Iterator[tuple[str, float, float]]:
+        """Yield what it holds: name, distance on the allowed side [m], its rate [m/s]."""
+        normal, offset = self.normal, _dot(self.normal, self.position)
+        yield "TCP", _dot(normal, arm.tcp_pose[:3]) - offset, _dot(normal, arm.tcp_speed[:3])
+        if self.restricts_elbow:
+            yield "elbow", _dot(normal, arm.elbow_position) - offset, _dot(normal, arm.elbow_velocity)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolDirection:
+    """A cone that holds the z axis of the TCP.
+
+    Attributes:
+        axis: of the cone, unit vector in the base frame.
+        deviation: largest angle from it [rad].
+        mode: when it is active; it never triggers reduced mode.
+    """
+
+    axis: Vector3
+    deviation: float
+    mode: BoundaryMode
+
+    def gap(self, arm: CartesianState) -> tuple[float, float]:
+        """Return the angle that is left [rad], and its rate [rad/s]."""
+        from protocol.pose import rotvec_to_flat  # loads numpy, which the command line does without
+
+        rotation = rotvec_to_flat(*arm.tcp_pose[3:])
+        z = zx, zy, zz = rotation[2], rotation[5], rotation[8]
+        wx, wy, wz = arm.tcp_speed[3:]
+        cosine = min(1.0, max(-1.0, _dot(self.axis, z)))
+        rate = _dot(self.axis, (wy * zz - wz * zy, wz * zx - wx * zz, wx * zy - wy * zx))
+        return self.deviation - acos(cosine), rate / max(_LEAST_SINE, sqrt(1.0 - cosine * cosine))
+
+
+@dataclass(frozen=True, slots=True)
+class Boundaries:
+    """Some boundaries, all of those of a box or the strict limits of a mode; none of them is false.
+
+    Attributes:
+        planes: at most `MOST_PLANES`.
+        tool_direction: None for any.
+    """
+
+    planes: tuple[SafetyPlane, ...] = ()
+    tool_direction: ToolDirection | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.planes) or self.tool_direction is not None
+
+    def limits(self, is_reduced: bool) -> Boundaries:
+        """Return the strict limits of reduced mode, or of normal mode."""
+        tool = self.tool_direction
+        return Boundaries(
+            tuple(plane for plane in self.planes if plane.mode.limits(is_reduced)),
+            tool if tool is not None and tool.mode.limits(is_reduced) else None,
+        )
+
+    def trigger_gap(self, arm: CartesianState) -> float:
+        """Return the distance to the nearest plane that triggers reduced mode [m]; negative beyond it."""
+        planes = (plane for plane in self.planes if plane.mode is BoundaryMode.TRIGGER)
+        return min((gap for plane in planes for _, gap, _ in plane.gaps(arm)), default=inf)
+
+    def find_near(self, arm: CartesianState, braking_time: float) -> ErrorReported | None:
+        """Return why a protective stop begins before a limit that the arm approaches, or None.
+
+        Args:
+            arm: at the set-point.
+            braking_time: time at the present speed that a stop takes as long a way as [s].
+        """
+        for plane in self.planes:
+            for what, gap, rate in plane.gaps(arm):
+                if rate < 0.0 and gap + rate * braking_time < PLANE_TOLERANCE:
+                    return _near(152, f"Position close to safety plane limits: {_place(plane, what, gap)}")
+        if self.tool_direction is not None:
+            left, rate = self.tool_direction.gap(arm)
+            if rate < 0.0 and left + rate * braking_time < DIRECTION_TOLERANCE:
+                return _near(151, f"Tool orientation close to limits: {left:.3f} rad left")
+        return None
+
+    def find_crossed(self, arm: CartesianState) -> ErrorReported | None:
+        """Return the violation of a limit by the arm, or None."""
+        for plane in self.planes:
+            for what, gap, _ in plane.gaps(arm):
+                if gap < 0.0:
+                    return _crossed(4, f"TCP position limit violated: {_place(plane, what, gap)}")
+        if self.tool_direction is not None and (left := self.tool_direction.gap(arm)[0]) < 0.0:
+            return _crossed(5, f"TCP orientation limit violated: {-left:.3f} rad beyond")
+        return None
+
+
+NO_BOUNDARIES = Boundaries()
+
+
+def _place(plane: SafetyPlane, what: str, gap: float) -> str:
+    return f"{what} {abs(gap) * 1e3:.1f} mm {'beyond' if gap < 0.0 else 'from'} plane '{plane.name}'"
+
+
+def _near(code: int, text: str) -> ErrorReported:
+    return ErrorReported(code, 0, ReportLevel.WARNING, f"Protective Stop: {text}")
+
+
+def _crossed(argument: int, text: str) -> ErrorReported:
+    return ErrorReported(191, argument, ReportLevel.VIOLATION, f"Safety system violation: {text}")
+
+
+def _dot(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    return fsum(map(mul, a, b))
