@@ -95,9 +95,14 @@ def assign_resizing(value: Any, old: Any, name: str) -> Any:
 
 def assign_within_capacity(value: Any, old: Any, name: str) -> Any:
     """`assign` for software in which a list has a capacity, which it keeps (D); so it can get shorter."""
-    if type(value) is list and type(old) is list and len(value) == len(old):
-        if value and type(value[0]) is type(old[0]) and type(value[0]) in _SCALARS:  # nearly always
-            return value
+    if (
+        type(value) is list
+        and type(old) is list
+        and len(value) == len(old) > 0
+        and type(value[0]) is type(old[0])
+        and type(value[0]) in _SCALARS
+    ):  # nearly always
+        return value
     return fitted(value, old, "variable", name)
 
 
