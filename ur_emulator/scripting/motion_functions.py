@@ -8,6 +8,7 @@ from typing import Any
 from protocol.pose import Pose as ToolPose
 from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported, EventQueue
+from ur_emulator.controller.world_model import BASE, WorldModel, WorldModelError
 from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.leg import Leg, move_j, move_tool
@@ -17,7 +18,7 @@ from ur_emulator.scripting.move_planner import MovePlanner
 from ur_emulator.scripting.script_arm import Cycles, ScriptArm, floats, require_positive, require_range
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
-from urscript.values import Pose, log_form
+from urscript.values import Pose, Struct, log_form
 
 # Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.
 JOINT_DEFAULTS = (1.4, 1.05)  # rad/s^2, rad/s
@@ -30,7 +31,11 @@ MAX_PER_CYCLE = 4
 
 
 def motion_functions(
-    arm: ScriptArm, place_arm: Callable[[Vector6], bool], events: EventQueue, planner: MovePlanner
+    arm: ScriptArm,
+    place_arm: Callable[[Vector6], bool],
+    events: EventQueue,
+    planner: MovePlanner,
+    world: WorldModel,
 ) -> Mapping[str, Callable[..., Any]]:
     """Return the builtins that move the arm from waypoint to waypoint.
 
@@ -39,6 +44,7 @@ def motion_functions(
         place_arm: puts it at joint angles [rad]; False where it would touch something.
         events: get warnings of overlapping blends.
         planner: of moves whose limits follow from the arm.
+        world: has the frames that goals can be given in.
     """
     motion = arm.motion
 
@@ -103,11 +109,29 @@ def motion_functions(
 
         return travel(thread, make)
 
+    def goal_of(function: str, goal: Any) -> Any:
+        """Return joint angles or a pose in the base; a goal may be a frame, or a pose in one."""
+        try:
+            match goal:
+                case str():
+                    return Pose.of(world.pose(goal, BASE))
+                case Struct(members={"pose": Pose() as pose, "frame": str(frame)}):
+                    return Pose.of(world.convert(_pose(pose), frame, BASE))
+        except WorldModelError as error:
+            raise ScriptRuntimeError(f"{function}: {error}") from None
+        if isinstance(goal, Pose) or (isinstance(goal, list) and len(goal) == 6):
+            return goal
+        raise ScriptRuntimeError(
+            f"{function}: goal {log_form(goal)} is none; allowed: six joint positions, a pose, a frame, "
+            "struct(pose, frame)"
+        )
+
     def optimovej(thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
-        _require_shares("optimovej", goal, a, v, r)
+        _require_shares("optimovej", a, v, r)
+        target = goal_of("optimovej", goal)
 
         def make(start: Vector6, _: ToolPose) -> Leg:
-            q = joints_of(goal, start)
+            q = joints_of(target, start)
             require_range("optimovej", q, arm.safety.limits)
             return planner.optimal(move_j(start, q, arm.tool, a=1.0, v=1.0, r=r), a, v)
 
@@ -132,7 +156,7 @@ def motion_functions(
         r: float,
     ) -> Cycles:
         def make(q: Vector6, start: ToolPose) -> Leg:
-            return move_tool(make_path(start), q, arm.tool, a=a, v=v, r=r, process=True)
+            return planner.limited(move_tool(make_path(start), q, arm.tool, a=a, v=v, r=r, process=True))
 
         return travel(thread, make)
 
@@ -146,8 +170,8 @@ def motion_functions(
         return travel(thread, make)
 
     def optimovel(thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
-        _require_shares("optimovel", goal, a, v, r)
-        pose = pose_of(goal)
+        _require_shares("optimovel", a, v, r)
+        pose = pose_of(goal_of("optimovel", goal))
 
         def make(q: Vector6, start: ToolPose) -> Leg:
             return planner.optimal(move_tool(PoseLine(start, pose), q, arm.tool, a=1.0, v=1.0, r=r), a, v)
@@ -164,7 +188,7 @@ def motion_functions(
         goal = pose_of(pose)
 
         def make(q: Vector6, start: ToolPose) -> Leg:
-            return move_tool(PoseLine(start, goal), q, arm.tool, a=a, v=v, r=r, process=True)
+            return planner.limited(move_tool(PoseLine(start, goal), q, arm.tool, a=a, v=v, r=r, process=True))
 
         # Drivers call it with the same pose again and again: nothing to warn of.
         return travel(thread, make, may_overlap=True)
@@ -217,11 +241,7 @@ def _require_limits(function: str, a: float, v: float, t: float, r: float) -> No
         require_positive(function, t=t)
 
 
-def _require_shares(function: str, goal: Any, a: float, v: float, r: float) -> None:
-    if not isinstance(goal, Pose) and not (isinstance(goal, list) and len(goal) == 6):
-        raise ScriptRuntimeError(
-            f"{function}: goal {log_form(goal)} is not modelled; allowed: six joint positions or a pose"
-        )
+def _require_shares(function: str, a: float, v: float, r: float) -> None:
     for name, share in (("a", a), ("v", v)):
         if not 0.0 < share <= 1.0:
             raise ScriptRuntimeError(f"{function}: {name} must be above 0 and up to 1, got {share:g}")

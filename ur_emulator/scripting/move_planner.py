@@ -13,8 +13,10 @@ from math import inf
 
 from ur_emulator.controller.arm_dynamics import ArmDynamics
 from ur_emulator.controller.planning import PlanningSettings
+from ur_emulator.controller.tool_settings import ToolSettings
 from ur_emulator.motion.leg import Leg
 from ur_emulator.motion.tool import UnreachableError
+from ur_emulator.scripting.tool_wrench import gentle
 
 # Points of a path where the arm is asked.
 _POINTS = 9
@@ -25,12 +27,19 @@ _TOP_SHARE = 0.99
 class MovePlanner:
     """Plans moves of one arm."""
 
-    def __init__(self, dynamics: ArmDynamics, planning: PlanningSettings) -> None:
+    def __init__(self, dynamics: ArmDynamics, planning: PlanningSettings, tool: ToolSettings) -> None:
         self._dynamics = dynamics
         self._planning = planning
+        self._tool = tool
+
+    def limited(self, leg: Leg) -> Leg:
+        """Return a move that keeps the limit of the tool's wrench."""
+        limit = self._planning.tool_wrench_limit
+        return leg if limit is None else gentle(leg, limit, self._tool.payload)
 
     def usual(self, leg: Leg) -> Leg:
         """Return a move of movej or movel in the motion version that is set."""
+        leg = self.limited(leg)
         if self._planning.motion_version == 1:
             return leg
         a, v = self._greatest(leg)
@@ -39,7 +48,7 @@ class MovePlanner:
     def optimal(self, leg: Leg, a_share: float, v_share: float) -> Leg:
         """Return a move with shares of the greatest acceleration and speed along its path."""
         a, v = self._greatest(leg)
-        return self._smooth(replace(leg, a=a_share * a, v=v_share * v))
+        return self._smooth(self.limited(replace(leg, a=a_share * a, v=v_share * v)))
 
     def _smooth(self, leg: Leg) -> Leg:
         if leg.r > 0.0:

@@ -62,7 +62,11 @@ class RobotHost:
         self._path_offset = ProgramPathOffset(arm)
         self._builtins: Mapping[str, Callable[..., Any]] = {
             **motion_functions(
-                arm, state.place_arm, state.events, MovePlanner(state.dynamics, state.planning)
+                arm,
+                state.place_arm,
+                state.events,
+                MovePlanner(state.dynamics, state.planning, state.tool),
+                state.world,
             ),
             **planning_functions(state.planning),
             **speed_functions(arm, self.step_time),

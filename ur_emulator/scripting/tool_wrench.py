@@ -1,0 +1,95 @@
+"""Slows moves down so that what the tool carries is accelerated by no more than a limited wrench.
+
+Source: script manual e-Series 5.2x, tool_wrench_limit_set: the wrench that motion causes, without gravity, in
+a frame at the flange; axes without a limit are free. Chosen: the wrench is that of the declared payload, at
+points of the path; half of a limit is left for the change of direction, so the speed is lowered first, then
+the acceleration. Not limited: blends, streams (servoj, speedj, ...), overlays and stops.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from protocol.pose import rotvec_to_matrix
+from ur_emulator.controller.planning import ToolWrenchLimit
+from ur_emulator.controller.tool_settings import Payload
+from ur_emulator.motion.leg import Leg
+from ur_emulator.motion.tool import UnreachableError
+
+# Points of a path where the wrench is computed.
+_POINTS = 25
+_NOTHING = 1e-9  # N, Nm
+
+
+def gentle(leg: Leg, limit: ToolWrenchLimit, payload: Payload) -> Leg:
+    """Return a move whose acceleration and speed keep the limit; a duration that is too short is given up."""
+    if leg.path.length <= 0.0 or payload.mass <= 0.0:
+        return leg
+    per_acceleration, per_square = _wrenches(leg, limit, payload)
+    most = np.array(limit.most)
+    planned = leg.with_duration()
+    v = min(planned.v, _least(0.5 * most / np.maximum(per_square, _NOTHING)) ** 0.5)
+    left = most - per_square * v**2
+    a = min(planned.a, _least(left / np.maximum(per_acceleration, _NOTHING)))
+    if (a, v) == (planned.a, planned.v):
+        return leg
+    return replace(leg, a=a, v=v, t=0.0)
+
+
+def _least(bounds: NDArray[np.float64]) -> float:
+    least = float(bounds.min(initial=inf))
+    return least if isfinite(least) else inf
+
+
+def _wrenches(
+    leg: Leg, limit: ToolWrenchLimit, payload: Payload
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what an acceleration of 1 and a speed of 1 along the path ask for.
+
+    Returns:
+        Magnitudes (points, 6) of the wrench in the frame of the limit: force [N], torque [Nm].
+    """
+    arm = leg.tool.arm
+    places = np.linspace(0.0, leg.path.length, _POINTS)
+    turns, twists = [], []
+    for s in places.tolist():
+        try:
+            q, slope = leg.path.at(s, leg.near(s))
+        except UnreachableError:
+            break  # the move itself ends there
+        state = arm.state(q, slope)
+        turns.append(rotvec_to_matrix(state.tcp_pose[3:]))
+        twists.append(state.tcp_speed)
+    if len(twists) < 2:
+        return np.zeros((1, 6)), np.zeros((1, 6))
+    turn = np.array(turns)
+    # Twists of the flange in its own axes, and how they change along the path.
+    twist = np.array(twists)
+    changes = np.gradient(twist, places[1], axis=0)
+    linear, spin, linear_change, spin_change = (
+        np.einsum("nji,nj->ni", turn, vectors)
+        for vectors in (twist[:, :3], twist[:, 3:], changes[:, :3], changes[:, 3:])
+    )
+    cog = np.array(payload.cog)
+    xx, yy, zz, xy, xz, yz = payload.inertia
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    frame = rotvec_to_matrix(limit.frame[3:])
+    lever = cog - np.array(limit.frame[:3])
+
+    def magnitude(acceleration: NDArray[np.float64], moment: NDArray[np.float64]) -> NDArray[np.float64]:
+        force = payload.mass * acceleration
+        moment = moment + np.cross(lever, force)
+        wrench: NDArray[np.float64] = np.concatenate([force @ frame, moment @ frame], axis=1)
+        return np.abs(wrench)
+
+    return (
+        magnitude(linear + np.cross(spin, cog), spin @ inertia),
+        magnitude(
+            linear_change + np.cross(spin_change, cog) + np.cross(spin, np.cross(spin, cog)),
+            spin_change @ inertia + np.cross(spin, spin @ inertia),
+        ),
+    )
