@@ -168,10 +168,11 @@ def _arm(
 
 
 # Speeds: UR3, UR5, UR10 manuals CB3 3.13; UR's ROS description (config/*/joint_limits.yaml) says the same and
-# has the other arms.
+# has the other arms, but for the UR8 Long: assumed, a UR15's, with base and shoulder of a UR20.
 _UR3_SPEEDS: Six = (180.0, 180.0, 180.0, 360.0, 360.0, 360.0)
 _UR5_SPEEDS: Six = (180.0,) * 6
 _UR10_SPEEDS: Six = (120.0, 120.0, 180.0, 180.0, 180.0, 180.0)
+_UR8LONG_SPEEDS: Six = (120.0, 120.0, 240.0, 300.0, 300.0, 300.0)
 _UR15_SPEEDS: Six = (180.0, 180.0, 240.0, 300.0, 300.0, 300.0)
 _UR20_SPEEDS: Six = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
 
@@ -203,8 +204,8 @@ _ROWS = (
     _arm("ur12e", UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, 0.014),
     # (330 - 91 - 34) Nm over 8.4 kg m²; elbow (150 - 29 - 16) over 2.8.
     _arm("ur16e", UR16E, _UR10_SPEEDS, (24.0, 37.0), 0.9, 0.01),
-    # (433 - 233 - 46) Nm over 24 kg m²; elbow (204 - 64 - 22) over 7.1. Its drives: assumed, a UR15's.
-    _arm("ur8long", UR8LONG, _UR15_SPEEDS, (6.0, 16.0), 1.75, 0.019),
+    # (433 - 233 - 46) Nm over 24 kg m²; elbow (204 - 64 - 22) over 7.1.
+    _arm("ur8long", UR8LONG, _UR8LONG_SPEEDS, (6.0, 16.0), 1.75, 0.019),
     # (433 - 149 - 46) Nm over 15 kg m²; elbow (204 - 44 - 22) over 5.
     _arm("ur15", UR15, _UR15_SPEEDS, (16.0, 27.0), 1.3, 0.014),
     # (433 - 103 - 46) Nm over 12 kg m²; elbow (204 - 29 - 22) over 3.8.

@@ -30,6 +30,7 @@ SECOND = RobotGeneration(
         recovery=ArmLimits(tool_speed=0.2, force=90.0, power=70.0, momentum=9.0),
         manual=ArmLimits(tool_speed=0.3),
         has_programs_in_recovery=False,
+        brakes_within_torque=True,
     ),
     electrics=Electrics(
         main_voltage=47.0,

@@ -90,11 +90,14 @@ def sends_half_a_message(arm):
     arm.client.inbox += encode_velocity(VelocityMode.VELOCITY, [1.0] * 6)[:13]
 
 
-# A UR20 that is stretched is too heavy to slow down like this: its box stops it. Others are the same arm twice.
+# Others are the same arm twice.
 ENDS = [
     (robot, end) for robot in ("ur3", "ur5", "ur10") for end in (falls_silent, closes, sends_half_a_message)
 ]
-ENDS += [(robot, falls_silent) for robot in ("ur3e", "ur5e", "ur10e", "ur16e", "ur30")]
+ENDS += [
+    (robot, falls_silent)
+    for robot in ("ur3e", "ur5e", "ur10e", "ur16e", "ur8long", "ur15", "ur18", "ur20", "ur30")
+]
 
 
 @pytest.mark.parametrize(("robot", "end"), ENDS)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,18 @@ from numpy.typing import NDArray
 from ur_emulator.controller.tool_settings import Payload, ToolSettings
 from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.motion.generators import REST_SPEED
+from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 
 _STILL = np.zeros(6)
 # Share of the rated torque for gravity and acceleration; friction and the arm's motion take the rest. Chosen.
 _TORQUE_SHARE = 0.7
+# Share for a stop, in which the arm's motion is accounted for and friction helps. Chosen.
+_BRAKING_SHARE = 0.9
 _LEAST = 1e-9  # Nm; a joint that needs less does not limit anything
+# What a stop has at least, also where the drives cannot hold the arm [rad/s^2].
+_LEAST_DECELERATION = 1.0
 
 
 class ArmDynamics:
@@ -72,6 +79,32 @@ class ArmDynamics:
         per_acceleration = np.abs(self._torque(q, _STILL, np.array(slope, dtype=np.float64)) - gravity)
         left = np.maximum(_TORQUE_SHARE * np.array(self._robot.tau_max) - np.abs(gravity), 0.0)
         return float((left / np.maximum(per_acceleration, _LEAST)).min())
+
+    def greatest_deceleration(self, target: JointTarget) -> float:
+        """Return the greatest deceleration of the leading axis that the drives can give in a stop [rad/s^2].
+
+        All joints come to rest together, see `ramp_towards`. Friction helps joints that move; of others it
+        may take a part of the torque.
+        """
+        leading = max(map(abs, target.qd))
+        if leading <= REST_SPEED:
+            return inf
+        qd = np.array(target.qd)
+        gravity = self.gravity_torque(target.q)
+        dry, drag = self._friction(qd)
+        moving = self._torque(target.q, qd, _STILL) + drag
+        per_deceleration = self._torque(target.q, _STILL, qd / -leading) - gravity
+        left = _BRAKING_SHARE * np.array(self._robot.tau_max) - dry - moving * np.sign(per_deceleration)
+        greatest = float((left / np.maximum(np.abs(per_deceleration), _LEAST)).min())
+        return max(greatest, _LEAST_DECELERATION)
+
+    def _friction(self, qd: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the dry friction of joints at rest, either way, and the friction of the others [Nm]."""
+        robot, speed = self._robot, np.abs(qd)
+        slow = speed if robot.viscous_kink is None else np.minimum(speed, robot.viscous_kink)
+        dry = np.array(robot.coulomb)
+        drag = dry + np.array(robot.viscous) * slow + np.array(robot.viscous_beyond_kink) * (speed - slow)
+        return np.where(speed > REST_SPEED, 0.0, dry), np.sign(qd) * drag
 
     def _torque(
         self, q: Sequence[float], qd: NDArray[np.float64], qdd: NDArray[np.float64]

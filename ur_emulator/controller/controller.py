@@ -101,6 +101,8 @@ class Controller:
             self._place_arm,
             version or generation.parse_version(generation.default_version)[:2],
         )
+        if generation.limits.brakes_within_torque:
+            motion.braking = self.state.dynamics.greatest_deceleration
         self._payload = self.state.tool.payload
         self.state.past.place(motion.target, self.plant.sense())
         self.programs = make_programs(self.state)

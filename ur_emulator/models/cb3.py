@@ -41,6 +41,7 @@ CB3 = RobotGeneration(
         recovery=UNLIMITED,  # likewise
         manual=UNLIMITED,
         has_programs_in_recovery=True,  # chosen
+        brakes_within_torque=False,
     ),
     electrics=Electrics(
         main_voltage=48.0,  # captures of resting arms

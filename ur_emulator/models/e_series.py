@@ -85,6 +85,8 @@ E_SERIES = RobotGeneration(
         recovery=ArmLimits(tool_speed=0.25, force=100.0, power=80.0, momentum=10.0),
         manual=ArmLimits(tool_speed=0.25),  # chosen: reduced speed of ISO 10218-1
         has_programs_in_recovery=False,  # UR5e hardware manual 2022
+        # Chosen; UR10e manual: the software adjusts accelerations to mass, centre and inertia of the payload.
+        brakes_within_torque=True,
     ),
     electrics=Electrics(
         main_voltage=47.8,  # A

@@ -49,6 +49,7 @@ class SafetyLimits:
         recovery: in recovery mode.
         manual: in the operational mode MANUAL, where the generation has it.
         has_programs_in_recovery: programs run in recovery mode.
+        brakes_within_torque: a stop brakes no harder than the drives can with the declared payload.
     """
 
     holding_deviation: float | None = None
@@ -60,3 +61,4 @@ class SafetyLimits:
     recovery: ArmLimits
     manual: ArmLimits
     has_programs_in_recovery: bool
+    brakes_within_torque: bool

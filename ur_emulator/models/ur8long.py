@@ -4,13 +4,14 @@ Sources, cited by letter below:
  A  ros-industrial/universal_robot, ur_description/config/ur8long/default_kinematics.yaml: the controller's
     own table, with its hash.
  B  physical_parameters.yaml beside it, as for the UR15.
- C  Drives and speeds: assumed, those of the UR15, whose shoulder and wrists it has; no list of its limits is
-    known.
+ C  Assumed, no list of its limits is known: drives and speeds of the UR15, whose shoulder and wrists it has;
+    base and shoulder turn no faster than a UR20's, of the same reach.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import pi
 
 from ur_emulator.models.robot_model import Link, dh_table
 from ur_emulator.models.ur15 import UR15
@@ -42,6 +43,7 @@ UR8LONG = replace(
         _WRIST_2,
         _WRIST_3,
     ),
+    qd_max=(2 * pi / 3, 2 * pi / 3, *UR15.qd_max[2:]),  # C
     stop_deceleration=5.0,  # assumed: the UR10's, scaled by the reach
     # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
     servo_inertia=(16.6, 24.0, 7.13, 0.916, 0.863, 0.851),

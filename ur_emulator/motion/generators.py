@@ -7,6 +7,7 @@ keeps the rest of its state itself. When `done`, its last target stays in force.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from operator import sub
 from typing import Protocol
 
@@ -127,14 +128,20 @@ class SpeedJ(Streamed):
 
 
 class StopJ:
-    """Decelerate all joints to rest, the leading axis at `a`. Source: URScript manual CB3 3.15, stopj."""
+    """Decelerate all joints to rest, the leading axis at `a`. Source: URScript manual CB3 3.15, stopj.
+
+    Attributes:
+        a: deceleration that is asked for [rad/s^2].
+        allowed: the greatest that is allowed in the next cycle [rad/s^2].
+    """
 
     def __init__(self, a: float) -> None:
         self.a = a
+        self.allowed = inf
         self.done = False
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Move the target velocity towards zero; the speed slider does not soften a stop."""
-        after = ramp_towards(target, ZERO6, self.a, dt)
+        after = ramp_towards(target, ZERO6, min(self.a, self.allowed), dt)
         self.done = max(map(abs, after.qd)) <= REST_SPEED
         return JointTarget(after.q) if self.done else after

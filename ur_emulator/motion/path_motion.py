@@ -13,6 +13,8 @@ Must not know scripts or physics: an owner is any object, compared by identity.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ur_emulator.models.robot_model import Vector6
 from ur_emulator.motion.generators import Generator, Hold, StopJ, Streamed
 from ur_emulator.motion.move import Move
@@ -35,10 +37,13 @@ class PathMotion:
     Attributes:
         path: target along the path of the program; what generators see.
         scaling_rate: rate of change of the speed scaling [1/s].
+        braking: gives the greatest deceleration of the leading axis [rad/s^2] that the drives can give in a
+            stop, in the direction of the path's velocity; None: a stop brakes as it was asked to.
     """
 
     def __init__(self, q: Vector6) -> None:
         self.path = JointTarget(q)
+        self.braking: Callable[[JointTarget], float] | None = None
         self._generator: Generator = HOLD
         self._owner: object | None = None
         self._renewed = False
@@ -155,6 +160,8 @@ class PathMotion:
             if not self._renewed:
                 generator = self._generator = generator.when_lost()
             self._renewed = False
+        if self.braking is not None and isinstance(generator, StopJ):
+            generator.allowed = self.braking(self.path)
         path = self.path = generator.step(self.path, dt, scale * time_factor)
         if generator.done and not isinstance(generator, Streamed):
             self._end_of(generator)
