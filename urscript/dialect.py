@@ -71,8 +71,9 @@ INDEX_TAKES_WHOLE_FLOATS: Final = True
 MIXED_TYPES_COMPARE: Final = True
 """`==` between a string and a number, or a pose and a list, is False, not an error (U)."""
 
-INT_AS_CONDITION: Final = False
-"""`if 1:` is a run-time error (U, never seen in a script). Strings are allowed: empty is false (D)."""
+NUMBER_AS_CONDITION: Final = True
+"""`if 1.0:` is as `if True:`, 0 is false (O: the maker's driver tests a float that came through a socket, in
+its program for all software). Strings are allowed: empty is false (D)."""
 
 SIX_NUMBERS_FIT_A_POSE_VARIABLE: Final = True
 """A variable that holds a pose takes a list of six numbers, and vice versa (O: a driver for the

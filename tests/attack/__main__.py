@@ -2,8 +2,10 @@
 
 python tests/attack                  # everything, a quarter of an hour
 python tests/attack "unread log"     # these attacks; the others keep their last figures
+python tests/attack --robot ur5e     # the same on another arm, into out/attack/ur5e.json
 """
 
+import argparse
 import json
 import math
 import os
@@ -19,24 +21,27 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-RESULTS = Path(__file__).with_name("results.json")
+# The arm of the page, and where its figures are; those of others have no page.
+ROBOT, RESULTS = "ur3", Path(__file__).with_name("results.json")
+OTHERS = Path("out") / "attack"
 SECONDS = 5.0
 
 
-def main(names):
-    """Run these attacks, or all."""
+def main(names, robot):
+    """Run these attacks, or all, on a box with this arm."""
+    results = RESULTS if robot == ROBOT else OTHERS / f"{robot}.json"
     attacks = {attack.name: (section, attack) for section in SECTIONS for attack in section.attacks}
     if unknown := set(names) - set(attacks):
         sys.exit(f"attack: {', '.join(sorted(unknown))} given: choose of {', '.join(attacks)}")
     rows = {}
-    if names and RESULTS.exists():
-        rows = {row["name"]: row for row in json.loads(RESULTS.read_text())["attacks"]}
+    if names and results.exists():
+        rows = {row["name"]: row for row in json.loads(results.read_text())["attacks"]}
     console = Console(width=160)
     with Progress(console=console) as progress:
         task = progress.add_task("attacks", total=len(names or attacks))
         for name in names or attacks:
             progress.update(task, description=name)
-            rows[name] = _row(*attacks[name])
+            rows[name] = _row(*attacks[name], robot)
             _show(console, rows[name])
             progress.advance(task)
     machine = f"{os.cpu_count()} cores, {platform.system()} {platform.release()}, Python {platform.python_version()}"
@@ -46,12 +51,13 @@ def main(names):
         "seconds": SECONDS,
         "attacks": [rows[name] for name in attacks if name in rows],
     }
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n")
-    console.print(f"written to {RESULTS}")
+    results.parent.mkdir(parents=True, exist_ok=True)
+    results.write_text(json.dumps(result, indent=1) + "\n")
+    console.print(f"written to {results}")
 
 
-def _row(section, attack):
-    outcome = watched(attack, SECONDS)
+def _row(section, attack, robot):
+    outcome = watched(attack, robot, SECONDS)
     figures = {name: round(value, 3) for name, value in asdict(outcome.seen).items()}
     return {
         "name": attack.name,
@@ -81,4 +87,8 @@ def _show(console, row):
         console.print(f"  [red]{problem}")
 
 
-main(sys.argv[1:])
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("attacks", nargs="*", metavar="ATTACK")
+parser.add_argument("--robot", default=ROBOT)
+given = parser.parse_args()
+main(given.attacks, given.robot)

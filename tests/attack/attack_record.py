@@ -89,9 +89,9 @@ class Outcome:
     stop_s: float
 
 
-def served(attack: Attack):
-    """Serve a box that an attack may begin with."""
-    return serving(*attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
+def served(attack: Attack, robot: str):
+    """Serve a box with this arm that an attack may begin with."""
+    return serving(robot, *attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
 
 
 def withstands(attack: Attack, box: BoxUnderAttack, seconds: float) -> list[str]:
@@ -99,9 +99,9 @@ def withstands(attack: Attack, box: BoxUnderAttack, seconds: float) -> list[str]
     return [*_attacked(attack, box, seconds)[1], *box.problems()]
 
 
-def watched(attack: Attack, seconds: float) -> Outcome:
+def watched(attack: Attack, robot: str, seconds: float) -> Outcome:
     """Attack a box of its own, with bystanders."""
-    with served(attack) as box:
+    with served(attack, robot) as box:
         began = time.monotonic()
         with watching(box) as seen:
             remark, problems = _attacked(attack, box, seconds)

@@ -17,7 +17,6 @@ from box_under_attack import BoxUnderAttack
 
 BYTES = Section("Bytes that make no sense, or never come")
 
-PORTS = ("dashboard", "primary", "secondary", "realtime", "rtde", "modbus", "control")
 _READER = "import socket, sys, time\ns = [socket.create_connection((sys.argv[1], int(p))) for p in sys.argv[2:]]\nprint(flush=True)\nwhile True: [c.recv(65536) for c in s]"
 
 
@@ -26,7 +25,7 @@ def slow_senders(box: BoxUnderAttack, seconds: float) -> None:
     said = get(box, "state")
     with ExitStack() as stack:
         clients = []
-        for port in PORTS:
+        for port in box.open_ports:
             for _ in range(max(10, min(100, round(12 * seconds)))):
                 with suppress(OSError):
                     clients.append(stack.enter_context(box.connect(port)))
@@ -46,9 +45,11 @@ def requests_byte_by_byte(box: BoxUnderAttack, seconds: float) -> None:
         "secondary": b"sec f():\n  textmsg(1)\nend\n",
         "rtde": b"\0\5V\0\2",
         "modbus": bytes.fromhex("000100000006010300800002"),
+        "interpreter": b"statelastexecuted\n",
         "control": get(box, "state"),
     }
-    for port, data in said.items():
+    for port in said.keys() & set(box.open_ports):
+        data = said[port]
         with box.connect(port) as client:
             for at in range(len(data)):
                 client.sendall(data[at : at + 1])
@@ -59,9 +60,9 @@ def requests_byte_by_byte(box: BoxUnderAttack, seconds: float) -> None:
 @BYTES.attack("Random bytes, and the bytes of all other protocols, to every port")
 def noise(box: BoxUnderAttack, seconds: float) -> None:
     rng = random.Random(7)
-    for port in PORTS:
+    for port in box.open_ports:
         data = b"".join((rng.randbytes(3000), b"\n", get(box, "state"), b"robotmode\ndef f():\n\0\5V\0\2\n"))
-        flood(box, port, data, seconds / len(PORTS))
+        flood(box, port, data, seconds / len(box.open_ports))
 
 
 @BYTES.attack("Lengths that lie: RTDE packages of 0 and 65,535 bytes, Modbus of 65,535, headers without end")

@@ -1,6 +1,6 @@
 """A box under attack: `ur-emulator serve` in its own process, bystanders beside it, and questions to it afterwards.
 
-with serving(folder) as box, watching(box) as seen:
+with serving("ur5e") as box, watching(box) as seen:
     attack(box)
 seen.rate, seen.gap_ms, box.problems()
 """
@@ -24,12 +24,11 @@ from pathlib import Path
 import bystander
 import psutil
 
-from protocol.realtime.layout import layout_for_version
-from protocol.ur_types import Ports, SoftwareVersion
+from protocol.realtime.layout import RealtimeLayout, layout_for_version
+from protocol.ur_types import Ports, RobotType
+from ur_emulator.models.robots import robot_by_name
 
-LAYOUT = layout_for_version(SoftwareVersion(3, 15, 8))
 PATIENCE = 20.0  # s; a box that has not answered by then does not answer
-PERIOD = 0.008  # s
 MOST_MEMORY = 300e6  # bytes; of the box and its worker processes together
 # Away from the standard ports, and below those that the kernel gives to clients.
 PORT_BASE, CONTROL_PORT = 1000, 30_900
@@ -47,6 +46,9 @@ class BoxUnderAttack:
         process: in which it runs.
         host: its address.
         ports: its ports.
+        layout: of its frames.
+        period: its control cycle [s].
+        model: as its dashboard says.
         programs: its folder of programs.
         errors: the file that stderr goes to, unless an attack took it.
         at_rest: descriptors and threads before the attack.
@@ -56,11 +58,20 @@ class BoxUnderAttack:
     process: subprocess.Popen
     host: str
     ports: Ports
+    layout: RealtimeLayout
+    period: float
+    model: str
     programs: Path
     errors: Path
     at_rest: tuple[int, int] = (0, 0)
     is_stopped: bool = False
     _turns: Iterator[int] = field(default_factory=count)
+
+    @property
+    def open_ports(self) -> tuple[str, ...]:
+        """Names of the ports that take something."""
+        names = ("dashboard", "primary", "secondary", "realtime", "rtde", "modbus", "interpreter")
+        return (*(name for name in names if getattr(self.ports, name)), "control")
 
     def connect(self, port: str, timeout: float = PATIENCE) -> socket.socket:
         """Connect to a port by its name in `Ports`, or "control"."""
@@ -133,18 +144,18 @@ class BoxUnderAttack:
 
     def _answers(self) -> str:
         model = self.ask("programState", "get robot model")[1]
-        return "" if model == "UR3" else f"asked for its model the box says {model!r}"
+        return "" if model == self.model else f"asked for its model the box says {model!r}"
 
     def _moves(self) -> str:
         speed = 0.1 * (-1) ** next(self._turns)
         with self.connect("realtime") as sock, sock.makefile("rb") as frames:
-            for k in range(round(PATIENCE / PERIOD)):
+            for k in range(round(PATIENCE / self.period)):
                 if k % _REPORT_AGAIN == 0:  # what others have sent before may take the place of the program
                     self.send("secondary", _MOVE.format(speed=speed))
-                frame = frames.read(LAYOUT.size)
-                if len(frame) < LAYOUT.size:
+                frame = frames.read(self.layout.size)
+                if len(frame) < self.layout.size:
                     return "the stream of port 30003 was closed"
-                if LAYOUT.decode(frame).target_qd[0] / speed > 0.2:  # the slider may stand anywhere
+                if self.layout.decode(frame).target_qd[0] / speed > 0.2:  # the slider may stand anywhere
                     return ""
         return "a joint did not move when a script told it to"
 
@@ -182,10 +193,13 @@ class BoxUnderAttack:
 
 
 @contextmanager
-def serving(*options: str, prelude: str = "", unread_log: bool = False) -> Iterator[BoxUnderAttack]:
+def serving(
+    robot: str, *options: str, prelude: str = "", unread_log: bool = False
+) -> Iterator[BoxUnderAttack]:
     """Serve a box in real time with an empty folder of programs and the control API.
 
     Args:
+        robot: type of its arm.
         options: more options of `ur-emulator serve`.
         prelude: Python code that its process runs first.
         unread_log: stderr is a pipe that nobody reads, instead of a file.
@@ -197,7 +211,18 @@ def serving(*options: str, prelude: str = "", unread_log: bool = False) -> Itera
         number = next(_numbers)
         host = f"127.{64 + number % 64}.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
         code = _START.format(prelude=prelude)
-        command = [sys.executable, "-c", code, "serve", "--host", host, "--port-base", str(PORT_BASE)]
+        command = [
+            sys.executable,
+            "-c",
+            code,
+            "serve",
+            "--robot",
+            robot,
+            "--host",
+            host,
+            "--port-base",
+            str(PORT_BASE),
+        ]
         command += [
             "--control-port",
             str(CONTROL_PORT),
@@ -222,7 +247,17 @@ def serving(*options: str, prelude: str = "", unread_log: bool = False) -> Itera
                 assert process.poll() is None, errors.read_text()
                 time.sleep(0.01)
             facts = json.loads(ready.read_text())
-            box = BoxUnderAttack(process, facts["host"], Ports(**facts["ports"]), programs, errors)
+            arm = robot_by_name(robot)
+            box = BoxUnderAttack(
+                process,
+                facts["host"],
+                Ports(**facts["ports"]),
+                layout_for_version(arm.software_version(None)),
+                arm.generation.period_s,
+                RobotType(arm.robot_type).name,
+                programs,
+                errors,
+            )
             if problem := box._moves():  # so that all that is loaded late is there
                 raise AssertionError(problem)
             time.sleep(0.3)  # the last clients are gone
@@ -263,7 +298,7 @@ def watching(box: BoxUnderAttack) -> Iterator[Seen]:
     """Let bystanders watch a box as long as the block lasts."""
     seen = Seen()
     timer = _bystander("timer", box.process.pid)
-    stream = _bystander("stream", box.host, box.ports.realtime)
+    stream = _bystander("stream", box.host, box.ports.realtime, box.period)
     try:
         yield seen
     finally:

@@ -1,6 +1,6 @@
 """Bystanders of an attack, each in a process of its own: a reader of port 30003, and a timer that also looks at memory.
 
-    python bystander.py stream HOST PORT
+    python bystander.py stream HOST PORT PERIOD
     python bystander.py timer PID
 
 Both print "ready", go on until their standard input is closed, then print one JSON object: `Stream`, `Timer`.
@@ -18,14 +18,14 @@ from itertools import pairwise
 
 import psutil
 
-PERIOD = 0.008  # s
+PERIOD = 0.008  # s; of the timer
 _LOOK_EVERY = 5  # periods between two looks at the memory
 _CHILDREN_EVERY = 25  # periods between two searches for worker processes; they cost most
 _HEAD = struct.Struct(">id")
 _MB = 1e6
 
 
-def stream(host, port):
+def stream(host, port, period):
     """Read frames.
 
     Returns:
@@ -53,10 +53,10 @@ def stream(host, port):
         is_open = is_open and read()
     if is_open:  # a stream that stood still at the end has a gap there
         stamps.append(stamps[-1])
-        arrivals.append(max(arrivals[-1], time.monotonic() - PERIOD))
-    cycles = {round(stamp / PERIOD) for stamp in stamps}
+        arrivals.append(max(arrivals[-1], time.monotonic() - period))
+    cycles = {round(stamp / period) for stamp in stamps}
     return {
-        "rate": (stamps[-1] - stamps[0]) / max(PERIOD, arrivals[-1] - arrivals[0]),
+        "rate": (stamps[-1] - stamps[0]) / max(period, arrivals[-1] - arrivals[0]),
         "gap_ms": 1e3 * max(after - before for before, after in pairwise(arrivals)),
         "lost": max(cycles) - min(cycles) + 1 - len(cycles),
         "closed": not is_open,
@@ -115,4 +115,6 @@ def _begin():
 
 if __name__ == "__main__":
     role, *rest = sys.argv[1:]
-    print(json.dumps(stream(rest[0], int(rest[1])) if role == "stream" else timer(int(rest[0]))))
+    print(
+        json.dumps(stream(rest[0], int(rest[1]), float(rest[2])) if role == "stream" else timer(int(rest[0])))
+    )

@@ -1,4 +1,4 @@
-"""`make soak`: a served box in real time under mixed load, attacked every minute; one hour, or SOAK_MINUTES.
+"""`make soak`: a served box in real time under mixed load, attacked every minute; one hour, or SOAK_MINUTES; SOAK_ROBOT is its arm, ur3 or another.
 
 The load is that of `bench/clients.py`: fifty RTDE clients and fifty readers of port 30003. They and a timer that has
 nothing to do with the box join anew every minute. The attacks are those of the table that need no box of their own;
@@ -32,7 +32,6 @@ from bench.clients import N_REALTIME, N_RTDE
 from bench.side_process import SideProcesses
 
 FOLDER = Path("out") / "soak"
-PERIOD_MS = 8.0
 # Of a round [s]: all of it, until its attack begins, of the attack, and after it until the box is at rest.
 ROUND, BEFORE, ATTACK, AFTER = 60.0, 10.0, 8.0, 15.0
 _SAMPLE_EVERY = 10.0  # s
@@ -103,7 +102,7 @@ class Sampler(threading.Thread):
         )
 
 
-def soak(minutes: float) -> dict[str, object]:
+def soak(minutes: float, robot: str) -> dict[str, object]:
     """Run for so long; return the figures, the rounds and the samples."""
     attacks = [
         attack
@@ -114,7 +113,7 @@ def soak(minutes: float) -> dict[str, object]:
     random.Random(1).shuffle(attacks)
     socket.create_connection = partial(_connect, socket.create_connection)
     console, rounds = Console(width=160), []
-    with serving() as box:
+    with serving(robot) as box:
         sampler = Sampler(box)
         sampler.start()
         while box.process.poll() is None and time.monotonic() - sampler.began < 60.0 * minutes:
@@ -123,7 +122,7 @@ def soak(minutes: float) -> dict[str, object]:
         sampler.end()
         problems = box.problems()
         stop_s = box.stop()
-    figures = _figures(rounds, sampler.samples)
+    figures = _figures(rounds, sampler.samples, box.period)
     figures |= {
         "problems": [*(p for r in rounds for p in r["problems"]), *problems],
         "stop_s": round(stop_s, 2),
@@ -140,7 +139,7 @@ def _round(box: BoxUnderAttack, sampler: Sampler, attack) -> dict[str, object]:
     """Let the load join, attack, wait for the load to end."""
     clients = [(box.host, box.ports.rtde, "rtde")] * N_RTDE
     clients += [(box.host, box.ports.realtime, "realtime")] * N_REALTIME
-    beside = SideProcesses(ROUND - _JOINING, clients)
+    beside = SideProcesses(ROUND - _JOINING, box.period, clients)
     time.sleep(BEFORE)
     problems = []
     sampler.is_attacked = True
@@ -161,7 +160,7 @@ def _round(box: BoxUnderAttack, sampler: Sampler, attack) -> dict[str, object]:
     }
 
 
-def _figures(rounds: list[dict], samples: list[Sample]) -> dict[str, object]:
+def _figures(rounds: list[dict], samples: list[Sample], period: float) -> dict[str, object]:
     warm = min(_LONGEST_WARM_UP, _WARM_UP * samples[-1].t)
     rest = [sample for sample in samples if sample.at_rest and sample.t >= warm]
     rss = [sample.box_mb for sample in rest]
@@ -170,7 +169,7 @@ def _figures(rounds: list[dict], samples: list[Sample]) -> dict[str, object]:
         "seconds": samples[-1].t,
         "attacks": len(rounds),
         "lost_cycles": sum(one["lost"] for one in rounds),
-        "timer_late_by_cycles": sum(int(one["timer_max_ms"] / PERIOD_MS) for one in rounds),
+        "timer_late_by_cycles": sum(int(one["timer_max_ms"] / (1e3 * period)) for one in rounds),
         "late_max_ms": max(one["late_max_ms"] for one in rounds),
         "timer_max_ms": max(one["timer_max_ms"] for one in rounds),
         "rss_first_mb": rss[0] if rss else None,
@@ -207,7 +206,7 @@ def draw(outcome: dict, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    result = soak(float(os.environ.get("SOAK_MINUTES", "60")))
+    result = soak(float(os.environ.get("SOAK_MINUTES", "60")), os.environ.get("SOAK_ROBOT", "ur3"))
     FOLDER.mkdir(parents=True, exist_ok=True)
     (FOLDER / "soak.json").write_text(json.dumps(result, indent=1) + "\n")
     draw(result, FOLDER / "soak.png")

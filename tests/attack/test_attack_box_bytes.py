@@ -5,6 +5,7 @@ from attack_record import withstands
 from attacks_bytes import BYTES
 
 
+@pytest.mark.parametrize("box_for", ["ur3", "ur5e"], indirect=True)
 @pytest.mark.parametrize("attack", BYTES.short(), ids=str)
 def test_the_box_withstands(attack, box_for):
     assert withstands(attack, box_for(attack), 0.5) == []

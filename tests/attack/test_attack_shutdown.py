@@ -92,7 +92,7 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
 
 @pytest.mark.parametrize("busy", [compiling, flooded, loading, reporting, unread, calling, looking_up])
 def test_a_busy_box_ends(busy):
-    with serving(prelude=_NO_NAMES if busy is looking_up else "") as box:
+    with serving("ur3", prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):
             assert box.stop() < math.inf
         assert box.process.returncode == 0
@@ -100,7 +100,7 @@ def test_a_busy_box_ends(busy):
 
 
 def test_a_box_ends_whose_log_nobody_reads():
-    with serving("--log", unread_log=True) as box:
+    with serving("ur3", "--log", unread_log=True) as box:
         lines = 500 * (b"addToLog " + b"x" * 500 + b"\n")
         with box.connect("dashboard") as sock, sock.makefile("rb") as replies:
             assert replies.readline()

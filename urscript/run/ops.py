@@ -241,11 +241,11 @@ greater_equal = _ordering(">=", operator.ge)
 
 
 def truth(value: Any) -> bool:
-    """A condition: a bool, or a string that is not empty. Source: script manual, socket_read_line."""
+    """A condition: a bool, a number that is not 0, or a string that is not empty; see `dialect`."""
     if value is True or value is False:
         return bool(value)
     if type(value) is str:
         return value != ""
-    if dialect.INT_AS_CONDITION and type(value) is int:
-        return value != 0
+    if dialect.NUMBER_AS_CONDITION and (type(value) is float or type(value) is int):
+        return bool(value != 0)
     raise ScriptRuntimeError(f"a condition must be True or False, got {a_type(value)}")
