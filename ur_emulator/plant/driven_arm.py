@@ -1,0 +1,253 @@
+"""DrivenArm: an arm with its drives, brakes and sensors, and what a command does to it in a cycle.
+
+A cycle is: target -> controller's model torque -> command path (delay, interpolation, lag) -> joint servos
+and physics in sub-steps -> a record of true values -> sensors.
+
+The arm has four control modes (`ControlMode`): position; force, with the slow outer loop of the servos held;
+freedrive and torque control, where no joint holds a position.
+
+Angles: the physics' hinge is the motor side of the gear, which the drive holds; the joint is there plus the
+gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
+"""
+
+from __future__ import annotations
+
+from operator import ge, truediv
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from protocol.ur_types import ControlMode
+from ur_emulator.errors import PlantError
+from ur_emulator.models.calibration import Calibration, calibrated_dh
+from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.random_streams import random_stream
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
+from ur_emulator.motion.direct_torque import TorqueCommand
+from ur_emulator.plant.arm_physics import ArmPhysics
+from ur_emulator.plant.dead_time import DeadTime
+from ur_emulator.plant.drives import TARGET_MAX, Drives
+from ur_emulator.plant.feedback import Feedback
+from ur_emulator.plant.physics import ServoGains
+from ur_emulator.plant.plant_state import Target
+
+# Control modes in which no joint holds a position.
+_FREE = (ControlMode.TEACH, ControlMode.TORQUE)
+
+
+class Command(NamedTuple):
+    """What the arm gets in a cycle, see `Plant.step`.
+
+    Attributes:
+        cycle: number of the cycle, for errors.
+        target: set-point for its end; None puts or keeps the brakes on.
+        mode: control mode.
+        torque: of free joints.
+    """
+
+    cycle: int
+    target: Target | None
+    mode: ControlMode
+    torque: TorqueCommand | None
+
+
+class DrivenArm:
+    """The arm of a plant.
+
+    Args:
+        robot: type of the arm.
+        calibration: of this arm.
+        fidelity: its imperfections.
+        seed: of the box.
+        dead_time: of its drives.
+
+    Attributes:
+        physics: masses, joints and contacts.
+        drives: of the joints.
+        feedback: gears and sensors.
+        moves_later: targets act within their own cycle, and measurements are a cycle old when they are
+            reported: what is reported of a cycle does not need its motion.
+        control_current: what the drives ask for at the end of the cycle (6,) [A].
+    """
+
+    def __init__(
+        self, robot: RobotModel, calibration: Calibration, fidelity: Fidelity, seed: int, dead_time: DeadTime
+    ) -> None:
+        generation = robot.generation
+        period, substep = generation.period_s, generation.substep_us * 1e-6
+        mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
+        gains = ServoGains.of(robot)
+        dh, presliding = calibrated_dh(robot, calibration), fidelity.friction_presliding
+        self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding)
+        self.drives = Drives(robot, calibration, fidelity, seed, gains, dead_time.substeps, substep, period)
+        age_substeps = max(1, round(fidelity.feedback_age / substep))
+        self.moves_later = age_substeps >= generation.n_substeps and not self.drives.target_acts_later
+        if self.moves_later:
+            age_substeps -= generation.n_substeps
+        self.feedback = Feedback(robot, fidelity, seed, age_substeps)
+        self._tau_max = robot.tau_max
+        self._per_torque = 1.0 / np.array(robot.torque_constant)
+        self._currents = np.zeros(6)
+        # Below this no joint can be at its torque limit [A].
+        self._unsaturated = min(map(truediv, robot.tau_max, robot.torque_constant))
+        self._mode = ControlMode.POSITION
+        # In force mode and after it, until the arm is moved away; see `hold_trim`.
+        self._trim_is_held = False
+        self._error = np.zeros(6)
+        self._is_braked = True
+        self._saturated_before = self._saturated_now = False
+        self.control_current = ZERO6
+        # The next cycle is computed, but not completed.
+        self._is_ahead = False
+
+    @property
+    def is_saturated(self) -> bool:
+        """A joint was at its torque limit at the start and at the end of the cycle."""
+        return self._saturated_before and self._saturated_now
+
+    @property
+    def position_error(self) -> Vector6:
+        """Set-point of the drives minus true angle at the end of the cycle [rad]."""
+        return six(self._error.tolist())
+
+    def reset(self, q: NDArray[np.float64]) -> None:
+        """Put the arm at rest at joint angles q (6,) [rad], brakes on."""
+        self.physics.place(self.feedback.gear.motor_position(q))
+        self._engage_brakes()
+        self.feedback.reset()
+
+    def hold_trim(self) -> None:
+        """See `Plant.hold_trim`."""
+        self._trim_is_held = True
+
+    # --- the cycle ---
+
+    def advance(self, command: Command) -> None:
+        """Advance by a cycle.
+
+        Raises:
+            PlantError: the target is not finite, or the simulation diverged.
+        """
+        cycle, target, mode, torque = command
+        if target is None:
+            self._stand_still()
+            return
+        if self._is_braked:
+            self._release_brakes()
+        if mode is not self._mode:
+            self._switch(mode, target)
+        elif self._trim_is_held and mode is ControlMode.POSITION and any(target.qd):
+            self._trim_is_held = False
+        if mode is ControlMode.TEACH:
+            self.drives.drive_freely(self.physics.q, self.physics.qd, torque and torque.torque)
+        elif torque is not None:
+            self.drives.drive_by_torque(self.physics.q, self.physics.qd, torque)
+        elif not self.drives.command(target):
+            raise PlantError(
+                f"target {target} in cycle {cycle}: finite numbers below {TARGET_MAX:g} are needed",
+                cycle=cycle,
+            )
+        if self._is_ahead:
+            self.drives.evaluate_friction()  # again, for the current that is expected at the target
+        else:
+            self._run()
+        self._is_ahead = False
+        self._keep(cycle)
+
+    def run_ahead(self) -> None:
+        """Compute the next cycle, if no target that is still unknown acts in it; `advance` completes it."""
+        if not self.drives.target_acts_later or self._is_braked or self._is_ahead:
+            return
+        if self._mode not in _FREE and not self.physics.loads.is_unexpected:
+            self.physics.store_state()
+            self._run()
+            self._is_ahead = True
+
+    def undo_run_ahead(self) -> None:
+        """Undo `run_ahead`."""
+        if self._is_ahead:
+            self._is_ahead = False
+            self.physics.restore_state()
+            self.feedback.undo()
+
+    def _run(self) -> None:
+        """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""
+        physics, drives, feedback = self.physics, self.drives, self.feedback
+        is_free = self._mode in _FREE
+        if not is_free:
+            drives.actual_speed[:] = physics.qd
+            drives.advance()
+        physics.run(drives, feedback.capture_at, feedback.captured)
+        np.multiply(physics.torque, self._per_torque, self._currents)
+        self.control_current = six(self._currents.tolist())
+        feedback.take(physics)
+        error = self._error
+        if is_free:
+            error[:] = 0.0
+        else:
+            np.add(physics.q, self.feedback.gear.error, error)
+            np.subtract(drives.q_final, error, error)
+
+    def _keep(self, cycle: int) -> None:
+        """Complete the cycle that was computed."""
+        physics, currents = self.physics, self.control_current
+        if physics.has_diverged:
+            raise PlantError(
+                f"the simulation diverged in cycle {cycle}: joint speeds {physics.qd.tolist()} rad/s; "
+                "reset the plant and check the targets",
+                cycle=cycle,
+            )
+        self._saturated_before = self._saturated_now
+        self._saturated_now = not (max(currents) < self._unsaturated > -min(currents)) and any(
+            map(ge, map(abs, physics.torque.tolist()), self._tau_max)
+        )
+        if self._mode not in _FREE:
+            trims = not (self._saturated_now or (self._trim_is_held and self._is_pressing))
+            self.drives.keep(self._error if trims else None)
+        self.feedback.keep()
+
+    @property
+    def _is_pressing(self) -> bool:
+        """True in force mode, and after it while the joints press against an obstacle."""
+        return self._mode is ControlMode.FORCE or self.drives.are_pressing(self.physics.q)
+
+    # --- control modes ---
+
+    def _switch(self, mode: ControlMode, target: Target) -> None:
+        """Change the control mode without a jump of the torques."""
+        self.undo_run_ahead()
+        was_free, self._mode = self._mode in _FREE, mode
+        self.physics.servos.set_free(mode in _FREE)
+        if was_free:
+            self.drives.follow_moving(target, self.physics.q)
+        self._trim_is_held = mode is ControlMode.FORCE or (self._trim_is_held and not was_free)
+
+    # --- brakes ---
+
+    def _stand_still(self) -> None:
+        """Advance by a cycle with the brakes on."""
+        self.undo_run_ahead()
+        if not self._is_braked:
+            self._engage_brakes()
+        self.feedback.take_rest()
+        self.feedback.keep()
+
+    def _engage_brakes(self) -> None:
+        """Stand still at once, wherever the arm is."""
+        self._is_braked = True
+        self._trim_is_held = False
+        if self._mode is not ControlMode.POSITION:
+            self._mode = ControlMode.POSITION
+            self.physics.servos.set_free(False)
+        self._saturated_before = self._saturated_now = False
+        self._error[:] = 0.0
+        self.control_current = ZERO6
+        self.drives.release()
+        self.physics.stop()
+        self.feedback.stop(self.physics)
+
+    def _release_brakes(self) -> None:
+        """Let the drives hold the arm, at the pose in which the brakes hold it."""
+        self._is_braked = False
+        self.drives.hold(self.feedback.q_rest, self.physics.q)
