@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 
 from ur_emulator.models.robot_generation import RobotGeneration
+
+# Date at which the controller starts: chosen, a box reads no clock, so that equal runs are equal.
+CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 
 
 @dataclass(slots=True)
@@ -38,3 +42,8 @@ class Clock:
     def advance_program(self) -> None:
         """Count a cycle of the primary program."""
         self.program_tick += 1
+
+
+def clock_time(timestamp: float) -> datetime:
+    """Return date and time of the controller, to the second, from the time of a cycle [s]."""
+    return CLOCK_EPOCH + timedelta(seconds=int(timestamp))

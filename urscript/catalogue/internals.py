@@ -554,7 +554,7 @@ _LATER: tuple[Builtin, ...] = (
         "struct(sec, nanosec)",
         "clock of the controller",
         support=APPROXIMATE,
-        note="mode 2 is a run-time error: a box counts robot time",
+        note="the system's clock begins on 2021-11-30 with the controller and counts robot time",
         since=releases(None, "5.18", "10.0"),
         source=MANUAL_LATE,
     ),

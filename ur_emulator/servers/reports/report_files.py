@@ -11,11 +11,12 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import PurePosixPath
 from typing import Any
 
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.clock import clock_time
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
 from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove_left_folders
@@ -23,8 +24,6 @@ from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove
 REPORT_KINDS = ("controller", "software", "system")
 LOG_NAME = "log_history.txt"
 REPORT_FOLDER = "flightreports"
-# Date at which the controller's clock is 0: chosen, the box knows no date.
-CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 _MAX_SAME_SECOND = 1000
 _FLIGHT_REPORT = re.compile(r"flightreport_([0-9]{1,9})\.zip")
 # Flight reports, and support files of any box.
@@ -59,11 +58,6 @@ class BoxFacts:
     def time(self) -> datetime:
         """Date and time of the controller, to the second."""
         return clock_time(self.timestamp)
-
-
-def clock_time(timestamp: float) -> datetime:
-    """Return date and time of the controller, to the second, from the time of a cycle [s]."""
-    return CLOCK_EPOCH + timedelta(seconds=int(timestamp))
 
 
 class ReportFolder:

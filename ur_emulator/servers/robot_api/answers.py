@@ -20,6 +20,7 @@ from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.commands.operator import ClosePopup, ShowPopup
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
+from ur_emulator.controller.clock import clock_time
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.safety.modes import ROW
@@ -28,7 +29,6 @@ from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer
-from ur_emulator.servers.reports.report_files import clock_time
 from ur_emulator.servers.reports.report_writer import ReportWriter
 from ur_emulator.servers.robot_api.description import openapi, page
 from ur_emulator.servers.robot_api.program_calls import ProgramCalls
