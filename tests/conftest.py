@@ -1,14 +1,16 @@
 """Property tests: `make test` runs the same cases every time, `make explore` draws new ones. None looks at a clock.
 
-Files with slow tests come first, so that none is left for the end when the others are done. What exists when all
-tests are collected is never looked at again by the garbage collector.
+Files with slow tests come first, so that none is left for the end when the others are done. The garbage collector
+rests while tests are collected, and never looks again at what exists then.
 """
 
 import gc
 import os
 
+import pytest
 from hypothesis import HealthCheck, settings
 
+gc.disable()
 _COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("fixed", _COMMON, derandomize=True)
 settings.register_profile("explore", _COMMON, print_blob=True)
@@ -28,3 +30,12 @@ def pytest_collection_modifyitems(items):
 def pytest_collection_finish():
     gc.collect()
     gc.freeze()
+    gc.enable()
+
+
+@pytest.fixture(scope="module")
+def without_page():
+    """A command that has run movements writes an empty page: figures take as long as the movement."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("pc_client.analysis.report.render_page", lambda *_: "")
+        yield

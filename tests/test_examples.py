@@ -66,7 +66,7 @@ def test_demo_and_plot(tmp_path):
 @pytest.mark.slow
 def test_ablation(tmp_path):
     said = run("ablation.py", "--quick", "--out", tmp_path)
-    assert len(said.splitlines()) == 2
+    assert len(said.splitlines()) == 1
     assert "| best | lag + gear + learning | typical |" in (tmp_path / "ablation.md").read_text()
     assert (tmp_path / "ablation.png").read_bytes().startswith(b"\x89PNG")
 

@@ -7,7 +7,6 @@ from integration_support import Finished, free_port_base
 
 import ur_emulator.cli
 from pc_client import cli
-from pc_client.analysis import report
 from ur_emulator import ControlBox
 
 
@@ -42,14 +41,6 @@ def ur_client(capsys):
         return Finished(code, told.out, told.err)
 
     return run
-
-
-@pytest.fixture(scope="module")
-def without_page():
-    """A command that has run movements writes its page without figures, which take as long as the movement."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(report, "render_page", lambda *_: "")
-        yield
 
 
 @pytest.fixture

@@ -182,6 +182,7 @@ def test_run_records_and_reports(robot, tmp_path, capsys):
     assert len(rows) > 500
 
 
+@pytest.mark.usefixtures("without_page")
 def test_own_numbers_reach_robot_recording_and_table(robot, tmp_path, capsys):
     (tmp_path / "mine.toml").write_text('base = "paper"\ngain_i = 3\nspeed_share = 0.9')
     out = tmp_path / "out"
@@ -225,6 +226,7 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
         assert words in out
 
 
+@pytest.mark.usefixtures("without_page")
 def test_yes_skips_the_question(robot, tmp_path, monkeypatch):
     def answer(question, abort):
         raise AssertionError("asked")

@@ -183,8 +183,8 @@ def flood(server, n, data):
 
 
 def test_all_inboxes_together_are_bounded_and_held_back_is_not_lost(box, monkeypatch):
-    lower(monkeypatch, all_inboxes_bytes=200_000, inbox_bytes=100_000)
-    n, lines = 12, 30_000
+    lower(monkeypatch, all_inboxes_bytes=100_000, inbox_bytes=50_000)
+    n, lines = 12, 8_000
     data = b"".join(b"%07d\n" % i for i in range(lines))
     network = box._network
     with listening_socket() as server, connect(box, "primary") as sock:
@@ -213,7 +213,7 @@ def test_all_inboxes_together_are_bounded_and_held_back_is_not_lost(box, monkeyp
         while not (said := log_lines(box, "all") + log_lines(box, "wrong")):
             most = max(most, sum(one.n_received for one in tuple(network._buffers.connections)))
         assert said == ["all"]
-        assert most <= 200_000 + n * (SHARE + sockets._READ_SIZE)
+        assert most <= 100_000 + n * (SHARE + sockets._READ_SIZE)
         for sender in senders:
             sender.join(TIMEOUT)
 
