@@ -54,6 +54,7 @@ SECOND = RobotGeneration(
     reports_control_as_target=True,
     has_operational_modes=True,
     has_remote_control=True,
+    has_remote_in_manual=False,
     fidelities=tuple(
         replace(it, dead_time=it.dead_time + 0.004, force_sigma=0.15)
         for it in CB3.fidelities

@@ -136,3 +136,20 @@ def test_both_new_stops_on_the_dashboard(box):
         box.set_operational_mode("automatic")
         box.safeguard_stop(safeguard="automatic mode")
         assert dashboard.ask("safetystatus") == "Safetystatus: AUTOMATIC_MODE_SAFEGUARD_STOP"
+
+
+def test_polyscope_x_has_no_remote_control_in_manual_mode():
+    with ur5e(version="10.12") as box:
+        box.set_operational_mode("manual")
+        assert not box.state.remote_control
+        with pytest.raises(RefusedError, match="PolyScope X has no remote control in manual mode"):
+            box.remote_control(True)
+        box.set_operational_mode("automatic")
+        assert not box.state.remote_control
+        box.remote_control(True)
+        assert box.state.remote_control
+
+
+def test_on_the_e_series_manual_mode_leaves_remote_control_alone(box):
+    box.set_operational_mode("manual")
+    assert box.state.remote_control

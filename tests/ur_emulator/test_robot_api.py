@@ -17,13 +17,28 @@ from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError
 
 PROGRAM = 'def dance():\n  textmsg("dancing")\n  while True:\n    sync()\n  end\nend\n'
+APPLICATION = """\
+reset_world_model()
+set_input_actions_to_default()
+set_gravity([0, 0, 9.82])
+local parent = get_frame_parent("base")
+move_frame("base", get_pose("base", parent), parent)
+global base_name = "base"
+set_target_payload(0, [0, 0, 0], [0, 0, 0, 0, 0, 0])
+set_tcp(p[0, 0, 0, 0, 0, 0], "Tool_flange")
+###
+# A comment between two lines of crosses.
+###
+def first(values = [3, 4]):
+  return values[0]
+end"""
 FORM = "multipart/form-data; boundary=XX"
 
 
 def urpx(name, script, **information):
-    """Return a program of PolyScope X, without nodes."""
+    """Return a program of PolyScope X, without nodes; its application begins as those of the maker do."""
     information = {"name": name, "createdDate": 1771239851763, "programState": "FINAL"} | information
-    application = {"urscript": {"script": 'global base_name = "base"\nset_gravity([0, 0, 9.82])'}}
+    application = {"urscript": {"script": APPLICATION}}
     program = {
         "programInformation": information,
         "urscript": {"script": f'$ 1 "ur-program"\n$ 2 "ur-code"\n{script}'},
@@ -42,7 +57,7 @@ def box(tmp_path_factory):
     folder = tmp_path_factory.mktemp("programs")
     (folder / "dance.script").write_text(PROGRAM)
     (folder / "odd.urpx").write_text("{}")
-    (folder / "slow.urpx").write_bytes(urpx("slow", "textmsg(base_name)\nsleep(100)"))
+    (folder / "slow.urpx").write_bytes(urpx("slow", "textmsg(base_name, first())\nsleep(100)"))
     with x_box("10.14.0", programs=folder) as box:
         yield box
 
@@ -180,7 +195,7 @@ def test_a_program_of_polyscope_x_plays_the_script_that_it_contains(box):
     assert loaded == (200, {"message": "Program loaded successfully", "name": "slow"})
     assert ask(box, "PUT", "/program/v1/state", {"action": "play"})[0] == 200
     assert ask(box, "GET", "/program/v1/state")[1]["state"] == "PLAYING"
-    box.wait_until(log="base")
+    box.wait_until(log="base3")
     stop(box)
 
 

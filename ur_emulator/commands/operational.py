@@ -51,7 +51,8 @@ class MoveEnablingDevice(CommandOperation):
 class SwitchRemoteControl(CommandOperation):
     """Switch to remote control, or to local control, in which clients may not command the box.
 
-    Clients of the dashboard and of the script ports must connect again after the switch to remote control.
+    PolyScope X has no remote control in manual mode. Clients of the dashboard and of the script ports must
+    connect again after the switch to remote control.
     """
 
     on: bool = parameter("remote control, or local", default=True)
@@ -60,6 +61,14 @@ class SwitchRemoteControl(CommandOperation):
         generation = box.state.robot.generation
         if not generation.has_remote_control:
             raise RefusedError(f"a box of the {generation.name} has no remote control")
+        if (
+            self.on
+            and box.state.operational.mode is OperationalMode.MANUAL
+            and not generation.has_remote_in_manual
+        ):
+            raise RefusedError(
+                f"a box of {generation.name} has no remote control in manual mode: choose automatic"
+            )
         box.state.operator.set_remote_control(self.on)
         box.state.events.append(LogAdded("Controller", f"{'Remote' if self.on else 'Local'} control"))
 

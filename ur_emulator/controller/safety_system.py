@@ -22,6 +22,7 @@ from ur_emulator.controller.safety.modes import (
     ProgramEffect,
     SafetyEvent,
 )
+from ur_emulator.controller.safety.operational_mode import OperationalMode
 from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.path_motion import SCALING_RATE
@@ -181,10 +182,12 @@ class SafetySystem:
                 self._programs.resume()
 
     def _begin_operational_mode(self) -> None:
-        state = self._state
+        state, mode = self._state, self._state.operational.mode
         self._set_limits(state.safety.mode)
         self._update()
-        state.events.append(LogAdded("Safety", f"Operational mode: {state.operational.mode.name}"))
+        state.events.append(LogAdded("Safety", f"Operational mode: {mode.name}"))
+        if mode is OperationalMode.MANUAL and not state.robot.generation.has_remote_in_manual:
+            state.operator.set_remote_control(False)
 
     def _wait(self) -> None:
         """Pause program and arm until the mode ends; a program that was paused before stays paused."""

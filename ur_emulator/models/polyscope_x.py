@@ -17,6 +17,7 @@ POLYSCOPE_X = replace(
     major=10,
     default_version="10.11.0",
     builds=((SoftwareVersion(10, 0), 0, datetime(2025, 6, 1)),),  # chosen
+    has_remote_in_manual=False,  # PolyScope X manual SW 10.6; README of "Remote Robot Controller"
     dashboard=(),
     robot_api=CALLS,
     # Switched off until somebody enables them under Security, Services. To which 30002 and 30003 belong is

@@ -54,6 +54,7 @@ class RobotGeneration:
         reports_control_as_target: `joint_control_output` is `target_current`, not what the servos ask for.
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
         has_remote_control: local control, in which clients may not command the box, and remote control.
+        has_remote_in_manual: remote control is possible in manual mode.
         fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
         dashboard: commands of the dashboard server; none: there is no such server.
@@ -85,6 +86,7 @@ class RobotGeneration:
     reports_control_as_target: bool
     has_operational_modes: bool
     has_remote_control: bool
+    has_remote_in_manual: bool = True
     fidelities: tuple[Fidelity, ...]
     robot_subtype: int
     dashboard: tuple[DashboardCommand, ...]
