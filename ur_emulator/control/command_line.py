@@ -123,6 +123,8 @@ _EXAMPLES = {
     "set_analog_input": "--group standard --n 0 --value 4.2",
     "push": "--force 0 0 20 --duration 0.5",
     "attach_payload": "--mass 1.5",
+    "set_safety_plane": "--name wall --position 0 -0.5 0 --normal 0 1 0",
+    "limit_tool_direction": "--axis 0 0 -1 --deviation 0.5",
     "add_obstacle": "--name wall --shape box --size 0.1 1 1 --pose 0.5 0 0.5 0 0 0",
     "remove_obstacle": "--name wall",
     "require_safeguard_reset": "--required on",

@@ -270,8 +270,9 @@ class Controller:
                 return target
             violation = self._setpoints.find_invalid(state.safety.limits, before, target)
             if violation is None and state.safety.boundaries:
-                arm = state.arm.state(target.q, target.qd, state.tool.tcp_offset)
-                near = state.safety.boundaries.find_near(arm, self._setpoints.braking_time(target))
+                way = (target.q, *self._setpoints.way_to_rest(target))
+                now, *ahead = (state.arm.state(q, target.qd, state.tool.tcp_offset) for q in way)
+                near = state.safety.boundaries.find_near(now, ahead)
                 violation = None if near is None else Violation(near)
         except UnreachableError:
             violation = UNREACHABLE_PATH

@@ -9,10 +9,10 @@ boundary holds is the TCP; tool spheres are not modelled.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from math import acos, fsum, inf, radians, sqrt
+from math import acos, fsum, inf, radians
 from operator import mul
 from typing import TYPE_CHECKING
 
@@ -29,8 +29,8 @@ MOST_PLANES = 8
 PLANE_TOLERANCE, DIRECTION_TOLERANCE = 0.020, radians(1.15)
 # So far back behind a plane reduced mode ends [m].
 TRIGGER_BAND = 0.020
-# Sine of the least angle between tool and axis of the cone at which its rate is computed.
-_LEAST_SINE = 1e-9
+# What comes no nearer than this does not move towards a boundary [m, rad].
+_NO_MOTION = 1e-6
 
 
 class BoundaryMode(Enum):
@@ -65,12 +65,12 @@ class SafetyPlane:
     mode: BoundaryMode
     restricts_elbow: bool = False
 
-    def gaps(self, arm: CartesianState) -> Iterator[tuple[str, float, float]]:
-        """Yield what it holds: name, distance on the allowed side [m], its rate [m/s]."""
+    def gaps(self, arm: CartesianState) -> Iterator[tuple[str, float]]:
+        """Yield what it holds: name, distance on the allowed side [m]."""
         normal, offset = self.normal, _dot(self.normal, self.position)
-        yield "TCP", _dot(normal, arm.tcp_pose[:3]) - offset, _dot(normal, arm.tcp_speed[:3])
+        yield "TCP", _dot(normal, arm.tcp_pose[:3]) - offset
         if self.restricts_elbow:
-            yield "elbow", _dot(normal, arm.elbow_position) - offset, _dot(normal, arm.elbow_velocity)
+            yield "elbow", _dot(normal, arm.elbow_position) - offset
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +87,13 @@ class ToolDirection:
     deviation: float
     mode: BoundaryMode
 
-    def gap(self, arm: CartesianState) -> tuple[float, float]:
-        """Return the angle that is left [rad], and its rate [rad/s]."""
+    def gap(self, arm: CartesianState) -> float:
+        """Return the angle that is left [rad]."""
         from protocol.pose import rotvec_to_flat  # loads numpy, which the command line does without
 
         rotation = rotvec_to_flat(*arm.tcp_pose[3:])
-        z = zx, zy, zz = rotation[2], rotation[5], rotation[8]
-        wx, wy, wz = arm.tcp_speed[3:]
-        cosine = min(1.0, max(-1.0, _dot(self.axis, z)))
-        rate = _dot(self.axis, (wy * zz - wz * zy, wz * zx - wx * zz, wx * zy - wy * zx))
-        return self.deviation - acos(cosine), rate / max(_LEAST_SINE, sqrt(1.0 - cosine * cosine))
+        cosine = _dot(self.axis, (rotation[2], rotation[5], rotation[8]))
+        return self.deviation - acos(min(1.0, max(-1.0, cosine)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,32 +122,35 @@ class Boundaries:
     def trigger_gap(self, arm: CartesianState) -> float:
         """Return the distance to the nearest plane that triggers reduced mode [m]; negative beyond it."""
         planes = (plane for plane in self.planes if plane.mode is BoundaryMode.TRIGGER)
-        return min((gap for plane in planes for _, gap, _ in plane.gaps(arm)), default=inf)
+        return min((gap for plane in planes for _, gap in plane.gaps(arm)), default=inf)
 
-    def find_near(self, arm: CartesianState, braking_time: float) -> ErrorReported | None:
+    def find_near(self, arm: CartesianState, ahead: Sequence[CartesianState]) -> ErrorReported | None:
         """Return why a protective stop begins before a limit that the arm approaches, or None.
 
         Args:
             arm: at the set-point.
-            braking_time: time at the present speed that a stop takes as long a way as [s].
+            ahead: the arm where it would go until it rests if it stopped now.
         """
         for plane in self.planes:
-            for what, gap, rate in plane.gaps(arm):
-                if rate < 0.0 and gap + rate * braking_time < PLANE_TOLERANCE:
+            then = zip(*(plane.gaps(later) for later in ahead), strict=True)
+            for (what, gap), gaps in zip(plane.gaps(arm), then, strict=True):
+                least = min(later for _, later in gaps)
+                if least < min(PLANE_TOLERANCE, gap - _NO_MOTION):
                     return _near(152, f"Position close to safety plane limits: {_place(plane, what, gap)}")
         if self.tool_direction is not None:
-            left, rate = self.tool_direction.gap(arm)
-            if rate < 0.0 and left + rate * braking_time < DIRECTION_TOLERANCE:
+            left = self.tool_direction.gap(arm)
+            least = min(map(self.tool_direction.gap, ahead))
+            if least < min(DIRECTION_TOLERANCE, left - _NO_MOTION):
                 return _near(151, f"Tool orientation close to limits: {left:.3f} rad left")
         return None
 
     def find_crossed(self, arm: CartesianState) -> ErrorReported | None:
         """Return the violation of a limit by the arm, or None."""
         for plane in self.planes:
-            for what, gap, _ in plane.gaps(arm):
+            for what, gap in plane.gaps(arm):
                 if gap < 0.0:
                     return _crossed(4, f"TCP position limit violated: {_place(plane, what, gap)}")
-        if self.tool_direction is not None and (left := self.tool_direction.gap(arm)[0]) < 0.0:
+        if self.tool_direction is not None and (left := self.tool_direction.gap(arm)) < 0.0:
             return _crossed(5, f"TCP orientation limit violated: {-left:.3f} rad beyond")
         return None
 
