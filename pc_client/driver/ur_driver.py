@@ -7,21 +7,18 @@ when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) go
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.driver.package_stream import PackageStream, raise_on_error
-from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver.connections import Connections
+from pc_client.driver.program_watch import ProgramWatch
 from pc_client.driver.receiver_script import receiver_script
-from pc_client.driver.reverse_server import DIAL_TIMEOUT, ReverseServer
-from pc_client.driver.robot_info import RobotInfo, read_robot_info
+from pc_client.driver.reverse_server import DIAL_TIMEOUT
 from pc_client.driver.robot_report import RobotReport, check_arm, make_report, reported_slider
-from pc_client.driver.stop_script import STOP_WORD, stop_script
+from pc_client.driver.stopping import stop_arm
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import (
     CommandSource,
@@ -31,29 +28,18 @@ from pc_client.driver.velocity_stream import (
     VelocityStream,
     collector_paused,
 )
-from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest, wait_until
+from pc_client.driver.waiting import REST_TIMEOUT, wait_for_rest
 from pc_client.driver.watchdog import (
     ProgramEndedError,
     check_angles,
     check_idle,
     check_safety,
     check_slider,
-    control,
-    has_ended,
     is_stopped,
-    software,
 )
-from pc_client.errors import DriverError, RobotStoppedError
-from protocol.primary.messages import ErrorCodeMessage, TextMessage
-from protocol.realtime.layout import RealtimeFrame, RealtimeLayout
+from pc_client.errors import DriverError
+from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
-from protocol.velocity_stream import VelocityMode, encode_velocity
-
-CONNECT_TIMEOUT = 5.0
-_START_TIMEOUT = 5.0
-"""A program that does not show as running within this [s] was not accepted."""
-_READ_ONLY = 210
-"""Error code for a program that came in local control. Source: test of the maker's client library."""
 
 
 class UrDriver:
@@ -74,13 +60,6 @@ class UrDriver:
             in real time that repeats a frame now and then does not do so each time.
     """
 
-    info: RobotInfo
-    layout: RealtimeLayout
-    _primary: PackageStream
-    _scripts: PackageStream
-    _frames: RealtimeClient
-    _server: ReverseServer
-
     def __init__(
         self,
         host: str,
@@ -89,20 +68,17 @@ class UrDriver:
         reverse_port: int | None = None,
         network: Network | None = None,
     ) -> None:
-        self._host = host
-        self._ports = ports or Ports.standard()
-        self._reverse_port = reverse_port
-        self._network: Network = network or TcpNetwork()
-        self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
+        self._robot = robot = Connections(network or TcpNetwork(), host, ports or Ports.standard())
+        self._watch = ProgramWatch(robot)
         self._in_motion = False
         self.time_waits = True
-        self._program = self._last_text = ""
-        self._is_read_only = False
         try:
-            self._connect()
+            robot.open(reverse_port)
         except BaseException:
-            self.close()
+            robot.close()
             raise
+        self.info = robot.info
+        self.layout = robot.frames.layout
 
     def __enter__(self) -> Self:
         return self
@@ -118,9 +94,7 @@ class UrDriver:
             if self._in_motion:
                 self.stop(None)
         finally:
-            for connection in self._open:
-                connection.close()
-            self._open.clear()
+            self._robot.close()
 
     def read_frame(self) -> RealtimeFrame:
         """The state of the robot now.
@@ -128,8 +102,8 @@ class UrDriver:
         Raises:
             DriverError: no frames come.
         """
-        self._frames.drain()
-        return self._frames.receive().latest
+        self._robot.frames.drain()
+        return self._robot.frames.receive().latest
 
     def actual_q(self) -> NDArray[np.float64]:
         """Joint positions (6,) as reported now [rad].
@@ -148,9 +122,10 @@ class UrDriver:
         Raises:
             DriverError: no frames come, or a connection broke.
         """
-        self._primary.poll()
+        self._robot.primary.poll()
+        robot = self._robot
         return make_report(
-            self._network, self._host, self._ports, self.info, self.read_frame(), self._primary
+            robot.network, robot.host, robot.ports, self.info, self.read_frame(), robot.primary
         )
 
     def check_ready(self) -> RealtimeFrame:
@@ -163,9 +138,9 @@ class UrDriver:
         frame = self.read_frame()
         check_safety(frame)
         check_idle(frame)
-        self._primary.poll()
-        check_arm(self.info, self._primary)
-        check_slider(reported_slider(self._primary))
+        self._robot.primary.poll()
+        check_arm(self.info, self._robot.primary)
+        check_slider(reported_slider(self._robot.primary))
         return frame
 
     def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
@@ -184,26 +159,24 @@ class UrDriver:
             DriverError: anything else that ended the run; the arm has been stopped.
         """
         self.check_ready()
-        server = self._server
+        robot, watch = self._robot, self._watch
+        server, frames, period = robot.server, robot.frames, self.info.period
         server.forget_callers()
         reverse: Transport | None = None
         try:
             with _AlwaysStopped(self) as guard:
-                period = self.info.period
                 text = receiver_script(server.address, server.port, acceleration=acceleration, period=period)
-                self._start(text)
-                reverse = server.accept_program(self._look_after, self._frames.patience(DIAL_TIMEOUT))
+                watch.start(text)
+                reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
                 guard.reverse = reverse
-                stream = VelocityStream(
-                    self._frames, reverse, self._network, period, self._raise_robot_errors
-                )
+                stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
                 try:
                     with collector_paused():
                         report = stream.run(source, on_row)
                 except ProgramEndedError as error:
-                    raise self._explain(error) from error
-                self._wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
-                wait_for_rest(self._frames, self._network)
+                    raise watch.explain(error) from error
+                watch.wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
+                wait_for_rest(frames, robot.network)
         finally:
             if reverse is not None:
                 reverse.close()
@@ -219,122 +192,8 @@ class UrDriver:
         Raises:
             DriverError: the arm could not be seen to come to rest.
         """
-        if reverse is not None and self._attempt(
-            lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
-        ):
-            return
-        if self._attempt(self._send_stop_program):
-            return
-        raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
-
-    def _attempt(self, act: Callable[[], object]) -> bool:
-        """Try one method to stop; True when the arm then rests and no program runs."""
-        try:
-            act()
-            wait_until(has_ended, self._frames, self._network, REST_TIMEOUT, "the robot's program goes on")
-            if not is_stopped(wait_for_rest(self._frames, self._network)):
-                self._end_paused_program()
-        except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
-            return False
+        stop_arm(self._robot, reverse)
         self._in_motion = False
-        return True
-
-    def _end_paused_program(self) -> None:
-        """End the program that a safety stop has paused, so that it cannot be resumed without this client.
-
-        A robot that does not answer keeps it; nothing moves meanwhile, and the next run reports it.
-        """
-        with suppress(DriverError):
-            self._scripts.send_program(STOP_WORD)
-            wait_until(is_stopped, self._frames, self._network, REST_TIMEOUT, "the paused program stays")
-
-    def _send_stop_program(self) -> None:
-        """Replace whatever runs by a program that stops the arm.
-
-        It uses new connections: the present ones may be broken.
-        """
-        for connection in (self._scripts, self._frames):
-            connection.close()
-        self._scripts = self._open_packages(self._ports.secondary, "secondary")
-        self._frames = self._open_frames()
-        self._scripts.send_program(stop_script())
-
-    def _open_packages(self, port: int, name: str) -> PackageStream:
-        transport = self._network.connect(self._host, port, CONNECT_TIMEOUT)
-        stream = PackageStream(transport, self._network, name)
-        self._open.append(stream)
-        return stream
-
-    def _open_frames(self) -> RealtimeClient:
-        transport = self._network.connect(self._host, self._ports.realtime, CONNECT_TIMEOUT)
-        frames = RealtimeClient(transport, self._network)
-        self._open.append(frames)
-        return frames
-
-    def _connect(self) -> None:
-        self._primary = self._open_packages(self._ports.primary, "primary")
-        self._scripts = self._open_packages(self._ports.secondary, "secondary")
-        self.info = read_robot_info(self._network, self._host, self._ports.dashboard, self._primary)
-        if not (condition := software(self.info.version)).holds:
-            raise DriverError(condition.complaint)
-        self._frames = self._open_frames()
-        self.layout = self._frames.layout
-        self._server = ReverseServer(
-            self._network, self._frames.local_address, self._frames.robot_address, self._reverse_port
-        )
-        self._open.append(self._server)
-
-    def _start(self, text: str) -> None:
-        """Send a program and wait until it shows as running; what was reported before is of no interest."""
-        self._frames.drain()
-        self._primary.poll()
-        self._scripts.poll()
-        self._program, self._last_text, self._is_read_only = text, "", False
-        self._scripts.send_program(text)
-        self._wait(
-            self._has_started, _START_TIMEOUT, "the robot did not start the program in time: see its log"
-        )
-
-    def _has_started(self, frame: RealtimeFrame) -> bool:
-        if self._is_read_only:
-            raise RobotStoppedError(control(remote=False).complaint)
-        return not is_stopped(frame)
-
-    def _raise_robot_errors(self) -> None:
-        """Read both script ports; raise what the robot reports about our program, or a moved speed slider."""
-        self._scripts.poll()
-        messages = self._primary.poll()
-        for message in messages:
-            if isinstance(message, TextMessage):
-                self._last_text = message.text
-            self._is_read_only |= isinstance(message, ErrorCodeMessage) and message.code == _READ_ONLY
-        raise_on_error(messages, self._program)
-        check_slider(reported_slider(self._primary))
-
-    def _explain(self, error: ProgramEndedError) -> DriverError:
-        """Say why our program has ended, as far as the robot reports it."""
-        try:
-            self._raise_robot_errors()
-        except DriverError as reason:
-            return reason
-        said = "the pendant or another client stopped it"
-        if self._last_text:
-            said = f'the robot\'s last message is "{self._last_text}"'
-        return ProgramEndedError(f"{error}; {said}")
-
-    def _look_after(self) -> None:
-        """Read everything that has come, while waiting for something else; at least one frame comes."""
-        check_safety(self._frames.receive().latest)
-        self._raise_robot_errors()
-
-    def _wait(self, condition: Callable[[RealtimeFrame], bool], timeout: float, complaint: str) -> None:
-        """Wait for a frame; raise on safety stops and on errors that the robot reports."""
-
-        def check(frame: RealtimeFrame) -> None:
-            check_safety(frame)
-            self._raise_robot_errors()
-
-        wait_until(condition, self._frames, self._network, timeout, complaint, check)
 
 
 class _AlwaysStopped:

@@ -52,7 +52,7 @@ def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition,
     generation = software(report.info.version)
     if not generation.holds:
         return (generation,)
-    conditions = E_SERIES_CONDITIONS + CONDITIONS if report.info.version.major == 5 else CONDITIONS
+    conditions = _E_SERIES_CONDITIONS + CONDITIONS if report.info.version.major == 5 else CONDITIONS
     return generation, *(condition(report, model) for condition in conditions)
 
 
@@ -171,7 +171,7 @@ def operational_mode(report: RobotReport, model: RobotModel | None) -> Condition
     )
 
 
-E_SERIES_CONDITIONS: tuple[Check, ...] = (_control, operational_mode)
+_E_SERIES_CONDITIONS: tuple[Check, ...] = (_control, operational_mode)
 """What only a robot of the e-Series reports; shown before the others."""
 
 CONDITIONS: tuple[Check, ...] = (

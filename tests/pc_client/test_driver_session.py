@@ -254,7 +254,7 @@ def test_messages_before_the_question_for_the_version_are_kept():
     robot = FakeRobot()
     with UrDriver("robot", network=robot) as driver:
         robot.report(TextMessage(text="hello"))
-        messages = driver._primary.poll()
+        messages = driver._robot.primary.poll()
     assert [m.text for m in messages if isinstance(m, TextMessage)] == ["hello"]
 
 
