@@ -1,22 +1,20 @@
-"""Numbers and names of the controller: modes, software versions, ports, serial numbers.
+"""Numbers and names of the controller: modes, software versions, ports.
 
 The numbers are those of the vendor's client interface documents, the same on every port.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import NamedTuple
 
-from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.errors import LocalProtocolError
 
 __all__ = [
     "JOINT_NAMES",
     "SIMULATED_MASTERBOARD",
-    "SIMULATED_SERIAL_PREFIX",
     "SIMULATOR_CHECKSUM",
     "ControlMode",
     "JointMode",
@@ -26,10 +24,7 @@ __all__ = [
     "RobotType",
     "SafetyMode",
     "SafetyStatus",
-    "SerialNumber",
     "SoftwareVersion",
-    "parse_serial",
-    "simulated_serial",
 ]
 
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
@@ -261,50 +256,8 @@ class Ports:
         )
 
 
-SIMULATED_SERIAL_PREFIX = "2099"
-"""Serial numbers start with the year of make (seen: 2017...); no arm was made in 2099."""
-
 SIMULATED_MASTERBOARD = 2099
 """Masterboard version of an emulated box: software before 3.12 sends no serial number. A UR5e has 6."""
 
 SIMULATOR_CHECKSUM = 0xFFFFFFFF
 """Calibration checksum of each joint in the maker's own simulator. Source: URCL, captures of URSim."""
-
-_SIMULATED_SERIAL = re.compile(SIMULATED_SERIAL_PREFIX + r"([1-9])(\d{6})")
-_SEED_MODULUS = 10**6
-
-
-class SerialNumber(NamedTuple):
-    """A serial number and its meaning: `seed` is None for a real arm."""
-
-    text: str
-    simulated: bool
-    seed: int | None
-
-
-def simulated_serial(robot_type: int, seed: int) -> str:
-    """Serial number of a simulated box: prefix, robot type digit, six digits of the seed.
-
-    Args:
-        robot_type: code of `RobotType`, one digit (3 = UR3).
-        seed: any whole number; only its value modulo 10**6 is kept.
-
-    Raises:
-        LocalProtocolError: the robot type is not one of 1..9.
-    """
-    if not 1 <= robot_type <= 9:
-        raise LocalProtocolError(f"robot type {robot_type} has no digit in a serial number: use 1 to 9")
-    return f"{SIMULATED_SERIAL_PREFIX}{robot_type:d}{seed % _SEED_MODULUS:06d}"
-
-
-def parse_serial(text: str) -> SerialNumber:
-    """Read a serial number as `get serial number` answers it.
-
-    Raises:
-        RemoteProtocolError: the text is not digits only.
-    """
-    text = text.strip()
-    if not (text.isascii() and text.isdigit()):
-        raise RemoteProtocolError(f"serial number {text!r} is not digits only")
-    match = _SIMULATED_SERIAL.fullmatch(text)
-    return SerialNumber(text, match is not None, int(match[2]) if match else None)

@@ -86,6 +86,7 @@ PROTOCOL_ORDER = (
         "frame_buffer",
         "patience",
         "pose",
+        "serial_numbers",
         "ur_types",
         "wire_codec",
         "wire_record",

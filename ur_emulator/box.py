@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from protocol.primary.messages import ReportLevel
-from protocol.ur_types import Ports, RobotMode, RobotType, simulated_serial
+from protocol.serial_numbers import simulated_serial
+from protocol.ur_types import Ports, RobotMode, RobotType
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import check_options, parse_pace, standard_ports
 from ur_emulator.control.operations import BoxOperations, make

@@ -11,14 +11,8 @@ from pc_client.driver.transport import Network
 from pc_client.recording.origin import origin_of
 from protocol.errors import RemoteProtocolError
 from protocol.primary.setup import ConfigurationData, KinematicsInfo
-from protocol.ur_types import (
-    SIMULATED_MASTERBOARD,
-    SIMULATOR_CHECKSUM,
-    RobotType,
-    SerialNumber,
-    SoftwareVersion,
-    parse_serial,
-)
+from protocol.serial_numbers import SerialNumber, parse_serial
+from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM, RobotType, SoftwareVersion
 
 _MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
 _SERIAL, _MODEL = "get serial number", "get robot model"

@@ -7,6 +7,7 @@ import dataclasses
 import pytest
 
 from protocol.errors import LocalProtocolError, ProtocolError, RemoteProtocolError
+from protocol.serial_numbers import parse_serial, simulated_serial
 from protocol.ur_types import (
     JOINT_NAMES,
     JointMode,
@@ -17,8 +18,6 @@ from protocol.ur_types import (
     SafetyMode,
     SafetyStatus,
     SoftwareVersion,
-    parse_serial,
-    simulated_serial,
 )
 from protocol.wire_record import since
 

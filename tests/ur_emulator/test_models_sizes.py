@@ -11,7 +11,8 @@ from box_support import FakeNetwork, connect
 
 from pc_client.kinematics.robot_model import robot_model
 from protocol.calibration_hash import calibration_hash
-from protocol.ur_types import RobotType, parse_serial
+from protocol.serial_numbers import parse_serial
+from protocol.ur_types import RobotType
 from ur_emulator import ControlBox
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller

@@ -31,7 +31,7 @@ class BoxIdentity:
         software: four numbers and a date.
         model: as people write it, "UR5e".
         wire_model: as the dashboard server writes it: "UR5" for a UR5e.
-        serial_number: digits; see protocol.ur_types.simulated_serial.
+        serial_number: digits; see protocol.serial_numbers.simulated_serial.
     """
 
     software: Software

@@ -10,11 +10,11 @@ from __future__ import annotations
 import ast
 from typing import Any, Final
 
-from urscript import dialect
 from urscript.catalogue import Catalogue
 from urscript.catalogue.costs import EXPENSIVE, UNITS
 from urscript.compile.inference import StaticTypes, Type, is_numeric
 from urscript.compile.interpreter_call import interpreter_call
+from urscript.compile.operators import HELPERS, logic, plain_operation
 from urscript.compile.python_tree import ask_after, call, constant, load, place
 from urscript.dialect import Dialect
 from urscript.names.own_calls import wrong_count
@@ -22,23 +22,8 @@ from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
-from urscript.values import INT_MAX, INT_MIN, Pose
+from urscript.values import Pose
 
-_ARITHMETIC: Final[dict[str, tuple[str, type[ast.operator]]]] = {
-    "+": ("_add", ast.Add),
-    "-": ("_sub", ast.Sub),
-    "*": ("_mul", ast.Mult),
-    "/": ("_div", ast.Div),
-    "%": ("_mod", ast.Mod),
-}
-_COMPARISON: Final[dict[str, tuple[str, type[ast.cmpop]]]] = {
-    "==": ("_equal", ast.Eq),
-    "!=": ("_unequal", ast.NotEq),
-    "<": ("_less", ast.Lt),
-    "<=": ("_less_equal", ast.LtE),
-    ">": ("_greater", ast.Gt),
-    ">=": ("_greater_equal", ast.GtE),
-}
 # Operations of an expression after which the code asks whether the program may go on.
 _ASK_EVERY: Final = 8
 _PLAIN = (bool, int, float, str, type(None))
@@ -173,38 +158,14 @@ class ExpressionCompiler:
             self._types.of(expression.left, scope),
             self._types.of(expression.right, scope),
         )
-        if operator in _COMPARISON:
-            helper, comparison = _COMPARISON[operator]
-            booleans = left_type is right_type is Type.BOOL and operator in ("==", "!=")
-            if booleans or (is_numeric(left_type) and is_numeric(right_type)):
-                return ast.Compare(left, [comparison()], [right], **place(span))
-            return self.asking(call(helper, [left, right], span))
-        helper, python_operator = _ARITHMETIC[operator]
-        if is_numeric(left_type) and is_numeric(right_type) and operator != "%":
-            raw = ast.BinOp(left, python_operator(), right, **place(span))
-            if operator == "/":
-                if not dialect.EXACT_DIVISION_GIVES_INT:
-                    return raw
-            elif Type.FLOAT in (left_type, right_type):
-                return raw
-            elif left_type is right_type is Type.INT:
-                return self._wrapped(raw, span)
-        return self.asking(call(helper, [left, right], span))
-
-    def _wrapped(self, raw: ast.expr, span: Span) -> ast.expr:
-        """`_i if INT_MIN <= (_i := raw) <= INT_MAX else _wrap(_i)`: a result of 32 bits."""
-        at = place(span)
-        bound = ast.NamedExpr(ast.Name("_i", ast.Store(), **at), raw, **at)
-        fits = ast.Compare(
-            constant(INT_MIN, span), [ast.LtE(), ast.LtE()], [bound, constant(INT_MAX, span)], **at
-        )
-        return ast.IfExp(fits, load("_i", span), call("_wrap", [load("_i", span)], span), **at)
+        plain = plain_operation(operator, left, right, (left_type, right_type), span)
+        return plain or self.asking(call(HELPERS[operator], [left, right], span))
 
     def _logic(self, expression: nodes.BinaryOperation, scope: FunctionScope) -> ast.expr:
-        operator, at = expression.operator, place(expression.span)
+        operator = expression.operator
         if operator == "xor":
-            left, right = self.condition(expression.left, scope), self.condition(expression.right, scope)
-            return ast.Compare(left, [ast.NotEq()], [right], **at)
+            both = [self.condition(expression.left, scope), self.condition(expression.right, scope)]
+            return logic(operator, both, expression.span)
         # A chain of one operator is left-associative; a flat list needs no nesting.
         operands: list[Expression] = []
         chain: Expression = expression
@@ -213,12 +174,7 @@ class ExpressionCompiler:
             chain = chain.left
         operands.append(chain)
         values = [self.condition(operand, scope) for operand in reversed(operands)]
-        if self._dialect.short_circuit:
-            return ast.BoolOp(ast.And() if operator == "and" else ast.Or(), values, **at)
-        result = values[0]
-        for value in values[1:]:
-            result = ast.BinOp(result, ast.BitAnd() if operator == "and" else ast.BitOr(), value, **at)
-        return result
+        return logic(operator, values, expression.span, short_circuit=self._dialect.short_circuit)
 
     def _prefix(self, expression: nodes.UnaryOperation, scope: FunctionScope) -> ast.expr:
         operand, span = expression.operand, expression.span

@@ -11,11 +11,7 @@ All errors of a program are collected, the first one in the text is raised.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
-
 from urscript.catalogue import Catalogue
-from urscript.catalogue.versions import NEVER
 from urscript.dialect import MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
@@ -26,21 +22,18 @@ from urscript.errors import (
 )
 from urscript.names.assignment import find_maybe_unassigned
 from urscript.names.call_graph import mark_recursion, spread_blocking
+from urscript.names.declarations import Declarations, open_program
+from urscript.names.name_errors import NameErrors
 from urscript.names.own_calls import shape_of, signature_of
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Block, Expression, Statement
 from urscript.syntax.walk import (
-    all_expressions,
-    all_statements,
     child_expressions,
     own_blocks,
     own_expressions,
 )
-
-MAX_SUGGESTIONS: Final = 40
-"""Unknown names of one program for which a suggestion is searched."""
 
 
 def resolve(
@@ -62,117 +55,34 @@ def resolve(
     Returns:
         What was found, and all errors in the order of the text; with errors the program cannot be compiled.
     """
-    resolver = _Resolver(source, catalogue, dialect)
-    program = resolver.resolve(within or resolver.open(block))
-    return program, sorted(resolver.errors, key=lambda error: (error.line, error.column))
+    errors = NameErrors(source, catalogue)
+    program = within or open_program(block, source, errors)
+    declarations = Declarations(program, errors)
+    declarations.declare(program.main)
+    for scope in program.functions:
+        declarations.declare_locals(scope)
+    look_up = _LookUp(program, errors, catalogue, dialect)
+    for scope in program.scopes():
+        look_up.scope(scope)
+    mark_recursion(program)
+    spread_blocking(program)
+    find_maybe_unassigned(program)
+    return program, sorted(errors.found, key=lambda error: (error.line, error.column))
 
 
-def statement_name(block: Block) -> str:
-    """The name of a program without `def`: the function that its first statement calls.
+class _LookUp:
+    """Finds what each name of one program is."""
 
-    Source: key messages of one-line programs on the primary interface.
-    """
-    for statement in block:
-        for expression in own_expressions(statement):
-            for part in all_expressions(expression):
-                if isinstance(part, nodes.Call):
-                    return part.function
-        if isinstance(statement, nodes.KeywordStatement):
-            return statement.keyword
-    return "unnamed"
+    def __init__(
+        self, program: ResolvedProgram, errors: NameErrors, catalogue: Catalogue, dialect: Dialect
+    ) -> None:
+        self._program = program
+        self._errors = errors
+        self._catalogue = catalogue
+        self._dialect = dialect
 
-
-def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
-    """The one definition that is the whole program, and calls of it below."""
-    items = tuple(item for item in block if not isinstance(item, nodes.Label))
-    if not items or not isinstance(items[0], nodes.Function) or items[0].kind == "thread":
-        return None, ()
-    definition, calls = items[0], items[1:]
-    its_call = nodes.ExpressionStatement(nodes.Call(definition.name, ()))
-    return (definition, calls) if all(item == its_call for item in calls) else (None, ())
-
-
-class _Resolver:
-    """Two passes: declarations, then lookups."""
-
-    def __init__(self, source: Source, catalogue: Catalogue, dialect: Dialect) -> None:
-        self.source = source
-        self.catalogue = catalogue
-        self.dialect = dialect
-        self.errors: list[ScriptCompileError] = []
-        self._n_unknown = 0
-
-    def resolve(self, program: ResolvedProgram) -> ResolvedProgram:
-        self.program = program
-        self._declare(program.main)
-        for scope in program.functions:
-            self._declare_locals(scope)
-        for scope in program.scopes():
-            self._look_up(scope)
-        mark_recursion(program)
-        spread_blocking(program)
-        find_maybe_unassigned(program)
-        return program
-
-    def open(self, block: Block) -> ResolvedProgram:
-        """The program: a single definition is the program itself, other text is its body.
-
-        Calls of that program after its definition are ignored: on a port it has run before they come.
-        """
-        function, calls = _definition_and_calls(block)
-        if function is not None:
-            if function.parameters:
-                self._error(ScriptContextError("a program takes no parameters"), function.parameters[0].span)
-            main = FunctionScope(function.name, function, None, function.body, "main")
-            return ResolvedProgram(self.source, function.kind, function.name, main, calls)
-        name = statement_name(block)
-        return ResolvedProgram(self.source, "statement", name, FunctionScope(name, None, None, block, "main"))
-
-    # --- declaring ---------------------------------------------------------------------------------------
-
-    def _declare(self, scope: FunctionScope) -> None:
-        """Declare the functions of `scope` and its globals, then those of nested functions."""
-        for statement in all_statements(scope.body):
-            if isinstance(statement, nodes.Function):
-                self._declare_function(statement, scope)
-            elif isinstance(statement, (nodes.Assign, nodes.Declaration)) and (
-                scope is self.program.main or statement.scope == "global"
-            ):
-                name = _declared_name(statement)
-                if name is not None:
-                    self.program.globals.add(name)
-                    if statement.scope == "global":
-                        self.program.declared_globals[name] = None
-
-    def _declare_function(self, function: nodes.Function, scope: FunctionScope) -> None:
-        if function.kind == "sec":
-            self._error(
-                ScriptContextError("a secondary program cannot be defined inside another program"),
-                function.span,
-            )
-        python_name = f"{self.program.prefix}f{len(self.program.functions)}_{function.name}"
-        inner = FunctionScope(function.name, function, scope, function.body, python_name)
-        scope.functions[function.name] = inner
-        self.program.functions.append(inner)
-        self._declare(inner)
-
-    def _declare_locals(self, scope: FunctionScope) -> None:
-        """Declare the locals of a function; all globals of the program are known already."""
-        assert scope.node is not None
-        for parameter in scope.node.parameters:
-            if parameter.name in scope.locals:
-                self._error(ScriptContextError(f"duplicate parameter '{parameter.name}'"), parameter.span)
-            scope.locals.add(parameter.name)
-        for statement in all_statements(scope.body):
-            if not isinstance(statement, (nodes.Assign, nodes.Declaration)) or statement.scope == "global":
-                continue
-            name = _declared_name(statement)
-            if name is not None and (statement.scope == "local" or name not in self.program.globals):
-                scope.locals.add(name)
-
-    # --- looking up --------------------------------------------------------------------------------------
-
-    def _look_up(self, scope: FunctionScope) -> None:
+    def scope(self, scope: FunctionScope) -> None:
+        """Look up all names of a function."""
         if scope.node is not None and scope.parent is not None:
             for parameter in scope.node.parameters:
                 if parameter.default is not None:
@@ -192,20 +102,20 @@ class _Resolver:
         match statement:
             case nodes.While() if loops == MAX_LOOP_DEPTH:
                 message = f"loops are nested more than {MAX_LOOP_DEPTH} deep"
-                self._error(ScriptContextError(message), statement.span)
+                self._errors.add(ScriptContextError(message), statement.span)
             case nodes.KeywordStatement(keyword="break" | "continue" as word) if not loops:
-                self._error(ScriptContextError(f"'{word}' outside a loop"), statement.span)
+                self._errors.add(ScriptContextError(f"'{word}' outside a loop"), statement.span)
             case nodes.Join():
                 scope.blocks = True
             case nodes.ExpressionStatement(value=nodes.Name(name="pause")) if self._is_pause(scope):
                 scope.blocks = True
-                self.program.builtins.add("pause")
+                self._program.builtins.add("pause")
                 return
         for expression in own_expressions(statement):
             self._expression(expression, scope, scope)
 
     def _is_pause(self, scope: FunctionScope) -> bool:
-        return self.dialect.has_pause and not self.program.is_variable("pause", scope)
+        return self._dialect.has_pause and not self._program.is_variable("pause", scope)
 
     def _expression(self, expression: Expression, scope: FunctionScope, runs_in: FunctionScope) -> None:
         """Look up the names of `expression` in `scope`; `runs_in` is the function that executes it."""
@@ -223,15 +133,15 @@ class _Resolver:
             case nodes.Subscript(target=nodes.Name(name=name), indices=indices) if self._is_array(
                 name, scope
             ):
-                array = self.catalogue.arrays[name]
-                self.program.builtins.update(filter(None, (array.getter, array.setter)))
+                array = self._catalogue.arrays[name]
+                self._program.builtins.update(filter(None, (array.getter, array.setter)))
                 if len(indices) > 1:
-                    self._error(ScriptTypeError(f"{name} takes one index, got 2"), expression.span)
+                    self._errors.add(ScriptTypeError(f"{name} takes one index, got 2"), expression.span)
                 for index in indices:
                     self._expression(index, scope, runs_in)
                 return
             case nodes.IntLiteral(value=value) if value == 2**31:
-                self._error(
+                self._errors.add(
                     ScriptSyntaxError("this integer does not fit into 32 bits; write a float"),
                     expression.span,
                 )
@@ -241,17 +151,17 @@ class _Resolver:
             self._expression(part, scope, runs_in)
 
     def _is_array(self, name: str, scope: FunctionScope) -> bool:
-        return name in self.catalogue.arrays and not self.program.is_variable(name, scope)
+        return name in self._catalogue.arrays and not self._program.is_variable(name, scope)
 
     def _variable(self, name: str, span: Span, scope: FunctionScope) -> None:
-        if self.program.is_variable(name, scope) or name in self.catalogue.variables:
+        if self._program.is_variable(name, scope) or name in self._catalogue.variables:
             return
-        if name in self.catalogue or scope.find_function(name) is not None:
+        if name in self._catalogue or scope.find_function(name) is not None:
             hint = f"'{name}' is a function, call it as {name}(...)"
-            self._error(ScriptNameError(name, hint=hint), span)
+            self._errors.add(ScriptNameError(name, hint=hint), span)
         else:
-            self._unknown(
-                name, span, lambda: [*scope.locals, *self.program.globals, *self.catalogue.variables]
+            self._errors.unknown(
+                name, span, lambda: [*scope.locals, *self._program.globals, *self._catalogue.variables]
             )
 
     def _call(self, call: nodes.Call, scope: FunctionScope, runs_in: FunctionScope) -> None:
@@ -263,27 +173,29 @@ class _Resolver:
             try:
                 signature_of(callee).check_keywords(*shape_of(call.arguments))
             except ScriptTypeError as error:
-                self._error(error, call.span)
+                self._errors.add(error, call.span)
             return
-        builtin = self.catalogue.lookup(call.function)
+        builtin = self._catalogue.lookup(call.function)
         if builtin is None:
-            self._unknown(
-                call.function, call.span, lambda: [*scope.visible_functions(), *self.catalogue.names]
+            self._errors.unknown(
+                call.function, call.span, lambda: [*scope.visible_functions(), *self._catalogue.names]
             )
             return
-        self.program.builtins.add(call.function)
+        self._program.builtins.add(call.function)
         runs_in.blocks = runs_in.blocks or builtin.may_wait
         try:
-            self.catalogue.static_bind(call.function, *shape_of(call.arguments))
+            self._catalogue.static_bind(call.function, *shape_of(call.arguments))
         except ScriptTypeError as error:
-            self._error(error, call.span)
+            self._errors.add(error, call.span)
 
     def _run(self, run: nodes.RunThread, scope: FunctionScope) -> None:
         callee = scope.find_function(run.thread)
         if callee is None:
-            self._unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
+            self._errors.unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
         elif callee.node is not None and callee.node.parameters:
-            self._error(ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span)
+            self._errors.add(
+                ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span
+            )
 
     def _argument_order(self, arguments: tuple[nodes.Argument, ...]) -> bool:
         """Positional arguments come before named ones."""
@@ -292,31 +204,8 @@ class _Resolver:
             if argument.name is not None:
                 seen_name = True
             elif seen_name:
-                self._error(ScriptSyntaxError("positional argument after a named argument"), argument.span)
+                self._errors.add(
+                    ScriptSyntaxError("positional argument after a named argument"), argument.span
+                )
                 return False
         return True
-
-    # --- reporting ---------------------------------------------------------------------------------------
-
-    def _unknown(self, name: str, span: Span, known: Callable[[], list[str]]) -> None:
-        self._n_unknown += 1
-        hint = None
-        # The searches are slow, so there is a limit.
-        if self._n_unknown <= MAX_SUGGESTIONS:
-            releases, version = self.catalogue.first_releases(name), self.catalogue.version
-            if releases != NEVER:
-                hint = f"known since {releases}; this is {version.generation.value} {version}"
-            elif alike := self.catalogue.suggest(name, known()):
-                hint = f"did you mean '{alike}'?"
-        name_only = Span(span.line, span.column, span.line, span.column + len(name))
-        self._error(ScriptNameError(name, hint=hint), name_only)
-
-    def _error(self, error: ScriptCompileError, span: Span) -> None:
-        width = span.end_column - span.column if span.line == span.end_line else 1
-        self.errors.append(error.locate(self.source, span.line, span.column, width))
-
-
-def _declared_name(statement: nodes.Assign | nodes.Declaration) -> str | None:
-    if isinstance(statement, nodes.Declaration):
-        return statement.name
-    return statement.target.name if isinstance(statement.target, nodes.Name) else None
