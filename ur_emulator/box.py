@@ -243,6 +243,7 @@ class Box(BoxOperations):
         if self.control_port:
             close_to_scripts(self, self.control_port)
         self.ports = Ports.of(numbers)
+        self._loop.keep_pace(self._box.controller.period_s)
         self._loop.add(self._box)
         self._loop.tasks.start()
         begin = start_up(self._access, self._player)

@@ -19,6 +19,10 @@ import pytest
 from protocol.ur_types import Ports
 
 TIMEOUT = 20.0  # s
+# Parameters of `box`: of a CB3, and of an e-Series box.
+BOTH_GENERATIONS = pytest.mark.parametrize(
+    "box", [(), ("--robot", "ur5e", "--software", "5.25.1")], indirect=True, ids=["cb3", "e-series"]
+)
 PERIOD = 0.008  # s
 
 

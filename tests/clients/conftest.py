@@ -5,9 +5,12 @@ from clients_support import served_box
 
 
 @pytest.fixture(scope="module")
-def box(tmp_path_factory):
-    """A CB3 with software 3.15 in real time, shared: a test leaves it able to run the next one."""
-    with served_box(tmp_path_factory.mktemp("box")) as served:
+def box(tmp_path_factory, request):
+    """A box in real time, shared: a test leaves it able to run the next one.
+
+    A CB3 with software 3.15, unless the parameter has other options.
+    """
+    with served_box(tmp_path_factory.mktemp("box"), *getattr(request, "param", ())) as served:
         yield served
 
 

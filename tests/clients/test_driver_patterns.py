@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from clients_support import TIMEOUT, connect
+from clients_support import BOTH_GENERATIONS, TIMEOUT, connect
 from driver_patterns import (
     CANCELLED,
     DONE,
@@ -54,6 +54,7 @@ def driver(box):
         rtde.until(lambda v: v["runtime_state"] == STOPPED)
 
 
+@BOTH_GENERATIONS
 def test_servo_set_points_are_followed(box):
     with driver(box) as (rtde, servers):
         start = np.array(rtde.data()["target_q"])
@@ -69,6 +70,7 @@ def test_servo_set_points_are_followed(box):
             raise AssertionError("the set-point was not reached")
 
 
+@BOTH_GENERATIONS
 def test_joint_and_tool_speeds(box):
     with driver(box) as (rtde, servers):
         for _ in range(60):
@@ -83,6 +85,7 @@ def test_joint_and_tool_speeds(box):
         rtde.until(lambda v: not any(v["target_qd"]))
 
 
+@BOTH_GENERATIONS
 def test_a_trajectory_with_blends_and_one_that_is_cancelled(box):
     with driver(box) as (rtde, servers):
         start = np.array(rtde.data()["target_q"])
@@ -104,6 +107,7 @@ def test_a_trajectory_with_blends_and_one_that_is_cancelled(box):
         assert 0.0 < values["target_q"][5] - start[5] < 0.9
 
 
+@BOTH_GENERATIONS
 def test_script_commands(box):
     with driver(box) as (rtde, servers):
         servers.send(IDLE, timeout_ms=0)
@@ -113,6 +117,7 @@ def test_script_commands(box):
         rtde.until(lambda v: v["payload"] == 0.0)
 
 
+@BOTH_GENERATIONS
 @pytest.mark.parametrize("mode", [SERVOJ, SPEEDJ, IDLE])
 def test_silence_ends_the_program(box, mode):
     """As long as was said with the last message, and not before."""
@@ -125,6 +130,7 @@ def test_silence_ends_the_program(box, mode):
         assert servers.is_dropped()
 
 
+@BOTH_GENERATIONS
 def test_unreachable_set_points_leave_the_joints_where_they_are(box):
     with driver(box) as (rtde, servers):
         start = rtde.data()["target_q"]
@@ -138,6 +144,7 @@ def test_unreachable_set_points_leave_the_joints_where_they_are(box):
         assert struct.pack("6f", *after) == struct.pack("6f", *before)
 
 
+@BOTH_GENERATIONS
 def test_a_second_upload_replaces_the_first(box):
     with driver(box) as (rtde, first), DriverServers() as second:
         first.send(IDLE, timeout_ms=0)
@@ -258,6 +265,7 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
             rtde.until(lambda v: v["runtime_state"] == STOPPED)
 
 
+@BOTH_GENERATIONS
 def test_a_program_is_reported_by_key_messages(box):
     with PrimaryWire(box) as primary:
         primary.write("def named():\n\tsync()\nend\n")

@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from clients_support import TIMEOUT, connect
+from clients_support import BOTH_GENERATIONS, TIMEOUT, connect
 from primary_wire import (
     CONFIGURATION,
     ERROR,
@@ -46,6 +46,7 @@ def primary(box):
         yield wire
 
 
+@BOTH_GENERATIONS
 def test_soon_after_connecting(box):
     """Version first; configuration and kinematics with the first states."""
     with PrimaryWire(box) as wire:
@@ -67,6 +68,7 @@ def test_version_message(primary):
     assert build >= 0
 
 
+@BOTH_GENERATIONS
 def test_power_words(primary):
     primary.write("power on\n")
     assert robot_mode(until(primary, lambda s: robot_mode(s) == RUNNING)) == RUNNING, "a running arm stays so"
@@ -83,6 +85,7 @@ def test_power_words(primary):
     until(primary, lambda s: robot_mode(s) == RUNNING)
 
 
+@BOTH_GENERATIONS
 def test_stop_program_may_be_said_again_and_again(primary):
     primary.write("stop program\nstop program\n")
     primary.write("def loop():\n\twhile True:\n\t\tsync()\n\tend\nend\n")
@@ -106,6 +109,7 @@ def titles_and_texts(primary, count):
     return found
 
 
+@BOTH_GENERATIONS
 def test_started_text_stopped(primary):
     primary.write('def talk():\n\ttextmsg("hello from a program")\nend\n')
     assert titles_and_texts(primary, 3) == [
@@ -121,11 +125,13 @@ def exception(primary):
     return *struct.unpack_from(">ii", body), body[8:].decode()
 
 
+@BOTH_GENERATIONS
 def test_an_unknown_function_is_named_with_its_place(primary):
     primary.write("def bad():\n  nothing_like_it()\nend\n")
     assert exception(primary) == (2, 3, "compile_error_name_not_found:nothing_like_it:")
 
 
+@BOTH_GENERATIONS
 def test_an_unreachable_joint_move_is_an_exception(primary):
     primary.write("def far():\n\tmovej(p[10, 0, 0, 0, 0, 0])\nend\n")
     line, _, text = exception(primary)
@@ -152,6 +158,7 @@ def unlock(primary):
     primary.write("stop program\n")
 
 
+@BOTH_GENERATIONS
 def test_an_unreachable_linear_move_is_a_protective_stop(primary):
     primary.write("def far():\n\tmovel(p[10, 0, 0, 0, 0, 0])\nend\n")
     codes = list(error_codes(primary))
@@ -160,6 +167,7 @@ def test_an_unreachable_linear_move_is_a_protective_stop(primary):
     unlock(primary)
 
 
+@BOTH_GENERATIONS
 def test_a_secondary_protective_stop_is_one_error_code(primary):
     primary.write("sec stop():\n\tprotective_stop()\nend\n")
     codes = [(code, argument) for code, argument, _ in error_codes(primary)]
@@ -167,12 +175,14 @@ def test_a_secondary_protective_stop_is_one_error_code(primary):
     unlock(primary)
 
 
+@BOTH_GENERATIONS
 def test_halt_alone_is_a_program(primary):
     primary.write("halt\n")
     titles = [title for title, _ in titles_and_texts(primary, 2)]
     assert titles == ["PROGRAM_XXX_STARTED", "PROGRAM_XXX_STOPPED"]
 
 
+@BOTH_GENERATIONS
 def test_a_tool_that_is_set_is_the_tool(box, primary):
     tool = (0.01, -0.02, 0.12, 0.3, -0.2, 0.1)
     with StrictRtde(box) as rtde:
@@ -186,6 +196,7 @@ def test_a_tool_that_is_set_is_the_tool(box, primary):
         rtde.until(lambda v: not any(v["tcp_offset"]) and v["payload"] == 0.0)
 
 
+@BOTH_GENERATIONS
 @pytest.mark.parametrize("port", ["primary", "secondary", "realtime"])
 def test_packages_never_come_half_a_second_apart(box, port):
     """urx and ur_modern_driver take longer silence for death; counted in robot time by what the stamps say."""

@@ -102,6 +102,18 @@ def test_a_service_is_called_between_long_callbacks_and_nobody_has_two_turns_in_
     assert all({a, b} != {"a", "b"} for a, b in pairwise(story))
 
 
+def test_a_late_service_with_a_short_cycle_waits_for_one_callback_of_a_tenth_of_it(pairs):
+    loop, story = EventLoop(), []
+    loop.keep_pace(0.002)
+    for name, (near, far) in zip("ab", pairs, strict=True):
+        far.send(b"x")
+        loop.watch(near, selectors.EVENT_READ, until_due(loop, story, name, 100e-6), pytest.fail)
+    loop.add(Due(loop, story, 0.0, 20))
+    loop.run()
+    loop.close()
+    assert all("service" in turns for turns in pairwise(story))
+
+
 def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiting(pairs):
     loop, story = EventLoop(), []
     near, far = pairs[0]

@@ -37,8 +37,9 @@ _COARSE = 0.050
 WAKE_UP = 400e-6
 # select() takes descriptors below this number only.
 _SELECT_LIMIT = 1024
-# How long callbacks run when a service is late already, or always due [s].
-_LATE_TURN = 500e-6
+# How long callbacks run when a service is late already, or always due [s]; of a shorter cycle this part.
+# Clients that come and go without pause could make boxes fall behind otherwise, more with shorter cycles.
+_LATE_TURN, _LATE_PART = 500e-6, 1.0 / 16.0
 # How long to poll for an expected event [s]: a client in lockstep answers in half of it.
 _POLL_TIME = 200e-6
 # Most waits in a row without polling, after polls that failed.
@@ -82,6 +83,7 @@ class EventLoop:
         self._stopping = False
         self.is_running = False
         self._thread = 0
+        self._late_turn = _LATE_TURN
         self._expects_soon = False
         self._pause = 1
         self._skip = 0
@@ -125,6 +127,10 @@ class EventLoop:
         return not self._skip
 
     # --- services
+
+    def keep_pace(self, period: float) -> None:
+        """Have a service with a cycle of so many seconds; late, it waits for callbacks for a part of that."""
+        self._late_turn = min(self._late_turn, _LATE_PART * period)
 
     def add(self, service: Service) -> None:
         """Let `service` advance in this loop."""
@@ -219,7 +225,7 @@ class EventLoop:
         now, lead = time.monotonic(), self._lead
         if now < deadline - lead:
             return deadline - lead
-        return deadline if now < deadline else now + _LATE_TURN
+        return deadline if now < deadline else now + self._late_turn
 
     @property
     def _lead(self) -> float:
