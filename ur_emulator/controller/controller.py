@@ -270,7 +270,7 @@ class Controller:
                 return target
             violation = self._setpoints.find_invalid(state.safety.limits, before, target)
             if violation is None and state.safety.boundaries:
-                way = (target.q, *self._setpoints.way_to_rest(target))
+                way = (target.q, *state.motion.way_to_rest(target))
                 now, *ahead = (state.arm.state(q, target.qd, state.tool.tcp_offset) for q in way)
                 near = state.safety.boundaries.find_near(now, ahead)
                 violation = None if near is None else Violation(near)

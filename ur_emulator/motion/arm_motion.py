@@ -5,7 +5,10 @@ Must not know scripts or physics.
 
 from __future__ import annotations
 
-from ur_emulator.models.robot_model import ZERO6, Vector6
+from collections.abc import Iterator
+from math import inf
+
+from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.direct_torque import DirectTorque, TorqueCommand
 from ur_emulator.motion.generators import Generator, StopJ
 from ur_emulator.motion.overlay import Overlay, OverlayChain
@@ -13,6 +16,9 @@ from ur_emulator.motion.path_motion import HOLD, PathMotion
 from ur_emulator.motion.pause import ReturnToPath
 from ur_emulator.motion.speed_l import StopL
 from ur_emulator.motion.target import JointTarget
+
+# The way of a slow arm: at its speed for this long [s], so that rounding is less. Chosen.
+_LEAST_LOOK_AHEAD = 0.02
 
 
 class ArmMotion(PathMotion):
@@ -34,6 +40,14 @@ class ArmMotion(PathMotion):
         self.target = self.path
         self._chain = OverlayChain()
         self._overlays = self._chain.overlays
+
+    def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
+        """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
+        allowed = inf if self.braking is None else self.braking(target)
+        braking_time = max(map(abs, target.qd)) / (2.0 * min(self.stop_deceleration, allowed))
+        for share in (0.5, 1.0):
+            time = share * max(braking_time, _LEAST_LOOK_AHEAD)
+            yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
 
     @property
     def is_moving(self) -> bool:

@@ -8,7 +8,6 @@ proposal of the arm's notes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot
 from operator import sub
@@ -17,7 +16,7 @@ from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
-from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.models.robot_model import RobotModel, Vector6
 from ur_emulator.motion.target import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
@@ -27,8 +26,6 @@ MAX_POSITION_DEVIATION = 0.15
 MAX_SATURATION_TIME = 0.1
 # A joint that is not faster is at rest, for the high holding torque [rad/s]. Source: see there.
 RESTING_SPEED = 0.01
-# The way of a slow arm ahead of which is looked [s]: so that it is longer than rounding. Chosen.
-LEAST_LOOK_AHEAD = 0.02
 # Rounding of a joint speed.
 SPEED_TOLERANCE = 1.0 + 1e-6
 
@@ -90,12 +87,6 @@ class SetpointCheck:
         if fastest <= self._safe_speed >= steepest and reach <= self._safe_reach:
             return None
         return find_invalid_setpoint(limits, before, target, self._stop_deceleration, self._period_s)
-
-    def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
-        """Yield joint angles half way and at rest if a stop began at a set-point [rad]."""
-        braking_time = max(LEAST_LOOK_AHEAD, max(map(abs, target.qd)) * self._braking)
-        for time in (0.5 * braking_time, braking_time):
-            yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
 
 
 def find_invalid_setpoint(
