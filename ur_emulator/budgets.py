@@ -101,7 +101,8 @@ class Budgets:
     )
     # More than any client sends; each costs the cycle up to 0.5 ms.
     programs_per_cycle: int = _cycle_budget(4, "programs", "started or refused", "the others wait")
-    script_warnings_per_cycle: int = _cycle_budget(4, "warnings", "about scripts", "no further ones")
+    # Of any length: in lockstep, time may stand still between two scripts that are refused.
+    script_warnings_per_cycle: int = _budget(4, "warnings about scripts", "a cycle", "no further ones")
     # A program with this much starts within 10 ms; 10,000 poses have room, or 3,300 waypoints of a .urp.
     program_functions: int = _budget(3_000, "functions", "a program", "it is refused")
     program_values: int = _budget(10_000, "global variables and poses", "a program", "it is refused")

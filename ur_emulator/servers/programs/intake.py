@@ -182,7 +182,7 @@ class ProgramIntake:
 
     def _warn(self, text: str, code: int = 0) -> None:
         self._n_warnings += 1
-        if self._n_warnings <= of_cycle(BUDGETS.script_warnings_per_cycle, self._period):
+        if self._n_warnings <= BUDGETS.script_warnings_per_cycle:
             self._box.announce(ErrorReported(code, 0, ReportLevel.WARNING, text))
 
     # --- programs
