@@ -13,7 +13,6 @@ from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetUp, StartProgram, StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.safety.configured_limits import limits_of
-from ur_emulator.controller.safety.status_bits import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.programs.compiling import (
     Outcome,
@@ -24,10 +23,12 @@ from ur_emulator.programs.compiling import (
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation, StartUp
 from ur_emulator.programs.installation_files import DEFAULT_NAME, NEW_BOX
-from ur_emulator.programs.variables_file import literal, write_variables
+from ur_emulator.programs.variables_file import write_variables
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.external_control import request_program
 from ur_emulator.servers.programs.input_actions import follow_inputs
+from ur_emulator.servers.programs.kept_variables import values_at_end
+from ur_emulator.servers.programs.play_conditions import is_paused, is_running, obstacle_to_playing
 from ur_emulator.servers.steps import Steps
 
 if TYPE_CHECKING:
@@ -42,7 +43,6 @@ SCRIPT_SENDER_PORT = 50002
 _NOT_UP = frozenset(
     {RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED, RobotMode.CONFIRM_SAFETY, RobotMode.BOOTING}
 )
-_PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 
 
 class MissingFileRefusal(RefusedError):
@@ -82,12 +82,12 @@ class ProgramPlayer:
     @property
     def is_running(self) -> bool:
         """True while a program plays, also one that a client has sent."""
-        return self._access.snapshot.runtime_state in RUNNING_STATES
+        return is_running(self._access)
 
     @property
     def is_paused(self) -> bool:
         """True while a program is paused, or about to be."""
-        return self._access.snapshot.runtime_state in _PAUSED
+        return is_paused(self._access)
 
     @property
     def script(self) -> str:
@@ -250,18 +250,9 @@ class ProgramPlayer:
 
     def _keep_variables(self) -> Steps[None]:
         """Wait for the end of the program, then keep the values of the installation's variables."""
-        programs, installation = self._access.controller.programs, self.installation
-        run = programs.latest
-        while programs.is_running and programs.latest is run:
-            yield
-        if run is None or self.installation is not installation:
-            return
-        declared = set(run.program.declared_globals)
-        values = {
-            name: (literal(run.read_global(name)) if name in declared else "") or old
-            for name, old in installation.variables.items()
-        }
-        if values == installation.variables:
+        installation = self.installation
+        values = yield from values_at_end(self._access.controller.programs, installation.variables)
+        if self.installation is not installation or values == installation.variables:
             return
         self._declare(replace(installation, variables=values))
         try:
@@ -277,18 +268,9 @@ class ProgramPlayer:
 
     def _must_be_able_to_play(self) -> None:
         """Refuse to play while something stands against it."""
-        snapshot = self._access.snapshot
-        if not self._access.controller.state.safety.lets_programs_run:
-            self._refuse("play", "the robot is stopped for safety")
-        if snapshot.robot_mode != RobotMode.RUNNING:
-            mode = RobotMode(snapshot.robot_mode).name
-            self._refuse("play", f"the robot is in {mode}, it must be RUNNING")
-        if self.is_running and not self.is_paused:
-            self._refuse("play", "a program plays already")
-        if self._access.controller.state.operator.requests:
-            self._refuse("play", "a popup waits to be closed, or a question for its answer")
-        if self.loaded is None and not self.is_paused:
-            self._refuse("play", "no program is loaded")
+        why = obstacle_to_playing(self._access, has_program=self.loaded is not None)
+        if why:
+            self._refuse("play", why)
 
     def _prepare(self, client: str) -> Steps[Outcome]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""
