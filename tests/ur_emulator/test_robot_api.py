@@ -73,7 +73,8 @@ def ask(box, method, path, body=None, content_type="application/json"):
     try:
         with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
             content = answer.read()
-            return answer.status, json.loads(content) if "json" in answer.headers["Content-Type"] else content
+            is_json = "json" in answer.headers.get("Content-Type", "")  # an answer without content has none
+            return answer.status, json.loads(content) if is_json else content
     except urllib.error.HTTPError as error:
         with error:
             return error.code, json.loads(error.read())
