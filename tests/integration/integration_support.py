@@ -318,9 +318,11 @@ def port_base_of(box):
 def free_port_base():
     """An offset at which all ports of a box are free.
 
-    They lie above the ports that the kernel gives to clients, that for Modbus below them.
+    They lie above the ports that the kernel gives to clients, that for Modbus below them. Processes of a run have
+    different ones: between this answer and the box another one could take them.
     """
-    bases = list(range(31_000, 32_260, 20))
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    bases = list(range(31_000, 32_260, 20))[worker :: int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))]
     random.Random(os.getpid() + time.monotonic_ns()).shuffle(bases)
     for base in bases:
         ports = Ports.standard(base)
