@@ -145,6 +145,53 @@ def test_payload_history_and_contact_questions(control, receive):
     assert control.setPayload(0.0, [0, 0, 0])
 
 
+def test_kinematics_and_settings(control, receive):
+    pose = receive.getTargetTCPPose()
+    tool = [0, 0, 0.1, 0, 0, 0]
+    assert control.getForwardKinematics(list(HOME), tool) == pytest.approx(
+        control.poseTrans(pose, tool), abs=1e-6
+    )
+    assert control.getInverseKinematics(pose, list(HOME)) == pytest.approx(HOME, abs=1e-6)
+    assert control.getInverseKinematicsHasSolution(pose, list(HOME))
+    assert not control.getInverseKinematicsHasSolution([3.0, 0, 0, 0, 0, 0], list(HOME))
+    wait_until(lambda: np.allclose(control.getActualToolFlangePose(), pose, atol=1e-3), "the answer")
+    assert control.setTcp(tool)
+    assert control.getTCPOffset() == tool
+    assert control.setTcp([0.0] * 6)
+    assert control.setTargetPayload(1.0, [0, 0, 0.05], [0.01, 0.01, 0.01, 0, 0, 0])
+    wait_until(lambda: receive.getPayloadInertia()[:3] == [0.01] * 3, "the inertia")
+    assert control.setPayload(0.0, [0, 0, 0])
+
+
+def test_contact_detection_and_freedrive(control):
+    assert control.startContactDetection([0, 0, 1, 0, 0, 0])
+    assert not control.readContactDetection()
+    assert not control.stopContactDetection()
+    assert control.freedriveMode([1, 1, 0, 0, 0, 0], [0.0] * 6)
+    wait_until(lambda: control.getFreedriveStatus() == 0, "the answer")
+    assert control.endFreedriveMode()
+    assert control.isProgramRunning()
+
+
+@pytest.mark.slow
+def test_dynamics_of_newer_software(tmp_path):
+    options = ("--robot", "ur5e", "--software", "5.25.1", "--fidelity", "ideal")
+    with served_box(tmp_path, *options) as newer, connected(RTDEControl, newer.host) as control:
+
+        def answer(question, *arguments):
+            wait_until(lambda: any(question(*arguments)), "the answer")  # the first shows what was before
+            return np.array(question(*arguments))
+
+        mass = answer(control.getMassMatrix, list(HOME), True).reshape(6, 6)
+        assert mass == pytest.approx(mass.T)
+        assert np.linalg.eigvalsh(mass).min() > -1e-9  # wrist 3 has a point mass on its axis
+        jacobian = answer(control.getJacobian, list(HOME), [0.0] * 6).reshape(6, 6)
+        assert jacobian[:, 0][5] == pytest.approx(1.0) or jacobian[0][5] == pytest.approx(1.0)
+        # The client's script asks for those of the moment: the arm rests.
+        zeros = [0.0] * 6
+        wait_until(lambda: control.getCoriolisAndCentrifugalTorques(list(HOME), zeros) == zeros, "the answer")
+
+
 def test_outputs(box, receive):
     with connected(RTDEIO, box.host) as io:
         assert io.setStandardDigitalOut(3, True)
