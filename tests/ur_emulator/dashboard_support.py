@@ -3,6 +3,7 @@
 import gzip
 import socket
 import threading
+import time
 from contextlib import contextmanager
 
 from box_support import TIMEOUT, connect
@@ -48,8 +49,9 @@ class Dashboard:
         self.send(*lines)
         return [self.reply() for _ in lines]
 
-    def until(self, line, wanted, limit=20_000):
-        for _ in range(limit):
+    def until(self, line, wanted):
+        end = time.monotonic() + TIMEOUT
+        while time.monotonic() < end:
             if self.ask(line) == wanted:
                 return
         raise AssertionError(f"{line!r} never answered {wanted!r}, but {self.ask(line)!r}")
