@@ -263,7 +263,7 @@ def test_speed_slider_slows_a_move(bench):
 
 def test_a_name_that_is_only_declared_says_so_when_it_is_called(bench):
     bench.tick(
-        1, StartProgram(compile_program("tool_wrench_limit_disable()", catalogue=catalogue_for("5.22")))
+        1, StartProgram(compile_program("mc_get_target_rtcp_speed()", catalogue=catalogue_for("5.22")))
     )
     bench.tick(2)
     assert "declared only" in texts(bench.events)[0]
