@@ -194,13 +194,13 @@ def test_one_read_is_one_realtime_package(box, old_box, version, port, size):
 
 
 def test_a_stream_of_one_line_programs_is_one_motion(box):
-    """`speedj` once a cycle on the realtime port: no braking between them."""
+    """`speedj` once a cycle on the realtime port: no braking between them, and none while a busy machine waits."""
     with StrictRtde(box) as rtde, connect(box, "realtime") as script:
         rtde.want("timestamp", "target_qd", "target_q")
         rtde.start()
         speeds = []
         for _ in range(125):
-            script.sendall(b"speedj([0.2, 0, 0, 0, 0, -0.1], 4.0, 0.1)\n")
+            script.sendall(b"speedj([0.2, 0, 0, 0, 0, -0.1], 4.0, 5.0)\n")
             speeds.append(rtde.data()["target_qd"])
         reached = next(n for n, qd in enumerate(speeds) if abs(qd[0] - 0.2) < 1e-9)
         assert all(abs(qd[0] - 0.2) < 1e-9 and abs(qd[5] + 0.1) < 1e-9 for qd in speeds[reached:])
