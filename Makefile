@@ -33,7 +33,7 @@ demo: $(STAMP) ## the paper's experiment: published controller and ours side by 
 ablation: $(STAMP) ## what each piece of the controller brings, into out/ablation (half an hour)
 	$(BIN)/python examples/ablation.py
 
-draw: $(STAMP) ## drawings of people on the emulated arm: extracted, executed, compared, into out/draw
+draw: $(STAMP) ## drawings on the emulated arm: extracted, executed, compared, into out/draw
 	$(BIN)/python examples/draw.py
 
 test: $(STAMP) ## all tests, in one process more than there are cores, at most four
@@ -42,7 +42,7 @@ test: $(STAMP) ## all tests, in one process more than there are cores, at most f
 explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
 	HYPOTHESIS_PROFILE=explore $(PYTEST) -m hypothesis
 
-attack: $(STAMP) ## attack a served box in every way, into docs/security.md (a quarter of an hour)
+attack: $(STAMP) ## attack served boxes of all kinds in every way, into docs/security.md (a quarter of an hour)
 	$(BIN)/python tests/attack
 	$(BIN)/python -m docs.generate
 

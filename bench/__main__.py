@@ -14,7 +14,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from bench.boxes import measure_boxes
+from bench.boxes import measure_box_start, measure_boxes
 from bench.clients import measure_clients
 from bench.compiling import measure_compiling
 from bench.connect_storm import measure_connect_storm
@@ -44,6 +44,7 @@ MEASUREMENTS: dict[str, Measurement] = {
     "lockstep": lambda minutes: measure_lockstep(),
     "realtime": measure_realtime,
     "clients": lambda minutes: measure_clients(60.0 * min(minutes, 1.0)),
+    "box_start": lambda minutes: measure_box_start(),
     "boxes": lambda minutes: measure_boxes(60.0 * min(minutes, 1.0)),
     "e_series_tick": lambda minutes: _on_e_series(measure_tick(E_SERIES_ARM)),
     "e_series_lockstep": lambda minutes: _on_e_series(measure_lockstep(E_SERIES_ARM)),
@@ -75,6 +76,7 @@ ASKED: dict[str, dict[str, tuple[str, float]]] = {
         "realtime_readers_125hz": (">=", 50.0),
         "clients_late_p999_over_timer_us": ("<=", 1000.0),
     },
+    "box_start": {"box_start_ms": ("<=", 60.0)},
     "boxes": {"boxes_realtime": (">=", 20.0)},
     "e_series_lockstep": {"e_series_lockstep_x_realtime": (">=", 20.0)},
     "e_series_realtime": {

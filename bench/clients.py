@@ -6,7 +6,7 @@ import time
 
 from bench.box_process import box_process
 from bench.side_process import SideProcesses
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 
 N_RTDE, N_REALTIME = 50, 50
 _SETTLE = 1.0  # s; until the box has settled

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import mujoco
 
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.plant import Plant
 
 FRAME, COMMAND = 1140, 28  # bytes of a realtime frame, and of a velocity command with its mode

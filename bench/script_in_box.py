@@ -10,7 +10,7 @@ from functools import partial
 from bench.script import SYNC_THREADS
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import CompiledProgram, compile_program

@@ -19,7 +19,7 @@ from array import array
 import numpy as np
 
 from protocol.rtde.client_connection import RtdeClientConnection
-from protocol.rtde.messages import Request, RequestProtocolVersion, SetupOutputs, Start
+from protocol.rtde.codec import Request, RequestProtocolVersion, SetupOutputs, Start
 
 # What a monitor asks for: the time stamp first, then some 500 bytes.
 RECIPE = (

@@ -12,10 +12,6 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.commands.push import Push
-from ur_emulator.scripting.program_slot import ProgramSlot
-
 os.environ.setdefault("MUJOCO_GL", "egl")
 
 import matplotlib as mpl
@@ -23,13 +19,16 @@ import mujoco
 import numpy as np
 
 from protocol.ur_types import ControlMode, SafetyMode
+from ur_emulator.commands.programs import StartProgram
+from ur_emulator.commands.surroundings import Push
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.models.calibration import calibrated_dh
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import TYPICAL
 from ur_emulator.models.mjcf import LINKS, arm_spec, to_body
-from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.physics import TABLE_HEIGHT
+from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 
 mpl.use("agg")

@@ -9,7 +9,7 @@ import numpy as np
 
 from pc_client.extraction.extract import extract
 from pc_client.extraction.figures import draw_extraction
-from pc_client.extraction.recording import PenRecording, on_one_axis, ordered_part
+from pc_client.extraction.pen import PenRecording, on_one_axis, ordered_part
 from pc_client.movements.files import load_movement
 
 

@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.robotic import SmoothedSquareWave
-from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
 from pc_client.results.static import figure, svg_text
 from pc_client.results.theme import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from multiprocessing.connection import Connection
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -82,7 +80,7 @@ def main() -> int:
         words = (name.replace(", ", "_").replace(" ", "_"), Path(fidelity).stem, str(seed), pace)
         folder = options.out / "-".join(words)
         try:
-            result = run_case(name, fidelity, seed, pace, replace(planned, out=folder))
+            result = run_case(name, fidelity, seed, pace, replace(planned, out=folder, overwrite=True))
         except ClientError as error:
             print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {error}", flush=True)
             continue
@@ -249,37 +247,11 @@ def _mean(result: dict[str, Any], kind: str, figure_name: str) -> float:
 
 @contextmanager
 def box(fidelity: str, seed: int, pace: str) -> Iterator[Ports]:
-    """Run a box in a process of its own, so that its loop and ours do not share an interpreter."""
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs, fidelity, seed, pace))
-    process.start()
-    try:
-        if not ours.poll(60.0) or (port_base := ours.recv()) is None:
-            sys.exit("ablation: no box could be started; stop other boxes")
-        yield Ports.standard(offset=port_base)
-        ours.send("stop")
-    finally:
-        ours.close()
-        process.join(20.0)
-
-
-def _serve(connection: Connection, fidelity: str, seed: int, pace: str) -> None:
+    """Run a box on free ports, so that one on the standard ports is not disturbed."""
     from ur_emulator import ControlBox
-    from ur_emulator.errors import PortError
 
-    # Moved up, so that a box on the standard ports is not disturbed.
-    for port_base in range(8_000, 28_000, 1000):
-        control_box = ControlBox(host=HOST, port_base=port_base, fidelity=fidelity, seed=seed, pace=pace)
-        try:
-            control_box.listen()
-        except PortError:
-            continue
-        with control_box:
-            connection.send(port_base)
-            connection.poll(None)
-        return
-    connection.send(None)
+    with ControlBox(host=HOST, port_base=None, fidelity=fidelity, seed=seed, pace=pace) as control_box:
+        yield control_box.ports
 
 
 if __name__ == "__main__":

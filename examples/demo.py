@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 
 from pc_client.analysis.report import build_report, build_tables
-from pc_client.analysis.side_by_side_page import build_side_by_side
+from pc_client.analysis.side_by_side import build_side_by_side
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError
@@ -55,9 +55,9 @@ def main() -> int:
         ]
         with simulated_box(SimulatedArm("ur3", options.fidelity, options.seed)) as box:
             for config, folder in shown:
-                run(replace(planned, out=out / folder), config, box, console)
+                run(replace(planned, out=out / folder, overwrite=True), config, box, console)
             for config, folder in others:
-                run(replace(planned, out=out / folder, repeat=1), config, box, console)
+                run(replace(planned, out=out / folder, repeat=1, overwrite=True), config, box, console)
         reports = [build_report(out / folder, console) for _, folder in shown]
         reports += [build_tables(out / folder, console) for _, folder in others]
         table = build_side_by_side(reports, out / "report.html")

@@ -30,9 +30,14 @@ if TYPE_CHECKING:
     from pc_client.api.signals import Signals as Signals
     from pc_client.control.controller import Controller as Controller
     from pc_client.errors import ClientError as ClientError
+    from pc_client.errors import PlanningError as PlanningError
+    from pc_client.errors import RobotStoppedError as RobotStoppedError
     from pc_client.experiment.prepare import Plan as Plan
     from pc_client.kinematics.cell import Cell as Cell
-    from pc_client.movements.joint_trajectory import JointTrajectory as JointTrajectory
+    from pc_client.kinematics.cell import Solid as Solid
+    from pc_client.kinematics.cell import Tool as Tool
+    from pc_client.kinematics.cell import Wall as Wall
+    from pc_client.movements.movement import JointTrajectory as JointTrajectory
 
 check_packages()
 
@@ -41,11 +46,16 @@ _HOMES = {
     "Cell": "kinematics.cell",
     "ClientError": "errors",
     "Controller": "control.controller",
-    "JointTrajectory": "movements.joint_trajectory",
+    "JointTrajectory": "movements.movement",
     "Movement": "api.movement",
     "Plan": "experiment.prepare",
+    "PlanningError": "errors",
+    "RobotStoppedError": "errors",
     "Run": "api.signals",
     "Signals": "api.signals",
+    "Solid": "kinematics.cell",
+    "Tool": "kinematics.cell",
+    "Wall": "kinematics.cell",
     "connect": "api.arm",
     "drawing": "api.drawing",
     "plan": "api.arm",

@@ -1,5 +1,12 @@
 """`python -m pc_client` is the command `ur-client`."""
 
-from pc_client.cli import main
+from ur_hil import run_command
 
-main()
+
+def main() -> None:
+    """Entry point of the console script."""
+    run_command("pc_client.cli")
+
+
+if __name__ == "__main__":
+    main()

@@ -18,8 +18,16 @@ from protocol.primary.packages import decode_package
 from protocol.primary.state import RobotState
 from protocol.primary.values import TypedValue
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
-from protocol.rtde.codec import HEADER_SIZE, MAX_SIZE, decode_message, take_package
-from protocol.rtde.messages import DataPackage, RequestProtocolVersionReply, Role, SetupOutputsReply
+from protocol.rtde.codec import (
+    HEADER_SIZE,
+    MAX_SIZE,
+    DataPackage,
+    RequestProtocolVersionReply,
+    Role,
+    SetupOutputsReply,
+    decode_message,
+    take_package,
+)
 from protocol.rtde.recipe import Recipe
 from protocol.rtde.types import REFUSALS, RtdeType
 from protocol.ur_types import SoftwareVersion

@@ -90,15 +90,7 @@ def _rotate(quaternion: _Quaternion, x: float, y: float, z: float) -> Vector3:
 
 
 def rotvec_from_flat(
-    r00: float,
-    r01: float,
-    r02: float,
-    r10: float,
-    r11: float,
-    r12: float,
-    r20: float,
-    r21: float,
-    r22: float,
+    r00: float, r01: float, r02: float, r10: float, r11: float, r12: float, r20: float, r21: float, r22: float
 ) -> Vector3:
     """Rotation vector [rad] of a rotation matrix given row by row.
 
@@ -214,12 +206,7 @@ def interpolate_pose(p_from: Sequence[float], p_to: Sequence[float], alpha: floa
     w, x, y, z = start
     tx, ty, tz = _rotvec(*_multiply((w, -x, -y, -z), _quaternion(brx, bry, brz)))
     rotation = _multiply(start, _quaternion(alpha * tx, alpha * ty, alpha * tz))
-    return (
-        ax + alpha * (bx - ax),
-        ay + alpha * (by - ay),
-        az + alpha * (bz - az),
-        *_rotvec(*rotation),
-    )
+    return (ax + alpha * (bx - ax), ay + alpha * (by - ay), az + alpha * (bz - az), *_rotvec(*rotation))
 
 
 # --- roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll) ---

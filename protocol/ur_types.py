@@ -14,6 +14,7 @@ from protocol.errors import LocalProtocolError
 
 __all__ = [
     "JOINT_NAMES",
+    "LOCKSTEP_MASTERBOARD",
     "SIMULATED_MASTERBOARD",
     "SIMULATOR_CHECKSUM",
     "ControlMode",
@@ -258,6 +259,9 @@ class Ports:
 
 SIMULATED_MASTERBOARD = 2099
 """Masterboard version of an emulated box: software before 3.12 sends no serial number. A UR5e has 6."""
+
+LOCKSTEP_MASTERBOARD = 2100
+"""That of an emulated box whose time waits for its clients."""
 
 SIMULATOR_CHECKSUM = 0xFFFFFFFF
 """Calibration checksum of each joint in the maker's own simulator. Source: URCL, captures of URSim."""

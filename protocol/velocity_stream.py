@@ -20,12 +20,7 @@ from numpy.typing import NDArray
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 
-__all__ = [
-    "HELLO_SIZE",
-    "VelocityMode",
-    "check_hello",
-    "encode_velocity",
-]
+__all__ = ["HELLO_SIZE", "VelocityMode", "check_hello", "encode_velocity"]
 
 _HELLO = (1).to_bytes(4, "big")
 

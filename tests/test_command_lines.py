@@ -14,6 +14,7 @@ from page_blocks import ROOT, parsed
 
 import pc_client.cli
 import ur_emulator.cli
+import ur_hil
 import urscript.cli
 from ur_emulator.control import command_line
 from ur_emulator.control.operations import OPERATIONS
@@ -186,3 +187,14 @@ def test_a_host_that_does_not_exist_is_named(words, said):
     assert said in told
     assert "nowhere.invalid" in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_ctrl_c_while_a_command_is_loaded_is_one_line(name, tmp_path, monkeypatch, capfd):
+    """Ctrl-C may come while modules are imported."""
+    (tmp_path / "slow_module.py").write_text("raise KeyboardInterrupt\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "argv", [f"/somewhere/{name}"])
+    with pytest.raises(SystemExit) as end:
+        ur_hil.run_command("slow_module")
+    assert (end.value.code, capfd.readouterr().err) == (ExitCode.INTERRUPTED, f"{name}: interrupted\n")

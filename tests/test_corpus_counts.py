@@ -10,8 +10,8 @@ from urscript.catalogue import CB3_3_15
 from urscript.errors import ScriptSyntaxError
 from urscript.source import Source
 from urscript.syntax import nodes
+from urscript.syntax.nodes import all_expressions, all_statements, own_expressions
 from urscript.syntax.parser import parse
-from urscript.syntax.walk import all_expressions, all_statements, own_expressions
 
 TESTS = Path(__file__).parent
 FOLDERS = ("urscript", "ur_emulator")

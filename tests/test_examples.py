@@ -1,7 +1,7 @@
 """Every example runs, and says what its docstring promises."""
 
-import importlib
 import json
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -36,13 +36,29 @@ def test_example(name, arguments, said):
     assert said in run(name, *arguments)
 
 
+def test_the_sample_program_of_polyscope_is_played(ur_box_factory):
+    box = ur_box_factory(programs=EXAMPLES / "programs")
+    with socket.create_connection((box.host, box.ports.dashboard)) as dashboard:
+        answers = dashboard.makefile()
+        answers.readline()
+        for command, answer in (("load pick.urp", "Loading program: "), ("play", "Starting program")):
+            dashboard.sendall(f"{command}\n".encode())
+            assert answers.readline().startswith(answer)
+        box.wait_until(log="parts: 3")
+        state = box.wait_until(program_state="STOPPED", steady=True)
+    # Home, as the installation has it; the gripper is off.
+    assert state.q == pytest.approx([0.0, -1.5, 1.2, -1.27, -1.57, 0.0], abs=1e-3)
+    assert not any(state.digital_outputs["standard"])
+
+
 @pytest.mark.slow
-def test_draw(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(EXAMPLES)
-    letter = importlib.import_module("draw").made_up_letter(tmp_path)
-    said = run("draw.py", letter, "--out", tmp_path, "--repeat", 1)
-    assert "executed, aligned" in said
+def test_draw(tmp_path):
+    """Without a path it draws what is in the tree."""
+    said = run("draw.py", "--out", tmp_path, "--repeat", 1)
+    assert said.count("executed, aligned") == 3
     assert (tmp_path / "report.html").exists()
+    drawn = json.loads((tmp_path / "draw.json").read_text())["drawings"]
+    assert [one["name"] for one in drawn] == ["letter_i", "elle", "signature"]
 
 
 @pytest.mark.slow

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
-    from ur_emulator.emulator import ControlBox
-    from ur_emulator.rack import BoxRack
+    from ur_emulator.emulator import BoxRack, ControlBox
 
 check_packages()
 
@@ -35,15 +34,11 @@ def check_platform(platform: str = sys.platform) -> None:
 def __getattr__(name: str) -> Any:
     """Import the box when it is first asked for: tools that only read tables stay light."""
     check_platform()
-    if name == "ControlBox":
-        from ur_emulator.emulator import ControlBox
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from ur_emulator import emulator
 
-        return ControlBox
-    if name == "BoxRack":
-        from ur_emulator.rack import BoxRack
-
-        return BoxRack
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(emulator, name)
 
 
 def __dir__() -> list[str]:

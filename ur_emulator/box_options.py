@@ -1,72 +1,135 @@
-"""The arguments of a box, and what is allowed."""
+"""The arguments of a box, what is allowed, and where a box is served."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from dataclasses import dataclass, replace
 from ipaddress import ip_address
 from os import PathLike
 from pathlib import Path
-from typing import TypedDict
+from typing import TYPE_CHECKING
 
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
-from ur_emulator.control.token import check_token
 from ur_emulator.errors import EmulatorError
 from ur_emulator.realtime.pacing import Pace
 
+if TYPE_CHECKING:
+    from ur_emulator.models.robot_generation import RobotGeneration
+
+# Environment variable with the token: what stands on a command line is seen by all users of a machine.
+TOKEN_VARIABLE = "UR_EMULATOR_TOKEN"
+MAX_TOKEN = 200
+# Printed ASCII without the blank: it goes through HTTP as it is.
+_TOKEN_CHARACTERS = frozenset(map(chr, range(0x21, 0x7F)))
 MAX_PORT = 65535
+# A typing error must not fill the memory: each box takes some 15 MB.
+MAX_BOXES = 200
 
 
-class BoxOptions(TypedDict, total=False):
-    """Arguments of one `ControlBox`."""
+@dataclass(frozen=True, slots=True)
+class BoxOptions:
+    """Arguments of a box.
 
-    robot: str
-    version: str | None
+    Attributes:
+        robot: type of the arm, such as "ur3" or "ur5e".
+        version: software that the box pretends to run; decides layouts and builtins. None: the usual one.
+        host: address to listen on; other machines can reach the box only through an address of theirs.
+        pace: "realtime" or "lockstep".
+        speed: how many times as fast as real time (realtime pace only).
+        seed: of calibration, phases and noise; the same seed is the same arm.
+        fidelity: "exact" (no physics: measured equals asked), "ideal", "typical", "poor", or a file that ends
+            in .toml (docs/fidelity.md).
+        port_base: offset added to all standard ports; None takes free ports.
+        programs: folder of programs and installations, for the dashboard's `load`; None for none.
+        control_port: number of the port for the control API over HTTP (docs/control.md); 0: a free one,
+            None: none.
+        control_token: what requests on that port must show; None: nothing, on a loopback address only.
+        skip_unknown_nodes: run programs of PolyScope without the nodes that are not known, those of URCaps
+            above all; the log names each.
+        remote_control: clients may command the box; False: it starts in local control (e-Series).
+        services: of a PolyScope X box, whose ports stay closed until they are enabled: "primary" and "rtde".
+        generation: in place of that of the arm.
+    """
+
+    robot: str = "ur3"
+    version: str | None = None
+    host: str = "127.0.0.1"
+    pace: str | Pace = Pace.REALTIME
+    speed: float = 1.0
+    seed: int = 0
+    fidelity: str = "typical"
+    port_base: int | None = 0
+    programs: str | PathLike[str] | None = None
+    control_port: int | None = None
+    control_token: str | None = None
+    skip_unknown_nodes: bool = False
+    remote_control: bool = True
+    services: Collection[str] = ()
+    generation: RobotGeneration | None = None
+
+    def check(self) -> None:
+        """Check the arguments that need no table.
+
+        Raises:
+            EmulatorError: one is not allowed.
+        """
+        if not 0.0 < self.speed < math.inf:
+            raise EmulatorError(f"speed {self.speed:g} given: it must be above 0 and finite, 1 is real time")
+        if self.seed < 0:
+            raise EmulatorError(f"seed {self.seed} given: it must be 0 or above")
+        if not self.host:
+            raise EmulatorError("no host given: name an address, 127.0.0.1 keeps other machines out")
+        if self.programs is not None and not Path(self.programs).is_dir():
+            raise EmulatorError(
+                f"programs folder {self.programs} given: there is no such folder, make it first"
+            )
+        if not 0 <= (self.control_port or 0) <= MAX_PORT:
+            raise EmulatorError(
+                f"control port {self.control_port} given: 1 to {MAX_PORT} are ports, 0 takes a free one"
+            )
+        check_token(self.control_token)
+        if self.control_port is not None and self.control_token is None and not is_loopback(self.host):
+            raise EmulatorError(
+                f"control port on {self.host}, which other machines can reach: give it a token "
+                "(--token, control_token), or listen on a loopback address"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class ServedAt:
+    """Where clients find a box, and as what.
+
+    Attributes:
+        title: arm, generation and software.
+        serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
+        host: address that it listens on.
+        ports: numbers of its ports; 0 for one that it does not have.
+        port_base: what was added to the standard ones.
+        control_port: number of the port for the control API over HTTP, 0 if it is not open.
+        notices: warnings for the user, one line each; the box runs all the same.
+    """
+
+    title: str
+    serial_number: str
     host: str
-    pace: str | Pace
-    speed: float
-    seed: int
-    fidelity: str
-    port_base: int | None
-    programs: str | PathLike[str] | None
-    control_port: int | None
-    control_token: str | None
-    skip_unknown_nodes: bool
-    remote_control: bool
-    services: Collection[str]
+    ports: Ports
+    port_base: int = 0
+    control_port: int = 0
+    notices: tuple[str, ...] = ()
 
 
-def check_options(
-    host: str,
-    speed: float,
-    seed: int,
-    programs: str | PathLike[str] | None,
-    control_port: int | None,
-    control_token: str | None,
-) -> None:
-    """Check the arguments that need no table.
+def check_token(token: str | None) -> None:
+    """Check a token, which lets who shows it control the box; None is no token.
 
     Raises:
-        EmulatorError: one is not allowed.
+        EmulatorError: it cannot stand in a header of HTTP.
     """
-    if not 0.0 < speed < math.inf:
-        raise EmulatorError(f"speed {speed:g} given: it must be above 0 and finite, 1 is real time")
-    if seed < 0:
-        raise EmulatorError(f"seed {seed} given: it must be 0 or above")
-    if not host:
-        raise EmulatorError("no host given: name an address, 127.0.0.1 keeps other machines out")
-    if programs is not None and not Path(programs).is_dir():
-        raise EmulatorError(f"programs folder {programs} given: there is no such folder, make it first")
-    if not 0 <= (control_port or 0) <= MAX_PORT:
+    if token is not None and not (0 < len(token) <= MAX_TOKEN and set(token) <= _TOKEN_CHARACTERS):
         raise EmulatorError(
-            f"control port {control_port} given: 1 to {MAX_PORT} are ports, 0 takes a free one"
-        )
-    check_token(control_token)
-    if control_port is not None and control_token is None and not is_loopback(host):
-        raise EmulatorError(
-            f"control port on {host}, which other machines can reach: give it a token "
-            "(--token, control_token), or listen on a loopback address"
+            f"a token of {len(token)} characters given: it has 1 to {MAX_TOKEN} printed characters of ASCII, "
+            "no blanks"
         )
 
 
@@ -101,4 +164,41 @@ def parse_pace(pace: str | Pace) -> Pace:
     except ValueError:
         raise EmulatorError(
             f"unknown pace {pace!r}: choose one of {', '.join(p.value for p in Pace)}"
+        ) from None
+
+
+def check_count(count: int) -> None:
+    """Check a number of boxes that share a loop.
+
+    Raises:
+        EmulatorError: there are none, or too many.
+    """
+    if not 1 <= count <= MAX_BOXES:
+        raise EmulatorError(f"{count} boxes asked for: 1 to {MAX_BOXES} are possible")
+
+
+def counted_up(count: int, first: BoxOptions) -> list[BoxOptions]:
+    """Return the options of `count` boxes: hosts and seeds are counted up from those of the first.
+
+    With free ports (`port_base` None) one host is enough for all.
+
+    Raises:
+        EmulatorError: the host is not an address from which `count` can be counted.
+    """
+    check_count(count)
+    one_host = count == 1 or first.port_base is None
+    hosts = [first.host] * count if one_host else _hosts_from(first.host, count)
+    return [replace(first, host=host, seed=first.seed + k) for k, host in enumerate(hosts)]
+
+
+def _hosts_from(host: str, count: int) -> list[str]:
+    try:
+        first = ip_address(host)
+        if first.is_unspecified:
+            raise ValueError
+        return [str(first + k) for k in range(count)]
+    except ValueError:
+        raise EmulatorError(
+            f"host {host!r} given for {count} boxes: name the address of the first one, such as 127.0.0.2; "
+            "the others get the next ones"
         ) from None

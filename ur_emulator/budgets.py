@@ -75,6 +75,12 @@ class Budgets:
     client_work: int = _budget(64, "units of work", "a turn of a client", "the rest waits for its next turn")
     commands: int = _cycle_budget(256, "commands", "a box", "RTDE clients wait for the next cycle")
 
+    # The public ur_rtde has 20 with 230 variables. 256 clients hold 20 MB with all they may have.
+    rtde_recipes: int = _budget(64, "input recipes", "an RTDE client", "its names are answered NOT_FOUND")
+    rtde_variables: int = _budget(
+        1_000, "variables of input recipes", "an RTDE client", "the names are answered NOT_FOUND"
+    )
+
     # --- control API ---
 
     scheduled_commands: int = _budget(1000, "operations", "wait for their time in a box", "it is refused")
@@ -84,6 +90,9 @@ class Budgets:
     body_bytes: int = _budget(64 * KIB, "bytes", "a body", "it is refused with status 413")
     # Programs of PolyScope X: 100 kB with a single node, 200 kB in the field.
     upload_bytes: int = _budget(MIB, "bytes", "a program for the Robot API", "it is refused with status 413")
+    uploads_bytes: int = _budget(
+        64 * MIB, "bytes", "all programs in the folder, 4 KiB each at least", "an upload is refused"
+    )
     log_entries: int = _budget(100, "entries", "an answer of `log`", "they come with the next call")
 
     # --- scripts sent: text of unfinished programs and of those that wait for the compiler ---
@@ -130,8 +139,12 @@ class Budgets:
 
     # --- variables and labels of running programs, as port 30001 reports them ---
 
-    # A client that connects gets all names and values; so many take 1 ms.
+    # A client that connects gets all names and values, encoded once a cycle: so many take 0.4 ms.
     variables_reported: int = _budget(2_000, "variables", "a program", "the others are not reported")
+    # As many of 31 characters.
+    variable_name_bytes: int = _budget(
+        64 * KIB, "bytes", "all names of a program", "the others are not reported"
+    )
     variable_bytes: int = _budget(256 * KIB, "bytes", "all values of a program", "the others go as none")
     # Updates come at 10 Hz. An element takes 2 µs.
     variables_per_update: int = _budget(500, "variables", "an update", "the others follow in the next one")
@@ -155,19 +168,18 @@ class Budgets:
 
     # All that a box dials: sockets and remote procedures of scripts, Modbus units, External Control.
     outgoing_connections: int = _budget(512, "connections", "a box", "`socket_open` returns False")
+    # Source: RFC 1035.
+    host_length: int = _budget(253, "characters", "the name of a host", "it is refused")
     # Threads that wait for a name server are given up by the system after half a minute.
     look_up_threads: int = _budget(8, "threads", "all boxes of a process", "names wait for their turn")
     look_ups_at_once: int = _budget(2, "names", "a box", "names wait for their turn")
     look_ups_waiting: int = _budget(64, "names", "a box", "`socket_open` returns False")
-    # So many bytes take 4 ms to search, if they are made for it.
+    # A line of the longest string has room. So many bytes take 2 ms to search, if they are made for it.
     inbox_bytes: int = _budget(
-        256 * KIB,
+        128 * KIB,
         "bytes",
         "a socket of a script",
         "nothing more is read; a read that finds no end drops them",
-    )
-    all_inboxes_bytes: int = _budget(
-        4 * MIB, "bytes", "all sockets of the scripts of a box", "no socket gets more than 4 KiB"
     )
     unsent_bytes: int = _budget(256 * KIB, "bytes", "a socket of a script", "a send returns False")
     all_unsent_bytes: int = _budget(
@@ -219,10 +231,9 @@ class Budgets:
     installation_entries: int = _budget(
         2_000, "TCPs, features, named lines, signals; variables", "an installation", "it is not loaded"
     )
-    # A program of 10,000 references among 500 nodes has half of it.
-    reference_steps: int = _budget(
-        10_000_000, "elements led past", "the references of a program", "it is not loaded"
-    )
+    # The longest path that Linux takes; each part of one is looked up.
+    path_length: int = _budget(4_096, "characters", "a path in the programs folder", "there is no such file")
+    path_parts: int = _budget(64, "parts", "a path in the programs folder", "there is no such file")
     report_files: int = _budget(
         50,
         "flight reports and support files",
@@ -233,7 +244,17 @@ class Budgets:
         32 * MIB, "bytes", "all reports in the programs folder", "no more are written until some are removed"
     )
     folder_files: int = _budget(
-        100_000, "files and folders", "a programs folder", "no reports are written into it"
+        100_000, "files and folders", "a programs folder", "no reports and uploads are written into it"
+    )
+
+    # --- memory ---
+
+    # Measured. A box that rests holds 90 MB, its worker processes share another 40.
+    memory: int = _budget(
+        160 * MIB,
+        "bytes",
+        "a process of boxes beyond what it holds at rest, with its worker processes",
+        "the programs or the task that made it grow most end with an error",
     )
 
     # --- programs and files: compiling, loading and reports in the worker process ---

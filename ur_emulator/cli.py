@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,12 +19,12 @@ from typer.core import TyperCommand
 from protocol.errors import ProtocolError
 from ur_emulator import check_platform
 from ur_emulator.box_log import printable
-from ur_emulator.control.token import TOKEN_VARIABLE
+from ur_emulator.box_options import TOKEN_VARIABLE
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
 if TYPE_CHECKING:
-    from ur_emulator.box import Box
     from ur_emulator.box_log import LogEntry
+    from ur_emulator.box_options import ServedAt
     from ur_emulator.realtime.line_writer import LineWriter
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -125,19 +126,18 @@ def serve(
         _complain(str(error))
         raise typer.Exit(ExitCode.FAILED) from None
     from ur_emulator.descriptor_limit import raise_descriptor_limit
-    from ur_emulator.realtime.worker_process import prestart_process
+    from ur_emulator.realtime.processes import Role, prepare_children
 
     raise_descriptor_limit()
-    prestart_process()  # it loads the compiler while the box is loaded
+    prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
-    from ur_emulator.emulator import ControlBox
+    from ur_emulator.box_options import BoxOptions, counted_up
     from ur_emulator.errors import EmulatorError
-    from ur_emulator.realtime.interpreter import freeze_existing_objects
+    from ur_emulator.rack import LoopRack
     from ur_emulator.realtime.line_writer import LineWriter
 
     try:
-        rack = ControlBox.many(
-            boxes,
+        first = BoxOptions(
             robot=robot,
             version=software,
             host=host,
@@ -153,6 +153,7 @@ def serve(
             remote_control=remote_control,
             services=services.replace(",", " ").split(),
         )
+        rack = LoopRack(counted_up(boxes, first))
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(ExitCode.WRONG_USAGE) from None
@@ -160,28 +161,31 @@ def serve(
         for name in _END_SIGNALS:
             signal.signal(name, lambda number, frame: rack.stop())
         rack.listen()
+        served = [box.served_at for box in rack.boxes]
         if ready_file is not None:
-            _write_ready_file(ready_file, rack)
+            _write_ready_file(ready_file, served)
     except (EmulatorError, ProtocolError, OSError) as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(ExitCode.FAILED) from None
     out, err = LineWriter(sys.stdout, "this output"), LineWriter(sys.stderr, "the log")
-    for notice in _notices(rack):
+    for notice in _notices(served):
         err.write(f"ur-emulator: {notice}")
-    for k, box in enumerate(rack):
+    for k, at in enumerate(served):
         out.write(
-            f"{box.title} ready at {box.host}, {pace}, {fidelity}, "
-            f"seed {seed + k}, serial {box.serial_number}: {_ports_line(box)}"
+            f"{at.title} ready at {at.host}, {pace}, {fidelity}, "
+            f"seed {seed + k}, serial {at.serial_number}: {_ports_line(at)}"
         )
         if log:
-            box.follow_log(partial(_show_entry, err, f"{box.host} " if boxes > 1 else ""))
-    freeze_existing_objects()
+            rack.follow_log(k, partial(_show_entry, err, f"{at.host} " if boxes > 1 else ""))
     try:
         rack.serve_forever()
     except EmulatorError as error:
         err.write(f"ur-emulator: {error}")
         raise typer.Exit(ExitCode.FAILED) from None
     finally:
+        if ready_file is not None:
+            with suppress(OSError):
+                ready_file.unlink(missing_ok=True)
         for name in _END_SIGNALS:
             signal.signal(name, signal.SIG_DFL)
         out.close()
@@ -219,24 +223,24 @@ def ctl(
     raise typer.Exit(control(words or ()))
 
 
-def _ports_line(box: Box) -> str:
+def _ports_line(at: ServedAt) -> str:
     """Name the ports that a user may want to connect to."""
-    numbers = {name: getattr(box.ports, name) for name in _SHOWN_PORTS} | {"control": box.control_port}
+    numbers = {name: getattr(at.ports, name) for name in _SHOWN_PORTS} | {"control": at.control_port}
     return ", ".join(f"{name.replace('_', ' ')} {number}" for name, number in numbers.items() if number)
 
 
-def _notices(rack: Sequence[Box]) -> Iterator[str]:
+def _notices(served: Sequence[ServedAt]) -> Iterator[str]:
     """Yield what the user should know before the boxes run."""
     from ur_emulator.box_options import is_loopback
 
-    notices = [notice for box in rack for notice in box.notices]
+    notices = [notice for at in served for notice in at.notices]
     if notices:
-        others = f" ({len(notices) - 1} more boxes say the like)" if len(notices) > 1 else ""
+        others = f" (the same for {len(notices) - 1} more boxes)" if len(notices) > 1 else ""
         yield f"{notices[0]}{others}"
-    box = rack[0]
-    if not is_loopback(box.host):
+    first = served[0]
+    if not is_loopback(first.host):
         yield (
-            f"other machines can reach {box.host}: whoever reaches port {box.ports.secondary} "
+            f"other machines can reach {first.host}: whoever reaches port {first.ports.secondary} "
             "(30002) runs programs here, which may connect to anything; let a firewall decide who"
         )
 
@@ -245,19 +249,19 @@ def _show_entry(err: LineWriter, prefix: str, entry: LogEntry) -> None:
     err.write(f"{prefix}{entry}")
 
 
-def _write_ready_file(path: Path, rack: Sequence[Box]) -> None:
+def _write_ready_file(path: Path, served: Sequence[ServedAt]) -> None:
     """Write the file in one step: a reader never sees half of it.
 
     Its top level describes the first box, `boxes` all of them.
     """
     boxes = [
         {
-            "host": box.host,
-            "ports": dataclasses.asdict(box.ports),
-            "serial_number": box.serial_number,
-            "control_port": box.control_port,
+            "host": at.host,
+            "ports": dataclasses.asdict(at.ports),
+            "serial_number": at.serial_number,
+            "control_port": at.control_port,
         }
-        for box in rack
+        for at in served
     ]
     facts = {**boxes[0], "boxes": boxes}
     partial = path.with_name(path.name + ".part")

@@ -87,6 +87,11 @@ class WorkerError(RefusedError):
 class NotRunningError(ControlError):
     """The box does not run, or it ended before the operation was done."""
 
+    ENDED = "the box has ended: operations need one that runs"
+
+    def __init__(self, message: str = ENDED) -> None:
+        super().__init__(message)
+
 
 class PortError(EmulatorError):
     """A TCP port of the box cannot be opened."""

@@ -6,8 +6,11 @@
     @pytest.mark.ur(robot="ur5", version="3.4.0", standard_ports=True)
     def test_the_old_software(ur_box): ...
 
-Boxes end with their test; a test that fails shows their logs. Nothing heavy is imported before a fixture is
-used, so that a test-suite without boxes pays nothing.
+    @pytest.mark.parametrize("ur_box", ["ur3", "ur5 3.4.0", "ur5e 5.25.1"], indirect=True)
+    def test_on_three_robots(ur_box): ...
+
+Boxes end with their test; a test that fails shows their states and logs. Nothing heavy is imported before a
+fixture is used, so that a test-suite without boxes pays nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import pytest
 
 if TYPE_CHECKING:
     from ur_emulator import ControlBox
+    from ur_emulator.models.robot_model import RobotModel
 
 # What `@pytest.mark.ur(...)` and `ur_box_factory(...)` take.
 OPTIONS = (
@@ -39,8 +43,10 @@ OPTIONS = (
     "services",
     "control_port",
     "control_token",
+    "in_process",
     "standard_ports",
 )
+DEFAULT_ROBOT = "ur3"
 DEFAULTS: dict[str, Any] = {"pace": "lockstep", "port_base": None}
 # Entries of a log that a failing test shows.
 MAX_SHOWN = 200
@@ -55,16 +61,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the defaults of all boxes to the command line."""
     group = parser.getgroup("ur-emulator", "emulated control boxes (fixtures ur_box, ur_box_factory)")
     group.addoption(
-        "--ur-robot", default="ur3", metavar="NAME", help="type of the arm, unless a test names one"
+        "--ur-robot", default=DEFAULT_ROBOT, metavar="NAME", help="type of the arm, unless a test names one"
     )
     group.addoption("--ur-version", default=None, metavar="X.Y.Z", help="software, unless a test names one")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make the marker known."""
+    """Make the marker known, and look at the defaults once for all tests."""
     config.addinivalue_line(
         "markers", f"ur({', '.join(f'{name}=...' for name in OPTIONS)}): how ur_box shall be"
     )
+    robot, version = config.getoption("--ur-robot"), config.getoption("--ur-version")
+    if version is None and robot == DEFAULT_ROBOT:
+        return
+    from ur_emulator.errors import ModelError
+
+    try:
+        _robot(robot, version)
+    except ModelError as error:
+        raise pytest.UsageError(f"--ur-robot, --ur-version: {error}") from None
 
 
 @pytest.fixture
@@ -78,7 +93,8 @@ def ur_box_factory(request: pytest.FixtureRequest) -> Iterator[BoxFactory]:
     with ExitStack() as stack:
 
         def make(**options: Any) -> ControlBox:
-            box = _start({**_defaults(request.config), **_checked(options, request.path.parent)}, stack)
+            defaults = _defaults(request.config, options.get("robot"))
+            box = _start({**defaults, **_checked(options, request.path.parent)}, stack)
             boxes.append(box)
             return box
 
@@ -87,34 +103,79 @@ def ur_box_factory(request: pytest.FixtureRequest) -> Iterator[BoxFactory]:
 
 @pytest.fixture
 def ur_box(request: pytest.FixtureRequest, ur_box_factory: BoxFactory) -> ControlBox:
-    """A fresh box for one test, as `@pytest.mark.ur(...)` wants it; it runs until the test ends."""
+    """A fresh box for one test, as `@pytest.mark.ur(...)` wants it; it runs until the test ends.
+
+    Its parameter, if there is one, names the arm and perhaps the software ("ur5e 5.25.1"), or is a mapping of
+    options.
+    """
+    named = getattr(request, "param", {})
+    if isinstance(named, str):
+        named = dict(zip(("robot", "version"), named.split(), strict=False))
     options: dict[str, Any] = {}
     for mark in reversed(list(request.node.iter_markers("ur"))):  # the nearest mark last: it wins
         if mark.args:
             pytest.fail(f"@pytest.mark.ur takes keywords only, {mark.args!r} given", pytrace=False)
         options |= mark.kwargs
-    return ur_box_factory(**options)
+    return ur_box_factory(**options | named)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Show the logs of a failing test's boxes."""
+    """Show the states and logs of a failing test's boxes."""
     report = yield
     if report.failed:
         for box in item.stash.get(_BOXES, []):
             entries = box.log
             left_out = [f"... {len(entries) - MAX_SHOWN} entries before"] if len(entries) > MAX_SHOWN else []
             text = "\n".join([*left_out, *map(str, entries[-MAX_SHOWN:])])
-            report.sections.append((f"log of the box at {box.host}:{box.ports.primary}", text or "(empty)"))
+            where = f"{box.title} at {box.host}:{box.ports.primary}"
+            report.sections.append((f"state of the {where}", _shown_state(box)))
+            report.sections.append((f"log of the {where}", text or "(empty)"))
     return report
 
 
-def _defaults(config: pytest.Config) -> dict[str, Any]:
-    defaults = {**DEFAULTS, "robot": config.getoption("--ur-robot")}
+def _shown_state(box: ControlBox) -> str:
+    """Return modes, program and joints, for people."""
+    from ur_emulator.errors import ControlError
+
+    try:
+        now = box.state
+    except ControlError as error:
+        return str(error)
+    q = ", ".join(f"{angle:.4f}" for angle in now.q)
+    return (
+        f"robot mode {now.robot_mode}, safety mode {now.safety_mode}\n"
+        f"program {now.program or '(none)'}: {now.program_state}\n"
+        f"joints [{q}] rad, {'at rest' if now.steady else 'moving'}, after {now.time:.3f} s"
+    )
+
+
+def _defaults(config: pytest.Config, robot: str | None) -> dict[str, Any]:
+    """Return the options of a box that nobody has named; the default software is for arms that run it."""
+    from ur_emulator.errors import ModelError
+
     version = config.getoption("--ur-version")
-    return defaults if version is None else {**defaults, "version": version}
+    defaults = {**DEFAULTS, "robot": config.getoption("--ur-robot")}
+    if version is not None:
+        with suppress(ModelError):
+            _robot(robot or defaults["robot"], version)
+            return {**defaults, "version": version}
+    return defaults
+
+
+def _robot(name: str, version: str | None) -> RobotModel:
+    """Return an arm that runs a version of the software.
+
+    Raises:
+        ModelError: there is none.
+    """
+    from ur_emulator.models.robots import robot_by_name
+
+    robot = robot_by_name(name, version)
+    robot.software_version(version)
+    return robot
 
 
 def _checked(options: dict[str, Any], folder: Path) -> dict[str, Any]:

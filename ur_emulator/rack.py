@@ -1,72 +1,62 @@
-"""Several control boxes in one process, on one loop in one thread.
+"""Control boxes on one loop in one thread of this process.
 
-    with ControlBox.many(20, host="127.0.0.2") as boxes:
-        for box in boxes:
-            print(box.host, box.serial_number)      # 127.0.0.2, 127.0.0.3, ... with the standard ports
-
-    with BoxRack([{"host": "127.0.0.2"}, {"host": "127.0.0.3", "fidelity": "poor"}]) as boxes:
-        ...
-
-The boxes are independent; an error in a cycle ends its box, the others go on. In real time their
-cycles are spread over the period.
+The boxes are independent; an error in a cycle ends its box, the others go on. In real time their cycles are
+spread over the period.
 """
 
 from __future__ import annotations
 
-import ipaddress
-from collections.abc import Iterable, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import overload
+from typing import Any
 
 from ur_emulator.box import Box
-from ur_emulator.box_options import BoxOptions
-from ur_emulator.errors import EmulatorError
+from ur_emulator.box_log import LogEntry
+from ur_emulator.box_options import BoxOptions, ServedAt
+from ur_emulator.controller.command import Command, Done
+from ur_emulator.errors import ControlError, EmulatorError
 from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
-from ur_emulator.realtime.loop_runner import LoopRunner
+from ur_emulator.realtime.memory import MemoryWatch, own_process
 from ur_emulator.realtime.pacing import Pace
 
-# A typing error must not fill the memory: each box takes some 15 MB.
-MAX_BOXES = 200
 _LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
+_JOIN_TIMEOUT = 10.0  # s
 
 
-class BoxRack(Sequence[Box], LoopRunner):
-    """Boxes that share a loop; a sequence of them."""
+class LoopRack:
+    """Boxes that share a loop: it runs once, in the calling thread or in one of its own; then all are closed.
 
-    def __init__(self, options: Iterable[BoxOptions]) -> None:
-        """Assemble the boxes; nothing listens before the rack is started.
+    Attributes:
+        boxes: in the order of their options.
+        loop: runs them.
+    """
+
+    def __init__(self, options: Sequence[BoxOptions]) -> None:
+        """Assemble the boxes; nothing listens yet.
 
         Args:
             options: arguments of each box. Two boxes need two addresses, or a `port_base` each.
 
         Raises:
-            EmulatorError: an argument is not among the allowed ones, or there are no boxes, or too many.
+            EmulatorError: an argument is not among the allowed ones.
         """
-        every = list(options)
-        if not 1 <= len(every) <= MAX_BOXES:
-            raise EmulatorError(f"{len(every)} boxes asked for: a rack holds 1 to {MAX_BOXES}")
-        self._loop = EventLoop(precise=any(o.get("pace") not in _LOCKSTEP for o in every))
+        self.loop = EventLoop(precise=any(one.pace not in _LOCKSTEP for one in options))
         # Several boxes would compute at each other's deadlines.
-        lead = WAKE_UP if len(every) == 1 else 0.0
+        lead = WAKE_UP if len(options) == 1 else 0.0
+        self._thread: threading.Thread | None = None
+        self._loop_failure: BaseException | None = None
         try:
-            self._boxes = tuple(
-                Box(**o, loop=self._loop, phase=k / len(every), lead=lead) for k, o in enumerate(every)
+            self.boxes = tuple(
+                Box(one, loop=self.loop, phase=k / len(options), lead=lead) for k, one in enumerate(options)
             )
         except BaseException:
-            self._loop.close()
+            self.loop.close()
             raise
-        for box in self._boxes:
+        for box in self.boxes:
             box.on_end = partial(self._end, box)
 
-    @overload
-    def __getitem__(self, index: int) -> Box: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Box]: ...
-    def __getitem__(self, index: int | slice) -> Box | Sequence[Box]:
-        return self._boxes[index]
-
-    def __len__(self) -> int:
-        return len(self._boxes)
+    # --- life
 
     def listen(self) -> None:
         """Open all ports of all boxes.
@@ -75,52 +65,103 @@ class BoxRack(Sequence[Box], LoopRunner):
             PortError: one of them is taken; none stays open then and the rack cannot be used any more.
         """
         try:
-            for box in self._boxes:
+            for box in self.boxes:
                 box.listen()
         except EmulatorError:
             self.close()
             raise
 
-    def close(self) -> None:
-        """Close all boxes and the loop."""
-        for box in self._boxes:
-            box.close()
-        self._loop.close()
+    def serve_forever(self) -> None:
+        """Run in the calling thread, of a process that only serves, until `stop`; the ports must be open.
 
-    def _failure(self) -> Exception | None:
-        return next((box.failure for box in self._boxes if box.failure is not None), None)
+        An error that has ended the loop or a box is raised at the end.
+        """
+        own_process()
+        watch = MemoryWatch(self.loop.tasks)
+        for box in self.boxes:
+            box.watch_memory(watch)
+        self._run()
+        failure = next((box.failure for box in self.boxes if box.failure is not None), None)
+        if failure is not None:
+            raise failure
+
+    def start(self) -> None:
+        """Open the ports and run in a thread.
+
+        Raises:
+            PortError: a port is taken.
+        """
+        self.listen()
+        self.loop.is_running = True
+        self._thread = threading.Thread(target=self._run_in_thread, name="control-box", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Let the loop end, from any thread."""
+        self.loop.stop()
+
+    def join(self) -> BaseException | None:
+        """End the loop and wait for that; return the error that has ended it or a box, if there is one."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join(_JOIN_TIMEOUT)
+            if self._thread.is_alive():
+                return EmulatorError(
+                    f"the loop of the box did not end within {_JOIN_TIMEOUT:g} s: its ports are still open; "
+                    "end the process"
+                )
+        else:
+            self.close()
+        return self._loop_failure or next((box.failure for box in self.boxes if box.failure), None)
+
+    def close(self) -> None:
+        """Close all boxes and the loop; in its thread after its last turn."""
+        for box in self.boxes:
+            box.close()
+        self.loop.close()
+
+    def _run(self) -> None:
+        try:
+            self.loop.run()
+        finally:
+            self.close()
+
+    def _run_in_thread(self) -> None:
+        try:
+            self._run()
+        except BaseException as failure:
+            self._loop_failure = failure
 
     def _end(self, box: Box) -> None:
-        """Close a box that was switched off or has failed; after the last one the rack has nothing to do."""
+        """Close a box that was switched off or has failed; after the last one there is nothing to do."""
         box.close()
-        if all(other.is_shut_down or other.failure is not None for other in self._boxes):
+        if all(other.is_shut_down or other.failure is not None for other in self.boxes):
             self.stop()
 
+    # --- what a user asks of the box with a number
 
-def counted_up(count: int, options: BoxOptions) -> list[BoxOptions]:
-    """Return the options of `count` boxes: hosts and seeds are counted up from those given.
+    def served_at(self, index: int) -> ServedAt:
+        """Where a box is served, and as what."""
+        return self.boxes[index].served_at
 
-    With free ports (`port_base` None) one host is enough for all.
+    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+        """Have an operation done, from any thread but that of the loop; return its result."""
+        return self.boxes[index].operations.perform(name, arguments)
 
-    Raises:
-        EmulatorError: the host is not an address from which `count` can be counted.
-    """
-    if not 1 <= count <= MAX_BOXES:
-        raise EmulatorError(f"{count} boxes asked for: 1 to {MAX_BOXES} are possible")
-    host, seed = options.get("host", "127.0.0.1"), options.get("seed", 0)
-    one_host = count == 1 or options.get("port_base", 0) is None
-    hosts = [host] * count if one_host else _hosts_from(host, count)
-    return [{**options, "host": h, "seed": seed + k} for k, h in enumerate(hosts)]
+    def submit(self, index: int, command: Command, done: Done | None) -> None:
+        """Submit a command for the next cycle, from any thread."""
+        self.boxes[index].submit(command, done)
 
+    def log(self, index: int) -> tuple[LogEntry, ...]:
+        """Return the last entries of the log, the oldest first."""
+        return self.boxes[index].log.entries
 
-def _hosts_from(host: str, count: int) -> list[str]:
-    try:
-        first = ipaddress.ip_address(host)
-        if first.is_unspecified:
-            raise ValueError
-        return [str(first + k) for k in range(count)]
-    except ValueError:
-        raise EmulatorError(
-            f"host {host!r} given for {count} boxes: name the address of the first one, such as 127.0.0.2; "
-            "the others get the next ones"
-        ) from None
+    def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
+        """Call `follower` with every entry from now on, in the thread of the loop; before the box runs."""
+        if self.loop.is_running:
+            raise ControlError("follow_log called while the box runs: call it before")
+        self.boxes[index].log.follow(follower)
+
+    def end_of(self, index: int) -> tuple[bool, Exception | None]:
+        """Return whether a client has switched the box off, and the error that has ended it."""
+        return self.boxes[index].is_shut_down, self.boxes[index].failure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import ROBOTS
 
 if TYPE_CHECKING:

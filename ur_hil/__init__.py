@@ -1,10 +1,12 @@
-"""The distribution ur-hil: its version, and the check that its packages are its own.
+"""The distribution ur-hil: its version, its commands, and the check that its packages are its own.
 
 Two of them, `protocol` and `urscript`, have names that a user's own folder or another distribution may have,
 too. Python takes the first that it finds; what fails then is an import deep inside. So the packages call
 `check_packages` first.
 """
 
+import sys
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,6 +22,18 @@ def tool_version() -> str:
         return version("ur-hil")
     except PackageNotFoundError:
         return "unknown"
+
+
+def run_command(module: str) -> None:
+    """Run a command of the distribution: `main` of a module, which takes a moment to be loaded.
+
+    Ctrl-C ends it with one line and exit code 130, also in that moment.
+    """
+    try:
+        import_module(module).main()
+    except KeyboardInterrupt:
+        sys.stderr.write(f"{Path(sys.argv[0]).name}: interrupted\n")
+        sys.exit(130)
 
 
 def check_packages() -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
+    from urscript.check.checking import check_program
     from urscript.errors import (
         ScriptCompileError,
         ScriptError,
@@ -22,13 +23,7 @@ if TYPE_CHECKING:
         ScriptRuntimeError,
         ScriptSyntaxError,
     )
-    from urscript.program import (
-        CompiledProgram,
-        ProgramStatus,
-        RunningProgram,
-        check_program,
-        compile_program,
-    )
+    from urscript.program import CompiledProgram, ProgramStatus, RunningProgram, compile_program
     from urscript.recording_host import RecordingHost
     from urscript.run.host import Host, HostFunction
     from urscript.run.threads import ScriptThread
@@ -48,7 +43,7 @@ _HOME: Final = {
     "CompiledProgram": "program",
     "ProgramStatus": "program",
     "RunningProgram": "program",
-    "check_program": "program",
+    "check_program": "check.checking",
     "compile_program": "program",
     "RecordingHost": "recording_host",
     "ScriptThread": "run.threads",

@@ -16,21 +16,22 @@ from typing import Annotated, Any, Final
 import typer
 
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
-from urscript.advice import check_with_advice, with_advice
+from urscript.check import check_with_advice, with_advice
+from urscript.check.warnings import RULES, ScriptWarning
 from urscript.commands.run_command import run
 from urscript.commands.support import (
     STANDARD_INPUT,
     AsJson,
+    Diagnostic,
     Software,
     catalogue_of,
+    diagnostic_of,
     echo_json,
     read_program,
     shown_name,
 )
-from urscript.diagnostics import Diagnostic, diagnostic_of
 from urscript.errors import ScriptError, ScriptSyntaxError
-from urscript.layout.formatter import format_program
-from urscript.lint.rules import RULES, ScriptWarning
+from urscript.formatter import format_program
 from urscript.source import Source, as_utf8
 
 _GC_THRESHOLD: Final = (100_000, 20, 100)
@@ -70,8 +71,9 @@ def check(
     found: list[tuple[str, ScriptError]] = []
     for file in files:
         errors, warnings = check_with_advice(read_program(file), catalogue=catalogue, name=shown_name(file))
-        found += [(str(file), error) for error in errors]
-        found += [(str(file), warning) for warning in warnings if warning.rule.code not in ignored]
+        kept = [warning for warning in warnings if warning.rule.code not in ignored]
+        in_order = sorted([*errors, *kept], key=lambda problem: (problem.line, problem.column))
+        found += [(str(file), problem) for problem in in_order]
     if as_json:
         echo_json(diagnostics=[diagnostic_of(error, file)._asdict() for file, error in found])
     else:

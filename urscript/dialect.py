@@ -14,7 +14,7 @@ Decisions without a constant, and where they are made:
 | the text of a struct | `{a: 1, b: "x"}` | values |
 | `insert` behind the last element, `remove` | appends, returns nothing | methods |
 | capacity of a slice; of a variable whose first value is a list | its length; that of the list | methods |
-| storing by index into a struct | as by the name of the member | elements |
+| storing by index into a struct | as by the name of the member | variables |
 | a sign before a list or matrix | by element | ops |
 | reading a variable before it has a value | run-time error | variables |
 | two definitions of one name | the later one counts | resolver |
@@ -35,9 +35,17 @@ STATEMENT_BUDGET: Final = 110_000
 Exported programs run thousands of assignments at their start without a sync, so real budgets are at least
 10^4 to 10^5 (O)."""
 
+LONGEST_NAME: Final = 255
+"""Characters of a name (U). The longest in known programs have 56; PolyScope cuts the names of programs to 31
+characters (O) and writes each one beyond ASCII as six (O), which makes 186."""
+
+LONGEST_LABEL: Final = 1_023
+"""Characters of a `$` line (U)."""
+
 LONGEST_STRING: Final = 65_536
-"""Characters of a string that `+` makes (U; str_cat and to_str end at 1023, D). Without a limit, a string
-that is added to itself thirty times fills the memory."""
+"""Characters of a string: a literal, what `+` makes, what comes from outside, the text of a value (U; that of
+str_cat and to_str ends at 1023, D). Without a limit, a string that is added to itself thirty times fills the
+memory."""
 
 LONGEST_LIST: Final = 65_536
 """Most elements that a list can have room for (U; a controller allocates no memory at run time, D)."""
@@ -48,6 +56,14 @@ another twice, and so on, has more values than any text of it can show."""
 
 RECURSION_LIMIT: Final = 200
 """Depth at which a recursive function fails with a run-time error (U; no field script recurses)."""
+
+MAX_CALL_DEPTH: Final = 200
+"""Calls inside one another in a thread, recursive ones not counted (U; drivers and exported programs have a
+few). A program in which functions call one another deeper is refused before it runs."""
+
+MAX_OPEN_CALLS: Final = 10_000
+"""Calls inside one another of all threads of a program together (U): the deepest of each thread that its
+functions allow, and its recursive ones as they happen. To end so many takes 2.5 ms."""
 
 MAX_LOOP_DEPTH: Final = 16
 """Nesting of loops that is allowed (U). The oldest Python that runs the box allows 20 blocks; a

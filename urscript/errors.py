@@ -17,10 +17,14 @@ Code that raises `ScriptRuntimeError` gives the message only: the runtime adds t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple, Self
 
 if TYPE_CHECKING:
     from urscript.source import Source
+
+
+_LONGEST_LINE: Final = 1_000
+"""Characters of a line that a message shows."""
 
 
 class StackEntry(NamedTuple):
@@ -116,8 +120,11 @@ class ScriptSyntaxError(ScriptCompileError):
 
     @property
     def wire_text(self) -> str:
-        """`syntax_error_on_line:<n>:<that line, spaces included>:`. Source: captures of e-Series 5.x."""
-        text = self.source.line(self.line) if self.source else ""
+        """`syntax_error_on_line:<n>:<that line, spaces included>:`. Source: captures of e-Series 5.x.
+
+        A long line is cut (U): clients hold packages of 2000 bytes.
+        """
+        text = self.source.line(self.line)[:_LONGEST_LINE] if self.source else ""
         return f"syntax_error_on_line:{self.line}:{text}:"
 
 

@@ -2,45 +2,46 @@
 
     text -> source -> parser -> nodes -> resolver -> compiler -> CompiledProgram -> start(host) -> step() ...
 
-`compile_program` is the entry point; `check_program` returns all errors of a text instead of raising.
+`compile_program` is the entry point; it raises the first error, `urscript.check` finds all of a text.
 """
 
 from __future__ import annotations
 
 import marshal
 import pickle
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from types import FrameType, TracebackType
+from typing import TYPE_CHECKING, Any, Final
 
 from urscript.catalogue import CB3_3_15, Catalogue
 from urscript.compile.compiler import CompiledCode, compile_resolved
 from urscript.dialect import Dialect, dialect_for
-from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError
+from urscript.errors import ScriptCompileError, ScriptRuntimeError, ScriptSyntaxError, StackEntry
 from urscript.names.living_scope import living_scopes
 from urscript.names.resolver import resolve
 from urscript.names.scopes import ResolvedProgram
-from urscript.run import positions, runtime
+from urscript.run import runtime, variables
 from urscript.run.interpreter_mode import InterpreterMode
 from urscript.run.metering import Meter, WorkBudget
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
 from urscript.source import Source, as_bytes
-from urscript.syntax.parser import find_syntax_errors, parse
+from urscript.syntax.parser import parse
 
 if TYPE_CHECKING:
-    from urscript.lint.rules import ScriptWarning
     from urscript.run.host import Host
 
 
+_LONGEST_KEPT: Final = 4_000
+"""Elements or characters of a global that can be read when the program has ended."""
+
+
 def compile_program(
-    text: str,
-    *,
-    catalogue: Catalogue = CB3_3_15,
-    dialect: Dialect | None = None,
-    name: str = "<program>",
+    text: str, *, catalogue: Catalogue = CB3_3_15, dialect: Dialect | None = None, name: str = "<program>"
 ) -> CompiledProgram:
     """Compile one program.
 
@@ -55,44 +56,17 @@ def compile_program(
         ScriptCompileError: The first error in the text, with line, column, wire_text and render().
     """
     dialect = dialect or dialect_for(catalogue.version)
-    program, errors = _resolve(Source(as_bytes(text), name), catalogue, dialect)
+    program, errors = resolve_source(Source(as_bytes(text), name), catalogue, dialect)
     if errors:
         raise errors[0]
     assert program is not None
-    return _compile(program, catalogue, dialect)
+    return compiled_program(program, catalogue, dialect)
 
 
-def check_program(
-    text: str, *, catalogue: Catalogue = CB3_3_15, dialect: Dialect | None = None, name: str = "<program>"
-) -> tuple[Sequence[ScriptCompileError], Sequence[ScriptWarning]]:
-    """All errors of a text, in order, or, when it has none, all warnings.
-
-    Names are looked up once the syntax is right.
-    """
-    from urscript.lint.all_warnings import find_warnings
-
-    source = Source(as_bytes(text), name)
-    dialect = dialect or dialect_for(catalogue.version)
-    program, errors = _resolve(source, catalogue, dialect)
-    if program is None:
-        return find_syntax_errors(source) or errors, ()
-    if not errors:
-        try:
-            _compile(program, catalogue, dialect)
-        except ScriptCompileError as error:
-            errors = [error]
-    if errors:
-        return errors, ()
-    try:
-        return (), find_warnings(program, catalogue)
-    except RecursionError:
-        # Nearly too deep for the compiler; then there are no warnings.
-        return (), ()
-
-
-def _resolve(
+def resolve_source(
     source: Source, catalogue: Catalogue, dialect: Dialect
 ) -> tuple[ResolvedProgram | None, list[ScriptCompileError]]:
+    """Find every name of a text; return all errors, and what was found: None after an error of syntax."""
     try:
         return resolve(parse(source), source, catalogue, dialect)
     except ScriptSyntaxError as error:
@@ -101,7 +75,12 @@ def _resolve(
         return None, [_too_deep(source)]
 
 
-def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -> CompiledProgram:
+def compiled_program(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -> CompiledProgram:
+    """Compile a program without errors.
+
+    Raises:
+        ScriptCompileError: It is nested too deeply.
+    """
     try:
         compiled = compile_resolved(program, catalogue, dialect, f"<urscript {program.name}>")
     except RecursionError:
@@ -116,6 +95,7 @@ def _compile(program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect) -
         builtins=frozenset(program.builtins),
         globals=frozenset(program.globals),
         declared_globals=tuple(program.declared_globals),
+        depth=program.main.depth,
         living_scopes={name: pickle.dumps(scope) for name, scope in living_scopes(program).items()},
     )
 
@@ -135,6 +115,7 @@ class CompiledProgram:
         builtins: Builtin functions it uses.
         globals: Its global variables.
         declared_globals: Those that are declared with `global`, in the order of the text.
+        depth: Calls inside one another that its functions allow, recursive ones aside.
         living_scopes: The names that statements of interpreter mode find, pickled, by the Python name of the
             function that calls `interpreter_mode`.
     """
@@ -148,6 +129,7 @@ class CompiledProgram:
     builtins: frozenset[str]
     globals: frozenset[str]
     declared_globals: tuple[str, ...]
+    depth: int
     living_scopes: Mapping[str, bytes] = field(repr=False)
 
     def start(self, host: Host, work: WorkBudget | None = None) -> RunningProgram:
@@ -186,8 +168,7 @@ class RunningProgram:
         self._namespace: dict[str, Any] = {}
         meter = Meter(self._namespace, work or WorkBudget())
         self._namespace.update(runtime.base_namespace(program.dialect, program.catalogue.methods, meter))
-        budget = program.dialect.statement_budget
-        self._scheduler = Scheduler(self._namespace, meter, budget, host.thread_ended)
+        self._scheduler = Scheduler(self._namespace, meter, program.dialect, host.thread_ended)
         self._namespace.update(runtime.flow_namespace(self._scheduler, self._namespace, meter))
         bind = partial(runtime.builtin_namespace, catalogue=program.catalogue, host=host, meter=meter)
         self._namespace.update(bind(program.builtins))
@@ -206,7 +187,7 @@ class RunningProgram:
         self._namespace.update(program.compiled.constants)
         self._namespace.update(dict.fromkeys((f"g_{name}" for name in program.globals), UNDEFINED))
         exec(marshal.loads(program.compiled.code), self._namespace)
-        self._main = self._scheduler.start(self._namespace["main"], program.name, None)
+        self._main = self._scheduler.start(self._namespace["main"], program.name, None, program.depth)
 
     @property
     def threads(self) -> Sequence[ScriptThread]:
@@ -239,12 +220,12 @@ class RunningProgram:
         except ProgramHalted:
             self._finish(ProgramStatus.FINISHED)
         except Exception as error:
-            self._fail(self._script_error(error))
+            self._fail(_script_error(error, self._texts))
         else:
             if self._main.finished or self._kill_wanted:
                 self._finish(ProgramStatus.FINISHED)
             elif self.program.kind == "sec" and not self.is_between:
-                self._fail_secondary()
+                self.fail("a secondary program must end within one control cycle")
         finally:
             self._in_step = False
         return self.status
@@ -259,6 +240,16 @@ class RunningProgram:
         elif self.status is ProgramStatus.RUNNING:
             self._finish(ProgramStatus.FINISHED)
 
+    def fail(self, text: str) -> None:
+        """End the run with an error, at the place where its main thread is."""
+        if self.status is ProgramStatus.RUNNING:
+            line, column = self.position(self._main)
+            self._fail(ScriptRuntimeError(text).locate(self.program.source, line, column))
+
+    def forget(self) -> None:
+        """Drop the values of all variables; after the end."""
+        self._namespace.update(dict.fromkeys(self._namespace, UNDEFINED))
+
     def read_global(self, name: str) -> Any:
         """The value of a global variable; `variables.UNDEFINED` before the first assignment.
 
@@ -269,15 +260,7 @@ class RunningProgram:
 
     def position(self, thread: ScriptThread) -> tuple[int, int]:
         """Line and column of a suspended thread."""
-        return positions.thread_position(thread, self.program.compiled)
-
-    def _script_error(self, error: Exception) -> ScriptRuntimeError:
-        return positions.script_error(error, self._texts)
-
-    def _fail_secondary(self) -> None:
-        line, column = self.position(self._main)
-        error = ScriptRuntimeError("a secondary program must end within one control cycle")
-        self._fail(error.locate(self.program.source, line, column))
+        return _thread_position(thread, self.program.compiled)
 
     def _fail(self, error: ScriptRuntimeError) -> None:
         if error.stack:
@@ -292,9 +275,95 @@ class RunningProgram:
         fault = self._scheduler.kill_all()
         if fault is not None and self.error is None:
             self.status = ProgramStatus.FAILED
-            self.error = self._script_error(fault)
+            self.error = _script_error(fault, self._texts)
         # Functions and their globals refer to each other; a box that runs with its garbage collector frozen
-        # would keep every program it ever ran. The variables stay readable.
-        for name in [name for name in self._namespace if not name.startswith("g_")]:
-            del self._namespace[name]
+        # would keep every program it ever ran. The variables stay readable, but for those that hold much.
+        for name, value in tuple(self._namespace.items()):
+            if not name.startswith("g_"):
+                del self._namespace[name]
+            elif isinstance(value, (list, str)) and len(value) > _LONGEST_KEPT:
+                self._namespace[name] = UNDEFINED
         self._host.program_ended()
+
+
+# --- places in the script, of errors and of suspended threads: compiled code carries lines and columns, see
+# `compile.python_tree`
+
+
+_Texts = Mapping[str, tuple[CompiledCode, Source]]
+"""Code and text of a program and of what is linked into it, by pseudo file name."""
+
+
+def _script_error(error: Exception, texts: _Texts) -> ScriptRuntimeError:
+    """The run-time error of the program for `error`, with its place and call stack.
+
+    Where static types are known, compiled code uses Python's operators; their exceptions are translated here.
+
+    Args:
+        error: Exception of a thread.
+        texts: That the thread runs.
+    """
+    stack, innermost, source = _stack(error.__traceback__, texts)
+    if isinstance(error, ScriptRuntimeError):
+        found = error
+    elif innermost is not None and isinstance(error, IndexError):
+        assert source is not None
+        found = ScriptRuntimeError(_bad_index(innermost, stack[-1], source))
+    elif innermost is not None and isinstance(error, ZeroDivisionError):
+        found = ScriptRuntimeError("division by zero")
+    elif isinstance(error, RecursionError):
+        found = ScriptRuntimeError("calls are nested too deeply")
+    else:
+        found = ScriptRuntimeError(f"internal error of this box: {type(error).__name__}: {error}")
+        found.__cause__ = error
+    found.stack = tuple(stack)
+    found.source = source
+    return found
+
+
+def _bad_index(frame: FrameType, place: StackEntry, source: Source) -> str:
+    """The message for an IndexError of a subscript, which is always a variable with a constant index."""
+    form = re.match(r"(\w+)\s*\[\s*(\d+)", source.line(place.line)[place.column - 1 :])
+    if form is not None:
+        names = f"v_{form[1]}", f"l_{form[1]}", f"g_{form[1]}"
+        found = {**frame.f_globals, **frame.f_locals}
+        variable = next((found[name] for name in names if name in found), None)
+        try:
+            variables.item(variable, int(form[2]))
+        except ScriptRuntimeError as error:
+            return error.message
+    return "index is out of range"
+
+
+def _stack(
+    traceback: TracebackType | None, texts: _Texts
+) -> tuple[list[StackEntry], FrameType | None, Source | None]:
+    """The call stack in the script, outermost first, the innermost frame if it is in the script, its text."""
+    stack: list[StackEntry] = []
+    innermost = source = None
+    while traceback is not None:
+        innermost = traceback.tb_frame
+        code = innermost.f_code
+        if code.co_filename in texts:
+            program, source = texts[code.co_filename]
+            name = code.co_name
+            line, column = program.positions[name].at(traceback.tb_lasti)
+            stack.append(StackEntry(program.function_names.get(name, name), line, column))
+        else:
+            innermost = None
+        traceback = traceback.tb_next
+    return stack, innermost, source
+
+
+def _thread_position(thread: ScriptThread, program: CompiledCode) -> tuple[int, int]:
+    """Line and column of a suspended thread, of the innermost call in the script."""
+    innermost: FrameType | None = None
+    body: Any = thread.body
+    while body is not None and hasattr(body, "gi_frame"):
+        frame = body.gi_frame
+        if frame is not None and frame.f_code.co_filename == program.file_name:
+            innermost = frame
+        body = body.gi_yieldfrom
+    if innermost is None:
+        return 1, 1
+    return program.positions[innermost.f_code.co_name].at(innermost.f_lasti)

@@ -250,9 +250,12 @@ def log_form(value: Any) -> str:
 
     Source: primary interface captures of text messages; field use for sockets.
     """
-    if isinstance(value, str):
-        return value
-    return _nested_form(value, "{:.6g}".format, ",")
+    text = value if isinstance(value, str) else _nested_form(value, "{:.6g}".format, ",")
+    if len(text) > dialect.LONGEST_STRING:
+        raise ScriptRuntimeError(
+            f"{a_type(value)} with a text of {len(text)} characters; allowed: up to {dialect.LONGEST_STRING}"
+        )
+    return text
 
 
 def _nested_form(value: Any, float_form: Any, comma: str) -> str:

@@ -9,15 +9,13 @@ from dataclasses import fields
 from typing import Any
 
 from protocol.ur_types import Ports
-from ur_emulator.box import Box
+from ur_emulator.box_options import TOKEN_VARIABLE, ServedAt
 from ur_emulator.budgets import BUDGETS, KIB
-from ur_emulator.commands.operation import Operation
-from ur_emulator.commands.parameters import Kind, Parameter
+from ur_emulator.commands.operation import Kind, Operation, Parameter
 from ur_emulator.control.box_state import BoxState, Question
 from ur_emulator.control.http_client import DEFAULT_PORT
 from ur_emulator.control.operations import OPERATIONS
 from ur_emulator.control.reading import ReadState
-from ur_emulator.control.token import TOKEN_VARIABLE
 
 
 def _attributes(described: type, names: Iterable[str]) -> Iterator[str]:
@@ -85,7 +83,7 @@ do. The methods return the number of the cycle.
         (
             "| attribute | is |",
             "| -- | -- |",
-            *_attributes(Box, ("host", "ports", "control_port", "port_base", "serial_number")),
+            *_attributes(ServedAt, ("host", "ports", "control_port", "port_base", "serial_number")),
         )
     )
 }
@@ -93,6 +91,26 @@ do. The methods return the number of the cycle.
 The fields of `box.ports`:
 
 {_fields(Ports)}
+
+A box that somebody else serves, in another process, in a container or on another machine of the
+laboratory, is used by the same methods:
+
+```sh
+ur-emulator serve --control-port {DEFAULT_PORT} --ready-file box.json
+```
+
+```python
+from ur_emulator import ControlBox
+
+box = ControlBox.attach("127.0.0.1", {DEFAULT_PORT})  # token="...", if it has one
+box.push(force=(0, 0, 20), duration=0.5)
+print(box.state.safety_mode, box.ports.rtde)
+```
+
+`--ready-file` writes a JSON object once all ports accept, and removes it at the end: `host`,
+`ports` (numbers by name), `serial_number` and `control_port` of the first box, and `boxes`, a list
+of the same for all. A box that was attached goes on when the program ends; `submit` and
+`follow_log` are for boxes of one's own.
 
 ## HTTP
 
@@ -109,7 +127,7 @@ address a control port requires a token.
 - `POST` takes a JSON object (content type `application/json`); without a body all defaults are taken.
 - The answer is a JSON object. An error is `{{"error": "one line"}}` with status 400 (wrong
   arguments), 401 (no token), 403 (see below), 404 (unknown operation), 405 (GET instead of POST, or
-  the reverse), 409 (the state of the box does not allow it), 413 (body above {
+  the reverse), 408 (a wait has timed out), 409 (the state of the box does not allow it), 413 (body above {
     BUDGETS.body_bytes // KIB
 } KiB; send longer programs to port 30002) or 431 (header above 16 KiB).
 - Connections are kept alive; the requests of a client are answered one after the other. The box

@@ -9,8 +9,7 @@ from typing import Final
 from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, catalogue_for
 from urscript.catalogue.methods import METHODS
 from urscript.catalogue.methods import SINCE as METHODS_SINCE
-from urscript.catalogue.types import Builtin, Support
-from urscript.catalogue.versions import Generation
+from urscript.catalogue.types import Builtin, Generation, Support
 
 _HEAD = """\
 # URScript coverage

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, MapRow
+from ur_emulator.controller.modbus_map import COILS, REGISTERS, MapRow
 
 _INTRODUCTION = """\
 # Modbus TCP
 
-Made from `ur_emulator/controller/modbus/robot_map.py` by `make docs`.
+Made from `ur_emulator/controller/modbus_map.py` by `make docs`.
 
 ## The box as a server: port 502
 

@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from docs.generate.page_parts import MARKS, example, table
+from protocol.__main__ import type_name
 from protocol.capture import StreamDecoder
-from protocol.layout_text import type_name
 from protocol.primary.layout import SUB_PACKAGES
-from protocol.primary.message_codec import version_message
-from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType
+from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
 from protocol.primary.packages import SECONDARY_MESSAGES, SafetyTolerances, encode_message_package
 from protocol.primary.state import state_size
 from protocol.primary.values import value_codes

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from docs.generate.page_parts import MARKS, example, table
-from protocol.realtime.columns import COLUMNS, VERSIONS, RealtimeColumn
-from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
+from protocol.realtime.layout import COLUMNS, MAX_FRAME_SIZE, VERSIONS, RealtimeColumn, layout_for_size
 
 _INTRODUCTION = """\
 # Realtime interface: ports 30003 and 30013
 
-Made from `protocol/realtime/columns.py` by `make docs`.
+Made from `protocol/realtime/layout.py` by `make docs`.
 
 This is the oldest interface that reports the robot at full rate, and the simplest: a client
 connects and receives a frame in every control cycle (125 a second, 500 on an e-Series), without greeting or

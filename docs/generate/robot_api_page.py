@@ -5,7 +5,7 @@ from __future__ import annotations
 from docs.generate.page_parts import table
 from protocol.robot_api import API_VERSIONS, BASE, CALLS
 from protocol.ur_types import Ports
-from ur_emulator.budgets import BUDGETS, KIB
+from ur_emulator.budgets import BUDGETS, KIB, MIB
 
 _INTRODUCTION = f"""\
 # Robot API of PolyScope X: port {Ports().robot_api}
@@ -29,7 +29,8 @@ answered when it is complete: POWER_ON when the robot is IDLE.
 Programs are the files `NAME.urpx`, `NAME.urp` and `NAME.script` of the folder `--programs`. A `.urpx`
 is JSON; the box plays the script that PolyScope X has stored in it, first that of the application,
 then that of the program. A `.urpx` that a client sends gets the name that stands in it, whatever the
-name of the file; 400 if there is one already. At most {BUDGETS.upload_bytes // KIB} KiB.
+name of the file; 400 if there is one already. At most {BUDGETS.upload_bytes // KIB} KiB,
+all programs of the folder together {BUDGETS.uploads_bytes // MIB} MiB.
 """
 
 

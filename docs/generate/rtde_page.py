@@ -10,12 +10,19 @@ from types import SimpleNamespace
 from docs.generate.page_parts import MARKS, example, table
 from protocol.capture import RtdeDecoder
 from protocol.rtde.client_connection import RtdeClientConnection
-from protocol.rtde.codec import MAX_NAMES_SIZE
+from protocol.rtde.codec import (
+    MAX_NAMES_SIZE,
+    Request,
+    RequestProtocolVersion,
+    RtdePackageType,
+    SetupOutputs,
+    Start,
+)
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
-from protocol.rtde.messages import Request, RequestProtocolVersion, RtdePackageType, SetupOutputs, Start
 from protocol.rtde.server_connection import RtdeServerConnection, request_limits
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits, TimeScaleSource
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.budgets import BUDGETS
 
 _CB3, _E_SERIES = request_limits(SoftwareVersion(3, 15)), request_limits(SoftwareVersion(5, 15))
 _INTRODUCTION = f"""\
@@ -45,7 +52,8 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
   `S`.
 * Rates are the control cycles of a second, 125 on a CB3 and 500 on an e-Series, divided by a whole
   number: a request for 60 gives 62.5. Rates from 1 to all cycles are possible.
-* A connection has one output recipe, the last one, and up to 255 input recipes, numbered from 1.
+* A connection has one output recipe, the last one, and up to {BUDGETS.rtde_recipes} input recipes with
+  {BUDGETS.rtde_variables:,} variables together, numbered from 1; a further one is answered `NOT_FOUND`.
 * The reply to a name that the software does not have is `NOT_FOUND`, to an input that another
   connection uses `IN_USE`; either makes the whole recipe void (number 0). Inputs are free again
   when the connection that uses them ends.

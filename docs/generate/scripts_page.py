@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from docs.generate.page_parts import table
-from protocol.controller_words import CONTROLLER_WORDS
-from protocol.script_channel import MAX_LINE, MAX_PROGRAM
+from protocol.script_channel import CONTROLLER_WORDS, MAX_LINE, MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 
 _INTRODUCTION = f"""\
 # Scripts over ports 30001, 30002 and 30003
 
-Made from `protocol/controller_words.py`, `protocol/script_channel.py` and `ur_emulator/budgets.py`
+Made from `protocol/script_channel.py`, `protocol/script_channel.py` and `ur_emulator/budgets.py`
 by `make docs`.
 
 A client of one of these three ports can make the robot run [URScript](../urscript-coverage.md):

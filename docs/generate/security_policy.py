@@ -78,7 +78,7 @@ _PROMISES = """\
 | promise | held by |
 |---|---|
 | No bytes that arrive at a port, and no program, end the process of a box or stop its other clients. An error ends the connection or the program that caused it, with a line in the log | `tests/attack`, `tests/fuzz` |
-| The use of resources by clients and programs is bounded, also in total (below); the newest request beyond a limit is refused. The box and its worker process stay below 300 MB together | `tests/attack` |
+| The use of resources by clients and programs is bounded (below); the newest request beyond a limit is refused. The memory of the box and its worker processes is measured as one total, which stays below 300 MB, on Linux; a box in the process of its user (`in_process=True`) is not measured | `tests/attack` |
 | A client that is not part of an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also lists the attacks that exceed them | `make attack` |
 | Nothing is read or written outside the folder `--programs`, by no name and through no link; without this option the box writes into a temporary folder, which it removes. No answer contains a path of this machine | `tests/attack` |
 | A web page in a browser on this machine cannot use the box: the control port checks `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close connections that begin with an HTTP request | `tests/attack` |

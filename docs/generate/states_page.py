@@ -18,14 +18,19 @@ from ur_emulator.controller.safety.boundaries import (
     TRIGGER_BAND,
     BoundaryMode,
 )
-from ur_emulator.controller.safety.enabling_device import ACTIVE, STOPPING, EnablingState
-from ur_emulator.controller.safety.enabling_device import TRANSITIONS as ENABLING_TRANSITIONS
-from ur_emulator.controller.safety.inputs import SafetyInput
+from ur_emulator.controller.safety.inputs import (
+    ACTIVE,
+    OPERATIONAL_MODES,
+    STOPPING,
+    EnablingState,
+    ModeSource,
+    OperationalMode,
+    SafetyInput,
+)
+from ur_emulator.controller.safety.inputs import TRANSITIONS as ENABLING_TRANSITIONS
 from ur_emulator.controller.safety.modes import EVENTS, MODES, after, mode_of
-from ur_emulator.controller.safety.operational_mode import OPERATIONAL_MODES, ModeSource, OperationalMode
-from ur_emulator.controller.safety.status_bits import safety_status_bits
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.controller.snapshot import safety_status_bits
+from ur_emulator.models.generations import CB3, E_SERIES
 
 
 class ProgramTransition(NamedTuple):

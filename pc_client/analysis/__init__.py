@@ -6,9 +6,9 @@
     budget   where the rest of the signal-to-noise ratio is lost
     run      all of these for one recording
     table    Table I: ours beside the paper's
-    figures  what the report shows (loads matplotlib, so it is imported only when a plot is drawn)
+    figures  what the pages show (loads matplotlib, so it is imported only when a plot is drawn)
     report   one self-contained page from a folder of recordings
-    side_by_side  several experiments in one table and on one page; its figures are in side_by_side_figures
+    side_by_side  several experiments in one table and on one page
 
 Everything is computed from recordings alone; nothing here talks to a robot.
 """

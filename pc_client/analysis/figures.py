@@ -1,10 +1,11 @@
-"""What the report shows: curves of runs, bars of levels and of shares. Loads matplotlib for the bars."""
+"""What reports show: curves of runs, bars of levels and of shares. Loads matplotlib for the bars."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import polars as pl
 from matplotlib.figure import Figure
 
 from pc_client.analysis.budget import PARTS
@@ -31,14 +32,18 @@ from protocol.ur_types import JOINT_NAMES
 Array = np.ndarray
 
 _PARTS_COLOURS = (BLUE, ORANGE, GREEN, RED, "#444444")
+_SPEED_COLUMNS = 2
+_SPEED_HEIGHT = 1.85
+"""Columns of the speeds of all movements, and the height of a row [inches]."""
 
 __all__ = [
     "budget_figure",
     "definitions_figure",
+    "levels_figure",
     "movement_sheet",
     "signals_sheet",
     "speed_curve",
-    "table_figure",
+    "speeds_sheet",
 ]
 
 
@@ -135,21 +140,64 @@ def signals_sheet(
     return Sheet(size[1], panels, origin_of(simulated).mark)
 
 
-def table_figure(table: Table) -> Figure:
-    """Table I: our repetitions and mean beside the paper's figure, for each movement."""
-    frame = table.frame
+def levels_figure(
+    frame: pl.DataFrame, experiments: Sequence[tuple[str, Table]], mark: str, *, floors: bool = False
+) -> Figure:
+    """The SNR of each movement: the paper's figure, and of each experiment the mean and the single runs.
+
+    Args:
+        frame: a row a movement: its name, the paper's figure, and the noise floor.
+        experiments: label and table of each.
+        mark: as of `Sheet`.
+        floors: whether the noise floors are shown.
+    """
+    names = frame["name"].to_list()
+    series = [Bars("paper, real UR3", PAPER_GREY, frame["paper_snr_db"].to_numpy())]
+    for i, (label, table) in enumerate(experiments):
+        runs = [[run.snr.speed_db for run in table.runs.get(name, ())] for name in names]
+        means = np.array([np.mean(levels) if levels else np.nan for levels in runs])
+        series.append(
+            Bars(label, colour_of(i), means, [levels if len(levels) > 1 else [] for levels in runs])
+        )
     return bars_of_levels(
-        frame["name"].to_list(),
-        (
-            Bars("paper, real UR3", PAPER_GREY, frame["paper_snr_db"].to_numpy()),
-            Bars(
-                "ours: mean and single runs", BLUE, frame["mean_snr_db"].to_numpy(), frame["snr_db"].to_list()
-            ),
-        ),
-        table.provenance.origin.mark,
+        names,
+        series,
+        mark,
         title="SNR of the TCP speed (Eq. 10)",
-        floors=frame["noise_floor_db"].to_numpy(),
+        floors=frame["noise_floor_db"].to_numpy() if floors else None,
     )
+
+
+def speeds_sheet(names: Sequence[str], experiments: Sequence[tuple[str, Table]], mark: str) -> Sheet:
+    """TCP speeds over time, one panel a movement: desired, and the first run of each experiment."""
+    n_rows = -(-len(names) // _SPEED_COLUMNS)
+    height = _SPEED_HEIGHT * n_rows + 0.4
+    grid = boxes(
+        (WIDTH, height),
+        [1] * _SPEED_COLUMNS,
+        [1] * n_rows,
+        margins=(0.65, 0.15, 0.55, 0.5),
+        gaps=(0.65, 0.75),
+    )
+    panels = []
+    # Down the first column, then down the second: the kinds stand beside each other.
+    for k, name in enumerate(names):
+        runs = {i: table.runs[name][0] for i, (_, table) in enumerate(experiments) if name in table.runs}
+        first = next(iter(runs.values()))
+        desired = speed_curve(first, REFERENCE_GREY, "desired", desired=True, width=3.6)
+        actual = [speed_curve(run, colour_of(i), experiments[i][0], width=1.0) for i, run in runs.items()]
+        span = (-0.1, first.track.t_end - first.track.t_start + 0.3)
+        panels.append(
+            Panel(
+                grid[k % n_rows][k // n_rows],
+                (desired, *actual),
+                name,
+                ("time [s]", "speed [mm/s]"),
+                (span, (0.0, None)),
+                "" if k else "above",
+            )
+        )
+    return Sheet(height, panels, mark)
 
 
 def definitions_figure(table: Table) -> Figure:

@@ -8,7 +8,7 @@
     power_law_exponent       beta in speed = k curvature^-beta: one third for drawing hands
 
 Pure functions on samples at equal steps of time. None of them filters. Differentiation amplifies noise, so
-measured signals are low-passed before (`comparison.filtering`).
+measured signals are low-passed before (`comparison.signals`).
 
 Source: S. Balasubramanian et al., "On the analysis of movement smoothness", JNER 12:112 (2015), for the
 first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.

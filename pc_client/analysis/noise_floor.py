@@ -35,7 +35,7 @@ from pc_client.recording.layout import Phase
 
 Array = NDArray[np.float64]
 
-_LEAST_STEPS = 30
+LEAST_STEPS = 30
 """Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
 
 
@@ -58,9 +58,9 @@ def _rest_steps(run: MeasuredRun) -> Array:
 
 
 def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
-    """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `_LEAST_STEPS` steps."""
+    """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
     steps = np.concatenate([_rest_steps(run) for run in runs])
-    if len(steps) < _LEAST_STEPS:
+    if len(steps) < LEAST_STEPS:
         return None
     # The mean of n differences is the last value less the first over n: taking it away costs 1 / n^2 of the
     # noise, not 1 / n as of independent values.

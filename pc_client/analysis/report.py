@@ -17,14 +17,15 @@ from rich.console import Console
 from rich.progress import track as progress
 
 from pc_client.analysis.budget import PARTS, SPLIT_HZ
+from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
-from pc_client.analysis.table import LAG, MOVEMENT, Table, build_table
+from pc_client.analysis.table import FLOOR, LAG, MOVEMENT, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.cell_file import parse_cell
-from pc_client.recording.loader import Recording, load_recording
-from pc_client.results.files import write_files
-from pc_client.results.pages import picture, render, report_libraries, zoomable
+from pc_client.kinematics.robot_model import ROBOTS
+from pc_client.recording.loader import load_recording
+from pc_client.results.pages import picture, render, report_libraries, write_files, zoomable
 from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
 
@@ -34,7 +35,6 @@ _T = TypeVar("_T")
 
 _LEVEL = Column("snr_db", "speed, Eq. 10", "dB", ".1f", missing="–")
 _DEFINITIONS = (
-    replace(MOVEMENT, header="means over the repetitions"),
     _LEVEL,
     replace(_LEVEL, name="snr_shifted_db", header="speed, shifted"),
     replace(LAG, header="shift"),
@@ -65,22 +65,27 @@ class Report:
     left_out: tuple[str, ...]
 
 
-def build_report(run_dir: Path | str, console: Console | None = None) -> Report:
+def build_report(
+    run_dir: Path | str, console: Console | None = None, *, include_aborted: bool = False
+) -> Report:
     """Rebuild tables and page from the recordings `<movement>_r<k>.mcap` in a folder.
 
     Args:
         run_dir: the folder; the results are written into it.
         console: where progress is shown; None shows none.
+        include_aborted: as of `build_tables`.
 
     Raises:
         RecordingError: as `build_tables`, or matplotlib or jinja2 is missing.
     """
-    report = build_tables(run_dir, console)
+    report = build_tables(run_dir, console, include_aborted=include_aborted)
     page = write_files(Path(run_dir), {REPORT_HTML: render_page(report.table, report.left_out, console)})
     return replace(report, paths=(*report.paths, *page))
 
 
-def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
+def build_tables(
+    run_dir: Path | str, console: Console | None = None, *, include_aborted: bool = False
+) -> Report:
     """Rebuild the tables from the recordings in a folder, without a page.
 
     Recordings that were cut off, or of runs that were given up, are left out of the table and named on the
@@ -89,6 +94,7 @@ def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
     Args:
         run_dir: the folder; the results are written into it.
         console: where progress is shown; None shows none.
+        include_aborted: show such runs too, as movements of their own, outside of all means.
 
     Raises:
         RecordingError: no usable recording, recordings of different experiments, or a file cannot be
@@ -104,7 +110,7 @@ def build_tables(run_dir: Path | str, console: Console | None = None) -> Report:
     left_out: list[str] = []
     for path in _shown(files, "reading", console):
         try:
-            runs.append(analyse_run(_whole(load_recording(path))))
+            runs.append(analyse_run(load_recording(path), include_aborted=include_aborted))
         except RecordingError as error:
             left_out.append(f"{path.name}: {one_line(error).removeprefix(str(path)).lstrip(': ')}")
         except Exception as error:  # an unexpected error in one file must not stop the others
@@ -137,21 +143,27 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     ]
     level = cs.ends_with("_db")  # one that is beyond all measure (no error at all) is a dash
     means = table.means.with_columns(pl.when(level.abs() < 200.0).then(level))
-    rows, (*columns, floor, error, lag) = table.shown()
-    columns += [replace(floor, header="noise floor"), replace(error, header="position error")]
+    rows, (*columns, error, lag) = table.shown()
+    columns = [replace(c, header="noise floor") if c is FLOOR else c for c in columns]
+    columns += [replace(error, header="position error")]
     rows = rows.with_columns(pl.col(_PATH_ERROR.name).list.max())
+    origin, several = table.provenance.origin, len(table.all_runs) > len(table.runs)
+    definitions = [replace(MOVEMENT, header="means over the repetitions" if several else ""), *_DEFINITIONS]
     return render(
         _TEMPLATE,
         scripts=True,
         table=table,
         levels=to_html(rows, [*columns, _PATH_ERROR, lag], bold="is_mean", links=True),
-        definitions=to_html(means, _DEFINITIONS),
+        definitions=to_html(means, definitions),
         budget=to_html(means, _BUDGET),
         movements=movements,
         split_hz=SPLIT_HZ,
         joint_names=JOINT_NAMES,
         table_figure=picture(
-            figures.table_figure(table), "Bars of the SNR of each movement, ours beside the paper's"
+            figures.levels_figure(
+                table.frame, [(table.provenance.controller, table)], origin.mark, floors=True
+            ),
+            "Bars of the SNR of each movement",
         ),
         definitions_figure=picture(
             figures.definitions_figure(table), "Four SNR definitions for each movement"
@@ -159,25 +171,14 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         budget_figure=picture(
             figures.budget_figure(table), "Share of each part in the error power, for each movement"
         ),
-        origin=table.provenance.origin,
+        origin=origin,
+        known_arm=table.provenance.robot_model.lower() in ROBOTS,
+        least_rest=LEAST_STEPS,
         seed=table.provenance.seed,
         facts=provenance_facts(table.all_runs),
         learned=_learned(table),
         left_out=list(left_out),
     )
-
-
-def _whole(recording: Recording) -> Recording:
-    """Return the recording when its run came to its end.
-
-    Raises:
-        RecordingError: the file is cut off, or the run was given up.
-    """
-    if not recording.complete:
-        raise RecordingError(f"left out, {recording.damage}")
-    if "aborted" in recording.summary:
-        raise RecordingError(f"left out, the run was given up ({recording.summary['aborted']})")
-    return recording
 
 
 def provenance_facts(runs: Sequence[MeasuredRun]) -> dict[str, str]:
@@ -204,7 +205,7 @@ def provenance_facts(runs: Sequence[MeasuredRun]) -> dict[str, str]:
         **_loop_facts(first.loop),
         "cell": _cell_summary(first.cell_text),
         "client version": ", ".join(sorted({run.provenance.client_version for run in runs})),
-        "runs": f"{len(runs)}, of {len({run.provenance.movement for run in runs})} movements",
+        "runs": f"{len(runs)}, movements: {len({run.provenance.movement for run in runs})}",
     }
 
 

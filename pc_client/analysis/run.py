@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pc_client.analysis.budget import PARTS, Budget, error_budget
 from pc_client.analysis.metrics import Errors, measure_errors
 from pc_client.analysis.snr import Snr, measure_snr
 from pc_client.analysis.track import TcpTrack, track_of
+from pc_client.errors import RecordingError
 from pc_client.recording.loader import Recording
 from pc_client.recording.provenance import Provenance
+
+GIVEN_UP = "given up"
+"""Kind of the movement of a run that did not come to its end."""
 
 
 def budget_column(part: str) -> str:
@@ -57,12 +61,23 @@ class MeasuredRun:
         }
 
 
-def analyse_run(recording: Recording) -> MeasuredRun:
+def analyse_run(recording: Recording, *, include_aborted: bool = False) -> MeasuredRun:
     """Measure one recording.
 
+    Args:
+        recording: of a whole run: the SNR of half a movement cannot stand beside others.
+        include_aborted: measure also a run that was given up; name and kind of its movement then say so.
+
     Raises:
-        RecordingError: signals are missing, or the movement phase is too short to be judged.
+        RecordingError: the run was given up or the file is cut off, signals are missing, or the movement
+            phase is too short to be judged.
     """
+    if recording.aborted:
+        if not include_aborted:
+            raise RecordingError(f"{recording.path}: {recording.aborted}: it has no SNR")
+        whose = recording.provenance
+        name = f"{whose.movement}_r{whose.repetition}_given_up"
+        recording = replace(recording, provenance=replace(whose, movement=name, kind=GIVEN_UP))
     track = track_of(recording)
     snr = measure_snr(track)
     return MeasuredRun(

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
-from pc_client.analysis.run import MeasuredRun
+from pc_client.analysis.run import GIVEN_UP, MeasuredRun
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance
 from pc_client.results.tables import Column, finite, to_markdown, to_rich
@@ -38,11 +38,20 @@ PAPER_SNR_DB = {
 }
 KINDS = ("uniform", "lognormal")
 
+PAPER_ROWS = pl.DataFrame(
+    [
+        {"kind": KINDS[name.startswith("lognorm")], "name": name, "paper_snr_db": level}
+        for name, level in PAPER_SNR_DB.items()
+    ]
+)
+"""The paper's table as a frame."""
+
 SHARED = "Paper: own points, not published; name, kind, number of targets agree"
 """Why no differences are given."""
 
 MOVEMENT = Column("name", "movement", align="left")
 LEVEL, PAPER = Column("mean_snr_db", "mean", format=".2f"), Column("paper_snr_db", "paper", format=".2f")
+FLOOR = Column("noise_floor_db", "floor", format=".2f")
 ERROR, LAG = Column("max_position_error_mm", "error", "mm", ".2f"), Column("lag_ms", "lag", "ms", ".1f")
 
 _FIGURES = (
@@ -90,8 +99,7 @@ class Table:
 
     def mean_of(self, kind: str, figure: str = "mean_snr_db") -> float | None:
         """The mean of a figure over the movements of one kind; None where no movement has it."""
-        mean: Any = self.frame.filter(kind=kind)[figure].mean()
-        return mean if mean is None else float(mean)
+        return mean_by_kind(self.frame, figure).get(kind)
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `table1.json`; figures that are not finite become null."""
@@ -110,17 +118,10 @@ class Table:
 
     def to_markdown(self) -> str:
         """Return the content of `table1.md`."""
-        lines = [
-            f"# {self.title}",
-            "",
-            "SNR of the TCP speed as in Eq. 10 of the paper, in dB: unshifted, unsmoothed.",
-            "",
-            to_markdown(*self.shown()),
-            "",
-            "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm.",
-            *(["", SHARED] if self.has_paper_rows else []),
-        ]
-        return "\n".join(lines) + "\n"
+        notes = ["SNR of the TCP speed as in Eq. 10 of the paper, in dB: unshifted, unsmoothed."]
+        floor = "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm."
+        after = [floor] * self.has_floor + [SHARED] * self.has_paper_rows
+        return "\n\n".join([f"# {self.title}", *notes, to_markdown(*self.shown()), *after]) + "\n"
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
@@ -139,32 +140,47 @@ class Table:
         return not PAPER_SNR_DB.keys().isdisjoint(self.runs)
 
     @property
+    def has_floor(self) -> bool:
+        """Whether the noise floor of a movement is known."""
+        return not self.frame["noise_floor_db"].is_null().all()
+
+    @property
     def title(self) -> str:
         """One line that says what the table shows, and whether the arm was a real one."""
-        return f"Table I: {self.provenance.arm}, controller {self.provenance.controller}"
+        what = "Table I" if self.has_paper_rows else "SNR of the TCP speed"
+        return f"{what}: {self.provenance.arm}, controller {self.provenance.controller}"
 
     def shown(self) -> tuple[pl.DataFrame, tuple[Column, ...]]:
         """The rows with the means, as people read them, and their columns."""
-        runs = [f"r{k}" for k in range(1, max(map(len, self.runs.values())) + 1)]
+        n_runs = max(map(len, self.runs.values()))
+        runs = [f"r{k}" for k in range(1, n_runs + 1)]
         frame = with_means(self.frame, LEVEL.name, PAPER.name)
         frame = frame.with_columns(pl.col("snr_db").list.to_struct(fields=runs)).unnest("snr_db")
         return frame, (
             MOVEMENT,
-            *(Column(run, format=".2f") for run in runs),
-            LEVEL,
+            *(Column(run, format=".2f") for run in runs if n_runs > 1),
+            LEVEL if n_runs > 1 else replace(LEVEL, header="SNR"),
             *([PAPER] if self.has_paper_rows else []),
-            Column("noise_floor_db", "floor", format=".2f"),
+            *([FLOOR] if self.has_floor else []),
             ERROR,
             LAG,
         )
 
 
 def with_means(frame: pl.DataFrame, *figures: str) -> pl.DataFrame:
-    """Rows by kind, and after those of each kind a row `mean KIND` (`is_mean`) of some figures."""
-    means = frame.group_by("kind", maintain_order=True).agg(pl.col(figures).mean())
+    """Rows by kind, and after those of a kind with several a row `mean KIND` (`is_mean`) of some figures."""
+    kinds = frame["kind"].unique(maintain_order=True)
+    several = frame.filter(pl.len().over("kind") > 1, pl.col("kind") != GIVEN_UP)
+    means = several.group_by("kind", maintain_order=True).agg(pl.col(figures).mean())
     means = means.with_columns(pl.format("mean {}", "kind").alias("name"), is_mean=True)
     both = pl.concat([frame.with_columns(is_mean=False), means], how="diagonal")
-    return both.sort(pl.col("kind").cast(pl.Enum(means["kind"])), "is_mean", maintain_order=True)
+    return both.sort(pl.col("kind").cast(pl.Enum(kinds)), "is_mean", maintain_order=True)
+
+
+def mean_by_kind(frame: pl.DataFrame, figure: str) -> dict[str, float]:
+    """The mean of a figure over the movements of each kind that has it."""
+    means = frame.drop_nulls(figure).group_by("kind", maintain_order=True).agg(pl.col(figure).mean())
+    return dict(means.iter_rows())
 
 
 def _frame_of_runs(runs: Sequence[MeasuredRun]) -> pl.DataFrame:

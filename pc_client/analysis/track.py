@@ -47,6 +47,7 @@ class TcpTrack:
         p_ref: (n, 3) reference position at these times, m.
         p_actual: (n, 3) position that the robot reported at these times, m.
         rows: index of each sample's row in the recording, (n,).
+        new_rows: index of every row with a time stamp of its own, (m,): of each control cycle.
         movement: samples first..last of the movement phase, as a slice.
         t_begin: controller time at which the movement began, s: up to a cycle before its first sample.
     """
@@ -55,6 +56,7 @@ class TcpTrack:
     p_ref: NDArray[np.float64]
     p_actual: NDArray[np.float64]
     rows: NDArray[np.intp]
+    new_rows: NDArray[np.intp]
     movement: slice
     t_begin: float
 
@@ -85,30 +87,36 @@ def track_of(recording: Recording) -> TcpTrack:
     """
     t = recording.t
     with np.errstate(invalid="ignore"):  # endless times are refused below
-        rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
-    moving = _movement_of(recording, rows)
+        new_rows = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0.0)
+    moving = _movement_of(recording, new_rows)
     for name, most in _MOST.items():
         if not np.all(np.abs(recording.column(name)) <= most):  # NaN is not
             raise RecordingError(f"{recording.path} has {name} with values beyond {most:g}, or not a number")
-    if not np.all(np.diff(t[rows]) > 0.0):
+    if not np.all(np.diff(t[new_rows]) > 0.0):
         raise RecordingError(f"{recording.path} has time stamps that go back; those of a robot do not")
-    cycle = float(np.median(np.diff(t[rows])))
+    cycle = float(np.median(np.diff(t[new_rows])))
     if not SHORTEST_CYCLE <= cycle <= LONGEST_CYCLE:
         raise RecordingError(
             f"{recording.path} has time stamps {cycle:g} s apart; {SHORTEST_CYCLE:g} to {LONGEST_CYCLE:g} s "
             "are a robot's"
         )
-    each = max(round(SAMPLING_TIME / cycle), 1)
-    rows = rows[moving[0] % each :: each]
+    each = rows_per_sample(t[new_rows])
+    rows = new_rows[moving[0] % each :: each]
     moving = _movement_of(recording, rows)
     return TcpTrack(
         t=t[rows],
         p_ref=recording.column("ref_tcp_position")[rows],
         p_actual=recording.column("actual_TCP_pose")[rows, :3],
         rows=rows,
+        new_rows=new_rows,
         movement=slice(int(moving[0]), int(moving[-1]) + 1),
         t_begin=float((t - recording.column("ref_t"))[rows[moving[0]]]),
     )
+
+
+def rows_per_sample(t: NDArray[np.float64]) -> int:
+    """How many steps of the times (n,) [s] make 8 ms: 1 at 125 Hz, 4 at 500 Hz."""
+    return 1 if len(t) < 2 else max(round(SAMPLING_TIME / float(np.median(np.diff(t)))), 1)
 
 
 def _movement_of(recording: Recording, rows: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -7,32 +7,38 @@ connection is open.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pc_client.api.confirmation import Confirm, ask_at_terminal, experiment_description
 from pc_client.api.signals import Run, Signals
-from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller
+from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
+from pc_client.control.tracker import ControlLaw
+from pc_client.driver.robot_info import RobotInfo
 from pc_client.driver.robot_report import RobotReport, read_report
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.ur_driver import UrDriver
-from pc_client.errors import ClientError, ControllerError
+from pc_client.errors import ClientError, ControllerError, DriverError, PlanningError
 from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
 from pc_client.experiment.observer import Observer
 from pc_client.experiment.preflight import model_of, preflight, require
-from pc_client.experiment.prepare import Experiment, Motion, Plan, make_plan
+from pc_client.experiment.prepare import Experiment, Motion, Plan, check_folder, make_plan, scratch_folder
 from pc_client.experiment.runner import ExperimentReport, ExperimentRunner
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.cell_file import load_cell
+from pc_client.kinematics.forward import tcp_pose
+from pc_client.kinematics.inverse import nearest_posture
 from pc_client.kinematics.robot_model import RobotModel, robot_model
 from pc_client.planning.approach import plan_approach
+from protocol.pose import T_to_pose, pose_to_T
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from ur_hil.records import checked
@@ -60,7 +66,7 @@ def connect(
     Raises:
         ClientError: the robot does not answer, does not report its type, or does not meet a condition.
     """
-    surroundings = load_cell(cell) if isinstance(cell, str | Path) else cell or NO_CELL
+    surroundings = _cell_of(cell)
     numbers = ports or Ports.standard()
     report = read_report(TcpNetwork(), host, numbers)
     model = model_of(report, surroundings)
@@ -70,18 +76,27 @@ def connect(
     return Arm(host, numbers, report, model, reverse_port, confirm)
 
 
-def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell = NO_CELL) -> Plan:
+def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell | str | Path | None = None) -> Plan:
     """Plan a motion: inverse kinematics, spline, all limits checked. Nothing moves.
 
     Args:
         motion: a movement of the TCP, or a `JointTrajectory`.
         arm: a connected one, or the name of a model, such as "ur3".
-        cell: surroundings and tool of a named model; a connected arm has its own cell.
+        cell: surroundings and tool of a named model, as of `connect`; a connected arm has its own.
 
     Raises:
         PlanningError: the arm cannot execute it; names the sample, its time and point, and the joint.
+        ClientError: a cell for an arm that has its own, or its file makes no sense.
     """
-    return make_plan(motion, robot_model(arm, cell) if isinstance(arm, str) else arm.model)
+    if isinstance(arm, str):
+        return make_plan(motion, robot_model(arm, _cell_of(cell)))
+    if cell is not None:
+        raise ClientError(f"cell: {arm!r} has its own; give it to connect, or plan for {arm.model.name!r}")
+    return make_plan(motion, arm.model)
+
+
+def _cell_of(cell: Cell | str | Path | None) -> Cell:
+    return load_cell(cell) if isinstance(cell, str | Path) else cell or NO_CELL
 
 
 class Arm:
@@ -121,7 +136,7 @@ class Arm:
 
     @property
     def simulated(self) -> bool | None:
-        """True, False, or None if the robot does not report it."""
+        """True, False, or None if the robot does not report it; held against every motion's report."""
         return self.report.info.simulated
 
     def frame(self) -> RealtimeFrame:
@@ -132,49 +147,94 @@ class Arm:
         """
         return self._report_now().frame
 
+    def fk(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Forward kinematics of the nominal arm; nothing moves.
+
+        The robot computes with the calibration of its own arm: `frame().actual_tcp_pose` differs by a few mm.
+
+        Args:
+            q: (6,) joint angles [rad], or (n, 6).
+
+        Returns:
+            (6,) or (n, 6): position [m] and rotation vector [rad] of the TCP in the base frame.
+
+        Raises:
+            PlanningError: other shapes, or values that are not finite.
+        """
+        angles = _sixes(q, "q")
+        poses = [T_to_pose(tcp_pose(self.model, one)) for one in angles.reshape(-1, 6)]
+        return np.array(poses).reshape(angles.shape)
+
+    def ik(self, pose: ArrayLike, q_near: ArrayLike | None = None) -> NDArray[np.float64]:
+        """Inverse kinematics of the nominal arm, on the branch nearest to a posture; nothing moves.
+
+        Args:
+            pose: (6,) position [m] and rotation vector [rad] of the TCP in the base frame, or (n, 6).
+            q_near: (6,) a posture [rad]; the arm's present one by default. Of several poses each has the
+                joint angles nearest to those of the one before.
+
+        Returns:
+            (6,) or (n, 6) joint angles [rad]. Clearances and speeds are not checked; `plan` does.
+
+        Raises:
+            PlanningError: a pose is out of reach; other shapes, or values that are not finite.
+        """
+        poses = _sixes(pose, "pose")
+        q = self.frame().actual_q if q_near is None else _sixes(q_near, "q_near")
+        found = [q := nearest_posture(self.model, pose_to_T(one.tolist()), q) for one in poses.reshape(-1, 6)]
+        return np.array(found).reshape(poses.shape)
+
     def run(
         self,
         plan: Plan | Motion,
-        controller: Controller = CONTROLLERS[DEFAULT],
+        controller: Controller | ControlLaw = CONTROLLERS[DEFAULT],
         *,
         out: str | Path | None = None,
+        overwrite: bool = False,
     ) -> Run:
         """Move to the start of a plan, identify the loop, follow the plan, and measure the result.
 
         Args:
             plan: made by `plan`, or a motion that is planned first.
-            controller: the velocity controller.
-            out: folder of the recording; None: the recording is not kept.
+            controller: the velocity controller, or a function of yours: it gets each frame and the reference
+                at its time (`q`, `qd_feedforward`, `qd_array`, `p`, `v`) and returns (6,) joint velocities
+                [rad/s]. Checks, guard of the tool, recording and SNR are those of the other controllers.
+            out: folder of the recording; None: it is not kept, unless the run is given up: then the error
+                names the file, in the temporary folder of the system.
+            overwrite: replace a simulated recording of the same name in it; without, it is refused.
 
         Raises:
             ClientError: a check failed or the robot stopped; the arm rests.
         """
-        return self.repeat(plan, 1, controller, out=out)[0]
+        return self.repeat(plan, 1, controller, out=out, overwrite=overwrite)[0]
 
     def repeat(
         self,
         plan: Plan | Motion,
         times: int,
-        controller: Controller = CONTROLLERS[DEFAULT],
+        controller: Controller | ControlLaw = CONTROLLERS[DEFAULT],
         *,
         out: str | Path | None = None,
+        overwrite: bool = False,
     ) -> tuple[Run, ...]:
         """Run a plan several times; a controller with ILC learns from one run to the next.
 
         Arguments and errors are those of `run`.
         """
         made = plan if isinstance(plan, Plan) else make_plan(plan, self.model)
-        with tempfile.TemporaryDirectory(prefix="ur-client-") as folder:
-            report = self.experiment([made], times, controller, Path(folder) if out is None else Path(out))
+        with scratch_folder() if out is None else nullcontext(Path(out)) as folder:
+            report = self.experiment([made], times, controller, folder, overwrite=overwrite)
             return tuple(Run.from_file(path) for path in report.paths)
 
     def experiment(
         self,
         plans: Sequence[Plan],
         repeat: int,
-        controller: Controller,
+        controller: Controller | ControlLaw,
         out: Path,
         observer: Observer | None = None,
+        *,
+        overwrite: bool = False,
     ) -> ExperimentReport:
         """Run several plans and keep their recordings.
 
@@ -184,15 +244,20 @@ class Arm:
             controller: the same for all runs.
             out: folder of the recordings.
             observer: gets the progress.
+            overwrite: as of `run`.
 
         Raises:
             ClientError: a check failed, the robot stopped or the answer was no; the arm rests, recordings
                 finished until then are complete.
         """
-        wanted = Experiment(self.model, tuple(plans), repeat, out)
+        law, config = None, controller
+        if not isinstance(config, Controller):
+            law, config = config, controller_of_law(getattr(config, "__name__", type(config).__name__))
+        wanted = Experiment(self.model, tuple(plans), repeat, out, overwrite)
+        check_folder(wanted)
         self.confirm(wanted)
         with self._session() as driver:
-            return ExperimentRunner(driver, wanted, controller, observer).run()
+            return ExperimentRunner(driver, wanted, config, observer, law).run()
 
     def approach(self, plan: Plan) -> Plan:
         """Move slowly to the start of a plan, on a checked path.
@@ -213,7 +278,7 @@ class Arm:
     def stream(self, law: VelocityLaw, *, acceleration: float = ACCELERATION) -> Signals:
         """Move the arm by a velocity law from its present posture, under the watchdog of every motion.
 
-        Before each velocity is sent, the posture in which the arm could come to rest is checked against joint
+        Before each velocity is sent, the way on which the arm could come to rest is checked against joint
         ranges and clearances. An error in the law ends the motion; the arm is stopped.
 
         Args:
@@ -240,7 +305,7 @@ class Arm:
         if not rows:
             raise ClientError("the velocity law ended before its first velocity: there are no signals")
         t, q, qd, pose, command = (np.array(column, dtype=np.float64) for column in zip(*rows, strict=True))
-        return Signals(t - t[0], q, qd, pose, command, self.simulated)
+        return Signals(t - t[0], q, qd, pose, command, driver.info.source)
 
     def confirm(self, wanted: Experiment) -> None:
         """Ask whether an arm that is not known to be simulated may do an experiment; nothing moves.
@@ -251,12 +316,37 @@ class Arm:
         self._ask(lambda: experiment_description(self._host, self._report_now(), self.model, wanted))
 
     def _report_now(self) -> RobotReport:
-        return read_report(TcpNetwork(), self._host, self._ports)
+        report = read_report(TcpNetwork(), self._host, self._ports)
+        self._check_same(report.info)
+        return report
 
     def _session(self) -> UrDriver:
-        return UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
+        driver = UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
+        try:
+            self._check_same(driver.info)
+        except DriverError:
+            driver.close()
+            raise
+        return driver
+
+    def _check_same(self, now: RobotInfo) -> None:
+        """Refuse another robot than that of `connect`, or one of another origin."""
+        then = self.report.info
+        now.check_same(then.model, then.serial)
+        if now.simulated is not then.simulated:
+            raise DriverError(f"the robot at {self._host} is {now}; at connect it was {then}: connect again")
 
     def _ask(self, text: Callable[[], str]) -> None:
         """Ask whether an arm may move, unless it reports itself as simulated."""
         if self.simulated is not True and not self._confirm(text()):
             raise ClientError("the arm was not moved: the answer was no")
+
+
+def _sixes(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if array.shape[-1:] != (6,) or array.ndim > 2 or not np.isfinite(array).all():
+        raise PlanningError(f"{what} of shape {array.shape}: give six finite numbers, or rows of six")
+    return array

@@ -12,8 +12,7 @@ from pc_client.experiment.experiment_text import experiment_text
 from pc_client.experiment.preflight import preflight
 from pc_client.experiment.prepare import Experiment
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.planning.approach import plan_approach
-from pc_client.planning.plan_text import approach_text
+from pc_client.planning.approach import approach_text, plan_approach
 
 __all__ = ["QUESTION", "Confirm", "ask_at_terminal", "experiment_description"]
 

@@ -12,8 +12,7 @@ from pc_client.drawing.drawing import Drawing, make_drawing
 from pc_client.drawing.placement import PlacementOptions
 from pc_client.errors import RecordingError
 from pc_client.extraction.extract import extract
-from pc_client.extraction.recording import PenRecording, on_one_axis, ordered_part
-from pc_client.extraction.sources import read_recording
+from pc_client.extraction.pen import PenRecording, on_one_axis, ordered_part, read_recording
 from pc_client.movements.geometry import WORKING_BOXES
 
 __all__ = ["drawing"]

@@ -8,9 +8,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pc_client.errors import MovementError
 from pc_client.movements import movement
 from pc_client.movements.files import load_movement
-from pc_client.movements.own_points import Style, through
+from pc_client.movements.own_points import Style, load_targets, through
 from pc_client.movements.robotic import Corners
 from pc_client.movements.samples import SampledTrajectory, rotations_of
 from pc_client.movements.twins import SETBACK
@@ -76,13 +77,34 @@ class Movement(movement.Movement):
         return cls(name, trajectory, np.array([trajectory.duration]))
 
     @classmethod
-    def from_csv(cls, path: str | Path) -> Self:
-        """A movement from a table of samples: x, y, z, t, or with orientations; see docs/movements.md.
+    def from_csv(
+        cls,
+        path: str | Path,
+        style: Style | None = None,
+        durations: ArrayLike | None = None,
+        *,
+        corners: Corners = "stop",
+    ) -> Self:
+        """A movement from a table, by the name of its file; see docs/movements.md.
+
+        Args:
+            path: x, y, z, t, or with orientations: samples. x, y, z alone: target points.
+            style: "human" or "robot": the rows are target points, t when each is reached, as those of
+                `ur-client movements new`; None: samples, if they have t.
+            durations: of the strokes between target points without t, (n - 1,) [s]; as of `through` if None.
+            corners: of "robot" only, as of `through`.
 
         Raises:
             MovementError: the file cannot be read or is not valid; names the line.
         """
-        return cls._of(load_movement(Path(path)))
+        path = Path(path)
+        if style is None and durations is None:
+            return cls._of(load_movement(path))
+        points, times = load_targets(path)
+        if times is not None and durations is not None:
+            raise MovementError(f"durations, but {path} has a column t: give only one of them")
+        given = times if durations is None else durations
+        return cls.through(points, style or "human", given, name=path.stem, corners=corners)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.analysis.run import MeasuredRun, analyse_run
-from pc_client.analysis.track import speed
-from pc_client.recording.export import flat_columns, split_columns
-from pc_client.recording.loader import load_recording
+from pc_client.analysis.track import TcpTrack, rows_per_sample, track_of
+from pc_client.recording.export import flat_columns, split_columns, table_of
+from pc_client.recording.loader import Recording, load_recording
+from pc_client.recording.origin import Source
 
 if TYPE_CHECKING:
     import polars
@@ -27,7 +28,7 @@ __all__ = ["Run", "Signals"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Signals:
-    """Signals of one motion, one row a control cycle; of a run one every 8 ms, as Eq. 10 has them.
+    """Signals of one motion, one row a control cycle.
 
     Attributes:
         t: (n,) time since the motion began [s]; of a run, since its movement began: negative before it.
@@ -35,7 +36,7 @@ class Signals:
         qd: (n, 6) reported joint velocities [rad/s].
         tcp_pose: (n, 6) reported TCP pose: position [m] and rotation vector [rad], base frame.
         qd_cmd: (n, 6) commanded joint velocities [rad/s].
-        simulated: True, False, or None where the robot does not report it.
+        source: robot, software, serial and simulated, by name.
     """
 
     t: Array
@@ -43,15 +44,26 @@ class Signals:
     qd: Array
     tcp_pose: Array
     qd_cmd: Array
-    simulated: bool | None
+    source: Source
+
+    @property
+    def simulated(self) -> bool | None:
+        """True, False, or None where the robot does not report it."""
+        value = self.source["simulated"]
+        return None if value is None else value is True
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {np.ptp(self.t):.2f} s, {len(self.t)} rows>"
 
     @cached_property
     def tcp_speed(self) -> Array:
-        """(n,) speed of the TCP [m/s]: the first difference of reported positions, as in Eq. 10; first 0."""
-        return np.concatenate(([0.0], speed(self.t, self.tcp_pose[:, :3])))
+        """(n,) speed of the TCP [m/s]: reported positions differenced over the last 8 ms, as in Eq. 10.
+
+        The rows of the first 8 ms are 0.
+        """
+        t, p, each = self.t, self.tcp_pose[:, :3], rows_per_sample(self.t)
+        moved = np.linalg.norm(p[each:] - p[:-each], axis=1) / (t[each:] - t[:-each])
+        return np.concatenate((np.zeros(min(each, len(t))), moved))
 
     def columns(self) -> Mapping[str, Array]:
         """Every number as a column (n,) of its own, by name; RTDE names where RTDE has the signal."""
@@ -67,10 +79,8 @@ class Signals:
         )
 
     def to_frame(self) -> polars.DataFrame:
-        """A table with the rows of the attributes, in their units."""
-        import polars
-
-        return polars.DataFrame(dict(self.columns()))
+        """A table with the rows of the attributes, in their units, and the columns of `source`."""
+        return table_of(self.columns(), self.source)
 
     def plot(self) -> Figure:
         """A figure: speed of the TCP, joint angles, joint velocities."""
@@ -85,10 +95,11 @@ class Run(Signals):
     """A run of a plan: reference, signals of the arm, and the figures of the paper.
 
     Attributes:
-        measured: the recording with all figures measured on it.
+        recording: all that was recorded.
     """
 
-    measured: MeasuredRun
+    recording: Recording
+    _track: TcpTrack
 
     @classmethod
     def from_file(cls, path: Path | str) -> Run:
@@ -97,26 +108,41 @@ class Run(Signals):
         Raises:
             RecordingError: it cannot be read, or holds too little.
         """
-        measured = analyse_run(load_recording(path))
-        recording, track = measured.recording, measured.track
-        q, qd, pose, command = (
-            recording.column(name)[track.rows]
-            for name in ("actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
+        recording = load_recording(path)
+        track = track_of(recording)
+        t, q, qd, pose, command = (
+            recording.column(name)[track.new_rows]
+            for name in ("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
         )
-        simulated = recording.provenance.simulated
-        return cls(track.t - track.t_begin, q, qd, pose, command, simulated, measured)
+        return cls(t - track.t_begin, q, qd, pose, command, recording.provenance.source, recording, track)
 
     def __repr__(self) -> str:
-        whose = self.measured.provenance
+        whose = self.recording.provenance
+        level = self.aborted or f"{self.snr:.1f} dB"
         return (
-            f"<Run {whose.repetition} of {whose.movement!r} with {whose.controller}: {self.snr:.1f} dB, "
+            f"<Run {whose.repetition} of {whose.movement!r} with {whose.controller}: {level}, "
             f"{len(self.t)} rows, {whose.origin.name}>"
         )
+
+    @property
+    def aborted(self) -> str:
+        """Why the run did not come to its end; empty for a whole one."""
+        return self.recording.aborted
+
+    @cached_property
+    def measured(self) -> MeasuredRun:
+        """All figures measured on the recording.
+
+        Raises:
+            RecordingError: the run was given up.
+        """
+        return analyse_run(self.recording)
 
     @property
     def snr(self) -> float:
         """Eq. 10 on the scalar speed of the TCP over the movement [dB]: neither shifted nor smoothed.
 
+        A run that was given up has none: `RecordingError`.
         `measured.snr` has the ratios of other definitions, `measured.errors` the errors in mm and rad.
         """
         return self.measured.snr.speed_db
@@ -124,21 +150,26 @@ class Run(Signals):
     @property
     def ref_q(self) -> Array:
         """(n, 6) joint positions of the reference [rad]."""
-        return self.measured.recording.column("ref_q")[self.measured.track.rows]
+        return self.recording.column("ref_q")[self._track.new_rows]
 
     @property
     def ref_tcp_position(self) -> Array:
         """(n, 3) TCP position of the reference [m]."""
-        return self.measured.track.p_ref
+        return self.recording.column("ref_tcp_position")[self._track.new_rows]
 
     def columns(self) -> Mapping[str, Array]:
         """Every number of the recording as a column (n,) of its own, with `t` and `tcp_speed`."""
-        rows = self.measured.track.rows
-        recorded = {name: values[rows] for name, values in flat_columns(self.measured.recording).items()}
+        rows = self._track.new_rows
+        recorded = {name: values[rows] for name, values in flat_columns(self.recording).items()}
         return {"t": self.t, "tcp_speed": self.tcp_speed, **recorded}
 
     def plot(self) -> Figure:
-        """The figure of the report: desired and actual TCP speed, error, path, joints and their errors."""
+        """The figure of the report: desired and actual TCP speed, error, path, joints and their errors.
+
+        Of a run that was given up that of `Signals`.
+        """
+        if self.aborted:
+            return super().plot()
         from pc_client.analysis.figures import movement_sheet
         from pc_client.results.static import draw
 

@@ -60,7 +60,7 @@ def _write(
 ) -> tuple[Path, ...]:
     """Write table and pictures; returns the files."""
     from pc_client.comparison.figure import comparison_sheet
-    from pc_client.results.files import write_files
+    from pc_client.results.pages import write_files
     from pc_client.results.static import draw, svg_text
     from pc_client.results.tables import to_json
 

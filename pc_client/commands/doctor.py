@@ -29,10 +29,8 @@ def doctor(
 
     surroundings = cell_of(cell)
     found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)
-    for name, number in found.open_ports.items():
-        say(f"port {number:5}  {name:13} open")
-    for name, number in found.closed_ports.items():
-        say(f"port {number:5}  {name:13} closed")
+    for name, number, state in found.ports:
+        say(f"port {number:5}  {name:13} {state}")
     if found.info is not None:
         say(f"robot       {found.info}")
     if found.rhythm is not None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pc_client.drawing.drawing import Drawing
     from pc_client.drawing.placement import PlacementOptions
     from pc_client.drawing.table import Entry
-    from pc_client.extraction.recording import PenRecording
+    from pc_client.extraction.pen import PenRecording
 
 
 @takes_run_settings
@@ -86,7 +86,7 @@ def draw(
     settings: RunSettings,
 ) -> None:
     """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
-    from pc_client.extraction.sources import read_recording
+    from pc_client.extraction.pen import read_recording
 
     if save is not None and len(files) > 1:
         raise typer.BadParameter("--save is for one drawing: give one FILE")
@@ -209,11 +209,9 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
     """Write page, tables and pictures, and show the tables."""
     from rich.progress import track
 
-    from pc_client.drawing.figures import sheets_of
-    from pc_client.drawing.page import render_page
-    from pc_client.drawing.shown import Shown
-    from pc_client.drawing.table import drawing_rich, drawings_json, drawings_markdown
-    from pc_client.results.files import write_files
+    from pc_client.drawing.figures import Shown, sheets_of
+    from pc_client.drawing.table import drawing_rich, drawings_json, drawings_markdown, render_page
+    from pc_client.results.pages import write_files
     from pc_client.results.static import draw, svg_text
     from pc_client.results.tables import to_json
 

@@ -91,7 +91,9 @@ def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, set
         plans = [plan(movement, arm) for movement in movements]
     try:
         with Progress(console, repeat * len(plans)) as progress:
-            report = arm.experiment(plans, repeat, settings.controller, out, progress)
+            report = arm.experiment(
+                plans, repeat, settings.controller, out, progress, overwrite=settings.overwrite
+            )
     except KeyboardInterrupt as interrupt:
         doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"
         raise InterruptedByUserError(

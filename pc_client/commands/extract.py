@@ -22,10 +22,9 @@ from pc_client.file_names import as_file_name
 from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
-    from pc_client.extraction.batch import Outcome
+    from pc_client.extraction.batch import Outcome, Row
     from pc_client.extraction.extract import ExtractOptions
-    from pc_client.extraction.results import Row
-    from pc_client.extraction.sources import PenSource
+    from pc_client.extraction.pen import PenSource
 
 _FEW_FIGURES = 6
 _MOST_ROWS = 30
@@ -62,9 +61,9 @@ def extract(
     dask: DaskOption = None,
 ) -> None:
     """Find the strokes of recorded movements, and say how well they reconstruct them."""
+    from pc_client.extraction.batch import STROKE_COLUMNS, table_of, to_json
     from pc_client.extraction.extract import ExtractOptions
-    from pc_client.extraction.results import STROKE_COLUMNS, table_of, to_json
-    from pc_client.results.files import write_files
+    from pc_client.results.pages import write_files
     from pc_client.results.tables import frame_of, to_csv
 
     check_workers(workers, dask)
@@ -98,7 +97,7 @@ def extract(
 
 def _look_up(files: Sequence[str]) -> tuple[list[PenSource], list[str]]:
     """The recordings that are meant, and what is wrong with folders and archives that cannot be opened."""
-    from pc_client.extraction.sources import pen_sources
+    from pc_client.extraction.pen import pen_sources
 
     sources, unusable = [], []
     for file in files:
@@ -157,7 +156,7 @@ def _show(outcomes: Sequence[Outcome], rows: Sequence[Row]) -> None:
         return
     import polars as pl
 
-    from pc_client.extraction.results import COLUMNS, table_of
+    from pc_client.extraction.batch import COLUMNS, table_of
     from pc_client.results.tables import to_rich
 
     frame = table_of(rows)

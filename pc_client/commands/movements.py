@@ -59,8 +59,8 @@ def show(
     """Show the figures of a movement, and how a UR3 would do it."""
     from pc_client.movements.description import describe
     from pc_client.movements.files import load_movement
+    from pc_client.planning.approach import plan_text
     from pc_client.planning.plan import plan_movement
-    from pc_client.planning.plan_text import plan_text
 
     loaded = load_movement(movement)
     figures = describe(loaded)
@@ -175,8 +175,8 @@ def duplicate(
 def _check_and_save(movement: Movement, out: Path) -> None:
     """Plan a movement for a UR3, save it and say what it would do; what cannot be planned is not saved."""
     from pc_client.movements.files import save_movement
+    from pc_client.planning.approach import plan_text
     from pc_client.planning.plan import plan_movement
-    from pc_client.planning.plan_text import plan_text
 
     plan = plan_movement(movement)
     save_movement(movement, out)

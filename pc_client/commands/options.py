@@ -87,6 +87,9 @@ ReversePortOption = Annotated[
         help="TCP port of this computer that the robot's program calls; 0: any free one.  [default: 31000]",
     ),
 ]
+OverwriteOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace simulated recordings of the same names.")
+]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
 
 
@@ -95,11 +98,11 @@ def say(text: str) -> None:
     console.print(printable(text), markup=False, soft_wrap=True)
 
 
-def show_report(folder: Path) -> Report:
+def show_report(folder: Path, *, include_aborted: bool = False) -> Report:
     """Build tables and report from a folder of recordings, and print Table I beside the paper's."""
     from pc_client.analysis.report import build_report
 
-    report = build_report(folder, console)
+    report = build_report(folder, console, include_aborted=include_aborted)
     console.print(report.table.to_rich())
     for line in report.left_out:
         say(line)

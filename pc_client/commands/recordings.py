@@ -21,6 +21,9 @@ def report(
         Path | None,
         typer.Option("--out", metavar="FILE", help="Page of several experiments; report.html by default."),
     ] = None,
+    include_aborted: Annotated[
+        bool, typer.Option("--include-aborted", help="Show runs that were given up, too, marked as such.")
+    ] = False,
 ) -> None:
     """Build tables and report again from the recordings of an experiment; of several, one page more.
 
@@ -31,17 +34,17 @@ def report(
             raise typer.BadParameter(
                 f"--out is for several folders: the page of one is {folders[0]}/report.html"
             )
-        if show_report(folders[0]).left_out:
+        if show_report(folders[0], include_aborted=include_aborted).left_out:
             raise typer.Exit(ExitCode.FAILED)
         return
     from pc_client.analysis.report import build_report
-    from pc_client.analysis.side_by_side_page import build_side_by_side
+    from pc_client.analysis.side_by_side import build_side_by_side
 
     page = out or Path("report.html")
     reports, left_out = [], []
     for folder in folders:
         try:
-            report = build_report(folder, console)
+            report = build_report(folder, console, include_aborted=include_aborted)
         except RecordingError as error:
             left_out.append(one_line(error))
         else:
@@ -59,7 +62,8 @@ def report(
 def export(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording, .mcap.")],
     to: Annotated[
-        Literal["csv", "parquet"], typer.Option("--to", metavar="csv|parquet", help="Format of the table.")
+        Literal["csv", "parquet", "mat"],
+        typer.Option("--to", metavar="csv|parquet|mat", help="Format of the table."),
     ] = "csv",
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Beside the recording by default.")

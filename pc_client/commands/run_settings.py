@@ -21,6 +21,7 @@ from pc_client.commands.options import (
     ControllerOption,
     GainIOption,
     GainPOption,
+    OverwriteOption,
     PortBaseOption,
     ReversePortOption,
     YesOption,
@@ -44,6 +45,7 @@ class RunSettings:
         cell: what stands around the arm and what it carries.
         ports: where the control box listens.
         reverse_port: where its programs dial back; see `ReverseServer`.
+        overwrite: replace simulated recordings of the same names.
         yes: do not ask before a real arm moves.
     """
 
@@ -51,6 +53,7 @@ class RunSettings:
     cell: Cell
     ports: Ports
     reverse_port: int | None
+    overwrite: bool
     yes: bool
 
 
@@ -62,6 +65,7 @@ def _read_settings(
     cell: CellOption = None,
     port_base: PortBaseOption = 0,
     reverse_port: ReversePortOption = None,
+    overwrite: OverwriteOption = False,
     yes: YesOption = False,
 ) -> RunSettings:
     """Make the record from what was given on the command line.
@@ -78,7 +82,7 @@ def _read_settings(
         config = base.changed(numbers, _OPTIONS.__getitem__)
     except ControllerError as error:
         raise typer.BadParameter(str(error)) from error
-    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, yes)
+    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, overwrite, yes)
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:

@@ -159,9 +159,9 @@ def _confirm(arm: Arm, waiting: Sequence[Case], n_runs: int) -> None:
 
 def _draw(store: ResultStore, name: str, table: pl.DataFrame) -> None:
     """Write the page with the plots; without matplotlib the table has to do."""
-    from pc_client.sweep.page import render_page
-
     try:
+        from pc_client.sweep.page import render_page
+
         with console.status("drawing"):
             page = render_page(name, table)
     except ModuleNotFoundError as error:
@@ -175,18 +175,20 @@ def _draw(store: ResultStore, name: str, table: pl.DataFrame) -> None:
 def _show(table: pl.DataFrame) -> None:
     """Say on the terminal what is best and what went wrong."""
     from pc_client.results.tables import to_rich
-    from pc_client.sweep.ranking import RANKING, rank_settings
+    from pc_client.sweep.settings import RANKING, edge_of, rank_settings
 
     settings = rank_settings(table)
     console.print(to_rich(settings.head(_MOST_SHOWN), RANKING))
+    if len(settings) > _MOST_SHOWN:
+        say(f"{_MOST_SHOWN} of {len(settings)} settings; the table has all")
     best = settings.row(0, named=True)
     if best["complete"]:
         gain = best["gain_margin"]
         margin = "no feedback" if gain is None else f"gain margin {gain:.2f}"
-        say(
-            f"best of {len(settings)}: {best['setting']}: {best['mean_snr_db']:.2f} dB, "
-            f"{best['n_runs']} runs, {margin}"
-        )
+        runs = f"{best['n_runs']} run{'s' * (best['n_runs'] != 1)}"
+        say(f"best of {len(settings)}: {best['setting']}: {best['mean_snr_db']:.2f} dB, {runs}, {margin}")
+        if edge := edge_of(table, settings):
+            say(edge)
     else:
         say("no setting has all its cases done: there is no best one")
     for status in ("refused", "failed"):

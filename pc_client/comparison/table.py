@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from pc_client.analysis.run import MeasuredRun
-from pc_client.comparison.filtering import FILTER_TEXT
-from pc_client.comparison.likeness import Likeness, measure_likeness
 from pc_client.comparison.movement_set import MovementSet
 from pc_client.comparison.signals import (
+    FILTER_TEXT,
     PLAN_RATE,
+    Likeness,
     executed_signal,
     filtered_signal,
+    measure_likeness,
     planned_signal,
     sampling_rate,
 )

@@ -42,8 +42,9 @@ class Controller:
         slew_limit: largest change of a commanded joint velocity [rad/s2].
         integral_limit: largest correction by the integral part [rad/s].
         speed_share: share of the joint speed limits that a command may use, 0..1.
-        path_tolerance: distance of the tool from its path that ends the run [m].
-        angle_tolerance: angle of the tool to its orientation on the path that ends it [rad].
+        path_tolerance: largest distance of the tool from its path that is allowed [m]; the guard of a run
+            allows what the loop predicts and a margin (`experiment.prediction`), never more than this.
+        angle_tolerance: the same for the angle of the tool to its orientation on the path [rad].
         compensates_lag: with `uses_preview`: dead time and lag are identified apart; the feed-forward is
             ahead by the dead time and adds lag * joint acceleration.
         compensates_gear: with `uses_preview`: the waves of the gears are found from the movements run so far,
@@ -64,7 +65,7 @@ class Controller:
     slew_limit: Annotated[float, number(0.1, 200.0, "rad/s2")]
     integral_limit: Annotated[float, number(0.0, 3.0, "rad/s")]
     speed_share: Annotated[float, number(0.1, 1.0)]
-    path_tolerance: Annotated[float, number(0.0005, 0.05, "m")]
+    path_tolerance: Annotated[float, number(0.0005, 0.1, "m")]
     angle_tolerance: Annotated[float, number(0.005, 0.5, "rad")] = 0.035
     compensates_lag: Flag = False
     compensates_gear: Flag = False
@@ -75,7 +76,9 @@ class Controller:
 
     @staticmethod
     def paper(**numbers: Value) -> Controller:
-        """The paper's controller: PI and feed-forward of the current time.
+        """The paper's controller: PI and feed-forward of the current time; its gains are ours.
+
+        The paper gives none: they were chosen so that the SNR is near its Table I (docs/fidelity.md).
 
         Args:
             numbers: fields with other values, such as `gain_p=4.0`.
@@ -137,11 +140,13 @@ class Controller:
 FIELDS = fields_of(Controller)
 """What each field of a controller but its name may hold: for options, files and sweeps alike."""
 
-# As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers. Gains as
-# a cautious user sets them: a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so
-# that the integral does not overshoot. One acceleration for all joints and movements, between movej's
-# default of 1.4 that UR's manual shows in its speedj examples and the 5 that users raise it to. It cuts
-# corners, by 7.2 mm at worst (docs/tracking.md): hence the wider path tolerance.
+# As published (Fig. 3): PI and feed-forward of the current time. The paper gives no numbers: these are
+# ordinary ones, chosen once on the movements of the set `arcs` so that the mean SNR lay near the paper's. The
+# agreement is a calibration, not a prediction (docs/fidelity.md, "What the numbers of the demo prove"). They
+# are a tenth of the bound pi/2T of a 30-45 ms loop, gain_i = gain_p^2 / 8 so that the integral does not
+# overshoot, and one acceleration for all joints, between movej's default of 1.4 and the 5 that users raise it
+# to. It cuts corners, and a movement of .15 m in 1.5 s, which needs more acceleration, by up to 65 mm: hence
+# the wider tolerances; beyond the room of the clearances the predicted way is checked, too.
 _PAPER = Controller(
     name="paper",
     gain_p=4.0,
@@ -151,7 +156,8 @@ _PAPER = Controller(
     slew_limit=15.0,
     integral_limit=0.1,
     speed_share=0.95,
-    path_tolerance=0.010,
+    path_tolerance=0.08,
+    angle_tolerance=0.07,
 )
 
 # Feed-forward ahead by the identified delay; the robot's own ramp is made short (UR's client library
@@ -192,6 +198,11 @@ APPROACH = Controller(
 
 CONTROLLERS = MappingProxyType({config.name: config for config in (_PAPER, _PREVIEW, _BEST)})
 _BASE = word(CONTROLLERS)
+
+
+def controller_of_law(name: str) -> Controller:
+    """The numbers beside a law of a user: those of `preview` without feedback; the law may trail more."""
+    return replace(_PREVIEW, name=f"own law {name}", gain_p=0.0, gain_i=0.0, path_tolerance=0.01)
 
 
 def load_controller(name_or_file: str) -> Controller:

@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
-from pc_client.drawing.joining import Joined, least_gaps
-from pc_client.drawing.marks import Mark, marks_of
-from pc_client.drawing.pacing import factor_needed, least_factor, paced
-from pc_client.drawing.placement import Placement, PlacementOptions, inverse, place
+from pc_client.drawing.joining import Joined, factor_needed, least_factor, least_gaps, paced
+from pc_client.drawing.placement import Mark, Placement, PlacementOptions, inverse, marks_of, place
 from pc_client.errors import MovementError
 from pc_client.extraction.extract import Extraction
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.movements.movement import Movement
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Motion
+from pc_client.movements.sigma_lognormal import Motion, SigmaLognormal
 
 __all__ = ["Drawing", "make_drawing", "spatial"]
 

@@ -7,7 +7,7 @@ both over all parts that move, while the pen is down. What is compared with the 
 time stamps, all signals through the same first difference, neither shifted nor smoothed. The figures of
 fluency are those of `analysis.human_likeness`; the executed signal is low-passed for them, see `execution`.
 
-Source: section 3.3 of the theory notes.
+Source: docs/extraction.md, section 1.
 """
 
 from __future__ import annotations

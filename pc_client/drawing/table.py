@@ -1,4 +1,7 @@
-"""The figures of drawings in three forms: `draw.json` for programs, `draw.md` for documents, a rich table."""
+"""The figures of drawings for readers: `draw.json`, `draw.md`, a table for the terminal, and the page.
+
+The page is one file that needs no network and holds no date, host or path of this machine.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,15 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pc_client.analysis.report import provenance_facts as facts_of_runs
+from pc_client.analysis.report import provenance_facts
 from pc_client.drawing.drawing import Drawing
 from pc_client.drawing.execution import Execution
+from pc_client.drawing.figures import COLOURS, FIGURES
 from pc_client.drawing.judgement import Agreement, Verdict
 from pc_client.recording.provenance import Provenance
-from pc_client.results.tables import Column, finite, frame_of, to_markdown, to_rich
+from pc_client.results.pages import render, zoomable
+from pc_client.results.panels import Sheet
+from pc_client.results.tables import Column, finite, frame_of, to_html, to_markdown, to_rich
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -28,8 +34,7 @@ __all__ = [
     "drawing_rich",
     "drawings_json",
     "drawings_markdown",
-    "facts_of",
-    "provenance_facts",
+    "render_page",
     "table_of",
 ]
 
@@ -104,7 +109,7 @@ def table_of(verdict: Verdict) -> pl.DataFrame:
     return frame_of(rows, COLUMNS)
 
 
-def facts_of(entry: Entry) -> dict[str, str]:
+def _facts_of(entry: Entry) -> dict[str, str]:
     """What was done to a drawing, by name."""
     drawing, verdict = entry.drawing, entry.verdict
     placement = drawing.placement
@@ -138,15 +143,15 @@ def facts_of(entry: Entry) -> dict[str, str]:
     return report
 
 
-def provenance_facts(entries: Sequence[Entry]) -> dict[str, str]:
+def _common_facts(entries: Sequence[Entry]) -> dict[str, str]:
     """What all runs have in common."""
     runs = [execution.run for entry in entries for execution in entry.executions]
-    facts = facts_of_runs(runs)
+    facts = provenance_facts(runs)
     return {
         "robot": runs[0].provenance.robot,
         **{name: facts[name] for name in _COMMON_FACTS if name in facts},
         "runs": f"{len(runs)}, of {len(entries)} drawings",
-        "recordings": "belong to those who made them; see the licence beside the data (Omniglot: MIT)",
+        "recordings": "belong to those who made them; their licence is beside them",
     }
 
 
@@ -167,10 +172,10 @@ def drawings_json(entries: Sequence[Entry]) -> dict[str, Any]:
 
 def drawings_markdown(entries: Sequence[Entry]) -> str:
     """The text of `draw.md`."""
-    lines = ["# Human movements on the arm", "", *_list(provenance_facts(entries))]
+    lines = ["# Drawings on the arm", "", *_list(_common_facts(entries))]
     for entry in entries:
         lines += ["", f"## {entry.name}", "", to_markdown(table_of(entry.verdict), COLUMNS)]
-        lines += ["", *_list(facts_of(entry))]
+        lines += ["", *_list(_facts_of(entry))]
     return "\n".join(lines) + "\n"
 
 
@@ -232,3 +237,38 @@ def _agreement(**agreements: Agreement) -> dict[str, Any]:
 
 def _list(facts: Mapping[str, str]) -> list[str]:
     return [f"- {name}: {text}" for name, text in facts.items()]
+
+
+_TEMPLATE = "drawing/draw.html.j2"
+
+
+def render_page(entries: Sequence[Entry], sheets: Mapping[str, Mapping[str, Sheet]]) -> str:
+    """Return the text of `report.html`.
+
+    Args:
+        entries: the drawings, at least one.
+        sheets: `figures.sheets_of` each drawing, by its name.
+
+    Raises:
+        ModuleNotFoundError: matplotlib, jinja2 or plotly is not installed (extra `report`).
+    """
+    sections = [
+        {
+            "name": entry.name,
+            "verdict": entry.verdict,
+            "factor": entry.drawing.factor,
+            "table": to_html(table_of(entry.verdict), COLUMNS),
+            "facts": _facts_of(entry),
+            "pictures": {name: zoomable(sheet, FIGURES[name]) for name, sheet in sheets[entry.name].items()},
+        }
+        for entry in entries
+    ]
+    return render(
+        _TEMPLATE,
+        scripts=True,
+        sections=sections,
+        colours=COLOURS,
+        facts=_common_facts(entries),
+        origin=entries[0].executions[0].run.provenance.origin,
+        seed=entries[0].executions[0].run.provenance.seed,
+    )

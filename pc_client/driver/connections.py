@@ -87,6 +87,6 @@ class Connections:
 
     def _open_frames(self) -> RealtimeClient:
         transport = self.network.connect(self.host, self.ports.realtime, CONNECT_TIMEOUT)
-        frames = RealtimeClient(transport, self.network)
+        frames = RealtimeClient(transport, self.network, time_waits=self.info.lockstep)
         self._open.append(frames)
         return frames

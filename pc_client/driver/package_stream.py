@@ -16,16 +16,15 @@ from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.patience import LONGEST_STEP, Patience
 from protocol.primary.framing import SubPackage
-from protocol.primary.layout import CartesianInfo, RobotModeData
-from protocol.primary.message_codec import decode_message
+from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary.messages import (
     ErrorCodeMessage,
     ReportLevel,
     RobotMessage,
     RuntimeExceptionMessage,
     VersionMessage,
+    decode_message,
 )
-from protocol.primary.setup import ConfigurationData, KinematicsInfo
 from protocol.primary.state import decode_sub_package, split_state
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import OLDEST

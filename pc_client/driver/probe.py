@@ -13,7 +13,7 @@ from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import RobotInfo, read_robot_info
 from pc_client.driver.robot_report import RobotReport, make_report
-from pc_client.driver.transport import Network
+from pc_client.driver.transport import NO_ROUTE, Network
 from pc_client.errors import DriverError, UnknownHostError
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
@@ -49,16 +49,14 @@ class Diagnosis:
     """What answers at an address.
 
     Attributes:
-        open_ports: name and number of every port that accepts a connection.
-        closed_ports: the others.
+        ports: name, number and state of every port: `open`, `closed`, `no answer`, `no route`.
         info: which robot; None when its primary port does not answer.
         rhythm: of the frames; None when none come.
         report: what `experiment.preflight` judges; None when the robot does not report enough.
         obstacle: which connection prevents a session, or "".
     """
 
-    open_ports: dict[str, int]
-    closed_ports: dict[str, int]
+    ports: tuple[tuple[str, int, str], ...]
     info: RobotInfo | None
     rhythm: FrameRhythm | None
     report: RobotReport | None
@@ -77,17 +75,15 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
     Raises:
         UnknownHostError: there is no such robot to ask.
     """
-    found: dict[str, int] = {}
-    absent: dict[str, int] = {}
+    states: dict[str, str] = {}
     for item in fields(ports):
-        number = getattr(ports, item.name)
         try:
-            network.connect(host, number, _CONNECT_TIMEOUT).close()
-            found[item.name] = number
+            network.connect(host, getattr(ports, item.name), _CONNECT_TIMEOUT).close()
+            states[item.name] = "open"
         except UnknownHostError:
             raise
-        except DriverError:
-            absent[item.name] = number
+        except DriverError as error:
+            states[item.name] = _state(error)
     info: RobotInfo | None = None
     rhythm: FrameRhythm | None = None
     report: RobotReport | None = None
@@ -96,20 +92,35 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
         primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
         try:
             info = read_robot_info(network, host, ports.dashboard, primary)
-            rhythm, frame = _listen(network, host, ports.realtime, seconds)
+            rhythm, frame = _listen(network, host, ports.realtime, seconds, time_waits=info.lockstep)
             primary.poll()
             report = make_report(network, host, ports, info, frame, primary)
         finally:
             primary.close()
     except DriverError as error:
         obstacle = str(error)
-    if not obstacle and "secondary" in absent:
+    if report is not None and report.rtde is None and states["rtde"] == "open":
+        states["rtde"] = "open, but it does not answer as RTDE"
+    if not obstacle and states["secondary"] != "open":
         obstacle = f"the secondary port {ports.secondary} takes no programs"
-    return Diagnosis(found, absent, info, rhythm, report, obstacle)
+    numbered = tuple((name, getattr(ports, name), state) for name, state in states.items())
+    return Diagnosis(numbered, info, rhythm, report, obstacle)
 
 
-def _listen(network: Network, host: str, port: int, seconds: float) -> tuple[FrameRhythm, RealtimeFrame]:
-    frames = RealtimeClient(network.connect(host, port, _CONNECT_TIMEOUT), network)
+def _state(error: DriverError) -> str:
+    """Of a port that accepts no connection."""
+    match error.__cause__:
+        case TimeoutError():
+            return "no answer"
+        case OSError(errno=number) if number in NO_ROUTE:
+            return "no route"
+    return "closed"
+
+
+def _listen(
+    network: Network, host: str, port: int, seconds: float, *, time_waits: bool
+) -> tuple[FrameRhythm, RealtimeFrame]:
+    frames = RealtimeClient(network.connect(host, port, _CONNECT_TIMEOUT), network, time_waits=time_waits)
     stamps: list[float] = []
     arrivals: list[float] = []
     n_heartbeats = 0

@@ -1,7 +1,8 @@
 """Frames of the realtime port: in order, decoded, each known to be new or a heartbeat.
 
 A heartbeat is a frame that repeats the last time stamp: the robot's time stands still while it waits for us.
-Frames are never dropped here; the caller decides what to do with late ones.
+Of a robot that does not say that its time waits it is as good as no frame. New frames are never dropped here;
+the caller decides what to do with late ones.
 """
 
 from __future__ import annotations
@@ -14,10 +15,9 @@ from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
 from protocol.patience import LONGEST_STEP, Patience
 from protocol.realtime.layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayout, layout_for_size
-from protocol.ur_types import ProgramState
 
 FRAME_TIMEOUT = 1.0
-"""Without a frame for this long [s] the robot counts as gone."""
+"""Without a new frame for this long [s] the robot counts as gone."""
 
 _STOPPED_TIMEOUT = 120.0
 """The same for a robot whose time waits for its clients [s]: its arm does not move unattended, so a box that
@@ -43,6 +43,11 @@ class Arrival(NamedTuple):
     latest: RealtimeFrame
     n_heartbeats: int
 
+    @property
+    def stands_still(self) -> bool:
+        """The last frame repeats the time stamp of the one before."""
+        return not self.new or self.latest is not self.new[-1]
+
 
 class RealtimeClient:
     """Reads one realtime connection.
@@ -50,22 +55,22 @@ class RealtimeClient:
     Args:
         transport: the connected port.
         network: its clock, for the time-outs.
+        time_waits: the robot says that its time waits for its clients, as in lockstep.
 
     Attributes:
         last_stamp: newest time stamp seen [s], or None before the first frame.
-        time_waits: the robot's time stops when nothing waits for it: it has repeated a time stamp
-            while no program ran, which a real controller never does.
     """
 
-    __slots__ = ("_buffer", "_layout", "_network", "_transport", "last_stamp", "time_waits")
+    __slots__ = ("_buffer", "_layout", "_n_repeated", "_network", "_transport", "last_stamp", "time_waits")
 
-    def __init__(self, transport: Transport, network: Network) -> None:
+    def __init__(self, transport: Transport, network: Network, *, time_waits: bool) -> None:
         self._transport = transport
         self._network = network
         self._buffer = FrameBuffer(MAX_FRAME_SIZE)
         self._layout: RealtimeLayout | None = None
         self.last_stamp: float | None = None
-        self.time_waits = False
+        self.time_waits = time_waits
+        self._n_repeated = 0  # frames that are not reported yet
 
     @property
     def layout(self) -> RealtimeLayout:
@@ -90,20 +95,14 @@ class RealtimeClient:
         return self._transport.peer_address
 
     def receive(self) -> Arrival:
-        """Wait for at least one frame and take all that are there.
+        """Wait for at least one frame, a new one unless time waits, and take all that are there.
 
         Raises:
-            DriverError: no whole frame in time, the stream ended, or it is no realtime stream.
+            DriverError: no such frame in time, the stream ended, it is no such stream, or time runs back.
         """
-        buffer = self._buffer
         data = self._transport.receive(_STEP)
         try:
-            if data:
-                buffer.feed(data)
-                first = buffer.next_frame()
-                if first is not None:  # the usual case: exactly one frame
-                    return self._sort(first)
-            return self._receive_slowly(data)
+            return self._take(data) or self._receive_slowly(data)  # usually it is exactly one frame
         except RemoteProtocolError as error:
             raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
 
@@ -127,13 +126,11 @@ class RealtimeClient:
                     "150 kB a second: restart it, or look what else answers there"
                 )
             try:
-                self._buffer.feed(data)
-                first = self._buffer.next_frame()
-                if first is None:
-                    continue
-                arrival = self._sort(first)
+                arrival = self._take(data)
             except RemoteProtocolError as error:
                 raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
+            if arrival is None:
+                continue
             if taken is not None:
                 taken.new.extend(arrival.new)
                 arrival = Arrival(taken.new, arrival.latest, taken.n_heartbeats + arrival.n_heartbeats)
@@ -145,7 +142,7 @@ class RealtimeClient:
         self._transport.close()
 
     def _receive_slowly(self, data: bytes | None) -> Arrival:
-        """Go on until a whole frame is there."""
+        """Go on until there is such a frame."""
         waited, timeout = Patience(), self.patience(FRAME_TIMEOUT)
         waited.spent(self._network.now() - (_STEP if data is None else 0.0))
         while True:
@@ -153,14 +150,25 @@ class RealtimeClient:
                 raise DriverError("the robot closed the realtime connection")
             if waited.spent(self._network.now()) > timeout:
                 raise DriverError(
-                    f"no realtime frame for {timeout:g} s: the robot or the network to it is gone"
+                    f"no new realtime frame for {timeout:g} s: the robot or the network to it is gone"
                 )
             data = self._transport.receive(_STEP)
-            if data:
-                self._buffer.feed(data)
-                first = self._buffer.next_frame()
-                if first is not None:
-                    return self._sort(first)
+            if (arrival := self._take(data)) is not None:
+                return arrival
+
+    def _take(self, data: bytes | None) -> Arrival | None:
+        """The frames that are whole now; None if none is, or none is new of a robot whose time runs."""
+        if not data:
+            return None
+        self._buffer.feed(data)
+        first = self._buffer.next_frame()
+        if first is None:
+            return None
+        arrival = self._sort(first)
+        if arrival.new or self.time_waits:
+            return arrival
+        self._n_repeated = arrival.n_heartbeats
+        return None
 
     def _sort(self, first: bytes) -> Arrival:
         """Decode this frame and all that follow in the buffer; separate new ones from heartbeats."""
@@ -168,7 +176,7 @@ class RealtimeClient:
         if layout is None:
             layout = self._layout = layout_for_size(len(first))
         new: list[RealtimeFrame] = []
-        n_heartbeats = 0
+        n_heartbeats, self._n_repeated = self._n_repeated, 0
         raw: bytes | None = first
         while raw is not None:
             frame = layout.decode(raw)
@@ -178,12 +186,15 @@ class RealtimeClient:
                     f"the robot's frame has the time stamp {stamp:g} s, allowed are "
                     f"0 to {_LATEST_STAMP:g} s: restart the control box"
                 )
-            if stamp != self.last_stamp:
+            if self.last_stamp is None or stamp > self.last_stamp:
                 new.append(frame)
                 self.last_stamp = stamp
+            elif stamp < self.last_stamp:
+                raise DriverError(
+                    f"the robot's frames jump back from {self.last_stamp:.6f} s to {stamp:.6f} s, time must "
+                    "grow: restart the control box"
+                )
             else:
                 n_heartbeats += 1
-                if getattr(frame, "runtime_state", None) == ProgramState.STOPPED:  # old software has none
-                    self.time_waits = True
             raw = self._buffer.next_frame()
         return Arrival(new, frame, n_heartbeats)

@@ -8,11 +8,18 @@ from dataclasses import dataclass
 from pc_client.driver.dashboard_query import ask_dashboard
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.transport import Network
-from pc_client.recording.origin import origin_of
+from pc_client.errors import DriverError
+from pc_client.recording.origin import Source, origin_of
 from protocol.errors import RemoteProtocolError
-from protocol.primary.setup import ConfigurationData, KinematicsInfo
+from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.serial_numbers import SerialNumber, parse_serial
-from protocol.ur_types import SIMULATED_MASTERBOARD, SIMULATOR_CHECKSUM, RobotType, SoftwareVersion
+from protocol.ur_types import (
+    LOCKSTEP_MASTERBOARD,
+    SIMULATED_MASTERBOARD,
+    SIMULATOR_CHECKSUM,
+    RobotType,
+    SoftwareVersion,
+)
 
 _MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
 _SERIAL, _MODEL = "get serial number", "get robot model"
@@ -37,8 +44,10 @@ class RobotInfo:
         model: e.g. `UR3` or `UR5e`, or "unknown" when the robot does not report it.
         serial: serial number, or "unknown" when the dashboard server does not report it.
         simulated: True when the robot says so; False when its serial number is that of a real arm and it has
-            no mark of a simulator; None when it does not report this.
+            no mark of a simulator; None when this is not certain.
         seed: of an emulated arm; None for another, and when the robot does not report it.
+        lockstep: the robot says that its time waits for its clients, as that of an emulated box may.
+        has_calibration: False when its calibration checksums are all ones, as on the maker's simulator.
     """
 
     version: SoftwareVersion
@@ -46,11 +55,31 @@ class RobotInfo:
     serial: str
     simulated: bool | None
     seed: int | None
+    lockstep: bool
+    has_calibration: bool = True
 
     @property
     def period(self) -> float:
         """Control cycle [s]. Source: UR realtime client interface: 125 Hz on CB3, 500 Hz on e-Series."""
         return _E_SERIES_PERIOD if self.version.major >= 5 else _CB3_PERIOD
+
+    def check_same(self, model: str, serial: str) -> None:
+        """Refuse another robot than the one of this arm and serial number.
+
+        Raises:
+            DriverError: it is another one.
+        """
+        if (self.model, self.serial) != (model, serial):
+            raise DriverError(
+                f"another robot answers: {self.model}, serial number {self.serial}, must be {model}, "
+                f"serial number {serial}; look which robot has this address, and connect again"
+            )
+
+    @property
+    def source(self) -> Source:
+        """Columns of a table of the robot's data."""
+        names = ("robot", "software", "serial", "simulated")
+        return dict(zip(names, (self.model, str(self.version), self.serial, self.simulated), strict=True))
 
     def __str__(self) -> str:
         origin = origin_of(self.simulated).name
@@ -78,26 +107,32 @@ def read_robot_info(network: Network, host: str, dashboard_port: int, primary: P
     except RemoteProtocolError:  # software before 3.12 does not know the question
         serial = None
     model = answers.get(_MODEL, "")
+    kinematics = primary.newest(KinematicsInfo)
+    has_calibration = kinematics is None or set(kinematics.checksum) != {SIMULATOR_CHECKSUM}
     return RobotInfo(
         version,
         arm_name(model if _MODEL_NAME.fullmatch(model) else _model_in(configuration), version),
         UNKNOWN if serial is None else serial.text,
-        _is_simulated(serial, configuration, primary.newest(KinematicsInfo)),
+        _is_simulated(serial, configuration, has_calibration),
         None if serial is None else serial.seed,
+        configuration is not None and configuration.masterboard_version == LOCKSTEP_MASTERBOARD,
+        has_calibration,
     )
 
 
 def _is_simulated(
-    serial: SerialNumber | None, configuration: ConfigurationData | None, kinematics: KinematicsInfo | None
+    serial: SerialNumber | None, configuration: ConfigurationData | None, has_calibration: bool
 ) -> bool | None:
-    """Whether the robot is a simulated one; None when neither is certain."""
-    if configuration is not None and configuration.masterboard_version == SIMULATED_MASTERBOARD:
+    """Whether the robot is a simulated one; None when neither is certain.
+
+    A missing calibration proves nothing: a real arm may have lost its own.
+    """
+    marks = (SIMULATED_MASTERBOARD, LOCKSTEP_MASTERBOARD)
+    if configuration is not None and configuration.masterboard_version in marks:
         return True
-    if kinematics is not None and set(kinematics.checksum) == {SIMULATOR_CHECKSUM}:
+    if serial is not None and serial.simulated:
         return True
-    if serial is None:
-        return None
-    return True if serial.simulated else None if configuration is None else False
+    return None if serial is None or configuration is None or not has_calibration else False
 
 
 def _model_in(configuration: ConfigurationData | None) -> str:

@@ -8,11 +8,10 @@ from pc_client.driver.dashboard_query import ask_dashboard
 from pc_client.driver.package_stream import PackageStream
 from pc_client.driver.realtime_client import RealtimeClient
 from pc_client.driver.robot_info import UNKNOWN, RobotInfo, arm_name, read_robot_info
-from pc_client.driver.rtde_query import ask_rtde
+from pc_client.driver.rtde_query import RtdeAnswer, ask_rtde
 from pc_client.driver.transport import Network
 from pc_client.errors import DriverError
-from protocol.primary.layout import CartesianInfo, RobotModeData
-from protocol.primary.setup import ConfigurationData, KinematicsInfo
+from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports, RobotType
 
@@ -33,7 +32,7 @@ class RobotReport:
         frame: its state on port 30003.
         slider: speed slider, 0 to 1, from port 30001.
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
-        payload: mass [kg], by RTDE, since software 3.11.
+        rtde: software, joints, TCP pose and (since 3.11) payload on port 30004; None without RTDE.
         calibration: name of the arm's calibration in the maker's drivers, from port 30001.
         remote_control: clients may command the robot, from the dashboard server; e-Series, since 5.6.
         operational_mode: `NONE`, `MANUAL` or `AUTOMATIC`, from the dashboard server; e-Series, since 5.6.
@@ -44,10 +43,16 @@ class RobotReport:
     frame: RealtimeFrame
     slider: float | None
     tcp_offset: tuple[float, ...] | None
-    payload: float | None
+    rtde: RtdeAnswer | None
     calibration: str | None
     remote_control: bool | None
     operational_mode: str | None
+
+    @property
+    def payload(self) -> float | None:
+        """Mass [kg]. Only RTDE reports it on a CB3: frames of port 30003 have it from 5.10 on."""
+        value = None if self.rtde is None else self.rtde.values.get("payload")
+        return value if isinstance(value, float) else None
 
 
 def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
@@ -59,7 +64,8 @@ def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
     primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
     try:
         info = read_robot_info(network, host, ports.dashboard, primary)
-        frames = RealtimeClient(network.connect(host, ports.realtime, _CONNECT_TIMEOUT), network)
+        connection = network.connect(host, ports.realtime, _CONNECT_TIMEOUT)
+        frames = RealtimeClient(connection, network, time_waits=info.lockstep)
         try:
             frame = frames.receive().latest
         finally:
@@ -102,7 +108,7 @@ def make_report(
         frame=frame,
         slider=reported_slider(primary),
         tcp_offset=None if cartesian is None else cartesian.tcp_offset,
-        payload=_read_payload(network, host, ports),
+        rtde=ask_rtde(network, host, ports.rtde, ("actual_q", "actual_TCP_pose", "payload")),
         calibration=None if kinematics is None else kinematics.calibration,
         remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
         operational_mode=mode if mode in _OPERATIONAL_MODES else None,
@@ -128,15 +134,6 @@ def reported_slider(primary: PackageStream) -> float | None:
     """The speed slider, 0 to 1, as the port was last polled; None when it was not reported."""
     mode = primary.newest(RobotModeData)
     return None if mode is None else mode.target_speed_fraction
-
-
-def _read_payload(network: Network, host: str, ports: Ports) -> float | None:
-    """Ask for the mass of the payload [kg]; None when the robot does not report it.
-
-    Only RTDE reports it on a CB3: frames of port 30003 have it from 5.10 on.
-    """
-    value = ask_rtde(network, host, ports.rtde, "payload")
-    return value if isinstance(value, float) else None
 
 
 def _configured(configuration: ConfigurationData, info: RobotInfo) -> str:

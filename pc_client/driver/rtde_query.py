@@ -1,12 +1,18 @@
-"""One value from the RTDE port, for what no other port reports. An absent port is no error."""
+"""What the RTDE port says now: its software, and values of variables. An absent port is no error."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.rtde.client_connection import ClientEvent, DataReceived, RtdeClientConnection
-from protocol.rtde.messages import (
+from protocol.rtde.codec import (
+    GetControllerVersion,
+    GetControllerVersionReply,
+    Request,
     RequestProtocolVersion,
     RequestProtocolVersionReply,
     RtdeTextMessage,
@@ -16,6 +22,7 @@ from protocol.rtde.messages import (
     StartReply,
 )
 from protocol.rtde.types import REFUSALS, RtdeValue
+from protocol.ur_types import SoftwareVersion
 
 CONNECT_TIMEOUT = 2.0
 REPLY_TIMEOUT = 1.0
@@ -28,40 +35,57 @@ _RATE = 125.0
 """Packages a second: as many as every generation sends, the first one is enough."""
 
 
-def ask_rtde(network: Network, host: str, port: int, name: str) -> RtdeValue | None:
-    """Ask for an output variable.
+@dataclass(frozen=True, slots=True)
+class RtdeAnswer:
+    """What the RTDE port says.
+
+    Attributes:
+        version: of its controller's software.
+        values: of the variables that this software knows, all of one cycle.
+    """
+
+    version: SoftwareVersion
+    values: Mapping[str, RtdeValue]
+
+
+def ask_rtde(network: Network, host: str, port: int, names: tuple[str, ...]) -> RtdeAnswer | None:
+    """Ask for the software and for output variables.
 
     Args:
         network: makes the connection.
         host: the robot.
         port: its RTDE port.
-        name: of the variable.
+        names: of the variables; those that the software does not know are left out.
 
     Returns:
-        Its value now; None when there is no RTDE port, or this software does not know the variable.
+        None when there is no RTDE port, or no RTDE behind it.
     """
     try:
         connection = network.connect(host, port, CONNECT_TIMEOUT)
     except DriverError:
         return None
     try:
-        return _first_value(_Events(connection, network), name)
+        return _answer(_Events(connection, network), names)
     except (DriverError, RemoteProtocolError):
         return None
     finally:
         connection.close()
 
 
-def _first_value(events: _Events, name: str) -> RtdeValue | None:
-    for request in (RequestProtocolVersion(2), SetupOutputs((name,), _RATE), Start()):
-        match events.reply(request):
-            case RequestProtocolVersionReply(False) | StartReply(False):
-                return None
-            case SetupOutputsReply(types) if not REFUSALS.isdisjoint(types):
-                return None
-    for _ in range(_MOST_PACKAGES):
-        if isinstance(event := events.next(), DataReceived):
-            return event.values[0]
+def _answer(events: _Events, names: tuple[str, ...]) -> RtdeAnswer | None:
+    if events.reply(RequestProtocolVersion(2)) != RequestProtocolVersionReply(True):
+        return None
+    version = events.reply(GetControllerVersion())
+    types = events.reply(SetupOutputs(names, _RATE))
+    if not isinstance(version, GetControllerVersionReply) or not isinstance(types, SetupOutputsReply):
+        return None
+    known = tuple(name for name, word in zip(names, types.types, strict=True) if word not in REFUSALS)
+    if known != names:  # one refused variable refuses the recipe
+        events.reply(SetupOutputs(known, _RATE))
+    if events.reply(Start()) == StartReply(True):
+        for _ in range(_MOST_PACKAGES):
+            if isinstance(event := events.next(), DataReceived):
+                return RtdeAnswer(version.version, dict(zip(event.names, event.values, strict=True)))
     return None
 
 
@@ -73,7 +97,7 @@ class _Events:
         self._network = network
         self._rtde = RtdeClientConnection()
 
-    def reply(self, request: RequestProtocolVersion | SetupOutputs | Start) -> ClientEvent:
+    def reply(self, request: Request) -> ClientEvent:
         """Ask, and wait for the answer."""
         self._connection.send(self._rtde.send(request))
         return self.next()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import select
 import socket
 import time
@@ -23,11 +24,16 @@ MOST_WAITING = 16 << 20
 sender. A peer that sends more while it is read without a pause floods us."""
 
 
+NO_ROUTE = (errno.EHOSTUNREACH, errno.ENETUNREACH)
+"""Nothing on the way to the address knows it: not the robot, which says nothing, but the network."""
+
 _EAGER_TIME = 300e-6
 """How long to look again and again before sleeping [s]: twice a cycle of an emulated box in lockstep."""
 
 _LONGEST_PAUSE = 32
 """Most waits in a row that are not tried eagerly: on a real arm that leaves one try in a quarter second."""
+
+_HOST_AND_PORT = re.compile(r"\[.*\]:\d+|[^:]*:\d+")
 
 _SEND_TIMEOUT = 5.0
 """A peer that takes nothing for this long [s] is gone."""
@@ -244,9 +250,10 @@ class TcpNetwork:
         except UnicodeError as error:  # of the codec for host names
             raise UnknownHostError(f"{host[:60]!r} is no host name or address") from error
         except socket.gaierror as error:
-            raise UnknownHostError(
-                f"{host}:{port} cannot be looked up: check the robot's name or address"
-            ) from error
+            remedy = "check the robot's name or address"
+            if _HOST_AND_PORT.fullmatch(host):
+                remedy = "give the name or address alone; --port-base (in Python: ports) sets the ports"
+            raise UnknownHostError(f"{host} cannot be looked up: {remedy}") from error
         except OSError as error:
             raise DriverError(f"{host}:{port} {_reason(error)}") from error
         return TcpTransport(connected, f"{host}:{port}")
@@ -284,6 +291,8 @@ def _reason(error: OSError) -> str:
         return "does not answer: check the address, the cable and that the robot is switched on"
     if isinstance(error, ConnectionRefusedError):
         return "refuses the connection: is the control box up, and is --port-base right?"
+    if error.errno in NO_ROUTE:
+        return "cannot be reached, there is no route to it: check the address and this computer's network"
     if error.errno == errno.EADDRINUSE:
         return "another program uses the port: end it, or give another --reverse-port (0: any free one)"
     if isinstance(error, (ConnectionResetError, BrokenPipeError, ConnectionAbortedError)):

@@ -37,7 +37,7 @@ from pc_client.driver.watchdog import (
     check_slider,
     is_stopped,
 )
-from pc_client.errors import DriverError
+from pc_client.errors import DriverError, RobotStoppedError, full_message
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 
@@ -56,8 +56,6 @@ class UrDriver:
     Attributes:
         info: which robot answered.
         layout: columns of its realtime frames.
-        time_waits: the robot's time stood still at the start of every stream so far, as in lockstep; a robot
-            in real time that repeats a frame now and then does not do so each time.
     """
 
     def __init__(
@@ -71,7 +69,6 @@ class UrDriver:
         self._robot = robot = Connections(network or TcpNetwork(), host, ports or Ports.standard())
         self._watch = ProgramWatch(robot)
         self._in_motion = False
-        self.time_waits = True
         try:
             robot.open(reverse_port)
         except BaseException:
@@ -177,11 +174,24 @@ class UrDriver:
                     raise watch.explain(error) from error
                 watch.wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
                 wait_for_rest(frames, robot.network)
+        except RobotStoppedError:
+            raise
+        except DriverError as error:
+            self._raise_safety_stop(error)
+            raise
         finally:
             if reverse is not None:
                 reverse.close()
-        self.time_waits &= report.time_waits
         return report
+
+    def _raise_safety_stop(self, error: DriverError) -> None:
+        """Raise a safety stop that the robot reports now: it may be the cause of an error, or its effect."""
+        try:
+            check_safety(self.read_frame())
+        except RobotStoppedError as stop:
+            raise RobotStoppedError(f"{stop}; before that: {full_message(error)}") from error
+        except DriverError:
+            pass  # a robot that is gone reports nothing
 
     def stop(self, reverse: Transport | None) -> None:
         """Bring the arm to rest, by every available method.

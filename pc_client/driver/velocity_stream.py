@@ -66,10 +66,6 @@ class CommandSource(Protocol[S_co]):
 RowSink = Callable[[RealtimeFrame, S], None]
 """Takes every new frame with what the source made of it."""
 
-_LONGEST_STANDSTILL = 5.0
-"""Seconds of our clock that the robot's time may stand still: a command must have been lost. Longer where
-time waits for clients: it may wait for another one that is stopped."""
-
 _FRAMES_BEFORE_START = 3
 """New frames after which a robot counts as one whose time runs by itself."""
 
@@ -93,7 +89,6 @@ class StreamReport:
         late_frames: new frames that got no command of their own because a newer one was already there.
         lost_frames: cycles whose frame never came.
         heartbeats: frames that repeated a time stamp.
-        time_waits: the robot repeated a frame before its program had a command, as in lockstep.
         robot_time: [s] from the first to the last frame, by the robot's stamps.
         wall_time: [s] of the same by our clock.
     """
@@ -102,7 +97,6 @@ class StreamReport:
     late_frames: int = 0
     lost_frames: int = 0
     heartbeats: int = 0
-    time_waits: bool = False
     robot_time: float = 0.0
     wall_time: float = 0.0
 
@@ -216,16 +210,15 @@ class VelocityStream:
             arrival = self._frames.receive()
             report.heartbeats += arrival.n_heartbeats
             n_new += len(arrival.new)
-            stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
+            stands_still = self._frames.time_waits and arrival.stands_still
             if stands_still or n_new >= _FRAMES_BEFORE_START:
                 if stands_still or is_at_full_speed(arrival.latest) or n_new >= longest:
-                    report.time_waits = stands_still
                     return arrival.latest
                 self._reverse.send(encode_velocity(VelocityMode.HOLD))
 
     def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
         """Skip heartbeats until time goes on."""
-        waited, longest = Patience(), self._frames.patience(_LONGEST_STANDSTILL)
+        waited, longest = Patience(), self._frames.patience(READ_TIMEOUT)
         while True:
             arrival = self._frames.receive()
             report.heartbeats += arrival.n_heartbeats
@@ -250,9 +243,8 @@ class VelocityStream:
             stamp = frame.timestamp
             gap = stamp - last_stamp
             if gap < _SHORTEST_GAP * self._period:
-                back = "back " if gap < 0.0 else ""
                 raise DriverError(
-                    f"the robot's frames jump {back}from {last_stamp:.6f} s to {stamp:.6f} s, a cycle is "
+                    f"the robot's frames jump from {last_stamp:.6f} s to {stamp:.6f} s, a cycle is "
                     f"{self._period:g} s: the stream is broken"
                 )
             if gap > 1.5 * self._period:

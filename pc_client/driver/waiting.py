@@ -80,8 +80,9 @@ def wait_for_rest(frames: RealtimeClient, network: Network) -> RealtimeFrame:
     while True:
         arrival = frames.receive()
         rested = [has_rested(frame) for frame in arrival.new]
-        stands_still = not arrival.new or arrival.latest is not arrival.new[-1]
-        if (rested and rested[-1]) or (stands_still and is_at_rest(arrival.latest)):
+        if (rested and rested[-1]) or (
+            frames.time_waits and arrival.stands_still and is_at_rest(arrival.latest)
+        ):
             return arrival.latest
         if waited.spent(network.now()) > REST_TIMEOUT:
             raise DriverError(f"the arm did not come to rest within {REST_TIMEOUT:g} s")

@@ -24,7 +24,8 @@ _FULL_SPEED = 0.999
 """Speed slider and speed scaling count as 1 from here on; the pendant shows whole percents."""
 
 _HOW_TO_GO_ON = {
-    SafetyMode.PROTECTIVE_STOP: "find the cause, then unlock the protective stop on the pendant",
+    SafetyMode.PROTECTIVE_STOP: "find the cause, then unlock the protective stop on the pendant, or "
+    "after 5 s by 'unlock protective stop' on the dashboard port",
     SafetyMode.SAFEGUARD_STOP: "leave the guarded area, then reset the safeguard",
     SafetyMode.SYSTEM_EMERGENCY_STOP: "release the emergency stop and start the robot again",
     SafetyMode.ROBOT_EMERGENCY_STOP: "release the emergency stop and start the robot again",

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from pc_client.experiment.prepare import Experiment
-from pc_client.planning.plan_report import PlanReport
+from pc_client.planning.checks import PlanReport
 from protocol.ur_types import JOINT_NAMES
 
 

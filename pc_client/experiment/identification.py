@@ -24,10 +24,16 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError, GainMarginError
+from pc_client.experiment.command_check import posture_complaint, way_to_rest
+from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import RobotModel
+from pc_client.planning.limits import limits_of
 from protocol.realtime.layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
+
+_N_CHECKED = 65
+"""Postures of the excitation that are checked: 16 to a pulse, less than 4 mrad apart."""
 
 _RETURN_TOLERANCE = 2e-3
 """How far from where it began the excitation may leave a joint [rad]."""
@@ -91,15 +97,15 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
         What was found, and what happened on the wire.
 
     Raises:
-        DriverError: the stream broke, or the arm did not follow.
+        DriverError: the excitation leads out of the limits, the stream broke, or the arm did not follow.
         GainMarginError: the controller would be unstable, or nearly.
     """
     period = driver.info.period
     q_start = driver.actual_q()
+    check_excitation(q_start, config, model)
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
     open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
-    knows_lag = config.compensates_lag or config.compensates_gear or config.uses_ilc
-    excitation = Excitation(q_start.tolist(), BRISK_PULSE if knows_lag else PULSE)
+    excitation = _excitation(q_start, config)
     table = ReferenceTable(excitation, period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0)
     stamps: list[float] = []
     commands: list[list[float]] = []
@@ -119,7 +125,7 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
         if late := report.late_frames + report.lost_frames:
             error.add_note(f"{late} of {len(t)} commands came late: is the computer or network too busy?")
         raise
-    if knows_lag:
+    if _needs_lag(config):
         loop = identify_loop(t, qd_cmd, q, period)
     else:
         loop = LoopModel.of_delay(estimate.delay, estimate.residual)
@@ -137,6 +143,30 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
         margins=margins,
         learning=learning_filter(config, loop, period),
     ), report
+
+
+def check_excitation(q_start: NDArray[np.float64], config: Controller, model: RobotModel) -> None:
+    """Check the excitation at a posture (6,) [rad], and the way to rest from each of its points.
+
+    Raises:
+        DriverError: it leads out of a joint range, or too near to floor, arm or cell.
+    """
+    excitation = _excitation(q_start, config)
+    motion = [excitation.at(float(t)) for t in np.linspace(0.0, excitation.duration, _N_CHECKED)]
+    q, qd = (np.array(rows) for rows in zip(*motion, strict=True))
+    if complaint := posture_complaint(clearance_model(model), limits_of(model), way_to_rest(model, q, qd)):
+        raise DriverError(
+            f"the loop cannot be identified at the start of the first movement: {complaint}; "
+            "move the movement's start away from it"
+        )
+
+
+def _excitation(q_start: NDArray[np.float64], config: Controller) -> Excitation:
+    return Excitation(q_start.tolist(), BRISK_PULSE if _needs_lag(config) else PULSE)
+
+
+def _needs_lag(config: Controller) -> bool:
+    return config.compensates_lag or config.compensates_gear or config.uses_ilc
 
 
 def _check_return(drift: NDArray[np.float64]) -> None:

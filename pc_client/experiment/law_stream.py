@@ -1,26 +1,25 @@
 """A velocity law of a user on the arm: six velocities for each frame, under the watchdog of every motion.
 
-Such a motion has no plan. So before a velocity is sent, the posture in which the arm would
-come to rest if it were stopped now is held against joint ranges and clearances, as a plan's postures are.
+Such a motion has no plan. So before a velocity is sent, the way on which the arm would come to rest if it
+were stopped now is held against joint ranges and clearances, as a plan's postures are.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.driver.receiver_script import STOP_DECELERATION
+from pc_client.control.tracker import six_velocities
 from pc_client.errors import DriverError
-from pc_client.kinematics.agreement import check_flange
+from pc_client.experiment.command_check import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.forward import check_flange
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.limits import limits_of
 from protocol.realtime.layout import RealtimeFrame
-from protocol.ur_types import JOINT_NAMES
 
 Array = NDArray[np.float64]
 
@@ -29,9 +28,6 @@ VelocityLaw = Callable[[RealtimeFrame], Sequence[float] | Array | None]
 
 ACCELERATION = 5.0
 """Of the robot's `speedj` [rad/s2], of the leading joint, where a user names no other."""
-
-_REACTION = 0.1
-"""From a frame to the start of the robot's ramp [s]: the loop's delay, and the robot's patience with us."""
 
 _SPEED_SHARE = 0.95
 """Of the joint speed limits that a law may use, as the controllers do."""
@@ -80,9 +76,8 @@ class LawStream:
         qd = self._law(frame)
         if qd is None:
             return LawStep(_REST, True)
-        velocities = _six(qd)
-        self._check_path(frame.actual_q, velocities)
-        self._last = velocities.tolist()
+        self._last = six_velocities(qd)
+        self._check_way(frame, np.array(self._last))
         return LawStep(self._last, False)
 
     def observe(self, stamp: float) -> LawStep:
@@ -93,47 +88,14 @@ class LawStream:
         """Refuse a report whose joint angles (6,) [rad] and TCP pose (6,) [m, rad] do not belong together.
 
         Raises:
-            DriverError: they are further apart than `kinematics.agreement` allows.
+            DriverError: they are further apart than `kinematics.forward` allows.
         """
         check_flange(self._model, q, pose)
 
-    def _check_path(self, q: Array, qd: Array) -> None:
-        """Refuse velocities from which the arm could not stop inside its limits."""
-        braking = _REACTION + float(np.abs(qd).max()) / (2.0 * STOP_DECELERATION)
-        at_rest = q + braking * qd
-        arm, margin = self._model.limits, self._limits.position_margin
-        left = np.minimum(at_rest - np.array(arm.q_min), np.array(arm.q_max) - at_rest)
-        joint = int(left.argmin())
-        if not left[joint] >= margin:
-            raise DriverError(
-                f"the velocity law drives {JOINT_NAMES[joint]} to {math.degrees(at_rest[joint]):.0f} deg, "
-                f"within {math.degrees(margin):.1f} deg of the end of its range: the arm was stopped"
-            )
-        clearance = self._clearance.along(at_rest)
-        for distances, least in (
-            (clearance.floor, self._limits.floor_clearance_min),
-            (clearance.own, self._limits.own_clearance_min),
-            (clearance.cell, self._limits.cell_clearance_min),
-        ):
-            if not (distance := float(distances.least[0])) >= least:
-                raise DriverError(
-                    f"the velocity law leads too near: {distances.nearest[0].says(distance, least)}: "
-                    "the arm was stopped"
-                )
-
-
-def _six(qd: Sequence[float] | Array) -> Array:
-    """The velocities (6,) [rad/s] that a law gave.
-
-    Raises:
-        DriverError: they are no six finite numbers.
-    """
-    try:
-        velocities = np.asarray(qd, dtype=np.float64)
-    except (TypeError, ValueError):
-        velocities = np.zeros(0)
-    if velocities.shape != (6,) or not np.isfinite(velocities).all():
-        raise DriverError(
-            f"the velocity law gave {str(qd)[:100]}: give six finite velocities in rad/s, or None to end"
-        )
-    return velocities
+    def _check_way(self, frame: RealtimeFrame, qd: Array) -> None:
+        """Refuse velocities (6,) [rad/s] from which the arm, as it moves now, cannot stop in its limits."""
+        measured = frame.actual_qd
+        fastest = np.where(np.abs(measured) > np.abs(qd), measured, qd)
+        way = way_to_rest(self._model, frame.actual_q, fastest)
+        if complaint := posture_complaint(self._clearance, self._limits, way):
+            raise DriverError(f"the velocity law leads out of the limits: {complaint}: the arm was stopped")

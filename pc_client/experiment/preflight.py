@@ -24,13 +24,16 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import DriverError
-from pc_client.kinematics.agreement import ROTATION_TOLERANCE, flange_difference
 from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.forward import ROTATION_TOLERANCE, flange_difference
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
 from protocol.ur_types import JOINT_NAMES
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)
 """How far from the flange the TCP may be [m, rad]: what a pendant rounds."""
+
+_RTDE_TOLERANCE = (0.02, 0.05)
+"""How far port 30004 may see the arm from where port 30003 does [m, rad]: a moment lies between the two."""
 
 _PAYLOAD_TOLERANCE = 0.05
 """Of the mass [kg]. Its weight is 0.5 N, a sixth of the noise of the controller's own force estimate."""
@@ -135,6 +138,28 @@ def payload(report: RobotReport, model: RobotModel | None) -> Condition:
     )
 
 
+def _rtde(report: RobotReport, model: RobotModel | None) -> Condition:
+    """Port 30004 belongs to the arm of port 30003: same software, joints and TCP."""
+    rtde, frame, version = report.rtde, report.frame, report.info.version
+    most, most_angle = _RTDE_TOLERANCE
+    reported, holds = "", None
+    if rtde is not None:
+        said = [rtde.values.get(name) for name in ("actual_q", "actual_TCP_pose")]
+        q, pose = (six if isinstance(six, tuple) and len(six) == 6 else (np.nan,) * 6 for six in said)
+        angle = float(np.abs(np.subtract(q, frame.actual_q)).max())
+        distance = float(np.abs(np.subtract(pose, frame.actual_tcp_pose)[:3]).max())
+        reported = f"{rtde.version}, {distance * 1e3:.0f} mm, {angle * 1e3:.0f} mrad from port 30003"
+        same = (rtde.version.major, rtde.version.minor) == (version.major, version.minor)
+        holds = same and distance <= most and angle <= most_angle
+    return Condition(
+        "RTDE",
+        reported,
+        f"{version}, within {most * 1e3:g} mm, {most_angle * 1e3:g} mrad",
+        "another controller answers on its port: check what forwards the ports, and the ports given",
+        holds,
+    )
+
+
 def _joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
     """Every joint stands within the range that plans use."""
     if model is None:
@@ -154,8 +179,7 @@ def _joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
 
 def _control(report: RobotReport, model: RobotModel | None) -> Condition:
     """Clients may command the robot; the maker's simulator obeys them in local control, too."""
-    is_makers = bool(report.info.simulated) and report.info.seed is None
-    return control(report.remote_control, obeys_in_local=is_makers)
+    return control(report.remote_control, obeys_in_local=not report.info.has_calibration)
 
 
 def operational_mode(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -185,6 +209,7 @@ CONDITIONS: tuple[Check, ...] = (
     _forward_kinematics,
     payload,
     _joint_angles,
+    _rtde,
 )
 """What a robot must fulfil, in the order in which it is shown: what explains the others comes first."""
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,8 +16,7 @@ from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
 from pc_client.movements.files import load_motion
 from pc_client.movements.geometry import LIBRARY_SHIFTS, Similarity
-from pc_client.movements.joint_trajectory import JointTrajectory
-from pc_client.movements.movement import Movement
+from pc_client.movements.movement import JointTrajectory, Movement
 from pc_client.movements.movement_file import movement_text
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.planning.plan import JointPlan, plan_joints, plan_movement
@@ -41,6 +43,10 @@ class Plan:
     joints: JointPlan
     text: str
 
+    def __repr__(self) -> str:
+        arm = ROBOTS[self.joints.report.robot].title
+        return f"<Plan of {self.movement.name!r} for a {arm}: {self.joints.duration:.2f} s>"
+
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
@@ -51,25 +57,32 @@ class Experiment:
         planned: the movements, in order.
         repeat: runs of each.
         out: folder of the recordings.
+        overwrite: replace simulated recordings of the same names.
 
     Raises:
-        ClientError: nothing to repeat, or a plan was made for another arm or another cell.
+        ClientError: nothing to repeat, two plans of one name, or a plan was made for another arm or another
+            cell.
     """
 
     model: RobotModel
     planned: tuple[Plan, ...]
     repeat: int
     out: Path
+    overwrite: bool = False
 
     def __post_init__(self) -> None:
         if self.repeat < 1:
             raise ClientError(f"{self.repeat} runs of each movement is nothing to do; give at least one")
-        for plan in self.planned:
+        names = [plan.movement.name for plan in self.planned]
+        for name, plan in zip(names, self.planned, strict=True):
+            if names.count(name) > 1:
+                raise ClientError(
+                    f"two plans are called {name!r}: their recordings would overwrite each other; rename one"
+                )
             report = plan.joints.report
             if report.robot != self.model.name or report.cell != self.model.cell:
                 raise ClientError(
-                    f"{plan.movement.name} was planned for a {ROBOTS[report.robot].title} "
-                    f"({report.cell.summary}), "
+                    f"{name} was planned for a {ROBOTS[report.robot].title} ({report.cell.summary}), "
                     f"this arm is a {self.model.title} ({self.model.cell.summary}): "
                     "plan it for this arm"
                 )
@@ -92,18 +105,11 @@ def load_movements(sources: Sequence[str | Path]) -> list[Motion]:
 
     Raises:
         MovementError: a movement is unknown or makes no sense.
-        ClientError: none is given, or two have the same name.
+        ClientError: none is given.
     """
     if not sources:
         raise ClientError("no movement is given; name at least one")
-    movements = [load_motion(source) for source in sources]
-    names = [movement.name for movement in movements]
-    for name in names:
-        if names.count(name) > 1:
-            raise ClientError(
-                f"two movements are called {name!r}; their recordings would overwrite each other"
-            )
-    return movements
+    return [load_motion(source) for source in sources]
 
 
 def prepare_experiment(
@@ -120,7 +126,7 @@ def prepare_experiment(
 
     Raises:
         PlanningError: a movement cannot be done by the arm, or there is no model of it.
-        ClientError: nothing to repeat.
+        ClientError: nothing to repeat, or two movements of one name.
     """
     model = robot_model(robot, cell)
     planned = tuple(make_plan(movement, model) for movement in movements)
@@ -146,15 +152,18 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
     return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), _text_of(motion))
 
 
-def clear_folder(experiment: Experiment) -> None:
-    """Make the folder ready: create it, take away recordings that this experiment records again.
+def check_folder(experiment: Experiment) -> list[Path]:
+    """Refuse a folder with recordings that this experiment must not replace; nothing is changed.
 
-    Only simulated ones are taken away: they can be made again by the seed, those of a real arm cannot, and
-    where it is not known, the arm may have been a real one.
+    Only simulated ones may be replaced, with `overwrite`: they can be made again by the seed, those of a
+    real arm cannot, and where it is not known, the arm may have been a real one.
+
+    Returns:
+        The files that this experiment replaces.
 
     Raises:
-        RecordingError: the folder cannot be written, or holds recordings of another experiment, or of an arm
-            that is not known to be simulated.
+        RecordingError: the folder cannot be read, or holds recordings of another experiment, of an arm that
+            is not known to be simulated, or, without `overwrite`, of this experiment.
     """
     ours = {
         experiment.recording_path(planned, k + 1)
@@ -162,22 +171,57 @@ def clear_folder(experiment: Experiment) -> None:
         for k in range(experiment.repeat)
     }
     try:
-        experiment.out.mkdir(parents=True, exist_ok=True)
-        old = set(experiment.out.glob("*.mcap"))
-        if foreign := sorted(old - ours):
+        old = sorted(experiment.out.glob("*.mcap"))
+        if foreign := [path.name for path in old if path not in ours]:
             raise RecordingError(
-                f"{experiment.out} holds recordings of another experiment ({foreign[0].name}); "
+                f"{experiment.out} holds recordings of another experiment ({foreign[0]}); "
                 "give another folder, or delete them"
             )
-        for path in sorted(old):
-            _refuse_to_lose(path)
+        for path in old:
+            _refuse_to_lose(path, experiment.overwrite)
+    except OSError as error:
+        raise _unusable(experiment, error) from error
+    return old
+
+
+def clear_folder(experiment: Experiment) -> None:
+    """Make the folder ready: create it, take away the recordings that this experiment replaces.
+
+    Raises:
+        RecordingError: see `check_folder`; or the folder cannot be written.
+    """
+    old = check_folder(experiment)
+    try:
+        experiment.out.mkdir(parents=True, exist_ok=True)
         for path in old:
             path.unlink()
     except OSError as error:
-        raise RecordingError(f"cannot use the folder {experiment.out}: {error.strerror or error}") from error
+        raise _unusable(experiment, error) from error
 
 
-def _refuse_to_lose(path: Path) -> None:
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A folder for recordings that are not asked for, in the temporary folder of the system.
+
+    It is removed, but after an error it stays with the recordings that it holds, and the error names it.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="ur-client-incident-"))
+    try:
+        yield folder
+    except BaseException as error:
+        if not any(folder.iterdir()):
+            folder.rmdir()
+        elif not any(str(folder) in note for note in getattr(error, "__notes__", ())):
+            error.add_note(f"recordings of the runs before: {folder}")
+        raise
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def _unusable(experiment: Experiment, error: OSError) -> RecordingError:
+    return RecordingError(f"cannot use the folder {experiment.out}: {error.strerror or error}")
+
+
+def _refuse_to_lose(path: Path, overwrite: bool) -> None:
     try:
         provenance = load_recording(path).provenance
     except RecordingError as error:
@@ -190,6 +234,8 @@ def _refuse_to_lose(path: Path) -> None:
             f"{path} is a recording {whose} ({provenance.origin.says}); it is not overwritten, "
             "give another folder"
         )
+    if not overwrite:
+        raise RecordingError(f"{path} exists: give another folder, or --overwrite (overwrite=True)")
 
 
 def _text_of(movement: Movement) -> str:

@@ -12,29 +12,25 @@ from pathlib import Path
 
 from pc_client.control.controller import Controller
 from pc_client.control.gear import GearObserver, MotorReference
+from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
-from pc_client.control.tracker import Tracker, TrackerStep
+from pc_client.control.tracker import ControlLaw, Tracker, TrackerStep
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.approach_run import run_approach
-from pc_client.experiment.identification import Identification, identify
+from pc_client.experiment.identification import Identification, check_excitation, identify
 from pc_client.experiment.observer import Observer, Silent
+from pc_client.experiment.prediction import LEAD, SETTLE, guarded, shortest_loop
 from pc_client.experiment.preflight import preflight, require
 from pc_client.experiment.prepare import Experiment, Plan, clear_folder
 from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.kinematics.arm_tree import arm_tree
-from pc_client.planning.approach import plan_approach
+from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
 from protocol.realtime.layout import RealtimeFrame
 from ur_hil import tool_version
-
-LEAD = 0.2
-"""Time at rest before a movement, position loop closed [s]: takes up what the approach left."""
-
-SETTLE = 0.3
-"""Time at rest after it, position loop closed [s]."""
 
 
 @dataclass(slots=True)
@@ -62,6 +58,7 @@ class ExperimentRunner:
         experiment: what to do.
         config: the controller, the same for all runs.
         observer: gets the progress.
+        law: computes the commands in place of the controller.
     """
 
     def __init__(
@@ -70,7 +67,9 @@ class ExperimentRunner:
         experiment: Experiment,
         config: Controller,
         observer: Observer | None = None,
+        law: ControlLaw | None = None,
     ) -> None:
+        self._law = law
         self._driver = driver
         self._experiment = experiment
         self._config = config
@@ -86,39 +85,55 @@ class ExperimentRunner:
         """
         experiment, driver = self._experiment, self._driver
         require(preflight(driver.report(), experiment.model))
+        # The loop is identified where the first run begins; that run needs no further approach.
+        first = self._plan_approach(experiment.planned[0].joints)
+        check_excitation(first.plan.start_q, self._config, experiment.model)
+        self._guarded(shortest_loop(driver.info.period))
         clear_folder(experiment)
         self._observer.connected(driver.info)
-        # The loop is identified where the first run begins; that run needs no further approach.
-        there: JointPlan | None = self._approach(experiment.planned[0].joints)
+        there: JointPlan | None = self._approach(first)
         found, _ = identify(driver, self._config, experiment.model)
         self._observer.identified(found)
+        configs = self._guarded(found.loop)
         report = ExperimentReport(found)
-        pace = "lockstep" if driver.time_waits else "realtime"
+        pace = "lockstep" if driver.info.lockstep else "realtime"
         gears = GearObserver(found.loop, driver.info.period)
-        for planned in experiment.planned:
+        for planned, config in zip(experiment.planned, configs, strict=True):
             name = planned.movement.name
             repetitions = self._repetitions(found)
             for repetition in range(1, experiment.repeat + 1):
-                plan = self._approach(planned.joints) if there is None else there
+                plan = self._approach(self._plan_approach(planned.joints)) if there is None else there
                 there = None
                 if self._config.compensates_gear:
                     repetitions.renew(gears.model)
                 self._observer.running(name, repetition)
                 path = experiment.recording_path(planned, repetition)
                 provenance = self._provenance(planned, repetition, found, pace)
-                stream = self._record(path, planned, plan, provenance, found, repetitions, gears)
+                stream = self._record(path, planned, plan, config, provenance, found, repetitions, gears)
                 report.paths.append(path)
                 report.streams.append(stream)
                 self._observer.finished(name, repetition, path, stream)
             report.remarks += [f"{name}: {remark}" for remark in repetitions.remarks]
         return report
 
-    def _approach(self, plan: JointPlan) -> JointPlan:
-        """Move slowly to the start of the plan; returns it in the turns where the arm is."""
-        approach = plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
+    def _plan_approach(self, plan: JointPlan) -> Approach:
+        return plan_approach(plan, self._driver.actual_q(), model=self._experiment.model)
+
+    def _approach(self, approach: Approach) -> JointPlan:
+        """Move slowly to the start of a plan; returns it in the turns where the arm is."""
         self._observer.approaching(approach)
         run_approach(self._driver, approach, self._experiment.model)
         return approach.plan
+
+    def _guarded(self, loop: LoopModel) -> list[Controller]:
+        """The controller with the tolerances of each movement on a loop; refuses what is beyond them.
+
+        What a user's law makes of a movement is not known: its tolerances stay.
+        """
+        if self._law is not None:
+            return [self._config] * len(self._experiment.planned)
+        model, period = self._experiment.model, self._driver.info.period
+        return [guarded(one.joints, self._config, model, loop, period) for one in self._experiment.planned]
 
     def _repetitions(self, found: Identification) -> Repetitions:
         """The memory of one movement, empty."""
@@ -148,13 +163,13 @@ class ExperimentRunner:
         path: Path,
         planned: Plan,
         plan: JointPlan,
+        config: Controller,
         provenance: Provenance,
         found: Identification,
         repetitions: Repetitions,
         gears: GearObserver,
     ) -> StreamReport:
         """Stream one run into one file; the repetitions and the gears learn from it."""
-        config = self._config
         table = self._table(planned, plan, found, repetitions)
         if not repetitions.may_use(plan, table):
             table = self._table(planned, plan, found, repetitions)
@@ -162,7 +177,7 @@ class ExperimentRunner:
         now = time.time_ns if provenance.pace == "realtime" else None
         with Recorder(path, provenance, self._signals, arm=self._arm, now=now) as recorder:
             stream = self._driver.stream(
-                Tracker(table, config, self._experiment.model),
+                Tracker(table, config, self._experiment.model, self._law),
                 _row_sink(recorder, log),
                 acceleration=config.speedj_acceleration,
             )
@@ -214,8 +229,8 @@ def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame
     def record(frame: RealtimeFrame, step: TrackerStep) -> None:
         point = step.point
         append(frame.values, step.t, point.q_array, point.qd_array, point.p, point.v, step.qd_cmd, step.phase)
-        if recorder.error is not None:
-            raise recorder.error
+        if (error := recorder.error) is not None:
+            raise error
         if log is not None:
             log.append(frame, step)
 

@@ -10,7 +10,7 @@ The positions are those of the virtual target points. Each belongs to the stroke
 stroke that begins there; moving one changes the movement only while these two strokes run, so the
 computations of a fit are local in time. Targets that may lie off the path are the idea of iDeLog.
 
-Source: sections 1.5 and 3 of the theory notes.
+Source: docs/theory.md, section 1; docs/extraction.md, section 5.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke, tilt_of_normal
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, tilt_of_normal
 
 __all__ = [
     "Bounds",

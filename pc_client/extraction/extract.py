@@ -12,7 +12,7 @@ The figures, over all parts of a recording that move, against the recording low-
 A signal so clean that the strokes could be fitted through the low-pass is judged through it, too: the filter
 flattens fast speed profiles in the recording, too.
 
-Source: sections 3.1 and 3.3 of the theory notes.
+Source: docs/extraction.md, section 1.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from pc_client.extraction.chain import Bounds, Chain, sigma_lognormal
 from pc_client.extraction.fitting import FitOptions, fit_parts, left_over
-from pc_client.extraction.recording import PenPart, PenRecording
+from pc_client.extraction.pen import PenPart, PenRecording
 from pc_client.extraction.smoothing import SmoothPart, moves, smooth_part, speed_peaks
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 

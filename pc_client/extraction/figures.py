@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pc_client.errors import printable
 from pc_client.extraction.extract import Extraction, PartExtraction
-from pc_client.movements.stroke import Motion
+from pc_client.movements.sigma_lognormal import Motion
 from pc_client.results.panels import Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.static import draw, figure, image_bytes
 from pc_client.results.theme import BLUE, RED, REFERENCE_GREY, SKY
@@ -80,7 +80,7 @@ def draw_overview(table: pl.DataFrame) -> bytes:
     """A batch: histograms of SNR_v, SNR_t and strokes per speed peak.
 
     Args:
-        table: `results.table_of` recordings; those in which nothing moves are passed over.
+        table: `batch.table_of` recordings; those in which nothing moves are passed over.
     """
     moving = table.drop_nulls("snr_v_db")
     figures = (

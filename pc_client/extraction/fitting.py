@@ -1,7 +1,11 @@
 """The sequence of a fit: first strokes, joint refinement, further strokes while they raise the SNR enough.
 
 All parts of a recording share one budget of strokes, and a further stroke goes to where most of the velocity
-is still unexplained, whichever part that is.
+is still unexplained, whichever part that is. Candidates are found by matched pursuit: the lognormal of some
+width at some time that reduces the energy of the residual velocity most is subtracted, and the search goes
+on; the strokes are refined together afterwards (`refine`).
+
+Source: the order of Robust XZERO (largest first, subtract, go on); docs/extraction.md, section 6.
 """
 
 from __future__ import annotations
@@ -9,17 +13,114 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.extraction.addition import best_candidates, idle_strokes
 from pc_client.extraction.chain import Bounds, Chain, inserted, with_chords, without
 from pc_client.extraction.initial import TYPICAL_SIGMA, initial_chain
 from pc_client.extraction.refine import Fit, FitTarget, refine, residuals
 from pc_client.extraction.smoothing import CUTOFF_HZ, SmoothPart, low_passed, velocity
 
-__all__ = ["FitOptions", "Fitted", "Scales", "fit_parts", "left_over"]
+__all__ = [
+    "Candidate",
+    "FitOptions",
+    "Fitted",
+    "Scales",
+    "best_candidates",
+    "fit_parts",
+    "left_over",
+]
+
+
+#: Widths (s) of the lognormals that are tried: of the strokes of handwriting, from hasty to calm.
+_TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
+_REACH = 3.0
+
+
+class Candidate(NamedTuple):
+    """A candidate stroke: its place, and the energy (squared velocity summed over samples) it explains."""
+
+    median: float
+    width: float
+    energy: float
+
+
+def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: int) -> list[Candidate]:
+    """The lognormals that reduce the energy of a residual velocity most, best first.
+
+    Args:
+        t: uniform times, (n,), s.
+        v_left: residual velocity, (n, dim).
+        count: how many at most.
+    """
+    step = float(t[1] - t[0])
+    left = np.array(v_left)
+    kernels = [_kernel(width / step) for width in _TRIED_WIDTHS_S]
+    found: list[Candidate] = []
+    gains = np.stack([_gains(left, kernel) for kernel in kernels])
+    for _ in range(count):
+        which, at = np.unravel_index(int(np.argmax(gains)), gains.shape)
+        energy = float(gains[which, at])
+        if energy <= 0.0:
+            break
+        found.append(Candidate(float(t[at]), _TRIED_WIDTHS_S[which], energy))
+        _subtract(left, kernels[which], int(at))
+        # Only the neighbourhood has changed; no second candidate is wanted in the first one's core.
+        reach = 2 * max(len(kernel) for kernel in kernels)
+        low, high = max(0, int(at) - reach), min(len(t), int(at) + reach + 1)
+        blocked = gains == -1.0
+        for row, kernel in enumerate(kernels):
+            gains[row, low:high] = _gains(left[max(0, low - reach) : high + reach], kernel)[
+                low - max(0, low - reach) :
+            ][: high - low]
+        gains[blocked] = -1.0
+        core = max(1, round(_TRIED_WIDTHS_S[which] / step))
+        gains[:, max(0, int(at) - core) : int(at) + core + 1] = -1.0
+    return found
+
+
+def _idle_strokes(chain: Chain, v_scale: float, step: float, cost: float) -> NDArray[np.bool_]:
+    """Strokes with a velocity that is small against the residual, (s,).
+
+    Args:
+        chain: the strokes.
+        v_scale: scale of velocities in the cost.
+        step: distance of the samples, s.
+        cost: what is left.
+    """
+    # Energy of a lognormal: D^2 integral Lambda^2 dt = D^2 exp(sigma^2 / 4) / (2 w sqrt(pi)).
+    energy = chain.lengths**2 * np.exp(0.25 * chain.sigma**2) / (2.0 * chain.width * np.sqrt(np.pi)) / step
+    idle: NDArray[np.bool_] = v_scale**2 * energy < 0.01 * cost
+    return idle
+
+
+def _kernel(width: float) -> NDArray[np.float64]:
+    """A lognormal with energy 1, width in samples."""
+    reach = max(1, round(_REACH * width))
+    shape = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    scaled: NDArray[np.float64] = shape / np.sqrt(shape @ shape)
+    return scaled
+
+
+def _gains(left: NDArray[np.float64], kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
+    n, reach = len(left), len(kernel) // 2
+    power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
+    total = np.zeros(n)
+    for column in left.T:
+        total += np.convolve(column, kernel)[reach : reach + n] ** 2
+    gains: NDArray[np.float64] = total / power
+    return gains
+
+
+def _subtract(left: NDArray[np.float64], kernel: NDArray[np.float64], at: int) -> None:
+    reach = len(kernel) // 2
+    low, high = max(0, at - reach), min(len(left), at + reach + 1)
+    piece = kernel[low - at + reach : high - at + reach]
+    left[low:high] -= np.outer(piece, piece @ left[low:high] / (piece @ piece))
+
 
 #: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
 _DECIMATION = 4
@@ -52,8 +153,7 @@ class FitOptions:
         last_iterations: of the last refinement.
         enough_db: SNR of the velocity, dB, above which no stroke is added.
         least_db: SNR of the velocity, dB, below which strokes are added beyond the budget, as long as they
-            pay: so poor a reconstruction is of no use. Below it others refit too (section 3.4 of the
-            theory notes).
+            pay: so poor a reconstruction is of no use. Below it the open extractor SynSig2Vec refits, too.
     """
 
     rounds: int = 3
@@ -198,7 +298,7 @@ def _add(
 
 def _tidy(fit: Fit, fit_target: FitTarget) -> Chain:
     """The fit's chain without strokes of no effect; one is kept in any case."""
-    idle = idle_strokes(fit.chain, fit_target.v_scale, float(fit_target.t[1] - fit_target.t[0]), fit.cost)
+    idle = _idle_strokes(fit.chain, fit_target.v_scale, float(fit_target.t[1] - fit_target.t[0]), fit.cost)
     if idle.all():
         idle[int(np.argmax(fit.chain.lengths))] = False
     return without(fit.chain, idle) if idle.any() else fit.chain

@@ -1,34 +1,100 @@
-"""The first strokes of a part: one for each interval between speed minima.
+"""The first strokes of a part: one for each interval between speed minima, by closed forms.
 
 The minima are the salient points; in time they divide the part into intervals, in space they are the first
-virtual targets. Sigma, median and width of each stroke come from the closed forms, by the candidate that fits
-the measured speed best; its arc angle from the directions at its inflections. Their errors, overlap
-above all, are corrected by the joint refinement.
+virtual targets. The heights of the inflections (2, 4) and of the peak (3) give sigma, by one formula each,
+and with sigma any two of their times the rest; docs/extraction.md, section 4, has the equations. Of the
+candidates the one that fits the measured speed best is taken; the arc angle is from the directions at the
+inflections. Their errors, overlap above all, are corrected by the joint refinement.
 
-Source: section 3.1 of the theory notes: segmentation of iDeLog, parameters of Robust XZERO.
+Source: segmentation of iDeLog (Ferrer et al., IEEE TPAMI 42 (2020)), parameters of Robust XZERO (O'Reilly &
+Plamondon, Pattern Recognition 42 (2009)).
 """
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from pc_client.errors import MovementError
 from pc_client.extraction.chain import Bounds, Chain, normals_across
-from pc_client.extraction.closed_forms import (
-    CharacteristicPoints,
-    lognormal_from_points,
-    sigma_from_peak_ratio,
-    sigma_from_slope_ratio,
-    turn_rate,
-)
 from pc_client.extraction.smoothing import SmoothPart
-from pc_client.movements.lognormal import evaluate_lognormals
+from pc_client.movements.lognormal import Lognormal, evaluate_lognormals
 
-__all__ = ["initial_chain", "salient_points"]
+__all__ = [
+    "CharacteristicPoints",
+    "ScaledLognormal",
+    "initial_chain",
+    "lognormal_from_points",
+    "salient_points",
+    "sigma_from_peak_ratio",
+    "sigma_from_slope_ratio",
+    "turn_rate",
+]
+
+
+class CharacteristicPoints(NamedTuple):
+    """Times (s) and speeds of the inflection before the peak, the peak and the inflection after it."""
+
+    times: tuple[float, float, float]
+    speeds: tuple[float, float, float]
+
+
+class ScaledLognormal(NamedTuple):
+    """A lognormal and its area D, the length of a stroke."""
+
+    lognormal: Lognormal
+    length: float
+
+
+def sigma_from_peak_ratio(ratio: float) -> float:
+    """Sigma from the speed at one inflection over the speed at the peak.
+
+    Args:
+        ratio: v2/v3, in (0, e^-1/2), or v4/v3, in [e^-1/2, 1): a Gaussian has e^-1/2 on both sides, a
+            lognormal less before the peak and more behind it.
+    """
+    if not 0.0 < ratio < 1.0:
+        raise MovementError(f"inflection at {ratio} of the peak: the ratio must lie in (0, 1)")
+    b = math.log(ratio)
+    return math.sqrt(max(0.0, -2.0 - 2.0 * b - 1.0 / (2.0 * b)))
+
+
+def sigma_from_slope_ratio(ratio: float) -> float:
+    """Sigma from the speed at the inflection behind the peak over that at the one before, v4/v2, >= 1."""
+    if not (math.isfinite(ratio) and ratio > 0.0):
+        raise MovementError(f"inflections with speeds at ratio {ratio}: the ratio must be greater than 0")
+    return math.sqrt(2.0 * math.sqrt(1.0 + math.log(ratio) ** 2) - 2.0)
+
+
+def lognormal_from_points(
+    points: CharacteristicPoints, sigma: float, i: int = 0, k: int = 2
+) -> ScaledLognormal:
+    """The lognormal of a known sigma through two of the three points.
+
+    Args:
+        points: the characteristic points.
+        sigma: from one of the formulas of this module, > 0.
+        i: the point whose time and speed are met, 0..2.
+        k: the other point whose time is met, 0..2.
+    """
+    root = sigma * math.sqrt(0.25 * sigma * sigma + 1.0)
+    a = (1.5 * sigma**2 + root, sigma**2, 1.5 * sigma**2 - root)
+    mu = math.log((points.times[i] - points.times[k]) / (math.exp(-a[i]) - math.exp(-a[k])))
+    t0 = points.times[i] - math.exp(mu - a[i])
+    exponent = mu - a[i] + a[i] ** 2 / (2.0 * sigma**2)
+    length = math.sqrt(2.0 * math.pi) * sigma * points.speeds[i] * math.exp(exponent)
+    return ScaledLognormal(Lognormal(t0, mu, sigma), length)
+
+
+def turn_rate(directions: tuple[float, float], distances: tuple[float, float]) -> float:
+    """Change of direction per length: (phi_4 - phi_2) / (s_4 - s_2), rad per length."""
+    return (directions[1] - directions[0]) / (distances[1] - distances[0])
+
 
 #: Peaks that stand out by less than this share of the top speed are ripples on their neighbours at first;
 #: strokes for those that deserve one are added where the refined residual is worst.

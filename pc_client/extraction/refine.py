@@ -1,22 +1,35 @@
-"""Joint refinement of all strokes of a part, in space and time, by least squares.
+"""Joint refinement of all strokes of a part, in space and time, by least squares with analytic derivatives.
 
-The residual stacks positions and velocities, each divided by its size over the whole recording, so that
+With u = (t - m) / w, z = ln(1 + sigma u) / sigma, F = Phi(z) and Lambda = dF/dt, a stroke with chord c,
+arc angle d about the normal n and k = 1 / sinc(d / 2) has
 
-    cost = 10^(-SNR_v / 10) + 10^(-SNR_t / 10)        (summed over the parts)
+    v(t) = Lambda k [cos(d (F - 1/2)) c + sin(d (F - 1/2)) n x c]
+    p(t) = k [C c + S n x c],   C + i S = integral from 0 to F of exp(i d (f - 1/2)) df
 
-and neither the drift of a fit to velocities alone nor the rough speed of a fit to positions alone can pass.
-All targets are free. The method is Levenberg's and Marquardt's with the analytic Jacobian.
+so everything is a number per time and stroke, times c or n x c, for flat and spatial strokes alike; these
+have one variable more, the bending out of their plane, whose vector is n. Variables of a stroke, in this
+order: median (in units of its width), ln width, sigma, arc angle, bending (rad, spatial strokes only), end
+target. The first target stands before them all; all targets are free.
 
-A stroke acts only while it runs, so the time axis is cut into pieces, each piece sees only the strokes that
-run in it, and the normal equations are a band about the diagonal: work and memory grow linearly with the
-length of a recording.
+The residual stacks positions and velocities, each divided by its size over the whole recording:
 
-Source: the damping rule is Nielsen's, as in Madsen, Nielsen & Tingleff, "Methods for non-linear least squares
-problems" (2004), section 3.2.
+    cost        = 10^(-SNR_v / 10) + 10^(-SNR_t / 10)        (summed over the parts), and the regularizer
+    regularizer = weight * sum over strokes of [ (ln(sigma / .2) / .5)^2 + (peak speed / top speed)^2 ]
+
+The regularizer chooses between chains that explain a recording equally well: for narrow speed profiles sigma
+is hardly visible, and of two neighbouring strokes only the sum is. Its weight is the residual per independent
+number of a 12 Hz signal, so it vanishes with the residual: clean strokes are recovered unchanged.
+
+The method is Levenberg's and Marquardt's. A stroke acts only while it runs, so the time axis is cut into
+pieces and the normal equations are a band: work and memory grow linearly with the length of a recording.
+
+Source: docs/theory.md, section 1, "The path of a stroke"; the damping rule is Nielsen's, as in Madsen,
+Nielsen & Tingleff, "Methods for non-linear least squares problems" (2004), section 3.2.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -24,12 +37,239 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
+from scipy.special import ndtr
 
 from pc_client.extraction.chain import Bounds, Chain, in_order, normals_across
-from pc_client.extraction.model import linearise, variables_per_stroke
-from pc_client.extraction.regularizer import Regularizer, regularizer_terms
 
-__all__ = ["Fit", "FitTarget", "moved", "refine", "residuals"]
+__all__ = [
+    "Fit",
+    "FitTarget",
+    "Linearisation",
+    "Regularizer",
+    "RegularizerTerms",
+    "linearise",
+    "moved",
+    "refine",
+    "residuals",
+    "variables_per_stroke",
+]
+
+
+_INV_SQRT_TWO_PI = 1.0 / math.sqrt(2.0 * math.pi)
+#: |arc_angle| below which the first terms of a series replace differences of nearly equal numbers.
+_STRAIGHT = 1e-3
+
+
+class Linearisation(NamedTuple):
+    """A piece of a movement at given times and how it changes.
+
+    Attributes:
+        p: positions, (n, dim).
+        v: velocities, (n, dim).
+        jacobian: derivatives, (columns, 2, dim, n): of p, then of v, by each variable.
+    """
+
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+
+
+def variables_per_stroke(dim: int) -> int:
+    """Number of variables of one stroke in the plane (2) or in space (3)."""
+    return 6 if dim == 2 else 8
+
+
+def linearise(chain: Chain, t: NDArray[np.float64], first: int, last: int) -> Linearisation:
+    """Evaluate strokes first .. last - 1 at the times t (n,), when all before are done and none after begun.
+
+    The rows of the Jacobian: the target at which stroke `first` begins, then the variables of each stroke.
+    """
+    s = slice(first, last)
+    m, w, sigma, arc_angle = (
+        values[s, None] for values in (chain.median, chain.width, chain.sigma, chain.arc_angle)
+    )
+    targets = chain.targets[first : last + 1]
+    chord = targets[1:] - targets[:-1]
+    dim = chord.shape[1]
+    across = _cross(chain.normal[s], chord)
+
+    # The speed profiles, (strokes, n): F, Lambda and the logarithmic derivatives of Lambda.
+    u = (t - m) / w
+    x = 1.0 + sigma * u
+    begun = x > 1e-12
+    x = np.where(begun, x, 1.0)
+    g = 1.0 / x
+    z = np.log(x) / sigma
+    phi = np.exp(-0.5 * z * z) * (_INV_SQRT_TWO_PI * begun)
+    done = ndtr(z) * begun
+    phi_g = phi * g
+    rate = phi_g / w
+    z_sigma = (u * g - z) / sigma
+    h = g * (z + sigma)
+    log_rate = (h, u * h - 1.0, -z * z_sigma - u * g)
+    done_by = (-phi_g, -u * phi_g, phi * z_sigma)
+
+    # The arcs: coefficients of the chord and of the vector across it.
+    k = 1.0 / _sinc(0.5 * arc_angle)
+    k_log_slope = np.where(np.abs(arc_angle) < _STRAIGHT, arc_angle / 12.0, _safe_slope(arc_angle))
+    lag = done - 0.5
+    beta = arc_angle * lag
+    cos, sin = k * np.cos(beta), k * np.sin(beta)
+    v_c, v_q = rate * cos, rate * sin
+    p_c, p_q, dp_c, dp_q = _arc_integrals(arc_angle, done, cos, sin, k)
+
+    n, size = len(t), variables_per_stroke(dim)
+    jacobian = np.zeros((dim + (last - first) * size, 2, dim, n))
+    by_stroke = jacobian[dim:].reshape(last - first, size, 2, dim, n)
+    p_turned = (k_log_slope * p_c + dp_c, k_log_slope * p_q + dp_q)
+    v_turned = (k_log_slope * v_c - lag * v_q, k_log_slope * v_q + lag * v_c)
+    turned_rates = tuple(rate * arc_angle * change for change in done_by)
+    gained_rates = tuple(rate * gain for gain in log_rate)
+    for i in range(dim):
+        c, q = chord[:, i, None], across[:, i, None]
+        along, sideways = cos * c + sin * q, cos * q - sin * c
+        for row in range(3):
+            np.multiply(done_by[row], along, out=by_stroke[:, row, 0, i])
+            by_stroke[:, row, 1, i] = gained_rates[row] * along + turned_rates[row] * sideways
+        by_stroke[:, 3, 0, i] = p_turned[0] * c + p_turned[1] * q
+        by_stroke[:, 3, 1, i] = v_turned[0] * c + v_turned[1] * q
+    if dim == 3:
+        # Bending turns the vector across, n x c, towards -n at right angles to both.
+        out_of_plane = -chain.normal[s] * np.linalg.norm(chord, axis=1)[:, None]
+        small = np.abs(arc_angle) < _STRAIGHT
+        safe = np.where(small, 1.0, arc_angle)
+        bend_v = rate * np.where(small, k * lag, sin / safe)
+        bend_p = np.where(small, 0.5 * k * (done * done - done), p_q / safe)
+        by_stroke[:, 4, 0] = bend_p[:, None] * out_of_plane[:, :, None]
+        by_stroke[:, 4, 1] = bend_v[:, None] * out_of_plane[:, :, None]
+    _add_targets(jacobian, by_stroke, chain.normal[s], ((p_c, p_q), (v_c, v_q)))
+    p = targets[0] + p_c.T @ chord + p_q.T @ across
+    return Linearisation(p, v_c.T @ chord + v_q.T @ across, jacobian)
+
+
+def _cross(normal: NDArray[np.float64], chord: NDArray[np.float64]) -> NDArray[np.float64]:
+    if chord.shape[1] == 2:
+        return np.column_stack((-chord[:, 1], chord[:, 0]))
+    return np.cross(normal, chord)
+
+
+def _sinc(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    nonzero = np.where(angle == 0.0, 1e-20, angle)
+    value: NDArray[np.float64] = np.sin(nonzero) / nonzero
+    return value
+
+
+def _safe_slope(arc_angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    safe = np.where(np.abs(arc_angle) < _STRAIGHT, 1.0, arc_angle)
+    slope: NDArray[np.float64] = 1.0 / safe - 0.5 / np.tan(0.5 * safe)
+    return slope
+
+
+def _arc_integrals(
+    arc_angle: NDArray[np.float64],
+    done: NDArray[np.float64],
+    cos: NDArray[np.float64],
+    sin: NDArray[np.float64],
+    k: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The integrals k C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
+    half = 0.5 * arc_angle
+    reach = k * done * _sinc(half * done)
+    angle = half * done - half
+    c, s = reach * np.cos(angle), reach * np.sin(angle)
+    small = np.abs(arc_angle) < _STRAIGHT
+    safe = np.where(small, 1.0, arc_angle)
+    lag = done - 0.5
+    dc = (lag * cos + 0.5 * k * np.cos(half) - c) / safe
+    ds = (lag * sin - 0.5 * k * np.sin(half) - s) / safe
+    if small.any():
+        dc = np.where(small, -arc_angle * (lag**3 + 0.125) / 3.0, dc)
+        ds = np.where(small, 0.5 * (done * done - done), ds)
+    return c, s, dc, ds
+
+
+def _add_targets(
+    jacobian: NDArray[np.float64],
+    by_stroke: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    coefficients: tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...],
+) -> None:
+    """The rows of the targets: a target ends one stroke, G_j, and takes from the next, - G_(j+1)."""
+    dim = jacobian.shape[2]
+    if dim == 2:
+        turning = np.array([[[0.0, -1.0], [1.0, 0.0]]])
+    else:
+        x, y, z = normal.T
+        o = np.zeros_like(x)
+        turning = np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1)
+    for kind, (along, sideways) in enumerate(coefficients):
+        for i in range(dim):
+            for j in range(dim):
+                own = along if i == j else sideways * turning[:, i, j, None]
+                ends = by_stroke[:, j - dim, kind, i]
+                ends[...] = own
+                ends[:-1] -= own[1:]
+                jacobian[j, kind, i] = (1.0 if kind == 0 and i == j else 0.0) - own[0]
+
+
+#: Middle and spread (of the logarithm) of sigma in handwriting: docs/extraction.md, section 5.
+_SIGMA, _SPREAD = 0.2, 0.5
+_SQRT_TWO_PI = math.sqrt(2.0 * math.pi)
+
+
+class Regularizer(NamedTuple):
+    """How strongly a fit is regularized.
+
+    Attributes:
+        weight: of the regularizer in the cost.
+        top_speed: of the part, > 0.
+    """
+
+    weight: float
+    top_speed: float
+
+
+class RegularizerTerms(NamedTuple):
+    """The regularizer at a chain: cost, and for every stroke its part of the normal equations.
+
+    Attributes:
+        cost: of all strokes.
+        gradient: (s, columns), downhill.
+        matrix: (s, columns, columns). The columns are the target at which the stroke begins and the
+            variables of the stroke, as in `linearise`.
+    """
+
+    cost: float
+    gradient: NDArray[np.float64]
+    matrix: NDArray[np.float64]
+
+
+def _regularizer_terms(chain: Chain, regularizer: Regularizer) -> RegularizerTerms:
+    """Cost, gradient and (Gauss-Newton) matrix of the regularizer."""
+    root = math.sqrt(regularizer.weight)
+    count, dim = len(chain), chain.targets.shape[1]
+    size = 6 if dim == 2 else 8
+    half = 0.5 * chain.arc_angle
+    per_chord = root / (np.sinc(half / math.pi) * chain.width * _SQRT_TWO_PI * regularizer.top_speed)
+    peak = per_chord[:, None] * chain.chords
+    skew = root * np.log(chain.sigma / _SIGMA) / _SPREAD
+    jacobian = np.zeros((count, dim + 1, dim + size))
+    for i in range(dim):
+        jacobian[:, i, i] = -per_chord
+        jacobian[:, i, size + i] = per_chord
+    jacobian[:, :dim, dim + 1] = -peak
+    straight = np.abs(half) < 1e-3
+    safe = np.where(straight, 1.0, half)
+    slope = np.where(straight, half / 6.0, 0.5 / safe - 0.5 / np.tan(safe))
+    jacobian[:, :dim, dim + 3] = slope[:, None] * peak
+    jacobian[:, dim, dim + 2] = root / (_SPREAD * chain.sigma)
+    value = np.column_stack((peak, skew))
+    return RegularizerTerms(
+        float(np.sum(value**2)),
+        -np.einsum("sri,sr->si", jacobian, value),
+        jacobian.transpose(0, 2, 1) @ jacobian,
+    )
+
 
 #: A stroke counts as begun and as done at this deviation: Phi(-4.5) = 3.4e-6 of its length.
 _TAIL = 4.5
@@ -195,7 +435,7 @@ def _data_equations(chain: Chain, fit_target: FitTarget) -> _Equations:
 
 
 def _regularized(data: _Equations, chain: Chain, regularizer: Regularizer) -> _Equations:
-    terms = regularizer_terms(chain, regularizer)
+    terms = _regularizer_terms(chain, regularizer)
     width = terms.gradient.shape[1]
     size = variables_per_stroke(chain.targets.shape[1])
     for i in range(width):

@@ -11,7 +11,7 @@ late time stamps). The filter must not shift anything in time, hence forwards an
 part is continued by point reflection, so that the first and the last position stay where they are and a part
 may start and end in full motion.
 
-Source: section 2 of the theory notes (12 Hz low-pass of signatures).
+Source: docs/extraction.md, section 3; 12 Hz as is usual for signatures.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.signal import butter, find_peaks, sosfiltfilt
 
-from pc_client.extraction.recording import PenPart
+from pc_client.extraction.pen import PenPart
 from pc_client.movements.geometry import read_only
 
 __all__ = [

@@ -18,8 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.kinematics.cell import Solid, Three
 from pc_client.kinematics.dh_arm import DhArm, link_hulls
-from pc_client.kinematics.robot_data import find_robot_file, find_share_folder
-from pc_client.kinematics.robot_model import RobotDescription, RobotModel, load_pinocchio_model
+from pc_client.kinematics.robot_model import (
+    RobotDescription,
+    RobotModel,
+    find_robot_file,
+    find_share_folder,
+    load_pinocchio_model,
+)
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,8 @@
 
 A damped Newton (Levenberg-Marquardt) iteration on the pose error log6(T_tcp_goal): near a solution the
 damping is zero and convergence quadratic, so a seed from the previous sample of a path needs two steps.
-It finds the solution nearest to the seed; the caller chooses the branch by the seed.
+It finds a solution near the seed; the caller chooses the branch by the seed. `nearest_posture` compares all
+branches, which it knows in closed form (Hawkins 2013), and lets the iteration finish the nearest.
 
 Source: paper section III ("an iterative Jacobian solver"); log6 on SE(3) as in Pinocchio's example of inverse
 kinematics.
@@ -10,12 +11,16 @@ kinematics.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import acos, atan2, cos, hypot, pi, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from pc_client.errors import PlanningError
+from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import RobotModel
 
 Array = NDArray[np.float64]
@@ -98,6 +103,66 @@ def solve_ik_se3(
             if damping > _MOST_DAMPING:
                 break  # no direction improves any more: out of reach
     return _solution(q, error, max_iterations, converged=_is_small(error))
+
+
+def nearest_posture(model: RobotModel, T_base_tcp: ArrayLike, q_near: ArrayLike) -> Array:
+    """Return the posture that brings the TCP to a pose, of all that do the nearest to another posture.
+
+    Args:
+        model: nominal arm.
+        T_base_tcp: (4, 4) wanted pose in `base`.
+        q_near: (6,) joint angles [rad]; near is a small sum of squares over all joints.
+
+    Returns:
+        (6,) joint angles [rad], each within its range.
+
+    Raises:
+        PlanningError: no posture of the arm reaches the pose.
+    """
+    goal, limits = np.asarray(T_base_tcp, dtype=np.float64), model.limits
+    q_min, q_max = np.array(limits.q_min), np.array(limits.q_max)
+    near = np.clip(np.asarray(q_near, dtype=np.float64), q_min, q_max)
+    turns = [q + 2.0 * pi * np.rint((near - q) / (2.0 * pi)) for q in _branches(model, goal, near[5])]
+    within = [q - 2.0 * pi * ((q > q_max).astype(int) - (q < q_min).astype(int)) for q in turns]
+    for q in sorted(within, key=lambda q: float(np.sum(np.square(q - near)))):
+        if (found := solve_ik(model, goal, q)).converged:
+            return found.q
+    x, y, z = goal[:3, 3].tolist()
+    raise PlanningError(
+        f"no posture of a {model.title} brings the TCP to ({x:.3f}, {y:.3f}, {z:.3f}) m in this orientation; "
+        f"its reach is {model.description.reach:g} m from the base axis"
+    )
+
+
+def _branches(model: RobotModel, T: Array, q6_near: float) -> Iterator[Array]:
+    """Yield the up to eight postures (6,) [rad] of a pose: shoulder left or right, wrist and elbow two ways.
+
+    Source: K. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", 2013.
+    """
+    z_tcp = tcp_pose(model, np.zeros(6))[:3, 3]
+    _, shoulder, elbow, wrist, wrist_2 = (model.pin_data.oMi[i].translation for i in range(1, 6))
+    d1, d4, d5, d6 = shoulder[2], -wrist_2[1], shoulder[2] - z_tcp[2], wrist_2[1] - z_tcp[1]
+    a2, a3 = elbow[0] - shoulder[0], wrist[0] - elbow[0]
+    x_tool, y_tool, z_tool = T[:3, :3].T
+    centre = T[:3, 3] - d6 * z_tool
+    if (r := hypot(centre[0], centre[1])) < abs(d4):
+        return
+    for left in (1.0, -1.0):
+        q1 = atan2(centre[1], centre[0]) + left * acos(d4 / r) + 0.5 * pi
+        ahead, aside = np.array((cos(q1), sin(q1), 0.0)), np.array((sin(q1), -cos(q1), 0.0))
+        c5 = min(1.0, max(-1.0, float(aside @ z_tool)))
+        for flip in (1.0, -1.0):
+            q5 = flip * acos(c5)
+            q6 = atan2(-flip * (aside @ y_tool), flip * (aside @ x_tool))
+            if abs(c5) > 1.0 - 1e-12:  # wrist 1 and wrist 3 are aligned: one of them is free
+                q6 = q6_near
+            axis = -(x_tool * sin(q6) + y_tool * cos(q6))
+            x, z = ahead @ (centre - d5 * axis), centre[2] - d5 * axis[2] - d1
+            c3 = (x * x + z * z - a2 * a2 - a3 * a3) / (2.0 * a2 * a3)
+            for up in (1.0, -1.0) if abs(c3) <= 1.0 else ():
+                q3 = up * acos(c3)
+                q2 = atan2(z, x) - atan2(a3 * sin(q3), a2 + a3 * cos(q3))
+                yield np.array((q1, q2, q3, atan2(ahead @ axis, -axis[2]) - q2 - q3, q5, q6))
 
 
 def _pose_error(model: RobotModel, T_base_goal: Any, q: Array) -> Array:

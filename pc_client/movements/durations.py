@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
-from pc_client.movements.timing import TwoSidedTiming
+from pc_client.movements.lognormal import TwoSidedTiming
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 
 __all__ = ["DurationRule", "Fitts", "Isochrony", "chained_windows", "leg_lengths", "retimed"]
 

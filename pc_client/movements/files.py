@@ -17,9 +17,9 @@ import numpy as np
 from pc_client.errors import MovementError, UnknownMovementError
 from pc_client.input_files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
-from pc_client.movements.joint_trajectory import JOINT_COLUMNS, JointTrajectory
-from pc_client.movements.movement import Movement
+from pc_client.movements.movement import JOINT_COLUMNS, JointTrajectory, Movement
 from pc_client.movements.movement_file import movement_text, parse_movement
+from pc_client.movements.own_points import POINT_COLUMNS, through
 from pc_client.movements.samples import FORMS, MIN_SAMPLES, SampledTrajectory, samples_of, write_samples
 from ur_hil.records import nearest
 
@@ -149,12 +149,17 @@ def _read(path: Path) -> Movement | JointTrajectory:
 
 
 def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
-    """What a table of samples holds; without a first line of names its columns are x, y, z, t."""
-    wanted = "x, y, z in m and t in s, and docs/movements.md for poses and joint angles"
-    rows = parse_rows(text, str(path), (*FORMS, JOINT_COLUMNS), wanted)
-    if len(rows.values) < MIN_SAMPLES:
-        raise MovementError(f"{path}: {len(rows.values)} samples; a movement needs at least {MIN_SAMPLES}")
+    """What a table of samples or target points holds; without a line of names, x, y, z and perhaps t."""
+    wanted = "x, y, z in m and t in s, target points x, y, z, or what docs/movements.md names beside them"
+    rows = parse_rows(text, str(path), (*FORMS, JOINT_COLUMNS, POINT_COLUMNS), wanted)
+    if rows.columns != POINT_COLUMNS and len(rows.values) < MIN_SAMPLES:
+        raise MovementError(
+            f"{path}: {len(rows.values)} samples; a movement needs at least {MIN_SAMPLES} "
+            "(target points with times: `ur-client movements new`, or Movement.from_csv with a style)"
+        )
     try:
+        if rows.columns == POINT_COLUMNS:
+            return through(rows.values, name=path.stem)
         if rows.columns == JOINT_COLUMNS:
             return JointTrajectory(rows.values[:, 0], rows.values[:, 1:], path.stem)
         trajectory = samples_of(rows)

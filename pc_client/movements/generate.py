@@ -12,10 +12,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from pc_client.errors import MovementError
-from pc_client.movements.arcs import arcs_movement
 from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS, library_names, save_movement
 from pc_client.movements.movement import Movement
-from pc_client.movements.recipe import recipe_movement
+from pc_client.movements.recipes import arcs_movement, recipe_movement
 from pc_client.movements.robotic import Corners
 from pc_client.movements.twins import GENERATORS, robotic_twin
 

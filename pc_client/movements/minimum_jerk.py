@@ -21,7 +21,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.stroke import Motion
+from pc_client.movements.sigma_lognormal import Motion
 
 __all__ = ["MinimumJerk", "Passing", "StrokeShape", "stroke_shape"]
 

@@ -1,4 +1,4 @@
-"""`Movement`: a named trajectory of the TCP, made by any model.
+"""`Movement`: a named trajectory of the TCP, made by any model; `JointTrajectory`: samples of joint angles.
 
 Planning, running and analysis use a movement through this class only. Files are read and written by
 `files.py`; new ones are made by `generate.py`.
@@ -22,11 +22,13 @@ from pc_client.movements.minimum_jerk import MinimumJerk
 from pc_client.movements.power_law import PowerLaw
 from pc_client.movements.robotic import RoboticTrajectory
 from pc_client.movements.samples import SampledTrajectory
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Motion
+from pc_client.movements.sigma_lognormal import Motion, SigmaLognormal
 
 __all__ = [
+    "JOINT_COLUMNS",
     "LONGEST_DURATION",
+    "MIN_SAMPLES",
+    "JointTrajectory",
     "Kind",
     "Movement",
     "MovementSample",
@@ -34,6 +36,7 @@ __all__ = [
     "Trajectory",
     "export_samples",
 ]
+
 
 #: Which model made a movement, as its file says it; "samples" are given.
 Kind = Literal["lognormal", "uniform", "minimum_jerk", "power_law", "samples"]
@@ -52,7 +55,7 @@ LONGEST_DURATION = 1200.0
 """No movement lasts longer [s]: its recording could not be read back (`pc_client.input_files`)."""
 
 
-def check_name(name: str) -> None:
+def _check_name(name: str) -> None:
     """Refuse a name that is no file name of the same folder on every system.
 
     Raises:
@@ -64,7 +67,7 @@ def check_name(name: str) -> None:
         )
 
 
-def check_duration(duration: float, whose: str) -> None:
+def _check_duration(duration: float, whose: str) -> None:
     """Refuse a duration outside the range of movements.
 
     Raises:
@@ -141,8 +144,8 @@ class Movement:
 
     def __post_init__(self) -> None:
         durations = read_only(self.stroke_durations)
-        check_name(self.name)
-        check_duration(self.duration, f"movement {self.name}")
+        _check_name(self.name)
+        _check_duration(self.duration, f"movement {self.name}")
         if durations.ndim != 1 or not len(durations) or not np.all(durations > 0.0):
             raise MovementError(
                 f"movement {self.name} with stroke durations {durations.tolist()} s: give times above 0 s"
@@ -154,6 +157,9 @@ class Movement:
             )
         object.__setattr__(self, "stroke_durations", durations)
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+
+    def __repr__(self) -> str:
+        return f"<Movement {self.name!r}: {self.kind}, {self.duration:.2f} s>"
 
     @property
     def kind(self) -> Kind:
@@ -236,3 +242,55 @@ def export_samples(movement: Movement, dt: float) -> SampleColumns:
     t = np.append(t[t < movement.duration - 1e-9 * dt], movement.duration)
     x, y, z = movement.sample(t).p.T
     return SampleColumns(t, x, y, z)
+
+
+#: Columns of a file; angles in rad, base to wrist 3.
+JOINT_COLUMNS = ("t", "q0", "q1", "q2", "q3", "q4", "q5")
+
+#: Fewest samples: a cubic has four coefficients.
+MIN_SAMPLES = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointTrajectory:
+    """Joint angles over time, from rest to rest.
+
+    Attributes:
+        t: (n,) times [s], increasing; shifted so that the first is 0.
+        q: (n, 6) joint angles [rad], base to wrist 3.
+        name: as in tables and file names.
+
+    Raises:
+        MovementError: shapes, times or values make no sense, or there are fewer than 4 samples.
+    """
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    name: str = "joints"
+
+    def __post_init__(self) -> None:
+        t, q = read_only(self.t), read_only(self.q)
+        _check_name(self.name)
+        if t.ndim != 1 or q.shape != (len(t), 6):
+            raise MovementError(
+                f"{self.name}: t {t.shape} and q {q.shape}: give n times and n rows of six angles in rad"
+            )
+        if len(t) < MIN_SAMPLES:
+            raise MovementError(f"{self.name}: {len(t)} samples; give at least {MIN_SAMPLES}")
+        bad = np.flatnonzero(~(np.isfinite(t) & np.isfinite(q).all(axis=1)))
+        if len(bad):
+            raise MovementError(f"{self.name}: sample {bad[0]} is not finite; give finite numbers")
+        stalled = np.flatnonzero(np.diff(t) <= 0.0)
+        if len(stalled):
+            k = int(stalled[0]) + 1
+            raise MovementError(
+                f"{self.name}: sample {k} is at t = {t[k]:g} s after {t[k - 1]:g} s: times must increase"
+            )
+        object.__setattr__(self, "t", read_only(t - t[0]))
+        object.__setattr__(self, "q", q)
+        _check_duration(self.duration, self.name)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self.t[-1])

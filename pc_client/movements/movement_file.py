@@ -15,14 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.lognormal import (
+    FULL_COVERAGE,
+    LiteralTiming,
+    Lognormal,
+    Timing,
+    TwoSidedTiming,
+    lead_from_k,
+)
 from pc_client.movements.minimum_jerk import MinimumJerk, Passing
 from pc_client.movements.movement import LONGEST_DURATION, Movement, Trajectory
 from pc_client.movements.power_law import TWO_THIRDS, PowerLaw
 from pc_client.movements.robotic import Corners, RoboticTrajectory
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
-from pc_client.movements.timing import FULL_COVERAGE, LiteralTiming, Timing, TwoSidedTiming, lead_from_k
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from ur_hil.records import Field, Finite, Items, checked, fields_of, number, record, text, word
 
 __all__ = ["movement_text", "parse_movement", "toml_value"]

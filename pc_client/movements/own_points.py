@@ -15,17 +15,19 @@ from pc_client.input_files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.durations import Isochrony, leg_lengths
 from pc_client.movements.geometry import read_only
+from pc_client.movements.lognormal import LiteralTiming
 from pc_client.movements.movement import Movement
-from pc_client.movements.recipe import HAND, LEAD, TOP_SPEED, literal_strokes
+from pc_client.movements.recipes import HAND, LEAD, TOP_SPEED, literal_strokes
 from pc_client.movements.robotic import Corners
-from pc_client.movements.timing import LiteralTiming
 from pc_client.movements.twins import SETBACK, robotic_trajectory
 
-__all__ = ["Style", "TargetTable", "default_durations", "load_targets", "through"]
+__all__ = ["POINT_COLUMNS", "Style", "TargetTable", "default_durations", "load_targets", "through"]
 
 #: "human": straight strokes by the paper's recipe; "robot": a smoothed square wave on the same lines.
 Style = Literal["human", "robot"]
 
+#: A table of target points without times.
+POINT_COLUMNS = ("x", "y", "z")
 #: Least default duration of a stroke, s: very short strokes would need more acceleration than speed.
 _SHORTEST = 1.0
 #: Longest duration of a stroke, s, and farthest coordinate, m, that are taken for meant.
@@ -113,7 +115,7 @@ def load_targets(path: str | Path) -> TargetTable:
     rows = parse_rows(
         FILE_KINDS["samples"].read_text(Path(path)),
         str(path),
-        [("x", "y", "z"), ("x", "y", "z", "t")],
+        [POINT_COLUMNS, (*POINT_COLUMNS, "t")],
         "x, y, z in m, and optionally t in s",
     )
     if len(rows.values) < 2:

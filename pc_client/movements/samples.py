@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 from pc_client.errors import MovementError
 from pc_client.movements.columns import Rows
 from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.stroke import Motion
+from pc_client.movements.sigma_lognormal import Motion
 
 __all__ = ["FORMS", "MIN_SAMPLES", "SampledTrajectory", "rotations_of", "samples_of", "write_samples"]
 

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pc_client.errors import MovementError
-from pc_client.movements.arcs import arcs_twin
 from pc_client.movements.durations import DurationRule, Fitts, Isochrony, retimed
 from pc_client.movements.minimum_jerk import MinimumJerk, Passing
 from pc_client.movements.movement import Movement
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS, PowerLaw
+from pc_client.movements.recipes import arcs_twin
 from pc_client.movements.robotic import Corners, RoboticTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.variability import duplicate

@@ -35,11 +35,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.lognormal import FULL_COVERAGE, Lognormal
 from pc_client.movements.movement import Movement
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke, arc_frame, sinc, tilt_of_normal
-from pc_client.movements.timing import FULL_COVERAGE
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, arc_frame, sinc, tilt_of_normal
 
 __all__ = ["HUMAN_STROKE", "PUBLISHED", "VariabilityRanges", "duplicate"]
 

@@ -1,4 +1,4 @@
-"""The slow approach from where the arm is to where a plan begins.
+"""The slow approach from where the arm is to where a plan begins; both in words, for who confirms them.
 
 All joints move together on a straight line in joint space, whatever stands there; so the line is checked
 here, posture by posture, before the arm moves. Two rules keep it short and safe: the
@@ -8,10 +8,10 @@ direct line is not clear, routes over raised postures are tried: up, turn, and d
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise, product
-from math import pi
+from itertools import accumulate, pairwise, product
+from math import pi, sqrt
 from types import MappingProxyType
 
 import numpy as np
@@ -20,12 +20,74 @@ from numpy.typing import ArrayLike, NDArray
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.planning.joint_lines import JointLines
 from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
 
 Array = NDArray[np.float64]
+
+
+class JointLines:
+    """A joint reference along straight joint lines; on each the speed is a trapezoid, from rest to rest.
+
+    All joints begin and end a line together. The joint with the largest distance leads.
+
+    Args:
+        postures: at least one, (6,) each [rad].
+        v: largest speed of the leading joint [rad/s].
+        a: its acceleration [rad/s²].
+    """
+
+    __slots__ = ("_a", "_ends", "_postures", "_v")
+
+    def __init__(self, postures: Sequence[Array], v: float, a: float) -> None:
+        self._postures = tuple(postures)
+        self._v = v
+        self._a = a
+        durations = [
+            self._line_duration(_largest_joint_distance(begin, end))
+            for begin, end in pairwise(self._postures)
+        ]
+        self._ends = tuple(accumulate(durations, initial=0.0))
+
+    @property
+    def duration(self) -> float:
+        """Time of all lines together [s]."""
+        return self._ends[-1]
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """Positions (6,) [rad] and velocities (6,) [rad/s] at time t [s]; at rest before 0 and at the end."""
+        still = np.zeros(len(self._postures[0]))
+        if t <= 0.0:
+            return self._postures[0], still
+        if t >= self.duration:
+            return self._postures[-1], still
+        line = next(k for k in range(1, len(self._ends)) if t < self._ends[k])
+        begin, end = self._postures[line - 1], self._postures[line]
+        distance = _largest_joint_distance(begin, end)
+        s, speed = self._on_line(t - self._ends[line - 1], distance)
+        return begin + (s / distance) * (end - begin), (speed / distance) * (end - begin)
+
+    def _line_duration(self, distance: float) -> float:
+        v, a = self._v, self._a
+        return distance / v + v / a if distance >= v * v / a else 2.0 * sqrt(distance / a)
+
+    def _on_line(self, t: float, distance: float) -> tuple[float, float]:
+        """Distance [rad] and speed [rad/s] of the leading joint, t [s] after its line begins."""
+        a = self._a
+        duration = self._line_duration(distance)
+        ramp = min(self._v / a, duration / 2.0)
+        if t < ramp:
+            return 0.5 * a * t * t, a * t
+        if t > duration - ramp:
+            left = duration - t
+            return distance - 0.5 * a * left * left, a * left
+        return a * ramp * (t - 0.5 * ramp), a * ramp
+
+
+def _largest_joint_distance(begin: Array, end: Array) -> float:
+    return float(np.abs(end - begin).max())
+
 
 _CHECK_STEP = 0.01
 """Largest distance of the stretched arm's flange between checked postures [m]."""
@@ -199,3 +261,35 @@ _ROUTES: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
 )
 """Postures between start and end of a route, shortest first: none; or postures with the arm straight up,
 turning the base while folding down, while rising, or in between."""
+
+
+def plan_text(plan: JointPlan) -> str:
+    """Return the plan as a few lines: box of motion, top speeds, duration, margins, start posture."""
+    title = f"{plan.name} on a {plan.report.robot} (nominal kinematics, TCP at the flange)"
+    return "\n".join(
+        (title, *(f"  {line}" for line in plan.report.lines()), f"  start posture   {_degrees(plan.start_q)}")
+    )
+
+
+def approach_text(approach: Approach) -> str:
+    """Return the approach to the start as a few lines."""
+    names = ", ".join(JOINT_NAMES)
+    title = (
+        f"first, slowly (at most {np.degrees(approach.v):.0f} deg/s, about {approach.duration:.1f} s,"
+        f" {_clear(approach)}), joints {names}:"
+    )
+    lines = (f"  from            {_degrees(approach.q_from)}",)
+    return "\n".join(
+        (title, *lines, *(f"  to              {_degrees(waypoint)}" for waypoint in approach.waypoints))
+    )
+
+
+def _clear(approach: Approach) -> str:
+    floor = f"{approach.floor_clearance * 1e3:.0f} mm clear of the floor"
+    if not np.isfinite(approach.cell_clearance):
+        return floor
+    return f"{floor}, {approach.cell_clearance * 1e3:.0f} mm of walls and solids of the cell"
+
+
+def _degrees(q: np.typing.NDArray[np.float64]) -> str:
+    return "(" + ", ".join(f"{angle:.1f}" for angle in np.degrees(q)) + ") deg"

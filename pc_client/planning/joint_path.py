@@ -1,4 +1,4 @@
-"""Inverse kinematics along a whole path, on one continuous branch.
+"""Inverse kinematics along a whole path, on one continuous branch, with a fixed orientation or its own.
 
 Each sample is solved from a linear prediction by the samples before it, so the solution stays on the branch
 of the first sample; leaving it, coming near a singularity or out of reach is refused.
@@ -7,6 +7,7 @@ of the first sample; leaving it, coming near a singularity or out of reach is re
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 import pinocchio as pin
@@ -14,13 +15,40 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
+from pc_client.kinematics.forward import (
+    SINGULARITIES,
+    SingularityMeasure,
+    measure_singularity,
+    tcp_jacobian,
+    tcp_pose,
+)
 from pc_client.kinematics.inverse import IkSolution, solve_ik_se3
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.kinematics.singularity import SINGULARITIES, SingularityMeasure, measure_singularity
-from pc_client.planning.limits import PlanLimits
-from pc_client.planning.orientation import fixed_tcp_rotation
-from pc_client.planning.refusal import PathNames
+from pc_client.planning.limits import PathNames, PlanLimits
+
+_TCP_RPY = (0.0, 0.75 * pi, 0.0)
+"""Roll, pitch, yaw of the TCP in `base` [rad]. Source: paper section III, "RPY(0, 3/4 pi, 0)"."""
+
+
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Return R = Rz(yaw) @ Ry(pitch) @ Rx(roll), the convention of UR and ROS.
+
+    Args:
+        roll: turn about the fixed x axis [rad], first.
+        pitch: turn about the fixed y axis [rad], second.
+        yaw: turn about the fixed z axis [rad], last.
+
+    Returns:
+        (3, 3) rotation matrix.
+    """
+    # Lower-case axes are scipy's fixed (extrinsic) axes.
+    return np.asarray(Rotation.from_euler("xyz", (roll, pitch, yaw)).as_matrix(), dtype=np.float64)
+
+
+def fixed_tcp_rotation() -> NDArray[np.float64]:
+    """Return R_base_tcp of the experiment: tool z = (.7071, 0, -.7071), forward and 45 deg down."""
+    return rotation_from_rpy(*_TCP_RPY)
+
 
 Array = NDArray[np.float64]
 

@@ -12,16 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.forward import tcp_jacobian, tcp_positions
+from pc_client.kinematics.forward import measure_singularity, tcp_jacobian, tcp_positions
 from pc_client.kinematics.robot_model import RobotModel, robot_model
-from pc_client.kinematics.singularity import measure_singularity
-from pc_client.planning.checks import CartesianSamples, check_motion, check_samples, measure_joint_range
-from pc_client.planning.joint_path import JointPath, follow_path
+from pc_client.planning.checks import (
+    CartesianSamples,
+    PlanReport,
+    check_motion,
+    check_samples,
+    measure_joint_range,
+)
+from pc_client.planning.joint_path import JointPath, fixed_tcp_rotation, follow_path
 from pc_client.planning.joint_spline import JointSpline
-from pc_client.planning.limits import PlanLimits, limits_of
-from pc_client.planning.orientation import fixed_tcp_rotation
-from pc_client.planning.plan_report import PlanReport
-from pc_client.planning.refusal import PathNames
+from pc_client.planning.limits import PathNames, PlanLimits, limits_of
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pc_client.errors import RecordingError
-from protocol.realtime.columns import COLUMNS
+from protocol.realtime.layout import COLUMNS
 
 
 class Phase(IntEnum):

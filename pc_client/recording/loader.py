@@ -94,6 +94,12 @@ class Recording:
         """Controller time of each row in s, (n,)."""
         return self._columns["timestamp"]
 
+    @property
+    def aborted(self) -> str:
+        """Why this is no whole run: it was given up, or the file is cut off; empty for a whole one."""
+        given_up = self.summary.get("aborted")
+        return self.damage if given_up is None else f"the run was given up ({given_up})"
+
     def rows_of(self, phase: Phase) -> NDArray[np.bool_]:
         """Return a mask (n,) of the rows of one phase."""
         return np.equal(self._columns["phase"], float(phase))

@@ -5,7 +5,12 @@ Everything that shows data takes them from here. Only data of an arm that is kno
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
+
+Source: TypeAlias = Mapping[str, str | bool | None]
+"""Columns of a table that say whose data it holds: `robot`, `software`, `serial`, `simulated`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from math import inf
 from typing import Annotated, get_type_hints
 
 from pc_client.errors import RecordingError
-from pc_client.recording.origin import Origin, origin_of
+from pc_client.recording.origin import Origin, Source, origin_of
 from ur_hil.records import Finite, Flag, Items, checked, record, text, whole
 
 _MOST_LETTERS = 200
@@ -71,6 +71,16 @@ class Provenance:
     def robot(self) -> str:
         """Model and firmware in one phrase, e.g. "UR3 3.15.8"."""
         return f"{self.robot_model} {self.firmware}"
+
+    @property
+    def source(self) -> Source:
+        """Columns of a table of the data: robot, software, serial, simulated."""
+        return {
+            "robot": self.robot_model,
+            "software": self.firmware,
+            "serial": self.serial,
+            "simulated": self.simulated,
+        }
 
     @property
     def origin(self) -> Origin:

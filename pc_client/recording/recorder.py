@@ -1,12 +1,14 @@
 """The recorder: takes one row a control cycle and appends them to a file, a chunk at a time.
 
-It runs inside the control loop, so `append` costs some microseconds and never raises for the disk's sake:
-the first I/O error is kept in `error` for the loop to see, rows go on into memory, and `close` reports what
-was saved. Truth about time is the controller's stamp in the row; nothing here reads a clock.
+It runs inside the control loop, so `append` costs some microseconds and neither waits for the disk nor raises
+for its sake: a thread writes (`outbox.py`), its first error is kept in `error` for the loop to see, rows go
+on into memory, and `close` reports what was saved. Truth about time is the controller's stamp in the row;
+nothing here reads a clock.
 
-A killed process loses at most the rows of the chunk it was filling (half a second); a machine that loses
-power may lose what the operating system had not yet written. Chunks are not compressed: one that was cut off
-is readable up to its last whole row, and the bytes depend on no compressor's version.
+A killed process loses at most the rows of the chunk it was filling (half a second) and those that a slow
+disk had not yet taken; a machine that loses power may lose what the operating system had not yet written.
+Chunks are not compressed: one that was cut off is readable up to its last whole row, and the bytes depend on
+no compressor's version.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 from numpy.typing import NDArray
 
-from pc_client.errors import RecordingError
+from pc_client.errors import RecordingError, one_line
 from pc_client.kinematics.arm_tree import ArmTree
 from pc_client.recording.arm_view import ArmView
 from pc_client.recording.layout import (
@@ -61,7 +63,6 @@ class Recorder:
 
     Attributes:
         path: the file.
-        error: the first I/O error, or None. Once set it stays.
         n_rows: rows appended so far.
     """
 
@@ -91,7 +92,6 @@ class Recorder:
             RecordingError: the file cannot be created, or a signal cannot be recorded.
         """
         self.path = Path(path)
-        self.error: RecordingError | None = None
         self.n_rows = 0
         topics = row_topics(state_signals)
         names = [signal.name for signal in topics[0].signals for _ in range(signal.count)]
@@ -99,7 +99,7 @@ class Recorder:
         self._now = now
         self._epoch = 0  # log time of the controller's time 0
         self._closed = False
-        self._n_written = 0  # rows that were given to the disk before it failed
+        self._n_posted = 0  # rows that were given to the thread before the disk failed
         try:
             self._outbox = Outbox(opener(self.path))
         except OSError as error:
@@ -114,10 +114,15 @@ class Recorder:
         self._writer.add_metadata(PROVENANCE_RECORD, provenance.to_metadata())
         self._channels = [self._register(topic) for topic in topics]
         self._view = None if arm is None else ArmView(arm, self._writer, names, provenance.cycle_time_s)
-        if not self._drain():
-            self._outbox.close()
-            assert self.error is not None
-            raise self.error
+        try:
+            self._outbox.start()
+        except OSError as error:
+            raise self._failure(error) from error
+
+    @property
+    def error(self) -> RecordingError | None:
+        """The first I/O error, or None. Once there it stays."""
+        return None if self._outbox.error is None else self._failure(self._outbox.error)
 
     def append(
         self,
@@ -144,7 +149,7 @@ class Recorder:
         """
         n, log_time = self.n_rows, self._log_time(float(frame_values[self._stamp_at]))
         self.n_rows += 1
-        if self.error is not None and n - self._n_written >= MAX_HELD_ROWS:
+        if n - self._n_posted >= MAX_HELD_ROWS:
             return
         row = (
             CDR_LITTLE_ENDIAN + frame_values.tobytes(),
@@ -157,8 +162,9 @@ class Recorder:
             self._view.show(n, log_time, frame_values, ref_q, ref_p)
         if self.n_rows % ROWS_PER_CHUNK == 0:
             self._writer.flush()
-            if self.error is None:
-                self._drain()
+            self._outbox.post()
+            if self._outbox.error is None:
+                self._n_posted = self.n_rows
 
     def close(self, summary: Mapping[str, object] | None = None) -> None:
         """Write the rest of the rows, the summary and the index, and close the file. Idempotent.
@@ -177,13 +183,12 @@ class Recorder:
             SUMMARY_RECORD, {key: json.dumps(value) for key, value in (summary or {}).items()}
         )
         self._writer.finish()
-        self._drain()  # also after an error: a disk may have been cleared
         try:
             self._outbox.close()
         except OSError as error:
-            self._latch(error)
-        if self.error is not None:
-            raise RecordingError(f"{self.error}; {self._saved()}") from self.error
+            self._outbox.error = self._outbox.error or error
+        if (failure := self.error) is not None:
+            raise RecordingError(f"{failure}; {self._saved()}") from self._outbox.error
 
     def __enter__(self) -> Self:
         return self
@@ -195,7 +200,9 @@ class Recorder:
             self.close()
             return
         try:
-            self.close({"aborted": type(error).__name__})
+            self.close({"aborted": f"{type(error).__name__}: {one_line(error)}".removesuffix(": ")})
+            if isinstance(error, Exception):  # of Ctrl-C the caller says what is kept
+                error.add_note(f"recorded until then: {self.path}")
         except RecordingError as lost:
             error.add_note(str(lost))  # the error that ended the run stays the one that is raised
 
@@ -212,20 +219,8 @@ class Recorder:
             self._epoch = self._now() - since_start
         return self._epoch + since_start
 
-    def _drain(self) -> bool:
-        """Write what waits; on an I/O error latch it and return False."""
-        try:
-            self._outbox.drain()
-        except OSError as error:
-            self._latch(error)
-            return False
-        self._n_written = self.n_rows
-        return True
-
-    def _latch(self, error: OSError) -> None:
-        if self.error is None:
-            self.error = RecordingError(f"cannot write the recording {self.path}: {error.strerror or error}")
-            self.error.__cause__ = error
+    def _failure(self, error: OSError) -> RecordingError:
+        return RecordingError(f"cannot write the recording {self.path}: {error.strerror or error}")
 
     def _saved(self) -> str:
         """Say in one phrase what can be read of the file."""

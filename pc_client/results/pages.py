@@ -1,12 +1,16 @@
-"""Pages of HTML that need nothing else: style, pictures, scripts inside; no network, date, host or path."""
+"""Pages of HTML that need nothing else: style, pictures, scripts inside; no network, date, host or path.
+
+They, and the tables beside them, are written by `write_files`.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pc_client.errors import RecordingError
@@ -17,7 +21,7 @@ if TYPE_CHECKING:
 
     from pc_client.results.panels import Sheet
 
-__all__ = ["picture", "render", "report_libraries", "zoomable"]
+__all__ = ["picture", "render", "report_libraries", "write_files", "zoomable"]
 
 
 def picture(figure: Figure, alt: str) -> Markup:
@@ -79,6 +83,22 @@ def render(template: str, *, scripts: bool = False, **values: Any) -> str:
     plotly = plotly_script() if scripts else ""
     common: dict[str, Any] = {"plotly": plotly, "labels": (), "left_out": (), "seed": None, "facts": {}}
     return environment.get_template(template).render(common | values)
+
+
+def write_files(folder: Path, contents: Mapping[str, str | bytes]) -> tuple[Path, ...]:
+    """Write texts (UTF-8) and bytes into files of a folder; folders that are missing are made.
+
+    Raises:
+        RecordingError: a file cannot be written.
+    """
+    paths = tuple(folder / name for name in contents)
+    for path, content in zip(paths, contents.values(), strict=True):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+        except OSError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror or error}") from error
+    return paths
 
 
 def _element(kind: str, image: bytes, alt: str, data: str = "") -> Markup:

@@ -27,6 +27,8 @@ from pc_client.results.theme import LETTERS, MARK_EDGE, MARK_FILL, RED, SHADE, W
 __all__ = ["Bars", "bars_of_levels", "draw", "figure", "image_bytes", "svg_text"]
 
 _DPI = 110
+_FEW_GROUPS = 6
+"""So many groups of bars have room on a figure at least, and their names beside each other."""
 
 
 @contextmanager
@@ -194,10 +196,11 @@ def bars_of_levels(
         title: above the figure, at the left.
         floors: (n,) a level for each group, as a line over its bars; nan where there is none.
     """
+    series = [bars for bars in series if not np.isnan(bars.levels).all()]
     x = np.arange(len(names))
     width = 0.84 / len(series)
-    with figure(3.4, mark) as page:
-        axes = page.add_axes((0.06, 0.2, 0.925, 0.66))
+    with figure(3.6, mark) as page:
+        axes = page.add_axes((0.06, 0.19, 0.925, 0.64))
         for i, bars in enumerate(series):
             places = x + width * (i - 0.5 * (len(series) - 1))
             axes.bar(places, bars.levels, 0.92 * width, color=bars.colour, label=bars.label)
@@ -205,9 +208,13 @@ def bars_of_levels(
                 axes.plot([place] * len(levels), levels, "o", ms=3.2, mfc="white", mec="black", mew=0.8)
         if floors is not None and not np.isnan(floors).all():
             axes.hlines(floors, x - 0.44, x + 0.44, color=RED, lw=1.4, label="noise floor of the encoders")
-        axes.set_xticks(x, names, rotation=20, ha="right")
+        few = len(names) <= _FEW_GROUPS
+        axes.set_xticks(x, names, rotation=0 if few else 20, ha="center" if few else "right")
+        shown = max(len(names), _FEW_GROUPS)  # a single bar is no wider than one of several
+        axes.set_xlim(-0.6, shown - 0.4)
         axes.set_ylabel("SNR [dB]")
-        axes.set_title(title)
+        axes.set_title(title, pad=20.0)
         axes.grid(axis="x", visible=False)
-        axes.legend(ncols=5, loc="lower right", bbox_to_anchor=(0.88 if mark else 1.0, 0.99))
+        # At the left, where it is seen on a narrow screen, too.
+        axes.legend(ncols=5, loc="lower left", bbox_to_anchor=(-0.005, 0.99))
     return page

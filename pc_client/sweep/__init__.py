@@ -1,8 +1,7 @@
 """Many experiments from one file: gains x fidelity x movements, side by side, resumable.
 
     config            the TOML file, read strictly
-    settings          its table [controller]: the values of each field, and their grid
-    search            its table [search]: optuna chooses among them
+    settings          what is tried: grids and searches of [controller]; which setting is the best
     case              one experiment, with an identity that depends on nothing but its content
     box               a simulated arm of a case's own, in a process that never outlives its user
     guard             the little program between the two
@@ -12,8 +11,7 @@
     measure           a recording as a row
     schedule          all cases over processes or a Dask cluster
     result_store      which cases are settled: one small file a case, and the table as Parquet or CSV
-    ranking           which setting is the best
-    figures, page     plots and the page that shows them
+    page              plots and the page that shows them
 
 A case is a pure function of its content: the box runs in lockstep and starts afresh, so the same case gives
 the same figures to the last bit, wherever it runs. Hence a result that is there needs no second run.

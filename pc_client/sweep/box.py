@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from pc_client.errors import ClientError, SweepError
+from pc_client.errors import ClientError, SweepError, full_message
 from pc_client.sweep.case import SimulatedArm
 from pc_client.sweep.guard import ENDED_FILE
 from protocol.errors import ProtocolError
@@ -102,7 +102,7 @@ def _started(arm: SimulatedArm, offset: int) -> Iterator[Box]:
         except (ClientError, ProtocolError) as error:
             if not _has_ended(folder):
                 raise
-            raise SweepError(f"the simulated box died{_last_words(folder)}: {error}") from error
+            raise SweepError(f"the simulated box died{_last_words(folder)}: {full_message(error)}") from error
 
 
 def _command(arm: SimulatedArm, offset: int, ready: Path) -> list[str]:

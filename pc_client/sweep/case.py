@@ -99,6 +99,11 @@ class Case:
         text = json.dumps(self.content(), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
+    @property
+    def incidents(self) -> str:
+        """Folder of its recordings within that of the sweep if it fails."""
+        return f"incidents/{self.identity}"
+
     def factors(self) -> dict[str, str | int | float | bool | None]:
         """What was chosen, by the names of the table's columns."""
         settings = asdict(self.controller)

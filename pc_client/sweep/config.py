@@ -22,8 +22,7 @@ from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.robot_model import ROBOTS
 from pc_client.movements.files import library_names, library_path, load_movement
 from pc_client.sweep.case import MovementFile, SimulatedArm
-from pc_client.sweep.search import Search, searched
-from pc_client.sweep.settings import Axis, Range, grid, read_axes, repeated
+from pc_client.sweep.settings import Axis, Range, Search, grid, read_axes, repeated, searched
 from ur_hil.records import Flag, Items, checked, nearest, record, text, whole, word
 
 FIDELITIES = ("exact", "ideal", "typical", "poor")

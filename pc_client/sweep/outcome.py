@@ -19,7 +19,7 @@ class Outcome:
         status: done; refused, because its gains are too large for the loop; or failed, and worth another try.
         error: why it is not done, one line.
         rows: figures of each repetition by column; of a refused case one with its delay and gain margin.
-        recordings: file name and content of each recording that shall stay.
+        recordings: file name and content of each recording that shall stay; of a failed case: all.
     """
 
     status: Status
@@ -28,6 +28,6 @@ class Outcome:
     recordings: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)
 
 
-def failed(error: str) -> Outcome:
+def failed(error: str, recordings: tuple[tuple[str, bytes], ...] = ()) -> Outcome:
     """A case that came to nothing."""
-    return Outcome("failed", " ".join(error.split()))
+    return Outcome("failed", " ".join(error.split()), recordings=recordings)

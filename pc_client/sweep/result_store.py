@@ -2,6 +2,7 @@
 
     DIR/cases/<identity>.json            what the case is and what came of it
     DIR/recordings/<identity>/*.mcap     its recordings, when they are kept
+    DIR/incidents/<identity>/*.mcap      recordings of a case that failed
     DIR/sweep.parquet, DIR/sweep.csv     the table
 
 Each file is written in one step: a file that is there is whole, whatever ended the sweep. The name of a
@@ -60,7 +61,7 @@ class ResultStore:
             SweepError: it cannot.
         """
         self.write("cases/.writable", b"").unlink(missing_ok=True)
-        for folder in ("cases", "recordings"):
+        for folder in ("cases", "recordings", "incidents"):
             for partial in (self.path / folder).rglob("*.part"):
                 with suppress(OSError):  # another sweep into this folder has removed it
                     if time.time() - partial.stat().st_mtime > _LONGEST_WRITE:
@@ -84,8 +85,9 @@ class ResultStore:
         Raises:
             SweepError: the disk is full, the folder has gone.
         """
+        folder = case.incidents if outcome.status == "failed" else f"recordings/{case.identity}"
         for name, content in outcome.recordings:
-            self.write(f"recordings/{case.identity}/{name}", content)
+            self.write(f"{folder}/{name}", content)
         facts = {
             "case": case.content(),
             "status": outcome.status,

@@ -19,13 +19,7 @@ from typing import TypeAlias
 from protocol.dashboard.commands import GREETING, DashboardCommand, match_command, unknown_command_reply
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 
-__all__ = [
-    "MAX_LINE",
-    "CommandReceived",
-    "DashboardConnection",
-    "DashboardEvent",
-    "UnknownCommand",
-]
+__all__ = ["MAX_LINE", "CommandReceived", "DashboardConnection", "DashboardEvent", "UnknownCommand"]
 
 MAX_LINE = 1 << 16
 """Longest line in bytes. No document gives a limit; clients send much shorter lines."""

@@ -12,30 +12,223 @@ and 5.3, as 75 and 9 bytes in 5.8; UR's client library needs 75 on 3.14).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.primary.framing import SubPackage
-from protocol.primary.setup import (
-    CalibrationData,
-    ConfigurationData,
-    KinematicsInfo,
-    SingularityInfo,
+from protocol.ur_types import (
+    LOCKSTEP_MASTERBOARD,
+    SIMULATED_MASTERBOARD,
+    SIMULATOR_CHECKSUM,
+    RobotMode,
+    SafetyMode,
+    SoftwareVersion,
 )
-from protocol.primary.tool import ToolCommunicationInfo, ToolData, ToolModeInfo
-from protocol.ur_types import RobotMode, SafetyMode
 from protocol.wire_record import Since, ValueOrigin, since, wire
 
 __all__ = [
     "SUB_PACKAGES",
     "AdditionalInfo",
+    "CalibrationData",
     "CartesianInfo",
+    "ConfigurationData",
     "ForceModeData",
     "JointData",
+    "KinematicsInfo",
     "MasterboardData",
     "RobotModeData",
     "SafetyData",
+    "SingularityInfo",
+    "ToolCommunicationInfo",
+    "ToolData",
+    "ToolModeInfo",
 ]
+
+
+_SEED = 0xC70F6907
+_MULTIPLIER = 0xC6A4A7935BD1E995
+_MASK = 2**64 - 1
+
+
+def calibration_hash(rows: Iterable[tuple[float, float, float, float]]) -> str:
+    """Return the name that the maker's drivers give to a calibration, a hash of the arm's DH table.
+
+    A nominal UR5e has "calib_12788084448423163542". Source: UR client library, `KinematicsInfo::toHash`: the
+    numbers as a C++ stream writes them, without anything between them, through `std::hash` of libstdc++
+    (MurmurHash64A, other in its last bytes).
+
+    Args:
+        rows: theta [rad], d [m], a [m], alpha [rad] of each joint, the base first.
+    """
+    text = "".join(f"{value:.6g}" for row in rows for value in row)
+    return f"calib_{_hash_bytes(text.encode())}"
+
+
+def _hash_bytes(data: bytes) -> int:
+    value = _SEED ^ (len(data) * _MULTIPLIER & _MASK)
+    whole = len(data) & ~7
+    for start in range(0, whole, 8):
+        word = int.from_bytes(data[start : start + 8], "little") * _MULTIPLIER & _MASK
+        value = (value ^ (_mixed(word) * _MULTIPLIER & _MASK)) * _MULTIPLIER & _MASK
+    if len(data) > whole:
+        value = (value ^ int.from_bytes(data[whole:], "little")) * _MULTIPLIER & _MASK
+    return _mixed(_mixed(value) * _MULTIPLIER & _MASK)
+
+
+def _mixed(value: int) -> int:
+    return value ^ (value >> 47)
+
+
+# --- what does not change while a box lives; the first two come in the first state of a connection only and
+# after the brakes have opened
+
+
+_SINCE_5_25_1 = Since(None, SoftwareVersion(5, 25, 1))
+_PROPERTY, _CONSTANT, _ZERO = ValueOrigin.PROPERTY, ValueOrigin.CONSTANT, ValueOrigin.INTERNAL_ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class KinematicsInfo(SubPackage):
+    """Denavit-Hartenberg parameters of this very arm; clients make their calibration check from it."""
+
+    SUB_TYPE: ClassVar[int] = 5
+    FIRST_STATE_ONLY: ClassVar[bool] = True
+
+    checksum: tuple[int, ...] = wire(
+        "I", "all ones on the maker's simulator", count=6, default=SIMULATOR_CHECKSUM, origin=_PROPERTY
+    )
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    calibration_status: int = wire("I", origin=_CONSTANT)
+
+    @property
+    def calibration(self) -> str:
+        """The name of the calibration in the maker's drivers."""
+        return calibration_hash(zip(self.dh_theta, self.dh_d, self.dh_a, self.dh_alpha, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigurationData(SubPackage):
+    """Limits, defaults and nominal kinematics; the order of the DH columns differs from KinematicsInfo."""
+
+    SUB_TYPE: ClassVar[int] = 6
+    FIRST_STATE_ONLY: ClassVar[bool] = True
+
+    joint_min_limit: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, origin=_PROPERTY
+    )
+    joint_max_limit: tuple[float, ...] = wire(
+        "d", count=6, unit="rad", interleaved="limits", default=0.0, origin=_PROPERTY
+    )
+    joint_max_speed: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s", interleaved="rates", default=0.0, origin=_PROPERTY
+    )
+    joint_max_acceleration: tuple[float, ...] = wire(
+        "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, origin=_CONSTANT
+    )
+    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976, origin=_CONSTANT)
+    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636, origin=_CONSTANT)
+    v_tool_default: float = wire("d", unit="m/s", default=0.25, origin=_CONSTANT)
+    a_tool_default: float = wire("d", unit="m/s2", default=1.2, origin=_CONSTANT)
+    eq_radius: float = wire("d", unit="m", default=0.25, origin=_CONSTANT)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    masterboard_version: int = wire(
+        "i",
+        f"{SIMULATED_MASTERBOARD} of this box, {LOCKSTEP_MASTERBOARD} in lockstep, by which clients know it; "
+        "6 in a UR5e capture, CB3 unknown",
+        default=6,
+        origin=_CONSTANT,
+    )
+    controller_box_type: int = wire("i", "4 UR5, 5 UR10, 6 UR3", default=6, origin=_PROPERTY)
+    robot_type: int = wire("i", "RobotType", default=3, origin=_PROPERTY)
+    robot_sub_type: int = wire("i", "1 CB2, 2 CB3, 3 e-Series", default=2, origin=_PROPERTY)
+    box_series: int = wire(
+        "H",
+        "5 CB5, 7 CB7; early software writes 1 and 2 (URCL)",
+        default=5,
+        since=_SINCE_5_25_1,
+        origin=_CONSTANT,
+    )
+    tool_flange_type: int = wire(
+        "H", "1 and 2: versions of the flange", default=1, since=_SINCE_5_25_1, origin=_CONSTANT
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationData(SubPackage):
+    """Internal."""
+
+    SUB_TYPE: ClassVar[int] = 9
+
+    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, origin=_ZERO)
+
+
+@dataclass(frozen=True, slots=True)
+class SingularityInfo(SubPackage):
+    """Internal, e-Series. That 5.9 is the first software is inferred: a state of 5.8 does not have it."""
+
+    SUB_TYPE: ClassVar[int] = 13
+    SINCE: ClassVar[Since] = since(None, (5, 9))
+
+    severity: int = wire("B", origin=_ZERO)
+    singularity_type: int = wire("B", origin=_ZERO)
+
+
+# --- the tool connector
+
+
+_MEASURED, _MODELLED = ValueOrigin.MEASURED, ValueOrigin.MODELLED
+
+
+@dataclass(frozen=True, slots=True)
+class ToolData(SubPackage):
+    """Tool connector: analogue inputs, supply, temperature."""
+
+    SUB_TYPE: ClassVar[int] = 2
+
+    analog_input_range2: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
+    analog_input_range3: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
+    analog_input2: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    analog_input3: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    tool_voltage_48v: float = wire("f", unit="V", default=48.0, origin=_MEASURED)
+    tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V", origin=_MODELLED)
+    tool_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
+    tool_temperature: float = wire("f", unit="degC", default=25.0, origin=_MEASURED)
+    tool_mode: int = wire("B", "JointMode, the tool's subset", default=239, origin=_MODELLED)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolCommunicationInfo(SubPackage):
+    """Serial line at the tool, e-Series."""
+
+    SUB_TYPE: ClassVar[int] = 11
+    SINCE: ClassVar[Since] = since(None, (5, 0))
+
+    is_enabled: bool = wire("?", default=False, origin=_MODELLED)
+    baud_rate: int = wire("i", default=115200, origin=_MODELLED)
+    parity: int = wire("i", "0 none, 1 odd, 2 even", origin=_MODELLED)
+    stop_bits: int = wire("i", default=1, origin=_MODELLED)
+    rx_idle_chars: float = wire("f", default=1.5, origin=_MODELLED)
+    tx_idle_chars: float = wire("f", default=3.5, origin=_MODELLED)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolModeInfo(SubPackage):
+    """Digital outputs at the tool, e-Series."""
+
+    SUB_TYPE: ClassVar[int] = 12
+    SINCE: ClassVar[Since] = since(None, (5, 1))
+
+    output_mode: int = wire("B", "0 digital, 1 dual-pin power", origin=_MODELLED)
+    digital_output_mode0: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_MODELLED)
+    digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_MODELLED)
+
 
 _MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = ValueOrigin
 

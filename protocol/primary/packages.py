@@ -14,18 +14,16 @@ from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
 from protocol.errors import RemoteProtocolError
-from protocol.primary.framing import (
-    HEADER,
-    PackageType,
-    encode_package,
+from protocol.primary.framing import HEADER, PackageType, encode_package
+from protocol.primary.messages import (
+    RobotMessage,
+    StartupMessage,
+    VersionMessage,
+    decode_message,
+    encode_message,
 )
-from protocol.primary.message_codec import decode_message, encode_message
-from protocol.primary.messages import RobotMessage, StartupMessage, VersionMessage
-from protocol.primary.program import ProgramStateMessage, decode_program_state
-from protocol.primary.state import (
-    RobotState,
-    decode_state,
-)
+from protocol.primary.state import RobotState, decode_state
+from protocol.primary.values import ProgramStateMessage, decode_program_state
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import Since, since
 
@@ -44,19 +42,8 @@ SECONDARY_MESSAGES: tuple[type[RobotMessage], ...] = (VersionMessage, StartupMes
 """The only robot messages that the secondary port carries."""
 
 _SAFETY_TOLERANCES = (
-    0.15,
-    25.0,
-    0.0,
-    3.0,
-    *(0.2,) * 6,
-    *(0.052359878,) * 6,
-    0.0,
-    0.0,
-    0.0,
-    0.01745329,
-    0.001,
-    0.01,
-)
+    0.15, 25.0, 0.0, 3.0, *(0.2,) * 6, *(0.052359878,) * 6, 0.0, 0.0, 0.0, 0.01745329, 0.001, 0.01,
+)  # fmt: skip
 """Body of package type 24; undocumented. Source: a byte capture of a CB3 3.10; 3.3 did not send the
 package."""
 

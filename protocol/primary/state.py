@@ -20,8 +20,7 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary.framing import HEADER, PackageType, SubPackage, encode_package
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_codec import Codec, codec_for
-from protocol.wire_record import OLDEST, wire_fields
+from protocol.wire_record import OLDEST, Codec, codec_for, wire_fields
 
 __all__ = [
     "RobotState",

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from protocol.errors import RemoteProtocolError
-from protocol.rtde.codec import MAX_SIZE, decode_message, encode_message, take_package
-from protocol.rtde.messages import (
+from protocol.rtde.codec import (
+    MAX_SIZE,
     REQUESTS,
     VERSIONS,
     DataPackage,
@@ -28,10 +28,12 @@ from protocol.rtde.messages import (
     SetupOutputsReply,
     Start,
     StartReply,
+    decode_message,
+    encode_message,
+    take_package,
 )
 from protocol.rtde.recipe import Recipe
-from protocol.rtde.states import RtdeState
-from protocol.rtde.types import REFUSALS, RtdeType, RtdeValue
+from protocol.rtde.types import REFUSALS, RtdeState, RtdeType, RtdeValue
 
 __all__ = ["ClientEvent", "DataReceived", "RtdeClientConnection"]
 

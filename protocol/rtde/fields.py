@@ -109,12 +109,7 @@ def _fixed(
 
 
 def _in(
-    name: str,
-    kind: RtdeType,
-    unit: str,
-    meaning: str,
-    since: Since = _BASE,
-    source: str = "UR RTDE guide",
+    name: str, kind: RtdeType, unit: str, meaning: str, since: Since = _BASE, source: str = "UR RTDE guide"
 ) -> RtdeField:
     return RtdeField(name, kind, unit, since, None, meaning, source=source)
 

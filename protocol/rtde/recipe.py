@@ -10,12 +10,13 @@ import struct
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import Any
+from weakref import WeakValueDictionary
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde.fields import RtdeField
 from protocol.rtde.types import RtdeType, RtdeValue
 
-__all__ = ["Recipe", "snapshot_encoder"]
+__all__ = ["Recipe", "recipe_of", "snapshot_encoder"]
 
 
 class Recipe:
@@ -27,7 +28,7 @@ class Recipe:
         size: bytes of all values.
     """
 
-    __slots__ = ("_counts", "_is_flat", "_struct", "names", "size", "types")
+    __slots__ = ("__weakref__", "_counts", "_is_flat", "_struct", "names", "size", "types")
 
     def __init__(self, names: Iterable[str], types: Iterable[RtdeType]) -> None:
         self.names = tuple(names)
@@ -76,6 +77,19 @@ class Recipe:
             values.append(flat[start] if count == 1 else flat[start : start + count])
             start += count
         return tuple(values)
+
+
+_RECIPES: WeakValueDictionary[tuple[tuple[str, ...], tuple[RtdeType, ...]], Recipe] = WeakValueDictionary()
+
+
+def recipe_of(fields: Sequence[RtdeField]) -> Recipe:
+    """Return the recipe of these variables: the same one for all who have it, as long as one has."""
+    # Names of the table, not those that arrived: every recipe would hold copies of its own.
+    key = tuple(field.name for field in fields), tuple(field.type for field in fields)
+    recipe = _RECIPES.get(key)
+    if recipe is None:
+        recipe = _RECIPES[key] = Recipe(*key)
+    return recipe
 
 
 def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[Any], bytes]:

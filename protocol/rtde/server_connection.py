@@ -15,14 +15,14 @@ Source: UR RTDE guide; where it says nothing, what public clients need, as noted
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde.codec import MAX_NAMES_SIZE, data_header, decode_message, encode_message, take_package
-from protocol.rtde.fields import RtdeField
-from protocol.rtde.messages import (
+from protocol.rtde.codec import (
+    MAX_NAMES_SIZE,
     VERSIONS,
     DataPackage,
     GetControllerVersion,
@@ -42,13 +42,68 @@ from protocol.rtde.messages import (
     SetupOutputsReply,
     Start,
     StartReply,
+    data_header,
+    decode_message,
+    encode_message,
+    take_package,
 )
-from protocol.rtde.recipe import Recipe, snapshot_encoder
-from protocol.rtde.states import TRANSITIONS, RtdeState
-from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeValue
+from protocol.rtde.fields import RtdeField
+from protocol.rtde.recipe import Recipe, recipe_of, snapshot_encoder
+from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue
 from protocol.ur_types import SoftwareVersion
 
-__all__ = ["InputReceived", "RequestLimits", "RtdeServerConnection", "ServerEvent", "request_limits"]
+__all__ = [
+    "TRANSITIONS",
+    "InputReceived",
+    "RequestLimits",
+    "RtdeServerConnection",
+    "ServerEvent",
+    "Transition",
+    "cycles_per_package",
+    "request_limits",
+]
+
+
+class Transition(NamedTuple):
+    """The robot's answer to a request: accepted or not, and the state after it."""
+
+    accepted: bool
+    state: RtdeState
+
+
+_PAUSED, _STARTED = RtdeState
+
+TRANSITIONS: Mapping[tuple[RtdeState, type[Request]], Transition] = {
+    (_PAUSED, RequestProtocolVersion): Transition(True, _PAUSED),
+    (_PAUSED, GetControllerVersion): Transition(True, _PAUSED),
+    (_PAUSED, SetupOutputs): Transition(True, _PAUSED),
+    (_PAUSED, SetupInputs): Transition(True, _PAUSED),
+    (_PAUSED, Start): Transition(True, _STARTED),
+    # ur_rtde's I/O interface never starts, but waits for this reply when it ends.
+    (_PAUSED, Pause): Transition(True, _PAUSED),
+    # The layout of what flows cannot change under it.
+    (_STARTED, RequestProtocolVersion): Transition(False, _STARTED),
+    (_STARTED, GetControllerVersion): Transition(True, _STARTED),
+    # Assumed: the guide shows set-ups before S or after P only, but not that others fail.
+    (_STARTED, SetupOutputs): Transition(True, _STARTED),
+    (_STARTED, SetupInputs): Transition(True, _STARTED),
+    (_STARTED, Start): Transition(True, _STARTED),
+    (_STARTED, Pause): Transition(True, _PAUSED),
+}
+"""Every request in every state. A version that does not exist is refused in both."""
+
+
+def cycles_per_package(frequency: float | None, rate: int) -> int:
+    """How many control cycles lie between two packages: floor(rate / frequency).
+
+    Args:
+        frequency: packages a second as asked for [Hz]; None for the full rate. What lies outside of 1 to
+            `rate` is clamped (assumed: the guide gives the range only).
+        rate: control cycles a second.
+    """
+    if frequency is None or math.isnan(frequency):
+        return 1
+    return int(rate / min(max(frequency, 1.0), rate))
 
 
 class RequestLimits(NamedTuple):
@@ -104,10 +159,7 @@ class RtdeServerConnection:
     """
 
     def __init__(
-        self,
-        version: SoftwareVersion,
-        outputs: Mapping[str, RtdeField],
-        inputs: Mapping[str, RtdeField],
+        self, version: SoftwareVersion, outputs: Mapping[str, RtdeField], inputs: Mapping[str, RtdeField]
     ) -> None:
         self._software = version
         self._limits = request_limits(version)
@@ -152,11 +204,12 @@ class RtdeServerConnection:
         """Makes a data package of a snapshot; None while none is to be sent."""
         return self._encoder if self.state is RtdeState.STARTED else None
 
-    def reply(self, in_use: Collection[str] = ()) -> bytes:
+    def reply(self, in_use: Collection[str] = (), *, has_room: bool = True) -> bytes:
         """Answer the request that `next_event` gave, and do what it asks.
 
         Args:
             in_use: names of input variables that belong to other clients.
+            has_room: for an input recipe; without, its names are answered as if they had not been read.
         """
         request, self._unanswered = self._unanswered, None
         if request is None:
@@ -174,7 +227,7 @@ class RtdeServerConnection:
             case SetupOutputs():
                 reply = self._set_up_outputs(request)
             case SetupInputs():
-                reply = self._set_up_inputs(request, in_use)
+                reply = self._set_up_inputs(request, in_use, self._known_inputs if has_room else {})
             case Start():
                 reply = StartReply(accepted)
             case Pause():
@@ -213,13 +266,15 @@ class RtdeServerConnection:
         self._encoder = snapshot_encoder(fields, data_header(size, recipe_id))
         return SetupOutputsReply(types, recipe_id)
 
-    def _set_up_inputs(self, request: SetupInputs, in_use: Collection[str]) -> SetupInputsReply:
+    def _set_up_inputs(
+        self, request: SetupInputs, in_use: Collection[str], known: Mapping[str, RtdeField]
+    ) -> SetupInputsReply:
         """Add an input recipe. One that is refused takes no id."""
-        fields, types = _look_up(request.names, self._known_inputs, in_use, self._limits)
+        fields, types = _look_up(request.names, known, in_use, self._limits)
         recipe_id = len(self.input_recipes) + 1
         if not fields or recipe_id > _LAST_ID:
             return SetupInputsReply(types, 0)
-        self.input_recipes[recipe_id] = Recipe(request.names, (field.type for field in fields))
+        self.input_recipes[recipe_id] = recipe_of(fields)
         return SetupInputsReply(types, recipe_id)
 
 

@@ -1,6 +1,6 @@
 """Data types of RTDE variables, and the words that a reply has instead of a type.
 
-Everything is big-endian. The variables are in `rtde.fields`, the packages in `rtde.messages`.
+Everything is big-endian. The variables are in `rtde.fields`, the packages in `rtde.codec`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ __all__ = [
     "NOT_FOUND",
     "REFUSALS",
     "RobotStatusBits",
+    "RtdeState",
     "RtdeType",
     "RtdeValue",
     "SafetyStatusBits",
@@ -88,6 +89,13 @@ class TextLevel(IntEnum):
     ERROR = 1
     WARNING = 2
     INFO = 3
+
+
+class RtdeState(Enum):
+    """Whether data packages flow to the client."""
+
+    PAUSED = "paused"
+    STARTED = "started"
 
 
 class RobotStatusBits(IntFlag):

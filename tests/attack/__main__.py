@@ -1,8 +1,9 @@
-"""`make attack`: attack a box in every way, one after the other, and write results.json, which `make docs` reads.
+"""`make attack`: attack boxes of all kinds in every way, one after the other; results.json is for `make docs`.
 
-python tests/attack                  # everything, a quarter of an hour
-python tests/attack "unread log"     # these attacks; the others keep their last figures
-python tests/attack --robot ur5e     # the same on another arm, into out/attack/ur5e.json
+python tests/attack                             # everything, a quarter of an hour
+python tests/attack "unread log"                # these attacks; the others keep their last figures
+python tests/attack --box rack                  # on boxes of this kind
+python tests/attack --repeat 30 "unread log"    # on one box again and again: its memory after each, nothing written
 """
 
 import argparse
@@ -11,84 +12,115 @@ import math
 import os
 import platform
 import sys
+import time
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
-from attack_record import watched
-from attack_table import SECTIONS
-from rich.console import Console
-from rich.progress import Progress
-from rich.table import Table
+from attack_record import attacked, served, watched
+from attack_table import SECTIONS, described
+from box_under_attack import KINDS, Seen
 
-# The arm of the page, and where its figures are; those of others have no page.
-ROBOT, RESULTS = "ur3", Path(__file__).with_name("results.json")
-OTHERS = Path("out") / "attack"
-SECONDS = 5.0
-
-
-def main(names, robot):
-    """Run these attacks, or all, on a box with this arm."""
-    results = RESULTS if robot == ROBOT else OTHERS / f"{robot}.json"
-    attacks = {attack.name: (section, attack) for section in SECTIONS for attack in section.attacks}
-    if unknown := set(names) - set(attacks):
-        sys.exit(f"attack: {', '.join(sorted(unknown))} given: choose of {', '.join(attacks)}")
-    rows = {}
-    if names and results.exists():
-        rows = {row["name"]: row for row in json.loads(results.read_text())["attacks"]}
-    console = Console(width=160)
-    with Progress(console=console) as progress:
-        task = progress.add_task("attacks", total=len(names or attacks))
-        for name in names or attacks:
-            progress.update(task, description=name)
-            rows[name] = _row(*attacks[name], robot)
-            _show(console, rows[name])
-            progress.advance(task)
-    machine = f"{os.cpu_count()} cores, {platform.system()} {platform.release()}, Python {platform.python_version()}"
-    result = {
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
-        "machine": machine,
-        "seconds": SECONDS,
-        "attacks": [rows[name] for name in attacks if name in rows],
-    }
-    results.parent.mkdir(parents=True, exist_ok=True)
-    results.write_text(json.dumps(result, indent=1) + "\n")
-    console.print(f"written to {results}")
+RESULTS = Path(__file__).with_name("results.json")
+# How long an attack lasts [s]; the first kind of box has all of them, the others those that depend on the kind.
+SECONDS, SECONDS_OF_OTHERS = 4.0, 1.0
+# Growth over the last repetitions that is allowed [1], and how many these are.
+_GROWTH, _LAST = 0.03, 10
+_REST = 0.5  # s; after an attack, until its memory is measured
 
 
-def _row(section, attack, robot):
-    outcome = watched(attack, robot, SECONDS)
-    figures = {name: round(value, 3) for name, value in asdict(outcome.seen).items()}
+def main(names, kinds):
+    """Attack boxes of these kinds in these ways; write the figures."""
+    told = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    figures = told.get("figures", {})
+    runs = [(KINDS[kind], ATTACKS[name]) for kind in kinds for name in names if kind in ATTACKS[name].kinds]
+    for number, (kind, attack) in enumerate(runs, 1):
+        figures.setdefault(kind.name, {})[attack.name] = row = _row(attack, kind)
+        _show(f"{number}/{len(runs)} {kind.name}: {attack.name}", row)
+        result = {
+            "date": f"{datetime.now(UTC):%Y-%m-%d}",
+            "machine": f"{os.cpu_count()} cores, {platform.system()} {platform.release()}, "
+            f"Python {platform.python_version()}",
+            "seconds": [SECONDS, SECONDS_OF_OTHERS],
+            "attacks": described(),
+            # In the order of the tables, without attacks that are gone.
+            "figures": {
+                name: {key: figures[name][key] for key in ATTACKS if key in figures[name]}
+                for name in KINDS
+                if name in figures
+            },
+        }
+        RESULTS.write_text(json.dumps(result, indent=1) + "\n")
+    print(f"written to {RESULTS}")
+
+
+def _row(attack, kind):
+    outcome = watched(attack, kind, SECONDS if kind.name == next(iter(KINDS)) else SECONDS_OF_OTHERS)
     return {
-        "name": attack.name,
-        "section": section.title,
-        "what": attack.what,
-        "limit": attack.limit,
-        **figures,
+        **{name: round(value, 3) for name, value in asdict(outcome.seen).items()},
         "stop_s": round(outcome.stop_s, 2) if math.isfinite(outcome.stop_s) else None,
         "remark": outcome.remark,
         "problems": list(outcome.problems),
     }
 
 
-def _show(console, row):
-    table = Table.grid(padding=(0, 2))
-    table.add_row(
-        row["name"],
-        f"rate {row['rate']:.3f}",
-        f"gap {row['gap_ms']:.0f} ms (timer {row['timer_gap_ms']:.0f})",
-        f"lost {row['lost']}",
-        f"{row['box_mb']:.0f} + {row['worker_mb']:.0f} MB",
-        f"stop {row['stop_s']} s",
-        row["remark"],
-    )
-    console.print(table)
+def _show(title, row):
+    gaps = f"gap {row['gap_ms']:.0f} ms (timer {row['timer_gap_ms']:.0f})"
+    memory = f"{row['box_mb']:.0f} + {row['worker_mb']:.0f} MB"
+    print(f"{title}: rate {row['rate']:.3f}, {gaps}, lost {row['lost']}, {memory}", row["remark"], flush=True)
     for problem in row["problems"]:
-        console.print(f"  [red]{problem}")
+        print(f"  {problem}", flush=True)
 
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("attacks", nargs="*", metavar="ATTACK")
-parser.add_argument("--robot", default=ROBOT)
-given = parser.parse_args()
-main(given.attacks, given.robot)
+def repeat(attack, kind, times, growth):
+    """Attack one box again and again; return what is wrong: a growing memory, or a problem."""
+    held = []
+    with served(attack, kind) as box:
+        for number in range(1, times + 1):
+            problems = attacked(attack, box, SECONDS_OF_OTHERS).problems
+            if problems:
+                return f"{attack.name}, repetition {number}: {'; '.join(problems)}"
+            time.sleep(_REST)
+            now = Seen()
+            now.look(box.process.pid)
+            held.append(now.memory_mb)
+            parts = f"{now.box_mb:.1f} + {now.worker_mb:.1f} MB"
+            print(f"{kind.name}: {attack.name}, repetition {number}: {parts}", flush=True)
+    # The box gives memory back now and then: the highest of each half says whether it grows.
+    last = held[-_LAST:]
+    share = max(last[_LAST // 2 :]) / max(last[: _LAST // 2]) - 1.0
+    print(f"{attack.name}: {share:+.1%} over the last {_LAST} repetitions")
+    return "" if share <= growth else f"{attack.name}: memory grows by {share:.1%}, more than {growth:.0%}"
+
+
+def _arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("attacks", nargs="*", metavar="ATTACK", help="all, if none is given")
+    parser.add_argument("--box", action="append", choices=KINDS, help="kind of box; all, if none is given")
+    parser.add_argument("--repeat", type=int, metavar="N", help=f"times, at least {_LAST}")
+    parser.add_argument("--growth", type=float, default=_GROWTH, metavar="SHARE", help="that --repeat allows")
+    given = parser.parse_args()
+    if unknown := set(given.attacks) - set(ATTACKS):
+        sys.exit(f"attack: {', '.join(sorted(unknown))} given: choose of {', '.join(ATTACKS)}")
+    if given.repeat is not None and given.repeat < _LAST:
+        sys.exit(
+            f"attack: --repeat {given.repeat} given: the last {_LAST} are compared: give {_LAST} or more"
+        )
+    return given
+
+
+ATTACKS = {attack.name: attack for section in SECTIONS for attack in section.attacks}
+if __name__ == "__main__":
+    given = _arguments()
+    if given.repeat is None:
+        main(given.attacks or ATTACKS, given.box or KINDS)
+    else:
+        found = [
+            repeat(ATTACKS[name], KINDS[kind], given.repeat, given.growth)
+            for name in given.attacks or ATTACKS
+            for kind in given.box or ATTACKS[name].kinds[:1]
+            if kind in ATTACKS[name].kinds
+        ]
+        sys.exit("\n".join(filter(None, found)))

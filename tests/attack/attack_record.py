@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from box_under_attack import BoxUnderAttack, Seen, serving, watching
+from box_under_attack import KINDS, MOST_MEMORY, BoxUnderAttack, Kind, Seen, serving, watching
 
 Run = Callable[[BoxUnderAttack, float], str | None]
 
@@ -21,16 +22,18 @@ class Attack:
         limit: what stops it: a limit and what happens beyond it; "" where nothing is refused.
         run: does it, for about so many seconds, never for more than a minute; may return a remark. An
             `AssertionError` or `OSError` says that the box has not behaved.
+        kinds: names of the boxes that it applies to.
         options: of `ur-emulator serve`.
         prelude: Python code that the process of the box runs first.
         unread_log: stderr is a pipe that nobody reads.
-        is_short: it makes sense within half a second, too, and belongs to `make test`.
+        is_short: it makes sense within a moment, too, and belongs to `make test`.
     """
 
     name: str
     what: str
     limit: str
     run: Run
+    kinds: tuple[str, ...] = tuple(KINDS)
     options: tuple[str, ...] = ()
     prelude: str = ""
     unread_log: bool = False
@@ -67,10 +70,6 @@ class Section:
 
         return add
 
-    def short(self) -> list[Attack]:
-        """Return those that belong to `make test`."""
-        return [attack for attack in self.attacks if attack.is_short]
-
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -80,7 +79,7 @@ class Outcome:
         seen: by the bystanders.
         problems: a line each; none if the box has withstood.
         remark: of the attack.
-        stop_s: from SIGTERM to the end of the process.
+        stop_s: from SIGTERM to the end of the process; nan if the box goes on.
     """
 
     seen: Seen
@@ -89,26 +88,33 @@ class Outcome:
     stop_s: float
 
 
-def served(attack: Attack, robot: str):
-    """Serve a box with this arm that an attack may begin with."""
-    return serving(robot, *attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
+def served(attack: Attack, kind: Kind):
+    """Serve a box of this kind that an attack may begin with."""
+    return serving(kind, *attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
 
 
-def withstands(attack: Attack, box: BoxUnderAttack, seconds: float) -> list[str]:
-    """Attack a box; return its problems, during the attack and afterwards."""
-    return [*_attacked(attack, box, seconds)[1], *box.problems()]
-
-
-def watched(attack: Attack, robot: str, seconds: float) -> Outcome:
+def watched(attack: Attack, kind: Kind, seconds: float) -> Outcome:
     """Attack a box of its own, with bystanders."""
-    with served(attack, robot) as box:
-        began = time.monotonic()
-        with watching(box) as seen:
-            remark, problems = _attacked(attack, box, seconds)
-            while not box.is_stopped and time.monotonic() < began + seconds:
-                time.sleep(0.02)  # what it has left behind is seen too
-        problems += box.problems()
-        return Outcome(seen, tuple(problems), remark, box.stop())
+    with served(attack, kind) as box:
+        outcome = attacked(attack, box, seconds)
+        return outcome if box.is_stopped else replace(outcome, stop_s=box.stop())
+
+
+def attacked(attack: Attack, box: BoxUnderAttack, seconds: float) -> Outcome:
+    """Attack a box with bystanders, which see what is left behind too; it goes on."""
+    began = time.monotonic()
+    with watching(box) as seen:
+        remark, problems = _attacked(attack, box, seconds)
+        while not box.is_stopped and time.monotonic() < began + seconds:
+            time.sleep(0.02)
+    problems += box.problems()
+    if seen.memory_mb > MOST_MEMORY:
+        problems.append(f"memory: {seen.memory_mb:.0f} MB")
+    if not box.is_stopped and (seen.lost or seen.closed):
+        problems.append(
+            f"the client of port 30003 has lost {seen.lost} cycles" + seen.closed * " and was closed"
+        )
+    return Outcome(seen, tuple(problems), remark, math.nan)
 
 
 def _attacked(attack: Attack, box: BoxUnderAttack, seconds: float) -> tuple[str, list[str]]:

@@ -8,3 +8,18 @@ from attacks_places import PLACES
 from attacks_scripts import SCRIPTS
 
 SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES)
+
+
+def described() -> list[dict[str, object]]:
+    """Return what the page says of each attack beside its figures."""
+    return [
+        {
+            "name": one.name,
+            "section": section.title,
+            "what": one.what,
+            "limit": one.limit,
+            "boxes": [*one.kinds],
+        }
+        for section in SECTIONS
+        for one in section.attacks
+    ]

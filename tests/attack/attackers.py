@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 
-from box_under_attack import CONTROL_PORT, PATIENCE, BoxUnderAttack
+from box_under_attack import ADDRESSES, CONTROL_PORT, PATIENCE, BoxUnderAttack
 
 RESET = struct.pack("ii", 1, 0)
 _TURN = 1 << 16
@@ -27,6 +27,7 @@ def flood(
     clients: int = 8,
     reads: bool = True,
     most: int = 64 << 20,
+    again: int = 0,
 ) -> None:
     """Send the same bytes again and again over some connections; one that the box closes is replaced.
 
@@ -38,6 +39,7 @@ def flood(
         clients: how many connections.
         reads: they read what comes.
         most: bytes in total.
+        again: where in the bytes a connection begins anew.
     """
     sent, end = 0, time.monotonic() + seconds
     events = selectors.EVENT_WRITE | (selectors.EVENT_READ if reads else 0)
@@ -64,7 +66,9 @@ def flood(
                         raise ConnectionError
                     if ready & selectors.EVENT_WRITE:
                         n = sock.send(memoryview(data)[at[sock] : at[sock] + _TURN])
-                        at[sock] = (at[sock] + n) % len(data)
+                        at[sock] += n
+                        if at[sock] == len(data):
+                            at[sock] = again
                         sent += n
                 except BlockingIOError:
                     pass
@@ -75,13 +79,24 @@ def flood(
 
 
 @contextmanager
-def crowd(box: BoxUnderAttack, port: str, n: int, data: bytes = b"") -> Iterator[list[socket.socket]]:
-    """Connect so many clients that each send this and read nothing; those that are refused are left out."""
+def crowd(
+    box: BoxUnderAttack, port: str, n: int, data: bytes = b"", of_address: int = 0
+) -> Iterator[list[socket.socket]]:
+    """Connect so many clients that each send this and read nothing; those that are refused are left out.
+
+    Args:
+        box: to be crowded.
+        port: by its name.
+        n: how many clients.
+        data: what each of them sends.
+        of_address: so many come from an address before the next one; 0: they take turns.
+    """
     with ExitStack() as stack:
         clients = []
-        for _ in range(n):
+        for k in range(n):
+            source = ADDRESSES[k // of_address % len(ADDRESSES)] if of_address else ""
             with suppress(OSError):
-                sock = stack.enter_context(box.connect(port, 2.0))
+                sock = stack.enter_context(box.connect(port, 2.0, source))
                 sock.settimeout(0.2)
                 with suppress(TimeoutError):
                     sock.sendall(data)
@@ -107,7 +122,7 @@ def until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) 
 
 def plays(box: BoxUnderAttack) -> bool:
     """Return whether a program runs."""
-    return box.ask("running")[0] == "Program running: true"
+    return box.state()["program_state"] == "PLAYING"
 
 
 def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[list[dict], int]:
@@ -169,7 +184,9 @@ def request(
         body: sent as JSON, bytes as they are.
         headers: `_` stands for `-`.
     """
-    connection = http.client.HTTPConnection(box.host, CONTROL_PORT, timeout=PATIENCE)
+    connection = http.client.HTTPConnection(
+        box.host, CONTROL_PORT, timeout=PATIENCE, source_address=(ADDRESSES[0], 0)
+    )
     data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
     given = {name.replace("_", "-"): value for name, value in headers.items()}
     try:

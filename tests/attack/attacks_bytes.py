@@ -13,7 +13,7 @@ from contextlib import ExitStack, suppress
 import psutil
 from attack_record import Section
 from attackers import flood, get
-from box_under_attack import BoxUnderAttack
+from box_under_attack import ONE, BoxUnderAttack
 
 BYTES = Section("Bytes that make no sense, or never come")
 
@@ -78,12 +78,14 @@ def lying_lengths(box: BoxUnderAttack, seconds: float) -> None:
         ),
         "dashboard": (1_000_000 * b"x",),
     }
-    for port, datas in said.items():
-        for data in datas:
+    for port in said.keys() & set(box.open_ports):
+        for data in said[port]:
             flood(box, port, data, seconds / 10, clients=4)
 
 
-@BYTES.attack("A client of all streams is stopped with SIGSTOP and goes on later", "it loses packages")
+@BYTES.attack(
+    "A client of all streams is stopped with SIGSTOP and goes on later", "it loses packages", kinds=ONE
+)
 def stopped_client(box: BoxUnderAttack, seconds: float) -> None:
     ports = (box.ports.primary, box.ports.secondary, box.ports.realtime)
     client = subprocess.Popen(
@@ -102,11 +104,36 @@ def stopped_client(box: BoxUnderAttack, seconds: float) -> None:
         client.stdout.close()
 
 
-@BYTES.attack("The worker process is killed while it compiles", "the program is refused; the next one runs")
+@BYTES.attack(
+    "The worker process is killed while it compiles, and once the server that it comes from too",
+    "the program is refused; the next one runs",
+)
 def killed_worker(box: BoxUnderAttack, seconds: float) -> None:
-    for _ in range(max(1, min(4, round(seconds / 2)))):
+    for k in range(max(2, min(4, round(seconds)))):
         box.run(*2000 * ("x = 1",))
-        for worker in psutil.Process(box.process.pid).children():
+        for worker in (*box.workers(), *psutil.Process(box.process.pid).children()[: k % 2]):
             with suppress(psutil.Error):
                 worker.kill()
         time.sleep(0.2)
+
+
+@BYTES.attack(
+    "The worker process is stopped with SIGSTOP while it compiles; programs go on coming",
+    "another one compiles them",
+)
+def stopped_worker(box: BoxUnderAttack, seconds: float) -> str:
+    stopped = {}
+    try:
+        end = time.monotonic() + max(1.5, seconds)
+        while time.monotonic() < end:
+            box.run(*2000 * ("x = 1",))
+            for worker in box.workers()[:1]:
+                with suppress(psutil.Error):
+                    worker.suspend()
+                    stopped[worker.pid] = worker
+            time.sleep(0.3)
+    finally:
+        for worker in stopped.values():
+            with suppress(psutil.Error):
+                worker.resume()
+    return f"{len(stopped)} were stopped"

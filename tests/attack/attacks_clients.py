@@ -9,13 +9,17 @@ from contextlib import suppress
 
 from attack_record import Section
 from attackers import crowd, flood, get, post, request, reset
-from box_under_attack import BoxUnderAttack
+from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
+
+from protocol.rtde.fields import OUTPUTS
+from protocol.ur_types import SoftwareVersion
 
 CLIENTS = Section("Fairness: many clients, many requests")
 
 _QUESTIONS = (
     b"robotmode\nprogramState\nget loaded program\nversion\nget serial number\nsafetystatus\nisProgramSaved\n"
 )
+_LISTED = SoftwareVersion(3, 4)
 _RTDE_START = (
     struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + 27, ord("O"), 125.0) + b"timestamp,actual_q,target_q\0\3S"
 )
@@ -25,12 +29,12 @@ def _read(function: int, first: int, count: int) -> bytes:
     return struct.pack(">HHHBBHH", 7, 0, 6, 1, function, first, count)
 
 
-@CLIENTS.attack("Ten dashboards ask seven questions without pause")
+@CLIENTS.attack("Ten dashboards ask seven questions without pause", kinds=WITH_DASHBOARD)
 def ten_dashboards(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "dashboard", 100 * _QUESTIONS, seconds, clients=10)
 
 
-@CLIENTS.attack("Ten dashboards load programs, some of which do not exist")
+@CLIENTS.attack("Ten dashboards load programs, some of which do not exist", kinds=WITH_DASHBOARD)
 def ten_dashboards_that_load(box: BoxUnderAttack, seconds: float) -> None:
     (box.programs / "spin.script").write_text("while True:\n  sync()\nend\n")
     flood(box, "dashboard", 20 * b"load spin.script\nload nothing.urp\nplay\nstop\n", seconds, clients=10)
@@ -47,7 +51,7 @@ def pipelined_http(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "control", 200 * get(box, "state"), seconds, clients=16)
 
 
-@CLIENTS.attack("16 clients of the control API post bodies of 1 MB: numbers, names, blanks")
+@CLIENTS.attack("16 clients of the control API post bodies of 1 MB: numbers, names, blanks", kinds=ONE)
 def long_bodies(box: BoxUnderAttack, seconds: float) -> None:
     bodies = (
         json.dumps({"force": 150_000 * [1.5]}).encode(),
@@ -59,7 +63,9 @@ def long_bodies(box: BoxUnderAttack, seconds: float) -> None:
         flood(box, "control", post(box, "push", body[: 1 << 20]), seconds / len(bodies), clients=16)
 
 
-@CLIENTS.attack("16 clients of the control API post JSON that is nested 12,000 deep and more", "refused, 400")
+@CLIENTS.attack(
+    "16 clients of the control API post JSON that is nested 12,000 deep and more", "refused, 400", kinds=ONE
+)
 def deep_json(box: BoxUnderAttack, seconds: float) -> None:
     for body in (60_000 * b"[", 12_000 * b'{"a":', b'{"force": ' + 30_000 * b"[" + 30_000 * b"]" + b"}"):
         status, _ = request(box, "POST", "push", body)
@@ -71,7 +77,7 @@ def deep_json(box: BoxUnderAttack, seconds: float) -> None:
 def connect_storm(box: BoxUnderAttack, seconds: float) -> str:
     n, end = 0, time.monotonic() + seconds
     while time.monotonic() < end and n < 60_000:
-        for port in ("dashboard", "secondary", "realtime", "rtde", "control"):
+        for port in box.open_ports:
             with suppress(OSError):
                 reset(box.connect(port, 1.0))
             n += 1
@@ -97,6 +103,19 @@ def crowd_of_rtde_clients(box: BoxUnderAttack, seconds: float) -> str:
     return f"{fed} of 100 were served"
 
 
+@CLIENTS.attack("168 RTDE clients, 64 of an address, with recipes of 2,048 bytes of names", "refused, or fed")
+def long_recipes(box: BoxUnderAttack, seconds: float) -> str:
+    names = b",".join(field.name.encode() for field in OUTPUTS if field.since.covers(_LISTED))
+    names = names[:2_048].rpartition(b",")[0]
+    recipe = struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + len(names), ord("O"), 125.0) + names
+    with crowd(box, "rtde", 168, recipe + b"\0\3S", of_address=64) as clients:
+        end, fed = time.monotonic() + seconds, set()
+        while time.monotonic() < end:
+            fed = {k for k in range(0, len(clients), 2) if _has_frames(clients[k])}
+            time.sleep(0.05)
+    return f"{len(fed)} of 84 were served"
+
+
 @CLIENTS.attack("Clients of all ports that read nothing", "packages to them are dropped, or they are closed")
 def unread_streams(box: BoxUnderAttack, seconds: float) -> None:
     said = {
@@ -108,8 +127,8 @@ def unread_streams(box: BoxUnderAttack, seconds: float) -> None:
         "modbus": 500 * _read(3, 128, 125),
         "control": 50 * get(box, "state"),
     }
-    for port, data in said.items():
-        with crowd(box, port, 30, data):
+    for port in said.keys() & set(box.open_ports):
+        with crowd(box, port, 30, said[port]):
             time.sleep(seconds / len(said))
 
 

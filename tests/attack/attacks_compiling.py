@@ -8,7 +8,9 @@ import time
 
 from attack_record import Section
 from attackers import crowd, flood, get, plays, reset, until
-from box_under_attack import BoxUnderAttack
+from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
+
+from protocol.robot_api import BASE
 
 COMPILING = Section("Budgets of what waits: scripts, files, reports")
 
@@ -50,7 +52,9 @@ def long_program_and_stop(box: BoxUnderAttack, seconds: float) -> str:
     return f"stopped after {until(lambda: not plays(box), 'the program stops'):.2f} s"
 
 
-@COMPILING.attack("The box is told to end while it compiles a program of nearly 4 MB", is_short=False)
+@COMPILING.attack(
+    "The box is told to end while it compiles a program of nearly 4 MB", is_short=False, kinds=ONE
+)
 def long_program_and_end(box: BoxUnderAttack, seconds: float) -> str:
     box.send("secondary", _program((4 << 20) - 100))
     time.sleep(0.5)
@@ -58,7 +62,10 @@ def long_program_and_end(box: BoxUnderAttack, seconds: float) -> str:
 
 
 @COMPILING.attack(
-    "40 clients send a program of 1 MB each and are reset", "what they wanted is dropped", is_short=False
+    "40 clients send a program of 1 MB each and are reset",
+    "what they wanted is dropped",
+    is_short=False,
+    kinds=ONE,
 )
 def senders_that_go(box: BoxUnderAttack, seconds: float) -> None:
     program = _program(1_000_000)
@@ -108,6 +115,7 @@ def _urp(body: str) -> bytes:
 @COMPILING.attack(
     "Files of 249 bytes to 35 kB that unpack to 30 MB of elements, text or attributes, or lie about their coding",
     "they are not loaded",
+    kinds=ONE,
 )
 def program_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
     (box.programs / "default.installation").write_bytes(gzip.compress(b"<Installation/>"))
@@ -139,6 +147,7 @@ def program_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
     "Script files of 30 MB, without an end, of zero bytes, and installations that are bombs",
     "they are not loaded",
     is_short=False,
+    kinds=ONE,
 )
 def script_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
     (box.programs / "default.installation").write_bytes(gzip.compress(30_000_000 * b"<"))
@@ -154,7 +163,11 @@ def script_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
     )
 
 
-@COMPILING.attack("Dashboards ask for flight reports and support files, one after the other", "refused")
+@COMPILING.attack(
+    "Dashboards ask for flight reports and support files, one after the other",
+    "refused",
+    kinds=WITH_DASHBOARD,
+)
 def flood_of_reports(box: BoxUnderAttack, seconds: float) -> str:
     end = time.monotonic() + seconds
     box.ask(*100 * ["addToLog " + 900 * "x"])
@@ -170,18 +183,42 @@ def flood_of_reports(box: BoxUnderAttack, seconds: float) -> str:
 # --- memory of answers
 
 
-@COMPILING.attack("64 clients of the control API ask for a full log and do not read it", "they are closed")
+@COMPILING.attack(
+    "64 clients of the control API ask for a full log and do not read it",
+    "they are closed",
+    kinds=WITH_DASHBOARD,
+)
 def unread_answers_over_http(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "dashboard", 100 * (b"addToLog " + b"\xe9" * 900 + b"\n"), min(seconds, 3.0), most=6 << 20)
     with crowd(box, "control", 64, 20 * get(box, "log")):
         time.sleep(seconds)
 
 
-@COMPILING.attack("64 clients of the control API send nearly 1 MiB of a body each, and no more")
+@COMPILING.attack("64 clients of the control API send nearly 1 MiB of a body each, and no more", kinds=ONE)
 def unfinished_bodies(box: BoxUnderAttack, seconds: float) -> None:
     head = f"POST /v1/push HTTP/1.1\r\nHost: {box.host}\r\nContent-Type: application/json\r\n"
     with crowd(box, "control", 64, f"{head}Content-Length: 1048576\r\n\r\n".encode() + 1_000_000 * b" "):
         time.sleep(seconds)
+
+
+@COMPILING.attack(
+    "20 clients of each port over HTTP send a body that never ends, in chunks or longer than it was said to be",
+    "400, 411 or 413, and they are closed",
+)
+def uploads_without_end(box: BoxUnderAttack, seconds: float) -> None:
+    paths = {"control": "POST /v1/run_program", "robot_api": f"POST {BASE}/programs/v1"}
+    kinds = (
+        "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n",
+        "Content-Type: multipart/form-data; boundary=b\r\nContent-Length: 1000000000000\r\n\r\n",
+        "Content-Type: multipart/form-data; boundary=b\r\nContent-Length: 1048576\r\n\r\n",
+    )
+    ports = paths.keys() & set(box.open_ports)
+    for port in ports:
+        for kind in kinds:
+            head = f"{paths[port]} HTTP/1.1\r\nHost: {box.host}\r\n{kind}".encode()
+            body = b"10000\r\n" + 0x10000 * b"x" + b"\r\n"
+            share = seconds / len(kinds) / len(ports)
+            flood(box, port, head + body, share, clients=20, again=len(head))
 
 
 @COMPILING.attack("20 RTDE clients ask for all variables 2,000 times each, in recipes of all lengths")

@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 
 from attack_record import Section
 from attackers import crowd, flood, get, reset, until
-from box_under_attack import BoxUnderAttack
+from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
 
 FAILURES = Section("One boundary for failures")
 
@@ -29,6 +29,7 @@ _WRITES = ("saveLog", "generate flight report", "generate support file .")
     "Clients take all descriptors (limit: 96), then a dashboard that is connected has the box write files",
     "further clients are closed; the writing is refused with one line, or the dashboard is closed",
     prelude=_FEW_DESCRIPTORS,
+    kinds=ONE,
 )
 def descriptors_exhausted(box: BoxUnderAttack, seconds: float) -> None:
     with box.connect("dashboard") as sock, sock.makefile("rw", newline="\n") as dashboard:
@@ -46,6 +47,7 @@ def descriptors_exhausted(box: BoxUnderAttack, seconds: float) -> None:
     "No thread can be started; scripts open sockets by name and call XML-RPC",
     "the call fails",
     prelude=_NO_THREADS,
+    kinds=ONE,
 )
 def threads_exhausted(box: BoxUnderAttack, seconds: float) -> None:
     flag = box.errors.with_name("no-threads")
@@ -62,6 +64,7 @@ def threads_exhausted(box: BoxUnderAttack, seconds: float) -> None:
 @FAILURES.attack(
     "64 clients of the control API ask for the log, do not read and are reset while others come",
     "the client that has been silent longest is closed",
+    kinds=ONE,
 )
 def control_clients_that_go(box: BoxUnderAttack, seconds: float) -> None:
     for _ in range(max(2, round(seconds))):
@@ -77,6 +80,7 @@ def control_clients_that_go(box: BoxUnderAttack, seconds: float) -> None:
     "lines are left out",
     options=("--log",),
     unread_log=True,
+    kinds=ONE,
 )
 def unread_log(box: BoxUnderAttack, seconds: float) -> None:
     line = b"addToLog " + b"x" * 500 + b"\n"
@@ -85,6 +89,7 @@ def unread_log(box: BoxUnderAttack, seconds: float) -> None:
 
 @FAILURES.attack(
     "A program is stopped, replaced and stopped again while its sockets connect and its file is loaded",
+    kinds=WITH_DASHBOARD,
 )
 def programs_in_all_states(box: BoxUnderAttack, seconds: float) -> None:
     (box.programs / "spin.script").write_text("while True:\n  sync()\nend\n")
@@ -110,7 +115,7 @@ def resets(box: BoxUnderAttack, seconds: float) -> None:
     while time.monotonic() < end:
         with ExitStack() as stack:
             for port, data in said.items():
-                for _ in range(4):
+                for _ in range(4 * box.has(port)):
                     with suppress(OSError):
                         sock = box.connect(port)
                         stack.callback(reset, sock)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import time
@@ -9,8 +10,10 @@ import zipfile
 from contextlib import suppress
 
 from attack_record import Section
-from attackers import log_since, request, run_to_end, until
-from box_under_attack import CONTROL_PORT, PATIENCE, PORT_BASE, BoxUnderAttack
+from attackers import flood, log_since, request, run_to_end, until
+from box_under_attack import CONTROL_PORT, ONE, PATIENCE, PORT_BASE, WITH_DASHBOARD, BoxUnderAttack
+
+from protocol.robot_api import BASE
 
 PLACES = Section("Nothing leaves its place")
 
@@ -37,7 +40,11 @@ _NAMES = (
 )
 
 
-@PLACES.attack("Dashboard and control API load files by 18 names that lead out", "there is no such file")
+@PLACES.attack(
+    "Dashboard and control API load files by 18 names that lead out",
+    "there is no such file",
+    kinds=WITH_DASHBOARD,
+)
 def paths_that_lead_out(box: BoxUnderAttack, seconds: float) -> None:
     outside = box.programs.parent
     (outside / "secret.script").write_text(_SECRET)
@@ -51,7 +58,31 @@ def paths_that_lead_out(box: BoxUnderAttack, seconds: float) -> None:
         assert str(outside) not in str(answer), f"{name[:40]} shows a path: {answer}"
 
 
-@PLACES.attack("The folder of programs holds links that lead out, to files and to folders", "not followed")
+@PLACES.attack("Programs are loaded by a path of 32,000 parts: dashboard, Robot API", "there is no such file")
+def paths_of_many_parts(box: BoxUnderAttack, seconds: float) -> None:
+    name = 32_000 * "a/" + "x"
+    if box.ports.dashboard:
+        answer = box.ask(f"load {name}")[0]
+        assert not answer.startswith("Loading"), answer
+        flood(box, "dashboard", f"load {name}.urp\nload installation {name}\n".encode(), seconds)
+    else:
+        body = json.dumps({"programName": name}).encode()
+        head = (
+            f"PUT {BASE}/program/v1/load HTTP/1.1\r\nHost: {box.host}\r\nContent-Type: application/json\r\n"
+        )
+        said = f"{head}Content-Length: {len(body)}\r\n\r\n".encode() + body
+        with box.connect("robot_api") as sock:
+            sock.sendall(said)
+            status = sock.recv(1 << 16).split(b"\r\n")[0]
+        assert b" 200" not in status, status
+        flood(box, "robot_api", said, seconds)
+    status, answer = request(box, "POST", "run_program", {"file": name})
+    assert status != 200, answer
+
+
+@PLACES.attack(
+    "The folder of programs holds links that lead out, to files and to folders", "not followed", kinds=ONE
+)
 def links_that_lead_out(box: BoxUnderAttack, seconds: float) -> None:
     outside = box.programs.parent / "outside"
     outside.mkdir()
@@ -79,7 +110,7 @@ def links_that_lead_out(box: BoxUnderAttack, seconds: float) -> None:
                 assert _SECRET.encode() not in archive.read(name), f"{name} of a support file leaks"
 
 
-@PLACES.attack("Reports are asked for and broken off: no `.part` file stays")
+@PLACES.attack("Reports are asked for and broken off: no `.part` file stays", kinds=WITH_DASHBOARD)
 def files_half_written(box: BoxUnderAttack, seconds: float) -> None:
     for _ in range(max(3, round(seconds))):
         with box.connect("dashboard") as sock:
@@ -107,7 +138,9 @@ def control_port_from_a_script(box: BoxUnderAttack, seconds: float) -> None:
 
 
 @PLACES.attack(
-    "Requests as a web page would send them: other hosts, origins, sites, content types", "403 or 400"
+    "Requests as a web page would send them: other hosts, origins, sites, content types",
+    "403 or 400",
+    kinds=ONE,
 )
 def requests_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
     own = f"{box.host}:{CONTROL_PORT}"
@@ -133,7 +166,7 @@ def requests_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
 )
 def scripts_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
     body = b'def page():\n  textmsg("from a page")\nend\npower off\n'
-    for port in ("primary", "secondary", "realtime", "dashboard"):
+    for port in {"primary", "secondary", "realtime", "dashboard"} & set(box.open_ports):
         for path in ("/", "/" + 700 * "a"):
             with box.connect(port) as sock, suppress(OSError):
                 sock.sendall(f"POST {path} HTTP/1.1\r\nHost: {box.host}\r\n\r\n".encode() + body)
@@ -144,7 +177,7 @@ def scripts_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
     assert request(box, "GET", "state")[1]["robot_mode"] == "RUNNING"
 
 
-@PLACES.attack("A second box wants the same ports", "it ends with one line; the first goes on")
+@PLACES.attack("A second box wants the same ports", "it ends with one line; the first goes on", kinds=ONE)
 def taken_ports(box: BoxUnderAttack, seconds: float) -> None:
     command = [
         sys.executable,
@@ -165,7 +198,10 @@ _FULL = "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048)
 
 
 @PLACES.attack(
-    "No file may grow beyond 2 kB; log, reports and support files are asked for", "refused", prelude=_FULL
+    "No file may grow beyond 2 kB; log, reports and support files are asked for",
+    "refused",
+    prelude=_FULL,
+    kinds=ONE,
 )
 def full_disk(box: BoxUnderAttack, seconds: float) -> None:
     box.ask(*20 * ["addToLog " + 900 * "x"])
@@ -179,6 +215,7 @@ def full_disk(box: BoxUnderAttack, seconds: float) -> None:
     "Nothing can be written into the folder of programs (`/sys/fs`)",
     "refused",
     options=("--programs", "/sys/fs"),
+    kinds=ONE,
 )
 def read_only_disk(box: BoxUnderAttack, seconds: float) -> None:
     answers = box.ask("saveLog", "generate flight report", "generate support file .", "load x.urp")

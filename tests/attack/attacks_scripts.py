@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from attack_record import Section
-from attackers import crowd, log_since, peer, plays, run_to_end, until
-from box_under_attack import PATIENCE, BoxUnderAttack
+from attackers import crowd, log_since, peer, plays, request, reset, run_to_end, until
+from box_under_attack import ONE, PATIENCE, WITH_E_SERIES, BoxUnderAttack
 
 SCRIPTS = Section("Budgets of running programs")
 
@@ -86,7 +86,9 @@ def long_globals(box: BoxUnderAttack, seconds: float) -> str:
 
 
 @SCRIPTS.attack(
-    "RTDE clients ask for `script_control_line` while a function of 100,000 statements runs", is_short=False
+    "RTDE clients ask for `script_control_line` while a function of 100,000 statements runs",
+    is_short=False,
+    kinds=ONE,
 )
 def line_of_a_long_function(box: BoxUnderAttack, seconds: float) -> str:
     with crowd(box, "rtde", 4, _RTDE_LINE):
@@ -129,7 +131,83 @@ def growing_values(box: BoxUnderAttack, seconds: float) -> None:
 )
 def flood_of_requests(box: BoxUnderAttack, seconds: float) -> None:
     _spend(box, seconds, *_times(1000, 'popup("x", "y")', "write_output_integer_register(0, i)"))
-    box.ask("close popup")
+    request(box, "POST", "close_popups", {})
+
+
+# --- much of all
+
+
+@SCRIPTS.attack(
+    "1,100 globals are lists of 65,536 elements, from `make_list`",
+    "the program is ended",
+    kinds=WITH_E_SERIES,
+)
+def many_lists(box: BoxUnderAttack, seconds: float) -> str:
+    n_lists = min(1_100, round(1_100 * seconds))
+    return _hold(box, seconds, *(f"global g{n} = make_list(65536, 0)" for n in range(n_lists)))
+
+
+@SCRIPTS.attack("Globals hold 9,000 strings of 32 kB", "the program is ended")
+def many_strings(box: BoxUnderAttack, seconds: float) -> str:
+    lists = (f"global g{n} = [{','.join(3_000 * ('s',))}]" for n in range(3))
+    put = (f'g{n}[i] = s + "x"' for n in range(3))
+    doubled = ('s = "0123456789abcdef"', *11 * ("s = s + s",))
+    return _hold(box, 2 * seconds, *doubled, *lists, *_times(3_000, *put, "sync()"))
+
+
+@SCRIPTS.attack(
+    "Lists of 10,000 structs, each with small lists, are made without end",
+    "the program is ended",
+    kinds=WITH_E_SERIES,
+)
+def structs_of_small_lists(box: BoxUnderAttack, seconds: float) -> str:
+    setup = tuple(
+        f"global g{n} = make_list(10000, struct(a=[0, 1, 2], b=[0], c=[[0, 0], [0, 0]]))" for n in range(20)
+    )
+    put = (f"g{n}[i] = struct(a=[i, 1, 2], b=[i], c=[[i, i], [i, i]])" for n in range(20))
+    return _spend(box, seconds, *_times(10_000, *put, "sync()"), setup=setup)
+
+
+@SCRIPTS.attack(
+    "190 threads, each in a chain of 900 or 190 calls, or in 190 calls of itself; 50 in a chain of 190",
+    "the program is refused or ended",
+)
+def threads_in_deep_calls(box: BoxUnderAttack, seconds: float) -> str:
+    end = ("def f0(a):", "  while True:", "    sync()", "  end", "end")
+    itself = ("def f0(a):", "  if a > 0:", "    f0(a - 1)", "  end", "  sync()", "end")
+    remarks = []
+    for threads, calls, last in ((190, 900, end), (190, 190, end), (50, 190, end), (190, 0, itself)):
+        chain = (line for n in range(1, calls) for line in (f"def f{n}(a):", f"  f{n - 1}(a + 1)", "end"))
+        work = ("thread work():", "  while True:", f"    f{max(0, calls - 1)}(190)", "  end", "end")
+        remarks.append(_hold(box, seconds / 4, *last, *chain, *work, *threads * ("run work()",)))
+    return f"{sum(remark.endswith('on') for remark in remarks)} of 4 run on"
+
+
+@SCRIPTS.attack(
+    "2,000 globals with names of 900 or 250 characters, while 245 clients a second connect to 30001",
+    "the program is refused, or names are not reported",
+)
+def long_names(box: BoxUnderAttack, seconds: float) -> str:
+    remarks = []
+    for length in (900, 250):
+        after = log_since(box, 0)[1]
+        names = (f"global v{n:04}{(length - 5) * 'x'} = {n}" for n in range(2_000))
+        box.run(*names, "while True:", "  sync()", "end")
+        began, n = time.monotonic(), 0
+        while (passed := time.monotonic() - began) < seconds / 2:
+            if n < 245 * passed:
+                with suppress(OSError):
+                    reset(box.connect("primary", 1.0))
+                n += 1
+            else:
+                time.sleep(0.002)
+        remarks.append(_state(box, after))
+    return f"{sum(remark.endswith('on') for remark in remarks)} of 2 run on"
+
+
+def _hold(box: BoxUnderAttack, seconds: float, *lines: str) -> str:
+    """Run `lines`, then nothing, for so many seconds."""
+    return _spend(box, seconds, "sync()", setup=lines)
 
 
 # --- sockets
@@ -213,6 +291,7 @@ def flood_of_sendings(box: BoxUnderAttack, seconds: float) -> None:
     "Programs look up names that take 3 s each, in 20 threads, and are replaced by others",
     "further look-ups fail at once",
     prelude=_SLOW_NAMES,
+    kinds=ONE,
 )
 def flood_of_look_ups(box: BoxUnderAttack, seconds: float) -> str:
     most = 0
@@ -282,7 +361,9 @@ def _call(box: BoxUnderAttack, port: int | str) -> None:
 
 
 @SCRIPTS.attack(
-    "XML-RPC servers give 16 odd answers, ports are absurd", "the call fails with an error of the language"
+    "XML-RPC servers give 16 odd answers, ports are absurd",
+    "the call fails with an error of the language",
+    kinds=ONE,
 )
 def odd_answers_of_procedures(box: BoxUnderAttack, seconds: float) -> None:
     for name, answer in ODD_ANSWERS.items():
@@ -296,7 +377,10 @@ def odd_answers_of_procedures(box: BoxUnderAttack, seconds: float) -> None:
 
 
 @SCRIPTS.attack(
-    "An XML-RPC server answers with 0.6 MB of gzip that unpack to 600 MB", "the call fails", is_short=False
+    "An XML-RPC server answers with 0.6 MB of gzip that unpack to 600 MB",
+    "the call fails",
+    is_short=False,
+    kinds=ONE,
 )
 def gzip_bomb_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
     with peer(_answering(_http(_bomb(), "Content-Encoding: gzip"))) as port:
@@ -311,7 +395,10 @@ def _bomb() -> bytes:
 
 
 @SCRIPTS.attack(
-    "An XML-RPC server answers without end, in lines of header and in body", "the call fails", is_short=False
+    "An XML-RPC server answers without end, in lines of header and in body",
+    "the call fails",
+    is_short=False,
+    kinds=ONE,
 )
 def endless_answer_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
     def header(client: socket.socket) -> None:

@@ -1,12 +1,13 @@
 """A box under attack: `ur-emulator serve` in its own process, bystanders beside it, and questions to it afterwards.
 
-with serving("ur5e") as box, watching(box) as seen:
+with serving(KINDS["e-Series"]) as box, watching(box) as seen:
     attack(box)
 seen.rate, seen.gap_ms, box.problems()
 """
 
 from __future__ import annotations
 
+import http.client
 import json
 import os
 import signal
@@ -14,28 +15,71 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
-from itertools import count
+from itertools import count, cycle
 from pathlib import Path
 
 import bystander
 import psutil
 
 from protocol.realtime.layout import RealtimeLayout, layout_for_version
-from protocol.ur_types import Ports, RobotType
+from protocol.ur_types import Ports
 from ur_emulator.models.robots import robot_by_name
 
 PATIENCE = 20.0  # s; a box that has not answered by then does not answer
-MOST_MEMORY = 300e6  # bytes; of the box and its worker processes together
+MOST_MEMORY = 300.0  # MB; of the box and its worker processes together
+# Clients of attacks have these in turn; the innocent one has 127.0.0.1.
+ADDRESSES = ("127.0.0.2", "127.0.0.3", "127.0.0.4", "127.0.0.5")
 # Away from the standard ports, and below those that the kernel gives to clients.
 PORT_BASE, CONTROL_PORT = 1000, 30_900
 _START = "import sys\nsys.argv[0] = 'ur-emulator'\n{prelude}\nfrom ur_emulator.cli import main\nmain()\n"
 _MOVE = "def alive():\n  speedj([{speed}, 0, 0, 0, 0, 0], 2.0, 0.1)\n  stopj(5.0)\nend\n"
 _REPORT_AGAIN = 250  # frames
+_LOOK_PERIOD = 0.02  # s; between two looks at what is resident, which cost nothing
+_MORE = 2e6  # bytes; so much more is a new peak: shares in common pages take 10 ms to be counted
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+_MODES = ("robot_mode", "safety_mode", "operational_mode", "remote_control")
 _numbers = count(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of box.
+
+    Attributes:
+        name: in results and on the page.
+        robot: type of the arm.
+        software: "" for that of the generation.
+        options: more options of `ur-emulator serve`.
+    """
+
+    name: str
+    robot: str
+    software: str = ""
+    options: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.name
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("CB3", "ur3"),
+        Kind("e-Series", "ur5e", "5.25.1"),
+        Kind("PolyScope X", "ur5e", "10.14.0", ("--services", "primary,rtde")),
+        Kind("oldest", "ur3", "3.0.0"),
+        Kind("rack", "ur3", "", ("--boxes", "3")),
+    )
+}
+# Those with a dashboard; those of the e-Series; the first, for what is the same in all of them.
+WITH_DASHBOARD = ("CB3", "e-Series", "oldest", "rack")
+WITH_E_SERIES = ("e-Series", "PolyScope X")
+ONE = ("CB3",)
 
 
 @dataclass(slots=True)
@@ -48,10 +92,11 @@ class BoxUnderAttack:
         ports: its ports.
         layout: of its frames.
         period: its control cycle [s].
-        model: as its dashboard says.
+        neighbour: address of the last box of its rack; its own without one.
         programs: its folder of programs.
         errors: the file that stderr goes to, unless an attack took it.
         at_rest: descriptors and threads before the attack.
+        modes: of all boxes before the attack.
         is_stopped: it was told to end.
     """
 
@@ -60,23 +105,39 @@ class BoxUnderAttack:
     ports: Ports
     layout: RealtimeLayout
     period: float
-    model: str
+    neighbour: str
     programs: Path
     errors: Path
     at_rest: tuple[int, int] = (0, 0)
+    modes: tuple[dict, ...] = ()
     is_stopped: bool = False
     _turns: Iterator[int] = field(default_factory=count)
+    _addresses: Iterator[str] = field(default_factory=lambda: cycle(ADDRESSES))
 
     @property
     def open_ports(self) -> tuple[str, ...]:
         """Names of the ports that take something."""
-        names = ("dashboard", "primary", "secondary", "realtime", "rtde", "modbus", "interpreter")
+        names = (
+            "dashboard",
+            "primary",
+            "secondary",
+            "realtime",
+            "rtde",
+            "modbus",
+            "interpreter",
+            "robot_api",
+        )
         return (*(name for name in names if getattr(self.ports, name)), "control")
 
-    def connect(self, port: str, timeout: float = PATIENCE) -> socket.socket:
-        """Connect to a port by its name in `Ports`, or "control"."""
+    def has(self, *ports: str) -> bool:
+        """Return whether all these ports are open."""
+        return set(ports) <= set(self.open_ports)
+
+    def connect(self, port: str, timeout: float = PATIENCE, source: str = "") -> socket.socket:
+        """Connect to a port by its name in `Ports`, or "control", from an address or from the next of `ADDRESSES`."""
         number = CONTROL_PORT if port == "control" else getattr(self.ports, port)
-        sock = socket.create_connection((self.host, number), timeout=timeout)
+        source = source or next(self._addresses)
+        sock = socket.create_connection((self.host, number), timeout=timeout, source_address=(source, 0))
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return sock
 
@@ -108,15 +169,23 @@ class BoxUnderAttack:
         process = psutil.Process(self.process.pid)
         return process.num_fds(), process.num_threads()
 
-    def forget_peaks(self) -> None:
-        """Let the peaks of memory begin anew, for the next attack on the same box."""
-        for process in self._processes():
-            with suppress(OSError):
-                Path(f"/proc/{process.pid}/clear_refs").write_text("5")
+    def workers(self) -> list[psutil.Process]:
+        """Return the worker processes; they come from a server process, which is the only child of the box."""
+        return [
+            worker for server in psutil.Process(self.process.pid).children() for worker in server.children()
+        ]
 
-    def _processes(self) -> list[psutil.Process]:
-        box = psutil.Process(self.process.pid)
-        return [box, *box.children()]
+    def state(self, host: str = "") -> dict:
+        """Return the modes and the program state of a box of the rack, by the control API."""
+        asking = http.client.HTTPConnection(host or self.host, CONTROL_PORT, timeout=PATIENCE)
+        with closing(asking):
+            asking.request("GET", "/v1/state")
+            found = json.loads(asking.getresponse().read())
+        return {name: found[name] for name in (*_MODES, "program_state")}
+
+    def _modes(self) -> tuple[dict, ...]:
+        states = [self.state(host) for host in dict.fromkeys((self.host, self.neighbour))]
+        return tuple({name: state[name] for name in _MODES} for state in states)
 
     # --- afterwards
 
@@ -132,7 +201,6 @@ class BoxUnderAttack:
             self._answers,
             self._keeps_nothing,
             self._moves,
-            self._memory_is_bounded,
             self._is_calm,
         ):
             try:
@@ -143,8 +211,13 @@ class BoxUnderAttack:
         return found
 
     def _answers(self) -> str:
-        model = self.ask("programState", "get robot model")[1]
-        return "" if model == self.model else f"asked for its model the box says {model!r}"
+        modes = self._modes()
+        if modes != self.modes:
+            return f"the modes are {modes} instead of {self.modes}"
+        if not self.ports.dashboard:
+            return ""
+        answer = self.ask("robotmode")[0]
+        return "" if answer == "Robotmode: RUNNING" else f"the dashboard says {answer!r}"
 
     def _moves(self) -> str:
         speed = 0.1 * (-1) ** next(self._turns)
@@ -167,13 +240,6 @@ class BoxUnderAttack:
             time.sleep(0.05)
         return ""
 
-    def _memory_is_bounded(self) -> str:
-        workers = psutil.Process(self.process.pid).children()
-        peaks = [
-            bystander.peak_memory(pid) for pid in (self.process.pid, *(worker.pid for worker in workers))
-        ]
-        return "" if sum(peaks) < MOST_MEMORY else f"memory: {sum(peaks) / 1e6:.0f} MB"
-
     def _is_calm(self) -> str:
         _, is_there, told = self.errors.read_text().partition("Traceback")
         return f"a traceback on stderr: {' / '.join(told.split(chr(10))[-8:])}" if is_there else ""
@@ -194,12 +260,12 @@ class BoxUnderAttack:
 
 @contextmanager
 def serving(
-    robot: str, *options: str, prelude: str = "", unread_log: bool = False
+    kind: Kind, *options: str, prelude: str = "", unread_log: bool = False
 ) -> Iterator[BoxUnderAttack]:
     """Serve a box in real time with an empty folder of programs and the control API.
 
     Args:
-        robot: type of its arm.
+        kind: of box.
         options: more options of `ur-emulator serve`.
         prelude: Python code that its process runs first.
         unread_log: stderr is a pipe that nobody reads, instead of a file.
@@ -209,7 +275,7 @@ def serving(
         programs, ready, errors = folder / "programs", folder / "ready.json", folder / "errors.txt"
         programs.mkdir()
         number = next(_numbers)
-        host = f"127.{64 + number % 64}.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
+        host = f"127.{64 + number % 64}.{os.getpid() >> 6 & 255}.{4 * (os.getpid() & 63) + 1}"
         code = _START.format(prelude=prelude)
         command = [
             sys.executable,
@@ -217,7 +283,9 @@ def serving(
             code,
             "serve",
             "--robot",
-            robot,
+            kind.robot,
+            *(["--software", kind.software] if kind.software else []),
+            *kind.options,
             "--host",
             host,
             "--port-base",
@@ -247,21 +315,21 @@ def serving(
                 assert process.poll() is None, errors.read_text()
                 time.sleep(0.01)
             facts = json.loads(ready.read_text())
-            arm = robot_by_name(robot)
+            arm = robot_by_name(kind.robot, kind.software)
             box = BoxUnderAttack(
                 process,
                 facts["host"],
                 Ports(**facts["ports"]),
-                layout_for_version(arm.software_version(None)),
+                layout_for_version(arm.software_version(kind.software or None)),
                 arm.generation.period_s,
-                RobotType(arm.robot_type).name,
+                facts["boxes"][-1]["host"],
                 programs,
                 errors,
             )
             if problem := box._moves():  # so that all that is loaded late is there
                 raise AssertionError(problem)
             time.sleep(0.3)  # the last clients are gone
-            box.at_rest = box.usage()
+            box.at_rest, box.modes = box.usage(), box._modes()
             yield box
         finally:
             process.kill()
@@ -279,9 +347,10 @@ class Seen:
         gap_ms: longest time between two frames of port 30003.
         lost: cycles of which no frame came.
         closed: the box has ended the stream.
-        timer_gap_ms: longest time between two wakes of a timer of 8 ms that has nothing to do with the box.
+        timer_gap_ms: longest time between two wakes of a timer of the same period that has nothing to do with the box.
         box_mb: most memory of the box.
-        worker_mb: most memory of its worker processes together.
+        worker_mb: most memory of its worker processes and their server together.
+        memory_mb: most memory of all of them.
     """
 
     rate: float = 0.0
@@ -291,21 +360,63 @@ class Seen:
     timer_gap_ms: float = 0.0
     box_mb: float = 0.0
     worker_mb: float = 0.0
+    memory_mb: float = 0.0
+
+    def look(self, box: int) -> None:
+        """Take the memory of a box and of its children into account: proportional shares of common pages."""
+        own, *others = map(_share, _family(box))
+        self.box_mb = max(self.box_mb, own / 1e6)
+        self.worker_mb = max(self.worker_mb, sum(others) / 1e6)
+        self.memory_mb = max(self.memory_mb, (own + sum(others)) / 1e6)
+
+
+def _family(box: int) -> list[int]:
+    with suppress(psutil.Error):
+        return [box, *(child.pid for child in psutil.Process(box).children(recursive=True))]
+    return [box]
+
+
+def _share(pid: int) -> int:
+    """Return the bytes that a process has to itself, and its shares in those that it has in common; 0 without it."""
+    with suppress(OSError), open(f"/proc/{pid}/smaps_rollup") as file:
+        return next(1024 * int(line.split()[1]) for line in file if line.startswith("Pss:"))
+    return 0
+
+
+def _resident(pid: int) -> int:
+    with suppress(OSError), open(f"/proc/{pid}/statm") as file:
+        return int(file.read().split()[1]) * _PAGE
+    return 0
+
+
+def _watch_memory(seen: Seen, box: int, has_ended: threading.Event) -> None:
+    """Look at the memory of a box whenever more is resident than ever before."""
+    most, k, family = 0, 0, _family(box)
+    while not has_ended.wait(_LOOK_PERIOD):
+        if k % 5 == 0:  # they cost most
+            family = _family(box)
+        k += 1
+        now = sum(map(_resident, family))
+        if now > most + _MORE:
+            most = now
+            seen.look(box)
 
 
 @contextmanager
 def watching(box: BoxUnderAttack) -> Iterator[Seen]:
-    """Let bystanders watch a box as long as the block lasts."""
-    seen = Seen()
-    timer = _bystander("timer", box.process.pid)
-    stream = _bystander("stream", box.host, box.ports.realtime, box.period)
+    """Let bystanders watch a box as long as the block lasts; the client is that of the neighbour in a rack."""
+    seen, has_ended = Seen(), threading.Event()
+    memory = threading.Thread(target=_watch_memory, args=(seen, box.process.pid, has_ended), daemon=True)
+    timer = _bystander("timer", box.period)
+    stream = _bystander("stream", box.neighbour, box.ports.realtime, box.period)
+    memory.start()
     try:
         yield seen
     finally:
-        told = json.loads(stream.communicate()[0])
-        host = json.loads(timer.communicate()[0])
-        seen.timer_gap_ms = host.pop("gap_ms")
-        for name, value in {**told, **host}.items():
+        told = json.loads(stream.communicate()[0]) | json.loads(timer.communicate()[0])
+        has_ended.set()
+        memory.join()
+        for name, value in told.items():
             setattr(seen, name, value)
 
 

@@ -1,9 +1,9 @@
-"""Bystanders of an attack, each in a process of its own: a reader of port 30003, and a timer that also looks at memory.
+"""Bystanders of an attack, each in a process of its own: a reader of port 30003, and a bare timer.
 
     python bystander.py stream HOST PORT PERIOD
-    python bystander.py timer PID
+    python bystander.py timer PERIOD
 
-Both print "ready", go on until their standard input is closed, then print one JSON object: `Stream`, `Timer`.
+Both print "ready", go on until their standard input is closed, then print one JSON object.
 """
 
 import json
@@ -13,16 +13,9 @@ import socket
 import struct
 import sys
 import time
-from contextlib import suppress
 from itertools import pairwise
 
-import psutil
-
-PERIOD = 0.008  # s; of the timer
-_LOOK_EVERY = 5  # periods between two looks at the memory
-_CHILDREN_EVERY = 25  # periods between two searches for worker processes; they cost most
 _HEAD = struct.Struct(">id")
-_MB = 1e6
 
 
 def stream(host, port, period):
@@ -63,43 +56,20 @@ def stream(host, port, period):
     }
 
 
-def timer(pid):
-    """Wake up every 8 ms, and look at the memory of a process and of its children.
+def timer(period):
+    """Wake up once a period.
 
     Returns:
-        gap_ms: longest time between two wakes; box_mb, worker_mb: most memory that the process held, and most that
-        its children held together.
+        timer_gap_ms: longest time between two wakes.
     """
-    box, children, box_peak, worker_peak, k = psutil.Process(pid), [], 0, 0, 0
     began = last = time.monotonic()
-    gap = 0.0
+    gap, k = 0.0, 0
     _begin()
-    while not select.select([sys.stdin], [], [], max(0.0, began + k * PERIOD - time.monotonic()))[0]:
+    while not select.select([sys.stdin], [], [], max(0.0, began + k * period - time.monotonic()))[0]:
         now = time.monotonic()
         gap, last = max(gap, now - last), now
-        with suppress(psutil.Error):
-            if k % _CHILDREN_EVERY == 0:
-                children = box.children()
-            if k % _LOOK_EVERY == 0:
-                box_peak = max(box_peak, peak_memory(pid))
-                worker_peak = max(worker_peak, sum(peak_memory(child.pid) for child in children))
-        # What the looks cost is no gap of the host.
-        last += time.monotonic() - now
-        k = max(k + 1, round((last - began) / PERIOD))
-    return {
-        "gap_ms": 1e3 * gap,
-        "box_mb": max(box_peak, peak_memory(pid)) / _MB,
-        "worker_mb": worker_peak / _MB,
-    }
-
-
-def peak_memory(pid):
-    """Return the most memory that a process has held at once [bytes], 0 for one that has ended."""
-    with suppress(OSError), open(f"/proc/{pid}/status") as status:
-        for line in status:
-            if line.startswith("VmHWM:"):
-                return 1024 * int(line.split()[1])
-    return 0
+        k = max(k + 1, round((now - began) / period))
+    return {"timer_gap_ms": 1e3 * gap}
 
 
 def _received(sock):
@@ -116,5 +86,7 @@ def _begin():
 if __name__ == "__main__":
     role, *rest = sys.argv[1:]
     print(
-        json.dumps(stream(rest[0], int(rest[1]), float(rest[2])) if role == "stream" else timer(int(rest[0])))
+        json.dumps(
+            stream(rest[0], int(rest[1]), float(rest[2])) if role == "stream" else timer(float(rest[0]))
+        )
     )

@@ -1,8 +1,8 @@
-"""`make soak`: a served box in real time under mixed load, attacked every minute; one hour, or SOAK_MINUTES; SOAK_ROBOT is its arm, ur3 or another.
+"""`make soak`: a served box in real time under mixed load, attacked every minute; one hour, or SOAK_MINUTES; SOAK_BOX is its kind, CB3 or another.
 
 The load is that of `bench/clients.py`: fifty RTDE clients and fifty readers of port 30003. They and a timer that has
 nothing to do with the box join anew every minute. The attacks are those of the table that need no box of their own;
-attackers have an address of their own. Writes out/soak/soak.json and out/soak/soak.png.
+attackers have addresses of their own. Writes out/soak/soak.json and out/soak/soak.png.
 """
 
 from __future__ import annotations
@@ -10,12 +10,10 @@ from __future__ import annotations
 import json
 import os
 import random
-import socket
 import sys
 import threading
 import time
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 import matplotlib
@@ -25,7 +23,7 @@ import psutil
 sys.path.append(str(Path(__file__).parents[2]))
 
 from attack_table import SECTIONS
-from box_under_attack import BoxUnderAttack, serving
+from box_under_attack import KINDS, BoxUnderAttack, Kind, serving
 from rich.console import Console
 
 from bench.clients import N_REALTIME, N_RTDE
@@ -38,7 +36,6 @@ _SAMPLE_EVERY = 10.0  # s
 # This share of the time belongs to the warm-up; at most so long [s].
 _WARM_UP, _LONGEST_WARM_UP = 0.2, 600.0
 _JOINING = 5.0  # s; what a round needs to begin and to end
-_ATTACKERS = "127.0.0.9"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,18 +99,17 @@ class Sampler(threading.Thread):
         )
 
 
-def soak(minutes: float, robot: str) -> dict[str, object]:
+def soak(minutes: float, kind: Kind) -> dict[str, object]:
     """Run for so long; return the figures, the rounds and the samples."""
     attacks = [
         attack
         for section in SECTIONS
         for attack in section.attacks
-        if not (attack.options or attack.prelude or attack.unread_log)
+        if kind.name in attack.kinds and not attack.is_special
     ]
     random.Random(1).shuffle(attacks)
-    socket.create_connection = partial(_connect, socket.create_connection)
     console, rounds = Console(width=160), []
-    with serving(robot) as box:
+    with serving(kind) as box:
         sampler = Sampler(box)
         sampler.start()
         while box.process.poll() is None and time.monotonic() - sampler.began < 60.0 * minutes:
@@ -128,11 +124,6 @@ def soak(minutes: float, robot: str) -> dict[str, object]:
         "stop_s": round(stop_s, 2),
     }
     return {"figures": figures, "rounds": rounds, "samples": [asdict(sample) for sample in sampler.samples]}
-
-
-def _connect(create_connection, address, timeout=None, source_address=None, **options):
-    """Connect from the address of the attackers."""
-    return create_connection(address, timeout, source_address or (_ATTACKERS, 0), **options)
 
 
 def _round(box: BoxUnderAttack, sampler: Sampler, attack) -> dict[str, object]:
@@ -206,7 +197,7 @@ def draw(outcome: dict, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    result = soak(float(os.environ.get("SOAK_MINUTES", "60")), os.environ.get("SOAK_ROBOT", "ur3"))
+    result = soak(float(os.environ.get("SOAK_MINUTES", "60")), KINDS[os.environ.get("SOAK_BOX", "CB3")])
     FOLDER.mkdir(parents=True, exist_ok=True)
     (FOLDER / "soak.json").write_text(json.dumps(result, indent=1) + "\n")
     draw(result, FOLDER / "soak.png")

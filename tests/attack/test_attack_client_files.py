@@ -29,8 +29,7 @@ from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
 from pc_client.errors import ClientError, MovementError, RecordingError, one_line
 from pc_client.experiment.prepare import _refuse_to_lose
-from pc_client.extraction.files import MOST_SAMPLES, parse_pen
-from pc_client.extraction.sources import contents, pen_sources
+from pc_client.extraction.pen import MOST_SAMPLES, contents, parse_pen, pen_sources
 from pc_client.file_names import MOST_BYTES, as_file_name, is_file_name
 from pc_client.input_files import FILE_KINDS
 from pc_client.kinematics.cell_file import load_cell
@@ -185,7 +184,7 @@ def test_one_bad_file_does_not_end_the_report_of_the_others(
     assert [line.split(":")[0] for line in report.left_out] == [
         f"bad_{k:02}.mcap" for k in range(len(CRAFTED))
     ]
-    monkeypatch.setattr("pc_client.commands.recordings.show_report", lambda folder: report)
+    monkeypatch.setattr("pc_client.commands.recordings.show_report", lambda folder, **options: report)
     assert cli.run(["report", str(tmp_path)]) == 1
 
 
@@ -195,7 +194,7 @@ def test_a_fault_of_ours_in_one_file_is_named_and_does_not_end_the_report(
     for name in ("a", "b"):
         (tmp_path / f"{name}.mcap").write_bytes(whole.read_bytes())
 
-    def fails_once(recording, of=analyse_run):
+    def fails_once(recording, of=analyse_run, **options):
         if recording.path.name == "a.mcap":
             raise ZeroDivisionError("x\x1b[2J")
         return of(recording)
@@ -208,7 +207,7 @@ def test_recordings_that_cannot_be_read_are_not_overwritten(tmp_path: Path) -> N
     path = tmp_path / "a.mcap"
     path.write_bytes(CRAFTED["wrong type of a number"])
     with pytest.raises(RecordingError, match="not overwritten"):
-        _refuse_to_lose(path)
+        _refuse_to_lose(path, overwrite=True)
 
 
 def test_a_file_beyond_its_limit_is_refused_before_it_is_in_memory(tmp_path: Path) -> None:
@@ -263,7 +262,7 @@ def test_packing_methods_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_
 
 def test_an_archive_of_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = zipped(tmp_path / "a.zip", {f"{k}.csv": b"0,0,0" for k in range(4)})
-    monkeypatch.setattr("pc_client.extraction.sources.MOST_MEMBERS", 3)
+    monkeypatch.setattr("pc_client.extraction.pen.MOST_MEMBERS", 3)
     with pytest.raises(RecordingError, match=r"4 files of 0 MiB in all; allowed are 3"):
         pen_sources([path])
 

@@ -34,8 +34,7 @@ from pc_client.experiment.preflight import model_of, preflight, refusal
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary.message_codec import encode_message
-from protocol.primary.messages import TextMessage
+from protocol.primary.messages import TextMessage, encode_message
 from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
@@ -266,7 +265,7 @@ def test_callers_without_an_end() -> None:
 def test_a_flooded_realtime_port() -> None:
     robot = FakeRobot()
     pipe = robot.connect("robot", 30003, 1.0)
-    frames = RealtimeClient(pipe, robot)
+    frames = RealtimeClient(pipe, robot, time_waits=False)
     pipe.receive = lambda timeout: robot.frame() * 14
     with pytest.raises(DriverError, match="the realtime port floods us"):
         frames.drain()
@@ -298,9 +297,9 @@ def test_any_bytes_on_the_ports_end_in_a_line(pieces: list[bytes], state: bool) 
                 stream.wait_for_version()
                 stream.poll()
             elif kind == "realtime":
-                RealtimeClient(pipe, robot).receive()
+                RealtimeClient(pipe, robot, time_waits=False).receive()
             else:
                 robot.connect = lambda host, port, timeout, pipe=pipe: pipe
-                ask_rtde(robot, "robot", 30004, "payload")
+                ask_rtde(robot, "robot", 30004, ("payload",))
         except DriverError as error:
             one_line(error)

@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 import psutil
 import pytest
 from attackers import crowd, until
-from box_under_attack import PATIENCE, BoxUnderAttack, serving
+from box_under_attack import KINDS, PATIENCE, BoxUnderAttack, serving
 
 _LONG_PROGRAM = b"def long():\n" + b"  x = [1, 2, 3]\n" * 250_000 + b"end\n"  # 4 MB
 _WAIT = "<Wait type='Sleep'><waitTime>0.01</waitTime></Wait>"
@@ -21,9 +21,16 @@ _URP = (
 _NO_NAMES = "import socket, threading\nsocket.getaddrinfo = lambda *names: threading.Event().wait()"
 
 
+def worker_of(box: BoxUnderAttack) -> psutil.Process:
+    """The worker process; its parent is the server of processes."""
+    (server,) = psutil.Process(box.process.pid).children()
+    (worker,) = server.children()
+    return worker
+
+
 def wait_for_work(box: BoxUnderAttack) -> None:
     """Wait until the worker process is at work."""
-    (worker,) = psutil.Process(box.process.pid).children()
+    worker = worker_of(box)
     before = worker.cpu_times().user
     until(lambda: worker.cpu_times().user > before + 0.1, "the worker process works")
 
@@ -56,8 +63,7 @@ def loading(box: BoxUnderAttack) -> Iterator[None]:
 @contextmanager
 def reporting(box: BoxUnderAttack) -> Iterator[None]:
     with box.connect("dashboard") as sock:
-        (worker,) = psutil.Process(box.process.pid).children()
-        worker.suspend()
+        worker_of(box).suspend()
         sock.sendall(b"generate support file .\n")
         box.ask("robotmode")  # the box has begun with the report by then
         yield
@@ -92,7 +98,7 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
 
 @pytest.mark.parametrize("busy", [compiling, flooded, loading, reporting, unread, calling, looking_up])
 def test_a_busy_box_ends(busy):
-    with serving("ur3", prelude=_NO_NAMES if busy is looking_up else "") as box:
+    with serving(KINDS["CB3"], prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):
             assert box.stop() < math.inf
         assert box.process.returncode == 0
@@ -100,7 +106,7 @@ def test_a_busy_box_ends(busy):
 
 
 def test_a_box_ends_whose_log_nobody_reads():
-    with serving("ur3", "--log", unread_log=True) as box:
+    with serving(KINDS["CB3"], "--log", unread_log=True) as box:
         lines = 500 * (b"addToLog " + b"x" * 500 + b"\n")
         with box.connect("dashboard") as sock, sock.makefile("rb") as replies:
             assert replies.readline()

@@ -8,11 +8,11 @@ from driver_startup import UR_TYPES, RefusedError, series, start
 from primary_wire import KEY, TEXT, PrimaryWire
 from strict_rtde import StrictRtde
 
-from protocol.primary.setup import ConfigurationData
+from protocol.primary.layout import ConfigurationData
 from protocol.rtde.fields import OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller.safety.configured_limits import limits_of
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.controller.safety.safety_state import limits_of
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.robots import ROBOTS
 from ur_emulator.servers.primary.robot_state import setup_records
 

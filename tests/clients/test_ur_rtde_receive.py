@@ -6,7 +6,7 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 from primary_wire import calibrated_dh, forward, rotation, twist
-from ur_rtde_support import HOME, PERIOD, RTDEReceive, connected, sample, wait_until
+from ur_rtde_support import HOME, PERIOD, RTDEIO, RTDEControl, RTDEReceive, connected, sample, wait_until
 
 RUNNING_ROBOT, NORMAL_SAFETY, RUNNING_JOINT, PLAYING = 7, 1, 253, 2
 GRAVITY = 9.81  # m/s^2
@@ -226,3 +226,18 @@ def test_three_receivers_and_a_reconnect(box):
         assert receivers[0].isConnected()
         stamp = receivers[0].getTimestamp()
         wait_until(lambda: receivers[0].getTimestamp() > stamp)
+
+
+@pytest.mark.ur(pace="realtime", standard_ports=True)
+def test_all_three_interfaces_work_with_the_fixture_of_the_plug_in(ur_box):
+    """They hold Python's lock while they wait: a box in a thread of this process could never answer."""
+    with (
+        connected(RTDEReceive, ur_box.host) as receive,
+        connected(RTDEIO, ur_box.host) as io,
+        connected(RTDEControl, ur_box.host) as control,
+    ):
+        assert receive.getActualQ() == pytest.approx(ur_box.state.q, abs=1e-3)
+        assert io.setStandardDigitalOut(1, True)
+        assert control.moveJ([0.5, -1.5, -1.8, 0.0, 1.2, 1.5], 2.0, 4.0)
+        assert ur_box.state.q == pytest.approx([0.5, -1.5, -1.8, 0.0, 1.2, 1.5], abs=0.01)
+        assert ur_box.state.digital_outputs["standard"][1]

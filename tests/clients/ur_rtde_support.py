@@ -83,6 +83,8 @@ class Arm(SimpleNamespace):
 
     def go_home(self):
         wait_until(lambda: self.control.moveJ(list(HOME), SPEED, ACCELERATION), "the start")
+        # The answer may overtake the last packages of the move.
+        self.until(lambda r: np.allclose(r.getTargetQ(), HOME, rtol=0, atol=1e-9))
 
     def until(self, condition):
         """Wait until the receive interface shows it."""

@@ -17,6 +17,7 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 import psutil
+from box_support import inside
 from fuzz_corpus import DIALLING_PROGRAMS, MESSAGES, peer_message
 from fuzz_mutations import mutate_bytes
 from fuzz_replies import READERS
@@ -25,13 +26,17 @@ from states_support import check_wires
 
 from protocol.robot_api import BASE
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
-from protocol.rtde.messages import RequestProtocolVersion, SetupOutputs, Start
+from protocol.rtde.codec import RequestProtocolVersion, SetupOutputs, Start
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.commands.operational import MoveEnablingDevice, SetOperationalMode, SwitchRemoteControl
-from ur_emulator.commands.power import PowerOn, ReleaseBrakes
+from ur_emulator.commands.power import (
+    MoveEnablingDevice,
+    PowerOn,
+    ReleaseBrakes,
+    SetOperationalMode,
+    SwitchRemoteControl,
+)
 from ur_emulator.commands.programs import StartProgram, StopProgram
-from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
     ConfirmSafety,
@@ -42,6 +47,8 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
+from ur_emulator.commands.surroundings import AttachPayload, Push
+from ur_emulator.controller.events import RobotModeChanged, SafetyModeChanged
 from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS
 from urscript import compile_program
 
@@ -131,6 +138,7 @@ class FuzzBox:
         self.cases, self.trail = Counter(), deque(maxlen=300)
         self.now = 0.0
         self.box = box = ControlBox(
+            in_process=True,
             **kind,
             pace="lockstep",
             port_base=None,
@@ -138,16 +146,16 @@ class FuzzBox:
             programs=folder,
             control_port=0,
         )
-        box.on_end = lambda: None
-        self.served, self.loop = box._box, box._loop
+        inside(box).on_end = lambda: None
+        self.served, self.loop = inside(box)._box, inside(box)._loop
         self.controller = self.served.controller
         self.generation = self.controller.state.robot.generation
         self.period = self.generation.period_s
         self.served._pacer = self.pacer = _Pacer(self.period)
-        box._operations._context.clock = lambda: self.now
+        inside(box).operations._context.clock = lambda: self.now
         self.defects = []
         box.follow_log(self._look_at_log)
-        box.listen()
+        inside(box).listen()
         self.loop.remove(self.served)  # its time is ours
         self.loop._thread = threading.get_ident()
         self.version = SoftwareVersion.parse(kind["version"])
@@ -160,6 +168,8 @@ class FuzzBox:
             self.readers[name].feed(self.witnesses[name].take())
         self.readers["rtde"] = RtdeWitness(self.witnesses["rtde"], self.turn, 1.0 / self.period)
         self.asked_at = {}
+        self.n_mode_changes = 0
+        self.served._listeners = (*self.served._listeners, self._count_mode_change)
         self.rest = self.controller.snapshot.target_q
         self.server = socket.create_server(("127.0.0.1", 0), backlog=64)
         self.server.setblocking(False)
@@ -167,6 +177,9 @@ class FuzzBox:
         self.process = psutil.Process()
         self.memory = self.process.memory_info().rss
         self.in_use = self._in_use()
+
+    def _count_mode_change(self, event):
+        self.n_mode_changes += isinstance(event, RobotModeChanged | SafetyModeChanged)
 
     def _connect(self, name):
         number = self.box.control_port if name == "control" else getattr(self.box.ports, name)
@@ -411,7 +424,8 @@ class FuzzBox:
         for name in ("primary", "primary_ro", "secondary", "secondary_ro"):
             reader = self.readers[name]
             reader.finish()
-            assert reader.n_states == self.n_published * 10 // round(1 / self.period) + 1, (
+            due = self.n_published * 10 // round(1 / self.period)
+            assert reader.n_states == 1 + due + self.n_mode_changes, (
                 name,
                 reader.n_states,
             )

@@ -3,13 +3,10 @@
 import json
 import struct
 
-from protocol.controller_words import CONTROLLER_WORDS
 from protocol.dashboard.commands import COMMANDS
 from protocol.interpreter import Word
 from protocol.robot_api import BASE, CALLS
-from protocol.rtde.codec import encode_message
-from protocol.rtde.fields import INPUTS, OUTPUTS
-from protocol.rtde.messages import (
+from protocol.rtde.codec import (
     GetControllerVersion,
     Pause,
     RequestProtocolVersion,
@@ -18,8 +15,11 @@ from protocol.rtde.messages import (
     SetupInputs,
     SetupOutputs,
     Start,
+    encode_message,
 )
-from ur_emulator.commands.parameters import Kind
+from protocol.rtde.fields import INPUTS, OUTPUTS
+from protocol.script_channel import CONTROLLER_WORDS
+from ur_emulator.commands.operation import Kind
 from ur_emulator.control.operations import OPERATIONS
 
 # Words and operations by which something else than a program may move the arm.

@@ -13,9 +13,8 @@ from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, Package
 from protocol.primary.packages import decode_package
 from protocol.primary.state import RobotState
 from protocol.realtime.layout import layout_for_version
-from protocol.rtde.codec import decode_message
-from protocol.rtde.messages import Role
-from protocol.rtde.messages import RtdePackageType as RtdeType
+from protocol.rtde.codec import Role, decode_message
+from protocol.rtde.codec import RtdePackageType as RtdeType
 
 # pymodbus's decoder of answers.
 _MODBUS = DecodePDU(is_server=False)

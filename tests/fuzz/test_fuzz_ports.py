@@ -8,6 +8,7 @@ import socket
 
 import fuzz_box
 import pytest
+from box_support import inside
 from dashboard_support import write_programs
 from fuzz_box import CB3, E_SERIES, POLYSCOPE_X, FuzzBox, run
 from fuzz_corpus import MESSAGES
@@ -57,7 +58,7 @@ def test_the_harness_notices_an_arm_that_moves(folder):
 
 def test_the_harness_notices_an_error_of_a_port(folder, monkeypatch):
     fuzz = FuzzBox(random.Random(1), folder, lively=False)
-    monkeypatch.setattr(fuzz.box._port_set._ports["rtde"], "_answer", lambda *args: 1 / 0)
+    monkeypatch.setattr(inside(fuzz.box)._port_set._ports["rtde"], "_answer", lambda *args: 1 / 0)
     with pytest.raises(AssertionError, match="ZeroDivisionError"):
         repeat(lambda: fuzz.attack("rtde"), 2000)
     fuzz.close()
@@ -93,7 +94,7 @@ def test_rtde_packages_that_come_faster_than_they_are_answered_are_not_read(fold
     client.send(b"\x00\x03P" * 200_000)
     for _ in range(100):
         fuzz.turn()
-        for session in fuzz.box._port_set._ports["rtde"]._sessions.values():
+        for session in inside(fuzz.box)._port_set._ports["rtde"]._sessions.values():
             assert len(session.protocol._buffer) <= 2 * BUDGETS.read_bytes
     client.take()
     assert client.is_open
@@ -105,7 +106,7 @@ def test_rtde_packages_that_come_faster_than_they_are_answered_are_not_read(fold
 def test_little_is_taken_from_a_client_in_a_turn(folder, port, monkeypatch):
     """64 KiB of line breaks on a script port once kept a cycle waiting for 100 ms and more."""
     fuzz = FuzzBox(random.Random(1), folder, lively=False)
-    served, taken = fuzz.box._port_set._ports[port], []
+    served, taken = inside(fuzz.box)._port_set._ports[port], []
     received = served.received
     monkeypatch.setattr(served, "received", lambda one, data: (taken.append(len(data)), received(one, data)))
     client, _ = fuzz.join(port)

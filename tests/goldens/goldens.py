@@ -25,17 +25,17 @@ from pc_client.control.controller import CONTROLLERS  # noqa: E402
 from pc_client.driver.ur_driver import UrDriver  # noqa: E402
 from pc_client.experiment.prepare import load_movements, prepare_experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
-from protocol.primary.message_codec import encode_message  # noqa: E402
+from protocol.primary.messages import encode_message  # noqa: E402
 from protocol.realtime.layout import layout_for_version  # noqa: E402
 from protocol.rtde.fields import output_fields  # noqa: E402
 from protocol.rtde.recipe import snapshot_encoder  # noqa: E402
 from protocol.ur_types import SoftwareVersion  # noqa: E402
 from ur_emulator import ControlBox  # noqa: E402
-from ur_emulator.controller.modbus.robot_map import read_register  # noqa: E402
-from ur_emulator.models.cb3 import CB3  # noqa: E402
-from ur_emulator.servers.primary.event_messages import message_for  # noqa: E402
+from ur_emulator.controller.modbus_map import read_register  # noqa: E402
+from ur_emulator.models.generations import CB3  # noqa: E402
+from ur_emulator.servers.primary.port import message_for  # noqa: E402
 from ur_emulator.servers.primary.robot_state import StateEncoder  # noqa: E402
-from urscript.program import check_program  # noqa: E402
+from urscript.check.checking import check_program  # noqa: E402
 
 VERSION = SoftwareVersion(3, 15, 8)
 CHUNKS = sorted((ROOT / "tests" / "ur_emulator" / "chunks").glob("*.script"))

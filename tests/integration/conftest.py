@@ -13,14 +13,14 @@ from ur_emulator import ControlBox
 @pytest.fixture
 def lockstep_box():
     """A box in lockstep on free ports."""
-    with ControlBox(pace="lockstep", port_base=None, seed=7) as box:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7) as box:
         yield box
 
 
 @pytest.fixture
 def realtime_box():
     """A box in real time on free ports."""
-    with ControlBox(pace="realtime", port_base=None, seed=7) as box:
+    with ControlBox(in_process=True, pace="realtime", port_base=None, seed=7) as box:
         yield box
 
 

@@ -76,7 +76,7 @@ def test_a_movement_that_does_not_exist_is_one_line(ur_client, tmp_path, monkeyp
         ("127.0.0.1", "refuses the connection"),
         ("robot.invalid", "cannot be looked up"),
         ("256.1.1.1", "cannot be looked up"),
-        ("127.0.0.1:30003", "cannot be looked up"),
+        ("127.0.0.1:30003", "give the name or address alone; --port-base"),
         pytest.param(
             "a..b",
             "a..b",
@@ -127,6 +127,7 @@ def test_the_process_leaves_with_that_code_and_one_line(arguments, code, tmp_pat
 def hasty(monkeypatch):
     monkeypatch.setattr(package_stream, "VERSION_TIMEOUT", 0.1)
     monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.1)
+    monkeypatch.setattr(realtime_client, "_STOPPED_TIMEOUT", 0.1)  # the greeting is that of a box in lockstep
     monkeypatch.setattr(dashboard_query, "REPLY_TIMEOUT", 0.1)
 
 

@@ -148,7 +148,7 @@ def test_a_client_that_was_stopped_in_a_movement_ends_with_one_line_when_it_goes
         assert "ur-client: the robot had no command for" in ended.complaint()
         bystander.until_rest()
     (recording,) = tmp_path.iterdir()
-    assert load_recording(recording).summary == {"aborted": "DriverError"}
+    assert "DriverError: the robot had no command for" in load_recording(recording).aborted
 
 
 def time_to_rest(bystander):

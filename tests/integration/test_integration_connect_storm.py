@@ -12,7 +12,7 @@ from types import FrameType, FunctionType
 
 import psutil
 import pytest
-from integration_support import TIMEOUT, Frames, connect, finish, serving
+from integration_support import TIMEOUT, Frames, connect, finish, inside, serving
 
 from ur_emulator import ControlBox
 from ur_emulator.box_log import MAX_ENTRIES, LogEntry
@@ -90,7 +90,10 @@ def test_descriptors_are_back_and_no_reader_has_lost_a_frame(tmp_path):
 @pytest.fixture
 def quiet_box():
     """A box in lockstep, and a client of its dashboard that stays."""
-    with ControlBox(pace="lockstep", port_base=None, seed=7) as box, connect(box, "dashboard") as dashboard:
+    with (
+        ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7) as box,
+        connect(box, "dashboard") as dashboard,
+    ):
         dashboard.recv(100)
         box.dashboard = dashboard
         yield box
@@ -98,14 +101,14 @@ def quiet_box():
 
 
 def everybody_has_gone(box):
-    n_clients = sum(len(listener.connections) for listener in box._port_set._listeners.values())
-    return n_clients == 1 and not box._intake._senders and not box._box.controller.is_active
+    n_clients = sum(len(listener.connections) for listener in inside(box)._port_set._listeners.values())
+    return n_clients == 1 and not inside(box)._intake._senders and not inside(box)._box.controller.is_active
 
 
 def between_cycles(box, ask):
     """Let the loop's thread answer: nothing is half done then."""
     answers = queue.Queue()
-    box._loop.call_soon_threadsafe(lambda: answers.put(ask()), answers.put)
+    inside(box)._loop.call_soon_threadsafe(lambda: answers.put(ask()), answers.put)
     return answers.get(timeout=TIMEOUT)
 
 

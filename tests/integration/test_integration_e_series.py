@@ -7,6 +7,8 @@ import pytest
 from integration_support import at, free_port_base
 
 from pc_client.analysis.run import analyse_run
+from pc_client.analysis.track import speed
+from pc_client.api.signals import Run
 from pc_client.movements.files import load_movement
 from pc_client.recording.loader import load_recording
 from ur_emulator import ControlBox
@@ -80,6 +82,12 @@ def test_every_cycle_of_2_ms_has_its_frame_and_its_command(recordings):
         np.testing.assert_allclose(np.diff(recording.t), PERIOD, atol=1e-9)
         assert recording.provenance.cycle_time_s == PERIOD
         assert recording.summary["late_frames"] == recording.summary["lost_frames"] == 0
+        run = Run.from_file(recording.path)
+        np.testing.assert_array_equal(run.q, recording.column("actual_q"))
+        track = run.measured.track
+        samples = run.tcp_speed[track.rows[1:]]  # of all rows, every fourth is a sample of Eq. 10
+        np.testing.assert_allclose(samples, speed(track.t, track.p_actual), rtol=1e-12)
+        assert len(run.ref_q) == len(run.ref_tcp_position) == len(run.to_frame()) == recording.n_rows
 
 
 def test_the_loop_is_as_quick_as_the_cycle_and_the_arm_follows_within_what_its_encoders_show(recordings):

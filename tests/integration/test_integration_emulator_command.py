@@ -29,7 +29,7 @@ from integration_support import (
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
-from ur_emulator.control.token import TOKEN_VARIABLE
+from ur_emulator.box_options import TOKEN_VARIABLE
 from ur_emulator.errors import EmulatorError
 
 

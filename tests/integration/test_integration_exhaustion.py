@@ -38,9 +38,10 @@ def ask(stream, line):
 
 
 def end_worker(box):
-    for process in psutil.Process(box.process.pid).children():
+    (server,) = psutil.Process(box.process.pid).children()
+    for process in server.children():
         process.kill()
-        process.wait(TIMEOUT)  # the box has noticed it
+        process.wait(TIMEOUT)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit on descriptors to run into")

@@ -14,6 +14,7 @@ from integration_support import (
     connect,
     finish,
     free_port_base,
+    inside,
     is_closed,
     send,
     serving,
@@ -21,8 +22,8 @@ from integration_support import (
 
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import BoxRack, ControlBox
+from ur_emulator.box_options import MAX_BOXES
 from ur_emulator.errors import EmulatorError, PortError
-from ur_emulator.rack import MAX_BOXES
 from ur_emulator.realtime import event_loop
 
 own_addresses = pytest.mark.skipif(
@@ -77,7 +78,7 @@ def test_a_box_among_others_does_to_the_byte_what_it_does_alone():
         together = [together[box] for box in boxes]
     assert together[0] != together[1]
     for k, frames in enumerate(together):
-        with ControlBox(seed=20 + k, pace="lockstep", port_base=None) as alone:
+        with ControlBox(in_process=True, seed=20 + k, pace="lockstep", port_base=None) as alone:
             assert run_move(alone) == frames
 
 
@@ -102,9 +103,9 @@ def test_boxes_in_real_time_all_give_every_frame():
 
 
 def test_boxes_in_real_time_take_turns_within_a_period():
-    rack = ControlBox.many(4, port_base=None)
-    pacers = [box._box._pacer for box in rack]
-    assert [pacer.may_tick(10.0, box._box) for pacer, box in zip(pacers, rack, strict=True)] == [
+    rack = ControlBox.many(4, in_process=True, port_base=None)
+    pacers = [inside(box)._box._pacer for box in rack]
+    assert [pacer.may_tick(10.0, inside(box)._box) for pacer, box in zip(pacers, rack, strict=True)] == [
         True,
         False,
         False,
@@ -116,8 +117,8 @@ def test_boxes_in_real_time_take_turns_within_a_period():
 
 @pytest.mark.parametrize(("count", "may_tick_early"), [(1, True), (2, False)])
 def test_a_box_without_others_computes_its_cycle_before_the_deadline(count, may_tick_early):
-    rack = ControlBox.many(count, port_base=None)
-    served = rack[0]._box
+    rack = ControlBox.many(count, in_process=True, port_base=None)
+    served = inside(rack[0])._box
     served._pacer.may_tick(10.0, served)
     assert served._pacer.may_tick(10.008 - 0.0003, served) == may_tick_early
     rack.close()
@@ -137,26 +138,26 @@ def test_boxes_may_differ():
 
 
 def test_one_box_can_be_closed_and_the_others_go_on():
-    with ControlBox.many(2, pace="realtime", port_base=None) as (one, two):
+    with ControlBox.many(2, in_process=True, pace="realtime", port_base=None) as (one, two):
         with connect(one, "dashboard") as gone, Frames(two) as frames:
             assert gone.recv(100).startswith(b"Connected")
-            one._loop.call_soon_threadsafe(one.close, pytest.fail)
+            inside(one)._loop.call_soon_threadsafe(inside(one).close, pytest.fail)
             assert is_closed(gone)
             for _ in range(20):
                 frames.new()
             assert frames.lost() == 0
-        assert one._box not in one._loop._services
+        assert inside(one)._box not in inside(one)._loop._services
         with pytest.raises(ConnectionRefusedError):
             connect(one, "dashboard")
 
 
 def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
-    rack = ControlBox.many(2, pace="realtime", port_base=None)
+    rack = ControlBox.many(2, in_process=True, pace="realtime", port_base=None)
     one, two = rack.__enter__()
     with connect(one, "dashboard") as gone, Frames(two) as frames:
         assert gone.recv(100).startswith(b"Connected")
-        one._loop.call_soon_threadsafe(
-            lambda: setattr(one._box.controller, "tick", lambda _: 1 // 0), pytest.fail
+        inside(one)._loop.call_soon_threadsafe(
+            lambda: setattr(inside(one)._box.controller, "tick", lambda _: 1 // 0), pytest.fail
         )
         assert is_closed(gone)
         assert any("the box has ended: ZeroDivisionError" in str(entry) for entry in one.log)
@@ -170,10 +171,10 @@ def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
 
 def test_a_box_that_compiles_is_closed_without_waiting_for_it():
     """Another box of the loop would miss its cycles meanwhile; its programs wait no longer either."""
-    with ControlBox.many(2, pace="lockstep", port_base=None) as (one, two):
-        endless = one._access.in_worker(signal.pause)
-        one._loop.call_soon_threadsafe(lambda: one._access.start_alone(endless), pytest.fail)
-        one._loop.call_soon_threadsafe(one.close, pytest.fail)
+    with ControlBox.many(2, in_process=True, pace="lockstep", port_base=None) as (one, two):
+        endless = inside(one)._access.in_worker(signal.pause)
+        inside(one)._loop.call_soon_threadsafe(lambda: inside(one)._access.start_alone(endless), pytest.fail)
+        inside(one)._loop.call_soon_threadsafe(inside(one).close, pytest.fail)
         with Frames(two) as frames:
             frames.raw()
             send(two, "secondary", MOVE)
@@ -187,7 +188,7 @@ def test_a_taken_port_of_one_box_leaves_no_port_open():
     with socket.create_server(("127.0.0.3", ports.rtde)):
         rack = ControlBox.many(3, host="127.0.0.2", port_base=base)
         with pytest.raises(PortError, match=rf"127\.0\.0\.3:{ports.rtde}"):
-            rack.listen()
+            rack.__enter__()
     for host in ("127.0.0.2", "127.0.0.3"):
         with pytest.raises(ConnectionRefusedError):
             socket.create_connection((host, ports.realtime), timeout=TIMEOUT)
@@ -242,7 +243,7 @@ def test_the_command_serves_several_boxes(tmp_path):
 def test_the_loop_waits_also_where_select_cannot(monkeypatch):
     """A process with a thousand open files: the loop's own descriptor is out of select()'s range."""
     monkeypatch.setattr(event_loop, "_SELECT_LIMIT", 0)
-    with ControlBox(pace="realtime", port_base=None) as box, Frames(box) as frames:
+    with ControlBox(in_process=True, pace="realtime", port_base=None) as box, Frames(box) as frames:
         for _ in range(50):
             frames.raw()
         assert frames.lost() == 0

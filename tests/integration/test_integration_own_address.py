@@ -10,7 +10,7 @@ from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.planning.joint_lines import JointLines
+from pc_client.planning.approach import JointLines
 from ur_emulator import ControlBox
 
 ELSEWHERE = "127.0.37.1"

@@ -69,7 +69,7 @@ def test_an_arm_with_its_own_calibration_is_ready(ur_client, robot, seed):
         doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
     assert doctor.code == 0, doctor.out
     assert "streaming   ready\n" in doctor.out
-    assert doctor.out.count("  ok\n") == 11
+    assert doctor.out.count("  ok\n") == 12
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_a_slider_that_is_moved_in_a_run_ends_it_and_the_recording_is_kept(stand
     assert done.code == 1
     assert "the robot's speed slider is 95 %, must be 100 %" in done.complaint()
     recording = load_recording(tmp_path / "lognorm_4_1_r1.mcap")
-    assert recording.summary["aborted"] == "DriverError"
+    assert "speed slider" in recording.aborted
     assert round(recording.column("timestamp")[-1] / PERIOD) - moved <= LONGEST_UNSEEN
 
 

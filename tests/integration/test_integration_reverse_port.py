@@ -36,7 +36,7 @@ def test_a_given_port_serves_all_programs_of_a_session_and_the_next_session(run_
     with socket.create_server((HOST, 0)) as found:
         port = found.getsockname()[1]
     for _ in range(2):
-        done = run_movement("--reverse-port", port, "--repeat", 2)
+        done = run_movement("--reverse-port", port, "--repeat", 2, "--overwrite")
         assert done.code == 0, done.err
     assert len(list(tmp_path.glob("out/*.mcap"))) == 2
 

@@ -6,6 +6,8 @@ import re
 import pytest
 from integration_support import at, free_port_base
 
+from pc_client.driver.robot_report import read_report
+from pc_client.driver.transport import TcpNetwork
 from pc_client.recording.loader import load_recording
 from ur_emulator import ControlBox
 
@@ -18,11 +20,17 @@ def test_a_box_that_reports_no_serial_number_is_simulated(ur_client, version, to
     assert re.search(f"UR3, software {told}, serial number unknown, SIMULATED", doctor.out)
 
 
+def test_only_a_box_in_lockstep_says_that_its_time_waits(lockstep_box, realtime_box):
+    for box, waits in ((lockstep_box, True), (realtime_box, False)):
+        info = read_report(TcpNetwork(), box.host, box.ports).info
+        assert (info.simulated, info.lockstep) == (True, waits)
+
+
 def test_a_box_that_reports_no_serial_number_may_be_run_again_and_its_data_are_marked(ur_client, tmp_path):
     out = tmp_path / "out"
     with ControlBox(pace="lockstep", port_base=free_port_base(), seed=7, version="3.2.0") as box:
         for _ in range(2):
-            done = ur_client("run", "uniform_4_1", *at(box), "--out", out)
+            done = ur_client("run", "uniform_4_1", *at(box), "--out", out, "--overwrite")
             assert done.code == 0, done.err
     assert "Table I: SIMULATED UR3" in done.out
     provenance = load_recording(out / "uniform_4_1_r1.mcap").provenance

@@ -191,7 +191,7 @@ def test_random_messages_never_break_the_limits(lockstep_box):
 
 PROGRAMS = {
     "speedj, absurd": "speedj([1e14,-1e14,0,0,0,0], 1e14, 0.1)",
-    "movej, no time": "movej([1,-1.5,-1.8,0,1.2,1.5], t=0.001)",
+    "movej, absurd": "movej([1,-1.5,-1.8,0,1.2,1.5], a=1e9, v=1e6)",
 }
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pc_client.extraction.extract import Extraction, PartExtraction
-from pc_client.extraction.recording import PenPart
+from pc_client.extraction.pen import PenPart
 from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 
 
 def flat_trajectory(targets, onsets, end, sigma=0.2, mu=-1.6, arc_angle=0.6):

@@ -1,23 +1,24 @@
-"""Movements to extract from: own strokes with known parameters, and where the real drawings lie."""
+"""Movements to extract from: own strokes with known parameters, the drawings of the tree, those of people."""
 
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pc_client.extraction.recording import PenPart, PenRecording
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
-from pc_client.movements.timing import TwoSidedTiming
+from pc_client.extraction.pen import PenPart, PenRecording
+from pc_client.movements.lognormal import TwoSidedTiming
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 
-DRAWINGS = Path(__file__).parents[3] / "shared" / "data" / "pen_strokes" / "strokes_background_small1.zip"
+DRAWINGS = Path(__file__).parents[2] / "examples" / "drawings"
+DRAWINGS_OF_PEOPLE = os.environ.get("OMNIGLOT")
 
-needs_drawings = pytest.mark.skipif(
-    not DRAWINGS.exists(),
-    reason=f"the drawings are not here: {DRAWINGS} (they are never part of the project)",
+needs_omniglot = pytest.mark.skipif(
+    not DRAWINGS_OF_PEOPLE,
+    reason="OMNIGLOT=PATH gives its strokes_background_small1.zip, which is not in the tree",
 )
 
 

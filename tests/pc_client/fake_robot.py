@@ -16,15 +16,19 @@ from pc_client.errors import DriverError
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from protocol.pose import T_to_pose, pose_trans
-from protocol.primary.layout import CartesianInfo, RobotModeData
-from protocol.primary.message_codec import encode_message, version_message
-from protocol.primary.messages import ErrorCodeMessage, ReportLevel, RuntimeExceptionMessage
-from protocol.primary.setup import ConfigurationData
+from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
+from protocol.primary.messages import (
+    ErrorCodeMessage,
+    ReportLevel,
+    RuntimeExceptionMessage,
+    encode_message,
+    version_message,
+)
 from protocol.primary.state import encode_state
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version
 from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.server_connection import RtdeServerConnection
-from protocol.ur_types import Ports, RobotType, SoftwareVersion
+from protocol.ur_types import LOCKSTEP_MASTERBOARD, Ports, RobotType, SoftwareVersion
 from protocol.velocity_stream import VelocityMode
 
 VERSION = SoftwareVersion(3, 15, 8)
@@ -186,6 +190,18 @@ class FakeRobot:
             if answer:
                 pipe.incoming.append(answer.encode() + b"\n")
 
+    @property
+    def timestamp(self):
+        return self.tick * PERIOD
+
+    @property
+    def actual_q(self):
+        return tuple(self.q)
+
+    @property
+    def actual_tcp_pose(self):
+        return pose_trans(T_to_pose(tcp_pose(self.arm, self.q)), self.tcp_offset)
+
     def robot_state(self):
         """What the script ports send ten times a second."""
         robot_type = RobotType[self.model] if self.model in RobotType.__members__ else RobotType.UR3
@@ -193,7 +209,9 @@ class FakeRobot:
             [
                 RobotModeData(target_speed_fraction=self.slider, speed_scaling=self.scaling),
                 CartesianInfo(tcp_offset=self.tcp_offset),
-                ConfigurationData(robot_type=robot_type),
+                ConfigurationData(
+                    robot_type=robot_type, masterboard_version=LOCKSTEP_MASTERBOARD if self.time_waits else 6
+                ),
             ],
             self.version,
         )
@@ -237,7 +255,7 @@ class FakeRobot:
             waits = self.program is None or (
                 self.program == "receiver" and not self.commands and self.safety_mode == 1
             )
-            if self.lockstep and waits:
+            if self.time_waits and waits:
                 self.clock += PERIOD
                 frames.append(self.frame())
                 return
@@ -287,19 +305,24 @@ class FakeRobot:
     def frame(self):
         values = dict(_ALL_ZERO)
         values.update(
-            timestamp=self.tick * PERIOD,
+            timestamp=self.timestamp,
             target_q=tuple(self.q),
-            actual_q=tuple(self.q),
+            actual_q=self.actual_q,
             actual_qd=tuple(self.qd),
             robot_mode=self.robot_mode,
             safety_mode=self.safety_mode,
             runtime_state=STOPPED if self.program is None else PAUSED if self.safety_mode != 1 else PLAYING,
         )
         values["speed_scaling"] = self.scaling
-        values["actual_tcp_pose"] = pose_trans(T_to_pose(tcp_pose(self.arm, self.q)), self.tcp_offset)
+        values["actual_tcp_pose"] = self.actual_tcp_pose
         return _ENCODE(SimpleNamespace(**values))
 
     # ---- what tests look at
+    @property
+    def time_waits(self):
+        """In lockstep, as only a robot is that can say so: an emulated one."""
+        return self.lockstep and self.has_dashboard and (self.serial or "").startswith("2099")
+
     @property
     def at_rest(self):
         return self.program is None and not any(self.qd)

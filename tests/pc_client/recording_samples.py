@@ -80,6 +80,7 @@ def record_movement(
     seed: int = 0,
     distort: Callable[[np.ndarray], np.ndarray] | None = None,
     prov: Provenance | None = None,
+    aborted: str = "",
 ) -> Path:
     """Record a straight reach along y; actual position = reference, delayed, scaled, offset, with noise.
 
@@ -111,4 +112,5 @@ def record_movement(
             recorder.append(
                 frame, now, np.full(6, ref[i, 1]), np.zeros(6), ref[i], velocity[i], np.zeros(6), phase
             )
+        recorder.close({"aborted": aborted} if aborted else {})
     return path

@@ -22,9 +22,9 @@ from pc_client.analysis.human_likeness import (
     speed_peaks,
 )
 from pc_client.errors import ClientError
+from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.robotic import SmoothedSquareWave
-from pc_client.movements.timing import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
 
 RATE = 1000.0
 T = np.arange(1001) / RATE

@@ -23,11 +23,14 @@ from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
 
 
-def record(folder: Path, movement: str, repetition: int, **changes: object) -> Path:
+def record(
+    folder: Path, movement: str, repetition: int, *, rest: float = 0.8, aborted: str = "", **changes: object
+) -> Path:
     kind = "uniform" if movement.startswith("uniform") else "lognormal"
     prov = provenance(movement=movement, kind=kind, repetition=repetition, **changes)
     path = folder / f"{movement}_r{repetition}.mcap"
-    return record_movement(path, lag=0.01 * repetition, noise=5e-6, seed=repetition, prov=prov)
+    faults = {"lag": 0.01 * repetition, "noise": 5e-6, "seed": repetition}
+    return record_movement(path, **faults, rest=rest, prov=prov, aborted=aborted)
 
 
 @pytest.fixture(scope="module")
@@ -216,6 +219,38 @@ def test_report_of_a_real_arm_does_not_say_simulated(tmp_path: Path) -> None:
     assert not any("SIMULATED" in json.dumps(figure) for figure in zoomed_of(html))
 
 
+def test_one_own_movement_is_not_set_beside_the_paper_and_has_no_means(tmp_path: Path) -> None:
+    record(tmp_path, "wave", 1, rest=0.2)
+    report = build_report(tmp_path)
+    html = own_text(report.paths[2].read_text())
+    assert heads(html)[:4] == ["movement", "SNR", "position error", "path error"]
+    body = html.partition("<header>")[2]
+    assert not re.search(
+        r"[Mm]eans? (SNR|of|over|logn)|Table I|beside the paper|beside that|not in the paper", body
+    )
+    assert "It is not known here: these recordings hold fewer than 30 control cycles of rest" in html
+    assert not any("paper" in svg for svg in figures_of(report.paths[2].read_text()))
+    assert report.paths[1].read_text().startswith("# SNR of the TCP speed: SIMULATED")
+    record(tmp_path, "wave", 2)
+    html = own_text(build_report(tmp_path).paths[2].read_text())
+    assert heads(html)[:5] == ["movement", "r1", "r2", "mean", "noise floor"]
+    assert "It is not known here" not in html
+    assert "mean lognormal" not in html  # of one movement
+
+
+def heads(html: str) -> list[str]:
+    return re.findall(r"<th>(.*?)(?:<br>.*?)?</th>", html)
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_on_a_narrow_screen_every_figure_says_what_its_data_are(tmp_path: Path, simulated: bool) -> None:
+    """Figures are wider than such a screen: their own mark is out of sight, at the right."""
+    record(tmp_path, "wave", 1, simulated=simulated)
+    style = re.findall(r"<style>.*?</style>", build_report(tmp_path).paths[2].read_text(), re.DOTALL)[0]
+    narrow = style.partition("@media screen and (max-width")[2]
+    assert ('content: "SIMULATED"; position: sticky; left: 0' in narrow) == simulated
+
+
 def test_names_from_a_recording_cannot_break_the_page(tmp_path: Path) -> None:
     prov = provenance(movement="<b>evil", serial="<script>")
     record_movement(tmp_path / "evil_r1.mcap", lag=0.01, prov=prov)
@@ -232,6 +267,8 @@ def test_cut_and_aborted_recordings_are_left_out_and_named(tmp_path: Path) -> No
     with Recorder(tmp_path / "lognorm_4_1_r3.mcap", provenance(repetition=3), SIGNALS) as recorder:
         append_rows(recorder, 60)
         recorder.close({"aborted": "RobotStoppedError"})
+    with pytest.raises(RecordingError, match=r"r3\.mcap: the run was given up .*: it has no SNR"):
+        analyse_run(load_recording(tmp_path / "lognorm_4_1_r3.mcap"))
     (tmp_path / "notes.mcap").write_text("hello")
     report = build_report(tmp_path)
     assert [len(runs) for runs in report.table.runs.values()] == [1]
@@ -243,6 +280,21 @@ def test_cut_and_aborted_recordings_are_left_out_and_named(tmp_path: Path) -> No
     html = report.paths[2].read_text()
     assert "the run was given up (RobotStoppedError)" in html
     assert str(tmp_path) not in html
+
+
+def test_a_run_that_was_given_up_is_shown_as_that_outside_of_all_means(tmp_path: Path) -> None:
+    whole = record(tmp_path, "lognorm_4_1", 1)
+    alone = build_table([analyse_run(load_recording(whole))])
+    for movement in ("lognorm_4_1", "lognorm_4_2"):
+        record(tmp_path, movement, 2, aborted="DriverError: off its path")
+    report = build_report(tmp_path, include_aborted=True)
+    assert list(report.table.runs) == ["lognorm_4_1", "lognorm_4_1_r2_given_up", "lognorm_4_2_r2_given_up"]
+    assert report.left_out == ()
+    assert report.table.mean_of("lognormal") == alone.mean_of("lognormal")
+    assert "mean given up" not in report.table.to_markdown()
+    text = own_text(report.paths[2].read_text())
+    assert "lognorm_4_2_r2_given_up" in text
+    assert "SNR, given up" not in text
 
 
 def test_folders_without_recordings(tmp_path: Path) -> None:

@@ -13,11 +13,13 @@ from recording_samples import provenance, record_movement
 from rich.console import Console
 
 from pc_client import cli
+from pc_client.analysis.figures import speeds_sheet
 from pc_client.analysis.report import Report, build_report, build_tables
-from pc_client.analysis.side_by_side import side_by_side
-from pc_client.analysis.side_by_side_page import build_side_by_side
+from pc_client.analysis.side_by_side import build_side_by_side, side_by_side
+from pc_client.analysis.table import Table
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.errors import RecordingError
+from pc_client.results.interactive import plotly_figure
 
 PAPER, PREVIEW = CONTROLLERS["paper"], CONTROLLERS["preview"]
 QUICK = replace(PAPER, gain_p=10.0, gain_i=5.0)
@@ -101,6 +103,52 @@ def test_the_page_shows_all_and_needs_nothing_else(reports: list[Report]) -> Non
     assert cells == [("4", "2"), ("10", "5")]  # gains and runs of the table of other numbers
     build_side_by_side(reports, out)
     assert out.read_text() == html
+
+
+def lead(table: Table) -> str:
+    means = table.to_json()["mean_snr_db"]
+    more = means["lognormal"] - means["uniform"]
+    return f"{abs(more):.1f} dB {'better' if more > 0 else 'worse'}"
+
+
+def test_the_papers_finding_is_set_beside_ours_in_one_sentence(reports: list[Report], tmp_path: Path) -> None:
+    published, preview = (report.table for report in reports[:2])
+    said = (
+        "The paper found lognormal movements reproduced 2.8 dB better than uniform ones (means of the SNR); "
+        f"here they are {lead(published)} (published controller), {lead(preview)} (preview)."
+    )
+    shown = build_side_by_side(reports[:2], tmp_path / "report.html")
+    assert shown.finding == said
+    assert said in (tmp_path / "report.html").read_text()
+    console = Console(width=200)
+    with console.capture() as capture:
+        console.print(shown.to_rich())
+    assert said[:60] in capture.get()
+    one_kind = build_tables(record(tmp_path / "one", PREVIEW, ("lognorm_4_1",)))
+    assert side_by_side([one_kind.table]).finding == ""
+
+
+def test_own_movements_are_not_set_beside_the_paper(tmp_path: Path) -> None:
+    own = [build_tables(record(tmp_path / c.name, c, ("wave", "uniform wave"))) for c in (PAPER, PREVIEW)]
+    shown = build_side_by_side(own, tmp_path / "report.html")
+    assert shown.finding == ""
+    text = own_text((tmp_path / "report.html").read_text()).partition('id="ours"')[0]
+    assert "paper's" not in text
+    assert "real UR3" not in text
+
+
+def test_what_is_compared_stands_together(reports: list[Report], tmp_path: Path) -> None:
+    build_side_by_side(reports[:2], tmp_path / "report.html")
+    heads = re.findall(r"<th>(.*?)(?:<br>.*?)?</th>", (tmp_path / "report.html").read_text())
+    assert heads[:5] == ["movement", "paper, real UR3", "published controller", "preview", "targets"]
+
+
+def test_every_movement_has_a_time_axis_with_numbers(reports: list[Report]) -> None:
+    experiments = [("a", reports[0].table), ("b", reports[1].table)]
+    layout = plotly_figure(speeds_sheet(list(MOVEMENTS), experiments, ""))["layout"]
+    axes = [axis for name, axis in layout.items() if name.startswith("xaxis")]
+    assert len(axes) == len(MOVEMENTS)
+    assert all(axis["showticklabels"] and axis["title"]["text"] == "time [s]" for axis in axes)
 
 
 def test_what_is_ours_is_reported_where_the_published_controller_is_shown(

@@ -17,9 +17,8 @@ from pc_client.kinematics.cell import NO_CELL, Cell, Solid, Tool, Wall
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.files import load_movement
-from pc_client.planning.approach import plan_approach
+from pc_client.planning.approach import approach_text, plan_approach, plan_text
 from pc_client.planning.plan import plan_movement
-from pc_client.planning.plan_text import approach_text, plan_text
 
 STROKES = StraightStrokes(INSIDE_THE_BOX, 1.5)
 PLAN = plan_movement(STROKES, model=robot_model("ur3"))

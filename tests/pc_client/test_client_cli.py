@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import socket
 import subprocess
@@ -16,8 +17,9 @@ import pc_client.api.arm as arm_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
+from pc_client.errors import DriverError
 from pc_client.recording.loader import load_recording
-from protocol.primary.setup import ConfigurationData, KinematicsInfo
+from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.primary.state import encode_state
 from protocol.ur_types import SoftwareVersion
 
@@ -64,7 +66,7 @@ def test_every_command_has_help(command, capsys):
         (["fly"], "fly"),
         (["movements"], "command"),
         (["doctor", "--robot", "x", "--quickly"], "quickly"),
-        (["export", "x.mcap", "--to", "xlsx"], "is not one of 'csv', 'parquet'"),
+        (["export", "x.mcap", "--to", "xlsx"], "is not one of 'csv', 'parquet', 'mat'"),
         ([*RUN, "--gain-p", "300"], "--gain-p: 300.0; give a number from 0 to 200 1/s"),
         ([*RUN, "--gain-i", "nan"], "--gain-i: nan; give a number"),
         ([*RUN, "--acceleration", "0"], "--acceleration: 0.0; give a number from 0.1 to 100 rad/s2"),
@@ -201,7 +203,15 @@ def test_own_numbers_reach_robot_recording_and_table(robot, tmp_path, capsys):
 def test_commands_that_move_an_arm_share_their_options(command, capsys):
     assert cli.run([command, "--help"]) == 0
     text = capsys.readouterr().out
-    for option in ("--controller", "--gain-p", "--gain-i", "--acceleration", "--port-base", "--yes"):
+    for option in (
+        "--controller",
+        "--gain-p",
+        "--gain-i",
+        "--acceleration",
+        "--port-base",
+        "--overwrite",
+        "--yes",
+    ):
         assert option in text
 
 
@@ -268,6 +278,45 @@ def test_doctor_says_ready(robot, capsys):
     assert "streaming   ready" in out
 
 
+def test_doctor_refuses_time_stamps_that_run_backwards(robot, capsys):
+    robot.lockstep = False
+    robot.on_tick = lambda fake: setattr(fake, "tick", fake.tick - 2)
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.5"]) == 1
+    assert "NOT NOW: the robot's frames jump back from 8.000000 s to 7.992000 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("cause", "word"),
+    [
+        (ConnectionRefusedError(), "closed"),
+        (TimeoutError(), "no answer"),
+        (OSError(errno.EHOSTUNREACH, "No route to host"), "no route"),
+    ],
+)
+def test_doctor_tells_a_closed_port_from_one_that_cannot_be_reached(robot, capsys, cause, word):
+    reached = robot.connect
+
+    def connect(host, port, timeout):
+        if port == 502:
+            raise DriverError("no connection") from cause
+        return reached(host, port, timeout)
+
+    robot.connect = connect
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 0
+    assert f"port   502  modbus        {word}\n" in capsys.readouterr().out
+
+
+def test_doctor_asks_rtde_and_does_not_only_dial(robot, capsys):
+    took = robot.took
+    robot.took = lambda pipe, data: (
+        took(pipe, data) if pipe.kind != "rtde" else pipe.incoming.append(b"SSH-2.0")
+    )
+    assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 0
+    out = capsys.readouterr().out
+    assert "port 30004  rtde          open, but it does not answer as RTDE\n" in out
+    assert out.endswith("streaming   ready; not reported by this software: payload, RTDE\n")
+
+
 def test_doctor_names_the_obstacle(robot, capsys):
     robot.lockstep = False
     robot.safety_mode = 3
@@ -314,6 +363,7 @@ def test_doctor_names_the_calibration_of_the_arm_as_the_makers_driver_does(robot
         dh_alpha=(1.570796327, 0.0, 0.0, 1.570796327, -1.570796327, 0.0),
     )
     robot.state = encode_state([ConfigurationData(), nominal_ur5e], robot.version)
+    robot.lockstep = False
     cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"])
     assert "calibration calib_12788084448423163542\n" in capsys.readouterr().out
 
@@ -321,7 +371,7 @@ def test_doctor_names_the_calibration_of_the_arm_as_the_makers_driver_does(robot
 def test_doctor_says_what_was_not_reported_beside_ready(robot, capsys):
     robot.payload = None
     assert cli.run(["doctor", "--robot", "127.0.0.1", "--seconds", "0.1"]) == 0
-    assert "streaming   ready; not reported by this software: payload" in capsys.readouterr().out
+    assert "streaming   ready; not reported by this software: payload, RTDE" in capsys.readouterr().out
 
 
 def test_doctor_refuses_another_generation_by_name(robot, capsys):

@@ -25,7 +25,7 @@ from pc_client.movements.files import load_movement
 from pc_client.movements.geometry import WORKING_BOXES
 from pc_client.recording.loader import load_recording
 
-DATA = Path(__file__).parents[3] / "shared" / "data" / "pen_strokes" / "strokes_background_small1.zip"
+LETTER = Path(__file__).parents[2] / "examples" / "drawings" / "letter_i.txt"
 
 
 @pytest.fixture
@@ -213,14 +213,12 @@ def test_ctrl_c_leaves_the_arm_at_rest_and_what_is_recorded(robot, file, tmp_pat
     assert load_recording(out / "letter_a_r1.mcap").n_rows > 100
 
 
-def test_a_drawing_of_the_data_set(robot, tmp_path):
-    if not DATA.exists():
-        pytest.skip(f"the data set is not here: {DATA}")
-    inside = "strokes_background_small1/Latin/character10/0692_13.txt"
+def test_a_drawing_of_the_tree_within_an_archive(robot, tmp_path):
+    with zipfile.ZipFile(tmp_path / "some.zip", "w") as archive:
+        archive.write(LETTER, "Latin/i.txt")
     out = tmp_path / "out"
-    assert (
-        cli.run(["draw", f"{DATA}:{inside}", "--robot", "127.0.0.1", "--out", str(out), "--size", "60"]) == 0
-    )
+    path = f"{tmp_path / 'some.zip'}:Latin/i.txt"
+    assert cli.run(["draw", path, "--robot", "127.0.0.1", "--out", str(out), "--size", "60"]) == 0
     (one,) = json.loads((out / "draw.json").read_text())["drawings"]
     assert one["marks"] == 2  # a stroke and a dot
     assert one["y_up"] is True  # rows of the screen as 0, -1, -2 ...

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from importlib import metadata
 from itertools import product
 
@@ -9,14 +10,19 @@ import pytest
 from closed_form_ik import DH
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics import robot_data
 from pc_client.kinematics.clearance import clearance_model, load_hulls
 from pc_client.kinematics.dh_arm import DhArm, link_hulls, urdf_text
 from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
 from pc_client.kinematics.inverse import solve_ik
-from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from pc_client.kinematics.robot_model import (
+    ROBOTS,
+    SHARE_VARIABLE,
+    find_robot_file,
+    find_share_folder,
+    robot_model,
+)
 from pc_client.movements.geometry import WORKING_BOXES
-from pc_client.planning.orientation import fixed_tcp_rotation
+from pc_client.planning.joint_path import fixed_tcp_rotation
 
 UR3 = robot_model("ur3")
 HULLS = clearance_model(UR3)
@@ -77,17 +83,17 @@ def nothing_installed(monkeypatch, tmp_path):
     def not_found(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr(robot_data.metadata, "distribution", not_found)
-    monkeypatch.setattr(robot_data.sys, "path", [str(tmp_path)])
-    monkeypatch.setattr(robot_data.sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(metadata, "distribution", not_found)
+    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    monkeypatch.delenv(robot_data.SHARE_VARIABLE, raising=False)
+    monkeypatch.delenv(SHARE_VARIABLE, raising=False)
     return tmp_path
 
 
 def test_a_missing_package_is_one_line_that_says_what_to_install(nothing_installed):
     with pytest.raises(PlanningError, match=r"pip install 'ur-hil\[client\]'") as error:
-        robot_data.find_share_folder()
+        find_share_folder()
     assert "\n" not in str(error.value)
 
 
@@ -99,12 +105,12 @@ def test_the_share_folder_is_found_where_installers_put_it(nothing_installed, mo
         share = nothing_installed / "share"
     else:
         share = nothing_installed / "elsewhere" / "share"
-        name = robot_data.SHARE_VARIABLE if place == "variable" else "AMENT_PREFIX_PATH"
+        name = SHARE_VARIABLE if place == "variable" else "AMENT_PREFIX_PATH"
         monkeypatch.setenv(name, str(share if place == "variable" else share.parent))
     (share / "example-robot-data" / "robots").mkdir(parents=True)
-    assert robot_data.find_share_folder() == share
+    assert find_share_folder() == share
     with pytest.raises(PlanningError, match=r"no arm\.urdf"):
-        robot_data.find_robot_file("arm.urdf")
+        find_robot_file("arm.urdf")
 
 
 @pytest.mark.parametrize("name", sorted(ROBOTS))
@@ -153,8 +159,8 @@ def test_a_folded_arm_hits_itself_and_an_upright_one_does_not():
 def test_floor_distances_are_those_of_the_lowest_mesh_vertex(q_deg):
     # Against the meshes themselves, every vertex moved by the DH table's own chain of link frames.
     q = np.radians(q_deg)
-    urdf = str(robot_data.find_robot_file(UR3.description.geometry))
-    shares = [str(robot_data.find_share_folder())]
+    urdf = str(find_robot_file(UR3.description.geometry))
+    shares = [str(find_share_folder())]
     root = pin.buildModelFromUrdf(urdf)
     meshes = pin.buildGeomFromUrdf(root, urdf, pin.GeometryType.COLLISION, package_dirs=shares)
     data = root.createData()

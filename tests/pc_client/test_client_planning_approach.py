@@ -13,9 +13,8 @@ from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.geometry import WORKING_BOXES
-from pc_client.planning.approach import _raised, plan_approach
+from pc_client.planning.approach import _raised, approach_text, plan_approach
 from pc_client.planning.plan import plan_movement
-from pc_client.planning.plan_text import approach_text
 
 UR3 = robot_model("ur3")
 PLAN = plan_movement(StraightStrokes(INSIDE_THE_BOX, 1.5), model=UR3)

@@ -9,9 +9,9 @@ from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import JointLimits, RobotModel, robot_model
+from pc_client.planning.approach import plan_text
 from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import plan_movement
-from pc_client.planning.plan_text import plan_text
 
 UR3 = robot_model("ur3")
 LIMITS = limits_of(UR3)

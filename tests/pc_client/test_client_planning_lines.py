@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pc_client.planning.joint_lines import JointLines
+from pc_client.planning.approach import JointLines
 
 angle = st.floats(-6.0, 6.0)
 posture = st.lists(angle, min_size=6, max_size=6).map(np.array)

@@ -9,8 +9,8 @@ from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import robot_model
+from pc_client.planning.joint_path import fixed_tcp_rotation, rotation_from_rpy
 from pc_client.planning.limits import limits_of
-from pc_client.planning.orientation import fixed_tcp_rotation, rotation_from_rpy
 from pc_client.planning.plan import plan_movement
 
 UR3 = robot_model("ur3")
@@ -177,7 +177,7 @@ def test_a_jump_in_the_path_is_refused_even_when_velocities_look_harmless():
 
 def test_the_joints_may_not_jump_to_another_branch():
     from pc_client.planning.joint_path import follow_path
-    from pc_client.planning.refusal import PathNames
+    from pc_client.planning.limits import PathNames
 
     # Given straight to the path follower, a gap of 0.3 m: it would have to leap.
     p = np.array([(0.35, -0.15, 0.25), (0.35, -0.15, 0.25), (0.35, 0.15, 0.25), (0.35, 0.15, 0.25)])

@@ -18,10 +18,16 @@ import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.comparison.figure import comparison_sheet
-from pc_client.comparison.filtering import CUTOFF_HZ, filtered_motion
-from pc_client.comparison.likeness import Likeness, measure_likeness
 from pc_client.comparison.movement_set import make_sets, save_sets
-from pc_client.comparison.signals import executed_signal, filtered_signal, planned_signal
+from pc_client.comparison.signals import (
+    CUTOFF_HZ,
+    Likeness,
+    executed_signal,
+    filtered_motion,
+    filtered_signal,
+    measure_likeness,
+    planned_signal,
+)
 from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, Comparison, build_comparison
 from pc_client.errors import ClientError
 from pc_client.movements import load_movement

@@ -13,7 +13,7 @@ from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.errors import DriverError
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.timing import TwoSidedTiming
+from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.recording.layout import Phase
 
 UR3 = robot_model("ur3")
@@ -77,7 +77,7 @@ def test_observe_changes_nothing():
 
 @pytest.mark.parametrize("wrong", [0.05, -0.05, float("nan")])
 def test_off_the_path_the_run_ends(wrong):
-    tracker = Tracker(table(Ramp([0.0] * 6, 1.0)), CONFIG, UR3)
+    tracker = Tracker(table(Ramp([0.0] * 6, 1.0)), CONTROLLERS["preview"], UR3)
     with pytest.raises(DriverError, match="off its path"):
         tracker.step(1.0, (0.0, 0.0, wrong, 0.0, 0.0, 0.0))
 
@@ -130,7 +130,7 @@ def run_loop(reference, config, *, cycles, lag, lookahead=None):
     return 10 * np.log10(signal / noise)
 
 
-# Source: theory notes, simulation of PI + feed-forward with 16 ms dead time, 10 ms lag and a zero-order hold:
+# From an independent simulation of PI + feed-forward with 16 ms dead time, 10 ms lag and a zero-order hold:
 # velocity at the end of a cycle trails by 30 ms, which is two cycles of pipe here.
 @pytest.mark.parametrize(("gain", "window", "snr"), [(0.0, 1.0, 14.7), (10.0, 1.0, 15.0), (10.0, 2.0, 25.1)])
 def test_paper_controller_reaches_what_theory_says(gain, window, snr):

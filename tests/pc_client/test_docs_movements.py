@@ -11,8 +11,7 @@ import pytest
 
 from pc_client.movements import describe, library_names, load_movement, robotic_twin
 from pc_client.movements.description import snr_of_delay
-from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.timing import FULL_COVERAGE, sigma_for_k
+from pc_client.movements.lognormal import FULL_COVERAGE, Lognormal, sigma_for_k
 from pc_client.movements.twins import GENERATORS
 from pc_client.planning.plan import plan_movement
 

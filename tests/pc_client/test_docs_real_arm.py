@@ -29,13 +29,13 @@ from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.kinematics.cell_file import load_cell, parse_cell
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.planning.approach import plan_approach
+from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.limits import limits_of
-from pc_client.planning.plan_text import approach_text
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "real-arm.md").read_text(encoding="utf-8")
+START = (ROOT / "docs" / "start" / "real-ur3.md").read_text(encoding="utf-8")
 CELL = load_cell(ROOT / "examples" / "cell.toml")
 MESSAGES = [
     message
@@ -132,10 +132,30 @@ def test_port_margins_and_tolerances_are_those_of_the_code():
         f"{floor} mm from the floor, {around} mm from walls and solids, and {own} mm between links and tool"
     )
     assert f"at least {margins}" in page
-    preview, paper = CONTROLLERS["preview"].path_tolerance, CONTROLLERS["paper"].path_tolerance
-    allowed = f"by {1e3 * preview:g} mm before a run ends ({1e3 * paper:g} mm with the published controller"
-    assert f"{allowed}, {1e3 * APPROACH.path_tolerance:g} mm in an approach)" in page
+    preview, approach = CONTROLLERS["preview"].path_tolerance, APPROACH.path_tolerance
+    assert f"by {1e3 * preview:g} mm before a run ends" in page
+    assert f"{1e3 * approach:g} mm in an approach)" in page
     assert f"repeats the last velocity for {1e3 * MISSED_ALLOWED:g} ms, then `stopj`" in PAGE
+
+
+def test_the_start_page_is_for_the_arms_and_the_software_that_the_client_takes():
+    assert f"TCP port {REVERSE_PORT}" in START
+    page = " ".join(START.split())
+    for said, taken in (
+        ("3.2 to 3.15", (3, 2)),
+        ("3.2 to 3.15", (3, 15)),
+        ("5.0 to 5.25", (5, 0)),
+        ("5.0 to 5.25", (5, 25)),
+    ):
+        assert f"software {said}" in page
+        assert software(SoftwareVersion(*taken)).holds
+    assert "`ur-client` refuses an arm with PolyScope X" in page
+    assert not software(SoftwareVersion(10, 11)).holds
+    for condition in (
+        control(remote=False),
+        operational_mode(SimpleNamespace(operational_mode="MANUAL"), None),
+    ):
+        assert condition.name in page
 
 
 def test_the_cell_of_the_page_is_one():

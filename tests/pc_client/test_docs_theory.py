@@ -14,16 +14,13 @@ from test_analysis_human_likeness import REFERENCE
 
 from pc_client.comparison.movement_set import make_sets
 from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, build_comparison
-from pc_client.movements.arcs import ARC_RULES
 from pc_client.movements.durations import Fitts, Isochrony
-from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS
-from pc_client.movements.recipe import HAND, LEAD
+from pc_client.movements.recipes import ARC_RULES, HAND, LEAD
 from pc_client.movements.robotic import SmoothedSquareWave
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import PlanarStroke, Stroke
-from pc_client.movements.timing import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
+from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke
 from pc_client.movements.twins import GENERATORS
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED
 
@@ -187,7 +184,7 @@ def test_check_figures(cells: list[str]) -> None:
 
 
 def test_inflections_of_the_page() -> None:
-    """The formulas as they stand there, against the code: times, shares of D, and ratios of speeds (theory notes, section 3)."""
+    """The formulas as they stand there, against the code: times, shares of D, and ratios of speeds."""
     s = 0.25
     lognormal = Lognormal(0.0, -1.6, s)
     root = s * math.sqrt(0.25 * s * s + 1.0)

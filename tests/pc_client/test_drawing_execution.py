@@ -16,12 +16,10 @@ from recording_samples import provenance
 
 from pc_client.drawing.drawing import make_drawing
 from pc_client.drawing.execution import executed
-from pc_client.drawing.figures import FIGURES, sheets_of
+from pc_client.drawing.figures import FIGURES, Shown, sheets_of
 from pc_client.drawing.judgement import judge, signals
-from pc_client.drawing.page import render_page
 from pc_client.drawing.placement import PlacementOptions
-from pc_client.drawing.shown import Shown
-from pc_client.drawing.table import COLUMNS, Entry, drawings_json, drawings_markdown, table_of
+from pc_client.drawing.table import COLUMNS, Entry, drawings_json, drawings_markdown, render_page, table_of
 from pc_client.errors import RecordingError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.results.static import draw, svg_text

@@ -7,8 +7,7 @@ import pytest
 from drawing_samples import one_part, two_parts_and_a_dot
 
 from pc_client.drawing.drawing import make_drawing
-from pc_client.drawing.joining import join, least_gaps
-from pc_client.drawing.pacing import ACCURACY, factor_needed, least_factor, paced
+from pc_client.drawing.joining import ACCURACY, factor_needed, join, least_factor, least_gaps, paced
 from pc_client.drawing.placement import PlacementOptions
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import robot_model

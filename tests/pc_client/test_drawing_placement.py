@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pc_client.drawing.drawing import spatial
-from pc_client.drawing.marks import marks_of
-from pc_client.drawing.placement import PLANES, PlacementOptions, inverse, place, sheet_frame
+from pc_client.drawing.placement import PLANES, PlacementOptions, inverse, marks_of, place, sheet_frame
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import UR3_BOX
 

@@ -17,9 +17,8 @@ from pc_client.driver.stop_script import stop_script
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.recording.origin import origin_of
-from protocol.primary.layout import CartesianInfo, RobotModeData
+from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary.messages import TextMessage
-from protocol.primary.setup import ConfigurationData, KinematicsInfo
 from protocol.primary.state import encode_state
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotType, SoftwareVersion
 
@@ -67,11 +66,12 @@ CALIBRATED = KinematicsInfo(checksum=(0x1234ABCD,) * 6)
     [
         ("20993000007", [ConfigurationData(), CALIBRATED], True),
         ("2017355123", [ConfigurationData(), CALIBRATED], False),
-        ("2017355123", [ConfigurationData(), URSIM], True),
+        ("2017355123", [ConfigurationData(), URSIM], None),
         ("2017355123", [OURS, CALIBRATED], True),
         ("2017355123", [], None),
         (None, [OURS, CALIBRATED], True),
-        (None, [ConfigurationData(), URSIM], True),
+        ("20993000007", [ConfigurationData(), URSIM], True),
+        (None, [ConfigurationData(), URSIM], None),
         (None, [ConfigurationData(), CALIBRATED], None),
         (None, [], None),
     ],

@@ -20,9 +20,10 @@ from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
 from pc_client.experiment.command_check import broken_limit
 from pc_client.experiment.identification import learning_filter
+from pc_client.experiment.prediction import LEAD, SETTLE
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
-from pc_client.experiment.runner import LEAD, SETTLE, ExperimentRunner
+from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
 
@@ -150,8 +151,8 @@ def test_a_plan_itself_keeps_the_limits(two, plan):
         (lambda c: c + 7.0, "joint speed"),
         (lambda c: c + 0.3 * (-1.0) ** np.arange(len(c))[:, None], "joint acceleration"),
         (lambda c: c + np.nan, "joint speed"),
-        (lambda c: c + np.eye(6)[0], "joint range"),
-        (lambda c: c - 0.14 * np.eye(6)[1], "mm of the floor, asked: 30 mm"),
+        (lambda c: c + np.eye(6)[0], "from the end of its range"),
+        (lambda c: c - 0.14 * np.eye(6)[1], "of the floor at z = 0 m, at least 30 mm"),
     ],
 )
 def test_commands_that_break_a_limit_are_named(two, plan, spoil, words):

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from pc_client.driver import robot_report
 from pc_client.driver.condition import conditions_text
-from pc_client.driver.rtde_query import ask_rtde
+from pc_client.driver.rtde_query import RtdeAnswer, ask_rtde
 from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
-from protocol.primary.message_codec import encode_message, version_message
-from protocol.primary.setup import ConfigurationData
+from protocol.primary.layout import ConfigurationData, KinematicsInfo
+from protocol.primary.messages import encode_message, version_message
 from protocol.primary.state import encode_state
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
 
@@ -37,6 +37,7 @@ NAMES = [
     "flange pose",
     "payload",
     "joint angles",
+    "RTDE",
 ]
 
 
@@ -179,7 +180,7 @@ def test_an_e_series_robot_in_remote_control_without_modes_passes():
 
 def test_the_makers_simulator_may_stay_in_local_control():
     fake = robot(version=E_SERIES, remote="false", operational="NONE", serial="20175599999")
-    fake.state = encode_state([ConfigurationData(masterboard_version=2099)], E_SERIES)
+    fake.state = encode_state([ConfigurationData(), KinematicsInfo()], E_SERIES)
     (row,) = (c for c in preflight(report(fake), UR3) if c.name == "control")
     assert (row.reported, row.needed, row.holds) == ("local", "remote or local (simulator)", True)
 
@@ -233,9 +234,9 @@ def test_what_a_robot_does_not_report_is_neither_passed_nor_refused():
     fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR3)], fake.version)
     conditions = preflight(report(fake), UR3)
     unreported = {condition.name for condition in conditions if condition.holds is None}
-    assert unreported == {"speed slider", "TCP offset", "payload"}
+    assert unreported == {"speed slider", "TCP offset", "payload", "RTDE"}
     assert refusal(conditions) == ""
-    assert conditions_text(conditions).count("not reported") == 3
+    assert conditions_text(conditions).count("not reported") == 4
 
 
 def test_an_arm_that_is_not_reported_cannot_be_compared():
@@ -255,7 +256,10 @@ def test_speed_scaling_of_0_without_a_program_is_no_speed():
 )
 def test_the_payload_is_asked_for_by_rtde(version, told):
     fake = robot(payload=1.5, version=SoftwareVersion(*version))
-    assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") == told
+    answer = ask_rtde(fake, "robot", Ports.standard().rtde, ("timestamp", "payload"))
+    assert answer.version == fake.version
+    assert answer.values.get("payload") == told
+    assert "timestamp" in answer.values
 
 
 def test_an_rtde_port_that_sends_nothing_or_nonsense_reports_nothing():
@@ -263,6 +267,26 @@ def test_an_rtde_port_that_sends_nothing_or_nonsense_reports_nothing():
     answers = fake.took
     for nonsense in (b"", b"SSH-2.0-OpenSSH_9.2\r\n"):
         fake.took = lambda pipe, data, say=nonsense: say and pipe.incoming.append(say)
-        assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") is None
+        assert ask_rtde(fake, "robot", Ports.standard().rtde, ("payload",)) is None
+        assert next(c for c in preflight(report(fake), UR3) if c.name == "RTDE").holds is None
     fake.took = answers
-    assert ask_rtde(fake, "robot", Ports.standard().rtde, "payload") == 0.0
+    assert ask_rtde(fake, "robot", Ports.standard().rtde, ("payload",)).values == {"payload": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        ({"actual_q": (0.4,) * 6}, "mrad from port 30003"),
+        ({"actual_TCP_pose": (0.0,) * 6}, " 0 mrad from port 30003"),
+        ({"actual_TCP_pose": 1.0}, "nan mm"),
+        ({"version": SoftwareVersion(3, 14, 0)}, "3.14.0"),
+    ],
+    ids=["posture", "arm", "no pose", "software"],
+)
+def test_rtde_of_another_controller_is_refused(other, words):
+    told = report(robot())
+    version = other.pop("version", told.rtde.version)
+    told = replace(told, rtde=RtdeAnswer(version, told.rtde.values | other))
+    line = refusal(preflight(told, UR3))
+    assert line.startswith("the robot's RTDE is")
+    assert words in line

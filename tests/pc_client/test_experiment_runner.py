@@ -9,6 +9,7 @@ from fake_robot import PERIOD, FakeRobot
 from mcap.reader import make_reader
 from recording_samples import SIGNALS, provenance
 
+from pc_client.api.signals import Run
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.stability import loop_margins
@@ -24,12 +25,14 @@ from pc_client.errors import (
 )
 from pc_client.experiment.experiment_text import experiment_text
 from pc_client.experiment.identification import identify
-from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment
+from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment, scratch_folder
 from pc_client.experiment.runner import ExperimentRunner
+from pc_client.kinematics.cell import Cell, Wall
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
 from pc_client.sweep.measure import loop_figures
+from protocol.velocity_stream import VelocityMode
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
 
@@ -59,7 +62,7 @@ def two(tmp_path_factory):
 
 
 def with_folder(experiment, out):
-    return type(experiment)(experiment.model, experiment.planned, experiment.repeat, out)
+    return replace(experiment, out=out, overwrite=True)
 
 
 def run(robot, experiment, controller="preview", notes=None, posture=POSTURE):
@@ -89,6 +92,17 @@ def test_an_identification_that_fails_says_how_many_commands_came_late(two, held
         is ("commands came late" in full_message(refused.value))
         is bool(held_up)
     )
+
+
+def test_an_excitation_too_near_to_a_wall_is_refused_before_anything_moves(tmp_path):
+    """The movement begins 20.2 mm from the wall, 20 mm are asked: the pulses would lead 0.6 mm nearer."""
+    cell = Cell("c", walls=(Wall("window", (0.0, 1.0, 0.0), -0.2059),))
+    one = prepare_experiment(load_movements(["uniform_4_1"]), repeat=1, out=tmp_path / "new", cell=cell)
+    robot = FakeRobot()
+    with pytest.raises(DriverError, match=r"cannot be identified .* of wall 'window', at least 20 mm"):
+        run(robot, one)
+    assert robot.programs == []
+    assert not one.out.exists()
 
 
 @pytest.mark.parametrize("receiver_ticks", [{1}, {2}, {60}, {300, 301}])
@@ -173,7 +187,7 @@ def test_two_movements_twice(two, tmp_path):
 def test_accepted_recorded_and_tabled_gain_margins_are_one(two, tmp_path):
     preview = CONTROLLERS["preview"]
     edge = loop_margins(LoopModel.of_delay(4 * PERIOD, 0.0), preview.gain_p, preview.gain_i, PERIOD).gain
-    experiment = replace(two, planned=two.planned[:1], repeat=1, out=tmp_path)
+    experiment = replace(two, planned=two.planned[:1], repeat=1, out=tmp_path, overwrite=True)
 
     def at_margin(margin):
         factor = edge / margin
@@ -200,7 +214,7 @@ def test_the_same_experiment_gives_the_same_bytes(two, tmp_path):
 
 
 def test_paper_controller_trails_by_the_delay_that_preview_takes_out(two, tmp_path):
-    short = type(two)(two.model, two.planned[1:], 1, tmp_path)
+    short = type(two)(two.model, two.planned[1:], 1, tmp_path, overwrite=True)
     errors = {}
     for name in CONTROLLERS:
         recording = load_recording(run(FakeRobot(), short, name).paths[0])
@@ -225,11 +239,20 @@ def test_what_is_recorded_before_a_protective_stop_stays(two, tmp_path):
             r.safety_mode = 3
 
     robot.on_tick = spoil
-    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP"):
+    with pytest.raises(RobotStoppedError, match=r"PROTECTIVE_STOP.*'unlock protective stop'") as caught:
         run(robot, with_folder(two, tmp_path))
-    assert load_recording(tmp_path / "uniform_4_1_r1.mcap").complete
-    cut = load_recording(tmp_path / "uniform_4_1_r2.mcap")
-    assert cut.summary == {"aborted": "RobotStoppedError"}
+    assert not load_recording(tmp_path / "uniform_4_1_r1.mcap").aborted
+    path = tmp_path / "uniform_4_1_r2.mcap"
+    assert full_message(caught.value) == f"{caught.value}; recorded until then: {path}"
+    cut = load_recording(path)
+    assert cut.summary == {"aborted": f"RobotStoppedError: {caught.value}"}
+    assert cut.aborted == f"the run was given up ({cut.summary['aborted']})"
+    given_up = Run.from_file(path)
+    assert given_up.aborted == cut.aborted
+    assert "the run was given up (RobotStoppedError" in repr(given_up)
+    assert given_up.plot().axes
+    with pytest.raises(RecordingError, match=r"the run was given up .*: it has no SNR"):
+        _ = given_up.snr
     assert not (tmp_path / "lognorm_4_1_r1.mcap").exists()
 
 
@@ -254,7 +277,45 @@ def test_in_every_phase_a_tool_off_its_path_ends_the_motion(phase, receiver, joi
     recordings = sorted(tmp_path.glob("*.mcap"))
     assert len(recordings) == (phase == "run")
     for path in recordings:
-        assert load_recording(path).summary == {"aborted": "DriverError"}
+        assert "mm and " in load_recording(path).aborted
+
+
+def test_a_protective_stop_that_follows_the_end_of_a_run_is_named_first(two, tmp_path):
+    robot = FakeRobot()
+
+    def collide(r):
+        if r.program == "receiver" and len(r.received) > 400:
+            r.q[2] += 0.15
+        if r.received and r.received[-1].mode is VelocityMode.STOP_PROGRAM and len(r.received) > 400:
+            r.safety_mode = 3
+
+    robot.on_tick = collide
+    with pytest.raises(RobotStoppedError, match=r"^the robot's safety mode is PROTECTIVE_STOP.*off its path"):
+        run(robot, with_folder(two, tmp_path))
+
+
+def test_a_folder_that_nobody_asked_for_is_removed(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with scratch_folder() as folder:
+        (folder / "a.mcap").touch()
+    with pytest.raises(ZeroDivisionError), scratch_folder():
+        raise ZeroDivisionError
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_error_keeps_and_names_recordings_that_nobody_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
+    def fail():
+        with scratch_folder() as folder:
+            (folder / "a.mcap").touch()
+            folder.mkdir()
+
+    with pytest.raises(FileExistsError) as caught:
+        fail()
+    (folder,) = tmp_path.iterdir()
+    assert [path.name for path in folder.iterdir()] == ["a.mcap"]
+    assert caught.value.__notes__ == [f"recordings of the runs before: {folder}"]
 
 
 def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp_path):
@@ -290,6 +351,13 @@ def test_experiments_that_make_no_sense(movements, repeat, tmp_path):
         prepare_experiment(load_movements(movements), repeat=repeat, out=tmp_path)
 
 
+def test_two_plans_of_one_name_are_refused_in_the_experiment_itself(two):
+    plan, other = two.planned
+    renamed = replace(other, movement=replace(other.movement, name=plan.movement.name))
+    with pytest.raises(ClientError, match=f"two plans are called '{plan.movement.name}'.*rename one"):
+        replace(two, planned=(plan, renamed))
+
+
 def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
     experiment = with_folder(two, tmp_path)
     ours, foreign = tmp_path / "uniform_4_1_r2.mcap", tmp_path / "other_r1.mcap"
@@ -316,6 +384,9 @@ def test_only_recordings_that_are_known_to_be_simulated_are_replaced(two, tmp_pa
         clear_folder(experiment)
     assert ours.exists()
     kept.unlink()
+    with pytest.raises(RecordingError, match=r"uniform_4_1_r1\.mcap exists: .*--overwrite"):
+        clear_folder(replace(experiment, overwrite=False))
+    assert ours.exists()
     clear_folder(experiment)
     assert not ours.exists()
 

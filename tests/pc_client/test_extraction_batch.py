@@ -9,18 +9,16 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from extraction_samples import DRAWINGS, needs_drawings, own_strokes, recorded
+from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot, own_strokes, recorded
 
 import pc_client.extraction.batch as batch
 from pc_client.errors import ClientError, RecordingError
 from pc_client.executors import open_executor
-from pc_client.extraction.batch import extract_many
+from pc_client.extraction.batch import STROKE_COLUMNS, extract_many, figures_of, strokes_of, table_of, to_json
 from pc_client.extraction.extract import extract
-from pc_client.extraction.results import STROKE_COLUMNS, figures_of, strokes_of, table_of, to_json
-from pc_client.extraction.sources import pen_sources
+from pc_client.extraction.pen import pen_sources
 from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.results.tables import frame_of, to_csv
 
 
@@ -175,9 +173,19 @@ def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
     assert figures_of(result)["n_strokes"] == 3
 
 
-@needs_drawings
+def test_the_drawings_of_the_tree_reach_the_figures():
+    """Of five kinds: straight marks, loops, a dot, sharp corners, a flourish; from a browser and a tablet."""
+    with open_executor(1) as executor:
+        table = table_of([outcome.row for outcome in extract_many(pen_sources([DRAWINGS]), executor)])
+    assert len(table) == 5
+    assert table["snr_v_db"].min() >= 20.0
+    assert table["snr_t_db"].min() >= 30.0
+    assert table["n_strokes"].sum() <= 1.2 * table["n_speed_peaks"].sum()
+
+
+@needs_omniglot
 def test_drawings_drawn_at_random_reach_the_figures():
-    sources = pen_sources([DRAWINGS])
+    sources = pen_sources([DRAWINGS_OF_PEOPLE])
     chosen = [sources[i] for i in np.random.default_rng(7).choice(len(sources), 30, replace=False)]
     with open_executor() as executor:
         rows = [outcome.row for outcome in extract_many(chosen, executor)]

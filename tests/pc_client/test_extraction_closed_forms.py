@@ -1,4 +1,4 @@
-"""The closed forms give back the lognormal that they are asked about (theory notes, sections 1.3, 3.1, 7)."""
+"""The closed forms give back the lognormal that they are asked about (docs/theory.md, sections 1 and 8)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pc_client.errors import MovementError
-from pc_client.extraction.closed_forms import (
+from pc_client.extraction.initial import (
     CharacteristicPoints,
     lognormal_from_points,
     sigma_from_peak_ratio,

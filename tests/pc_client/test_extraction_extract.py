@@ -15,9 +15,9 @@ from scipy.special import ndtr
 from pc_client.extraction.chain import Bounds
 from pc_client.extraction.extract import ExtractOptions, extract
 from pc_client.extraction.fitting import FitOptions
-from pc_client.extraction.recording import PenPart, PenRecording, on_one_axis, ordered_part
+from pc_client.extraction.pen import PenPart, PenRecording, on_one_axis, ordered_part
 from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.stroke import arc_frame
+from pc_client.movements.sigma_lognormal import arc_frame
 
 
 def numbers(trajectory):

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import importlib
 import zipfile
 
 import numpy as np
 import pytest
-from extraction_samples import DRAWINGS, needs_drawings
+from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot
 
 from pc_client.errors import RecordingError
-from pc_client.extraction.files import parse_pen, read_pen
-from pc_client.extraction.recording import PenPart, PenRecording, ordered_part
-from pc_client.extraction.sources import contents, pen_sources
+from pc_client.extraction.pen import (
+    PenPart,
+    PenRecording,
+    contents,
+    ordered_part,
+    parse_pen,
+    pen_sources,
+    read_pen,
+)
 
 OMNIGLOT = "START\n10.5,-20.25,0\n11.5,-21.25,9\n12.5,-22.25,20\nBREAK\n30,-40,400\n31,-40,410\nBREAK\n"
 
@@ -222,9 +229,25 @@ def test_archives_that_are_none(folder):
             pen_sources([folder / name])
 
 
-@needs_drawings
+def test_the_drawings_of_the_tree_are_found_and_read():
+    read = {
+        source.name: parse_pen(content, source.name) for source, content in contents(pen_sources([DRAWINGS]))
+    }
+    marks = {name.rpartition("/")[2]: len(recording.parts) for name, recording in read.items()}
+    assert marks == {"elle.txt": 1, "letter_i.txt": 2, "letter_t.txt": 2, "signature.csv": 1, "zigzag.txt": 1}
+
+
+def test_the_drawings_of_the_tree_are_what_their_program_makes(monkeypatch):
+    monkeypatch.syspath_prepend(DRAWINGS)
+    made = importlib.import_module("make_drawings").drawings()
+    assert made == {
+        path.name: path.read_text() for path in DRAWINGS.iterdir() if path.suffix in (".txt", ".csv")
+    }
+
+
+@needs_omniglot
 def test_the_drawings_are_all_found_and_read():
-    sources = pen_sources([DRAWINGS])
+    sources = pen_sources([DRAWINGS_OF_PEOPLE])
     assert len(sources) == 2720
     for source, content in contents(sources[::97]):
         recording = parse_pen(content, source.name)

@@ -14,8 +14,7 @@ from pc_client.extraction.chain import (
     sigma_lognormal,
     without,
 )
-from pc_client.extraction.model import linearise, variables_per_stroke
-from pc_client.extraction.refine import moved
+from pc_client.extraction.refine import linearise, moved, variables_per_stroke
 
 
 def chain_of(dim, arc_angles=(0.8, -1.5, 0.0, 1e-5), seed=0):

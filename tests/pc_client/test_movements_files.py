@@ -20,13 +20,11 @@ from pc_client.movements import (
 )
 from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS
 from pc_client.movements.generate import write_library
-from pc_client.movements.lognormal import Lognormal
+from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.movement_file import movement_text
 from pc_client.movements.robotic import RoboticTrajectory
 from pc_client.movements.samples import SampledTrajectory
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
-from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 
 NAMES = [
     f"{kind}_{number}" for kind in ("uniform", "lognorm") for number in ("4_1", "4_2", "5_1", "5_2", "5_3")

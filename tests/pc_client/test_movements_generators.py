@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from pc_client.errors import MovementError
 from pc_client.movements import Movement, generate_movement, load_movement, save_movement
 from pc_client.movements.durations import Fitts, Isochrony, chained_windows, leg_lengths, retimed
+from pc_client.movements.lognormal import FULL_COVERAGE, TwoSidedTiming
 from pc_client.movements.movement_file import movement_text
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
-from pc_client.movements.timing import FULL_COVERAGE, TwoSidedTiming
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.movements.twins import GENERATORS, retimed_twin
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED, VariabilityRanges, duplicate
 

@@ -17,10 +17,9 @@ from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from pc_client.movements import Movement, generate_movement, library_names, load_movement
 from pc_client.movements.description import snr_of_delay, speed_rms_frequency
 from pc_client.movements.geometry import UR3_BOX, WORKING_BOXES, Box
-from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.stroke import Stroke
-from pc_client.movements.targets import TargetRules, random_targets
-from pc_client.movements.timing import TwoSidedTiming
+from pc_client.movements.lognormal import TwoSidedTiming
+from pc_client.movements.recipes import TargetRules, random_targets
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.planning.plan import plan_movement
 
 PAPER, ARCS = library_names("paper"), library_names("arcs")

@@ -12,10 +12,10 @@ from scipy.integrate import quad
 from scipy.special import erf, ndtr
 
 from pc_client.errors import MovementError
-from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.timing import (
+from pc_client.movements.lognormal import (
     FULL_COVERAGE,
     LiteralTiming,
+    Lognormal,
     TwoSidedTiming,
     lead_from_k,
     sigma_for_k,

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client import cli
+from pc_client import Movement, cli
 from pc_client.errors import MovementError
 from pc_client.movements import load_movement, load_targets, through
-from pc_client.movements.own_points import default_durations
-from pc_client.movements.recipe import TOP_SPEED
+from pc_client.movements.own_points import Style, default_durations
+from pc_client.movements.recipes import TOP_SPEED
 
 POINTS = [[0.3, -0.1, 0.2], [0.35, 0.0, 0.25], [0.3, 0.1, 0.2]]
 
@@ -143,6 +143,35 @@ def test_what_is_wrong_with_a_table_is_named_by_file_and_line(
     assert complaint in err
     assert err.count("\n") == 1
     assert not Path("mine.toml").exists()
+
+
+@pytest.mark.parametrize("times", [None, (0.0, 2.0, 3.5)])
+@pytest.mark.parametrize("style", [None, "human", "robot"])
+def test_a_table_that_the_command_takes_is_a_movement_in_python(
+    style: Style | None, times: tuple[float, ...] | None, tmp_path: Path
+) -> None:
+    table, out = tmp_path / "mine.csv", tmp_path / "mine.toml"
+    rows = [[*point, *([] if times is None else [times[i]])] for i, point in enumerate(POINTS)]
+    table.write_text("".join(",".join(map(str, row)) + "\n" for row in rows))
+    command = ["movements", "new", "--targets", str(table), "--out", str(out), "--style", style or "human"]
+    assert cli.run(command) == 0
+    if style is None and times is not None:  # samples over time
+        with pytest.raises(MovementError, match=r"3 samples; a movement needs at least 4 .* with a style"):
+            Movement.from_csv(table)
+        return
+    made, wanted = Movement.from_csv(table, style), load_movement(out)
+    assert (made.name, made.kind) == (wanted.name, wanted.kind)
+    t = np.linspace(0.0, wanted.duration, 51)
+    np.testing.assert_array_equal(made.motion(t).p, wanted.motion(t).p)
+
+
+def test_durations_of_a_table_are_given_once(tmp_path: Path) -> None:
+    table = tmp_path / "targets.csv"
+    table.write_text(".3 -.1 .2\n.3 0 .2\n")
+    assert Movement.from_csv(table, durations=[2.0]).duration == 2.0
+    table.write_text(".3 -.1 .2 0\n.3 0 .2 2\n")
+    with pytest.raises(MovementError, match="has a column t: give only one of them"):
+        Movement.from_csv(table, durations=[2.0])
 
 
 @pytest.mark.parametrize(

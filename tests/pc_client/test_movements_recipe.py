@@ -25,9 +25,15 @@ from pc_client.movements import (
 )
 from pc_client.movements.durations import leg_lengths
 from pc_client.movements.geometry import UR3_BOX
-from pc_client.movements.recipe import HAND, LEAD, TOP_SPEED, literal_strokes, recipe_movement
-from pc_client.movements.targets import random_targets
-from pc_client.movements.timing import LiteralTiming, sigma_for_k
+from pc_client.movements.lognormal import LiteralTiming, sigma_for_k
+from pc_client.movements.recipes import (
+    HAND,
+    LEAD,
+    TOP_SPEED,
+    literal_strokes,
+    random_targets,
+    recipe_movement,
+)
 from pc_client.movements.twins import SETBACK
 
 HUMANS = library_names("paper")[5:]

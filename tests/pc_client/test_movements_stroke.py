@@ -13,10 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import Similarity
-from pc_client.movements.lognormal import Lognormal
-from pc_client.movements.sigma_lognormal import SigmaLognormal, planar_sum
-from pc_client.movements.stroke import PlanarStroke, Stroke, lift_strokes
-from pc_client.movements.timing import LiteralTiming, TwoSidedTiming
+from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
+from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke, lift_strokes, planar_sum
 
 A, B = (0.25, -0.1, 0.2), (0.35, 0.1, 0.3)
 LOGNORMAL = Lognormal(0.1, -1.6, 0.25)

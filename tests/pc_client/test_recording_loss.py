@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import random
+import time
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -23,17 +25,24 @@ ROW_BYTES = sum(topic.dtype.itemsize + 9 + 22 for topic in row_topics(SIGNALS)) 
 
 
 class FullDisk:
-    """A raw file on a disk with this much room; writes short before it fails, as the kernel does."""
+    """A raw file on a disk with this much room; writes short before it fails, as the kernel does.
+
+    Attributes:
+        ends: size of the file after each write.
+    """
 
     def __init__(self, path: Path, room: int) -> None:
         self.file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
         self.room = room
+        self.ends: list[int] = []
 
     def write(self, data: memoryview) -> int:
         free = self.room - self.file.tell()
         if free <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
-        return self.file.write(data[:free])
+        n_written = self.file.write(data[:free])
+        self.ends.append(self.file.tell())
+        return n_written
 
     def seek(self, offset: int) -> int:
         return self.file.seek(offset)
@@ -43,6 +52,12 @@ class FullDisk:
 
     def close(self) -> None:
         self.file.close()
+
+
+def wait_for_error(recorder: Recorder) -> str:
+    while recorder.error is None:  # the thread that writes has it soon
+        time.sleep(0.001)
+    return str(recorder.error)
 
 
 @pytest.fixture
@@ -76,14 +91,13 @@ def is_prefix(recording: Recording) -> bool:
 
 
 def test_cut_at_every_chunk_boundary(tmp_path: Path) -> None:
-    ends = []
-    recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS)
-    for _ in range(4):
-        ends.append((tmp_path / "a.mcap").stat().st_size)  # what a killed process leaves
-        append_rows(recorder, ROWS_PER_CHUNK)
+    disk = FullDisk(tmp_path / "a.mcap", 10**9)
+    recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
+    append_rows(recorder, 3 * ROWS_PER_CHUNK + 1)
     recorder.close()
     data = (tmp_path / "a.mcap").read_bytes()
-    for n_chunks, end in enumerate(ends):
+    assert len(disk.ends) == 5
+    for n_chunks, end in enumerate(disk.ends[:4]):  # what a killed process leaves
         recording = load_bytes(tmp_path, data[:end])
         assert recording.n_rows == n_chunks * ROWS_PER_CHUNK
         assert not recording.complete
@@ -181,8 +195,7 @@ def test_a_full_disk_never_raises_inside_the_loop_and_loses_nothing_written(
     path = tmp_path / "a.mcap"
     recorder = Recorder(path, provenance(), SIGNALS, opener=lambda p: FullDisk(p, room))
     append_rows(recorder, N_ROWS)
-    assert recorder.error is not None
-    assert "No space left on device" in str(recorder.error)
+    assert "No space left on device" in wait_for_error(recorder)
     assert recorder.n_rows == N_ROWS
     with pytest.raises(RecordingError) as caught:
         recorder.close()
@@ -217,7 +230,7 @@ def test_rows_held_in_memory_are_written_when_there_is_room_again(
     disk = FullDisk(tmp_path / "a.mcap", head + 20_000)
     recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
     append_rows(recorder, N_ROWS)
-    assert recorder.error is not None
+    wait_for_error(recorder)
     disk.room = 10**9
     with pytest.raises(RecordingError, match=f"all {N_ROWS} rows are saved"):
         recorder.close()
@@ -228,11 +241,34 @@ def test_memory_for_held_rows_is_bounded(tmp_path: Path, head: int, monkeypatch:
     monkeypatch.setattr(recorder_module, "MAX_HELD_ROWS", 2 * ROWS_PER_CHUNK)
     disk = FullDisk(tmp_path / "a.mcap", head)
     recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
-    append_rows(recorder, 5 * ROWS_PER_CHUNK)
+    append_rows(recorder, ROWS_PER_CHUNK)
+    wait_for_error(recorder)
+    append_rows(recorder, 4 * ROWS_PER_CHUNK)
     disk.room = 10**9
-    with pytest.raises(RecordingError, match=f"{2 * ROWS_PER_CHUNK} of {5 * ROWS_PER_CHUNK} rows are saved"):
+    with pytest.raises(RecordingError, match=f"{3 * ROWS_PER_CHUNK} of {5 * ROWS_PER_CHUNK} rows are saved"):
         recorder.close()
-    assert load_recording(tmp_path / "a.mcap").n_rows == 2 * ROWS_PER_CHUNK
+    assert load_recording(tmp_path / "a.mcap").n_rows == 3 * ROWS_PER_CHUNK
+
+
+def test_a_disk_that_stands_still_delays_no_row_and_is_an_error(
+    tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pc_client.recording.outbox.MOST_WAITING", 1)
+    goes_on = Event()
+
+    class StandingDisk(FullDisk):
+        def write(self, data: memoryview) -> int:
+            assert not self.ends or goes_on.wait(60.0)  # the head is written at once
+            return super().write(data)
+
+    disk = StandingDisk(tmp_path / "a.mcap", 10**9)
+    recorder = Recorder(tmp_path / "a.mcap", provenance(), SIGNALS, opener=lambda _: disk)
+    append_rows(recorder, N_ROWS)  # one chunk is being written, one waits, the third finds no room
+    assert "the disk is too slow" in str(recorder.error)
+    goes_on.set()
+    with pytest.raises(RecordingError, match=f"too slow.*all {N_ROWS} rows are saved"):
+        recorder.close()
+    assert (tmp_path / "a.mcap").read_bytes() == whole
 
 
 def test_disk_full_from_the_first_byte(tmp_path: Path) -> None:
@@ -269,4 +305,4 @@ def test_a_run_that_ends_in_an_error_leaves_a_complete_file_that_says_so(tmp_pat
     recording = load_recording(tmp_path / "a.mcap")
     assert recording.complete
     assert recording.n_rows == 5
-    assert recording.summary == {"aborted": "KeyError"}
+    assert recording.summary == {"aborted": "KeyError: 'the robot stopped'"}

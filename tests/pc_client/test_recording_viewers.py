@@ -24,7 +24,7 @@ from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from pc_client.recording.layout import Phase
 from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
-from protocol.realtime.columns import COLUMNS
+from protocol.realtime.layout import COLUMNS
 
 SIGNALS = [(column.name, column.count, column.unit) for column in COLUMNS]
 NAMES = [name for name, count, _ in SIGNALS for _ in range(count)]

@@ -116,3 +116,15 @@ def test_bars_without_a_level_are_left_out() -> None:
     text = svg_text(bars_of_levels(["a", "b"], series, "", title="SNR", floors=np.array([np.nan, np.nan])))
     assert "<!-- paper -->" in text
     assert "noise floor" not in text
+
+
+def test_a_single_bar_is_no_wider_than_one_of_several() -> None:
+    for names in (["a"], ["a", "b", "c"], list("abcdefgh")):
+        series = [
+            Bars("none", BLUE, np.full(len(names), np.nan)),
+            Bars("ours", RED, np.full(len(names), 30.0)),
+        ]
+        (axes,) = bars_of_levels(names, series, "", title="SNR").axes
+        low, high = axes.get_xlim()
+        assert max(bar.get_width() for bar in axes.patches) / (high - low) < 1.0 / 6.0
+        assert axes.get_legend_handles_labels()[1] == ["ours"]  # a series without a level has no name either

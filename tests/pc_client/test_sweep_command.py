@@ -17,6 +17,7 @@ import pc_client.api.arm as arm_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
+from pc_client.recording.loader import load_recording
 from pc_client.sweep.case import all_cases
 from pc_client.sweep.config import read_config
 
@@ -80,11 +81,16 @@ def test_a_sweep_finds_the_best_gains(job, tmp_path, capsys):
     assert run(write(tmp_path, GRID), out, "--format", "csv") == 0
     told = capsys.readouterr().out
     assert "24 cases, 0 of them done before" in told
+    assert "5 of 6 settings; the table has all\n" in told  # five are shown
     assert "best of 6: gain_p = 5, gain_i = 2: 30.15 dB, 8 runs, gain margin 8.33" in told
+    edge = "(gain_i = 2 is the largest of 2)"
+    assert edge in told
     assert len(read_csv(out)) == 48
     page = (out / "sweep.html").read_text()
     assert "SIMULATED" in page
     assert page.count("<img") == 1 + 5  # the map; over movement, fidelity, both gains and repetition
+    assert page.count("<h1>Sweep</h1>") == 1  # of the file sweep.toml
+    assert edge in page
     assert page.index("gain_p = 5, gain_i = 2") < page.index("gain_p = 8, gain_i = 0")
 
 
@@ -306,8 +312,11 @@ def test_a_robot_that_is_not_as_it_must_be_is_refused(robot, tmp_path, capsys):
 
 
 def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
+    received = []
+
     def stop(r):
-        if len(r.received) == 300:
+        received.append(r.program == "receiver")
+        if sum("velocity_receiver" in text for text in r.programs) == 3 and sum(received[-100:]) == 100:
             r.safety_mode = 3
 
     robot.on_tick = stop
@@ -316,6 +325,9 @@ def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
     (row,) = read_csv(tmp_path / "out")
     assert row["status"] == "failed"
     assert "PROTECTIVE_STOP" in row["error"]
+    (incident,) = tmp_path.glob("out/incidents/*/uniform_4_1_r1.mcap")
+    assert row["error"].endswith(f"recorded until then: {incident.relative_to(tmp_path / 'out')}")
+    assert load_recording(incident).aborted
     assert "1 cases have not begun: look at the arm" in capsys.readouterr().out
 
 

@@ -14,7 +14,7 @@ from pc_client.recording.origin import origin_of
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.outcome import failed
 from pc_client.sweep.page import map_axes
-from pc_client.sweep.ranking import rank_settings, spans_grid, varying
+from pc_client.sweep.settings import edge_of, rank_settings, spans_grid, varying
 
 
 def test_the_best_setting_has_the_largest_mean_over_all_its_runs():
@@ -66,6 +66,23 @@ def test_without_anything_to_compare_the_controller_is_named():
 def test_a_table_is_of_a_real_arm_only_if_every_row_is(own, states, simulated):
     rows = [{"fidelity": "typical" if own else None, "simulated": state} for state in states]
     assert origin_of_rows(rows) is origin_of(simulated)
+
+
+@pytest.mark.parametrize(
+    ("ps", "qs", "said"),
+    [
+        ((3.0, 5.0, 7.0), (1.0, 2.0, 3.0), ""),
+        ((6.0, 8.0), (1.0, 2.0, 3.0), "gain_p = 6 is the smallest of 2"),
+        ((2.0, 4.0), (0.5, 1.5), "gain_p = 4 is the largest of 2, gain_i = 1.5 is the largest of 2"),
+        ((4.0, 5.0, 6.0), (0.0, 9.0), ""),  # there is no gain below 0
+        ((5.0, 30.0), (2.0,), "gain_p = 5 is the smallest of 2"),  # 30 is refused
+        ((30.0, 40.0), (2.0,), ""),  # nothing is the best
+    ],
+)
+def test_a_best_setting_at_the_edge_is_named_with_its_side(ps, qs, said):
+    table = table_of(*(case(gain_p=p, gain_i=q) for p in ps for q in qs))
+    whole = f"the best lies at the edge of what was tried ({said}): a better one may lie beyond"
+    assert edge_of(table, rank_settings(table)) == (whole if said else "")
 
 
 def test_axes_are_what_varies():

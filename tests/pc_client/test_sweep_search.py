@@ -13,8 +13,7 @@ from sweep_samples import PREVIEW, case, invented, table_with
 from pc_client import cli
 from pc_client.control.controller import CONTROLLERS
 from pc_client.sweep.outcome import failed
-from pc_client.sweep.search import Search, searched
-from pc_client.sweep.settings import Range
+from pc_client.sweep.settings import Range, Search, searched
 
 AXES = {
     "gain_p": Range(low=1.0, high=30.0, log=True),

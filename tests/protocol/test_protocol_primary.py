@@ -14,13 +14,10 @@ from protocol.primary import framing as F
 from protocol.primary import layout as L
 from protocol.primary import messages as M
 from protocol.primary import packages as P
-from protocol.primary import setup as U
 from protocol.primary import state as S
-from protocol.primary import tool as T
-from protocol.primary.message_codec import encode_message, version_message
+from protocol.primary.messages import encode_message, version_message
 from protocol.ur_types import SoftwareVersion
-from protocol.wire_codec import codec_for
-from protocol.wire_record import wire_fields
+from protocol.wire_record import codec_for, wire_fields
 
 V3_15 = SoftwareVersion(3, 15, 8)
 NO_TIME_HEX = "ff" * 8
@@ -255,9 +252,9 @@ def test_order_and_sizes_on_the_wire_of_an_e_series(version, more):
 
 
 def test_configuration_grows_with_5_25_1():
-    record = U.ConfigurationData(box_series=7, tool_flange_type=2)
+    record = L.ConfigurationData(box_series=7, tool_flange_type=2)
     for version, end in (("5.25", ""), ("5.25.1", "0007 0002")):
-        data = S.encode_sub_package(U.ConfigurationData, record, SoftwareVersion.parse(version))
+        data = S.encode_sub_package(L.ConfigurationData, record, SoftwareVersion.parse(version))
         assert data[445:] == bytes.fromhex(end)
     assert S.decode_sub_package(6, data[5:]) == record
 
@@ -280,8 +277,8 @@ def test_robot_mode_data_byte_by_byte():
 # Sub-packages of a 5.8 simulator's first state.
 CAPTURED = [
     (L.AdditionalInfo(freedrive_button_enabled=True), "00000009 08 00 01 00 01"),
-    (T.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
-    (T.ToolModeInfo(), "00000008 0c 00 01 01"),
+    (L.ToolCommunicationInfo(), "0000001a 0b 00 0001c200 00000000 00000001 3fc00000 40600000"),
+    (L.ToolModeInfo(), "00000008 0c 00 01 01"),
     (
         L.MasterboardData(
             analog_output0=0.004000000189989805,
@@ -311,8 +308,8 @@ def test_joints_stand_together_and_pairs_alternate():
     for k in range(6):
         block = struct.unpack_from(">3d4fB", data, 5 + 41 * k)
         assert block == tuple(getattr(joints, field.name)[k] for field in fields(joints))
-    configuration = distinct(U.ConfigurationData)
-    data = S.encode_sub_package(U.ConfigurationData, configuration, V3_15)
+    configuration = distinct(L.ConfigurationData)
+    data = S.encode_sub_package(L.ConfigurationData, configuration, V3_15)
     assert struct.unpack_from(">2d", data, 5 + 16 * 4) == (
         configuration.joint_min_limit[4],
         configuration.joint_max_limit[4],
@@ -354,8 +351,8 @@ def test_records_may_be_mappings_or_any_object():
 
 
 def test_a_reader_skips_what_newer_software_appends():
-    record = distinct(U.ConfigurationData)
-    data = S.encode_sub_package(U.ConfigurationData, record, SoftwareVersion(5, 25, 1))
+    record = distinct(L.ConfigurationData)
+    data = S.encode_sub_package(L.ConfigurationData, record, SoftwareVersion(5, 25, 1))
     assert S.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
     body = F.encode_package(14, b"\x01\x02") + S.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
     (state,) = read(F.encode_package(16, body))
@@ -381,7 +378,7 @@ def test_states_that_do_not_add_up_are_refused(body, problem):
 
 def test_a_state_takes_each_sub_package_once():
     with pytest.raises(LocalProtocolError, match="ToolData is unknown or repeated"):
-        S.encode_state([T.ToolData(), T.ToolData()], V3_15)
+        S.encode_state([L.ToolData(), L.ToolData()], V3_15)
     with pytest.raises(LocalProtocolError, match="SubPackage is unknown"):
         S.encode_state([F.SubPackage()], V3_15)
 
@@ -390,7 +387,7 @@ def test_software_before_3_0_has_no_table():
     old = SoftwareVersion(1, 8)
     assert S.state_types(old, first=True) == ()
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0: use 3\.0\.0 or later"):
-        S.encode_state([T.ToolData()], old)
+        S.encode_state([L.ToolData()], old)
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0 had other layouts"):
         encode_message(M.TextMessage(text="x"), old)
     data = P.encode_message_package(M.TextMessage(text="x"), V3_15)

@@ -6,7 +6,6 @@ import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.primary import program as S
 from protocol.primary import values as V
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, encode_package
 from protocol.primary.packages import decode_package
@@ -55,21 +54,21 @@ MATRIX = TypedValue(
 
 # (version, message, bytes). The first update is the example of the document, the second a capture.
 MESSAGES = [
-    ("3.3", S.GlobalVariablesUpdate(timestamp=0, values=(boolean(True), text("aaaa"))),
+    ("3.3", V.GlobalVariablesUpdate(timestamp=0, values=(boolean(True), text("aaaa"))),
      f"0000001b 19 {'00' * 8} 01 0000 0c 01 0a 03 0004 61616161 0a"),
-    ("5.4", S.GlobalVariablesUpdate(), f"00000010 19 {NO_TIME} 01 0000"),
-    ("3.15.8", S.GlobalVariablesSetup(timestamp=16_634_482_000, names=("i", "pose_1")),
+    ("5.4", V.GlobalVariablesUpdate(), f"00000010 19 {NO_TIME} 01 0000"),
+    ("3.15.8", V.GlobalVariablesSetup(timestamp=16_634_482_000, names=("i", "pose_1")),
      f"00000019 19 {16_634_482_000:016x} 00 0000 690a {b'pose_1'.hex()}0a"),
-    ("3.15.8", S.GlobalVariablesSetup(start_index=300, names=("\xe9",)), f"00000012 19 {NO_TIME} 00 012c e90a"),
-    ("3.15.8", S.GlobalVariablesSetup(), f"00000010 19 {NO_TIME} 00 0000"),
-    ("3.15.8", S.GlobalVariablesUpdate(start_index=2, values=(integer(10), POSE)),
+    ("3.15.8", V.GlobalVariablesSetup(start_index=300, names=("\xe9",)), f"00000012 19 {NO_TIME} 00 012c e90a"),
+    ("3.15.8", V.GlobalVariablesSetup(), f"00000010 19 {NO_TIME} 00 0000"),
+    ("3.15.8", V.GlobalVariablesUpdate(start_index=2, values=(integer(10), POSE)),
      f"00000030 19 {NO_TIME} 01 0002 0f 0000000a 0a 0c {POSE_HEX} 0a"),
-    ("3.15.8", S.GlobalVariablesUpdate(values=(listed(real(0.5), real(-2.0)), TypedValue(ValueType.NONE))),
+    ("3.15.8", V.GlobalVariablesUpdate(values=(listed(real(0.5), real(-2.0)), TypedValue(ValueType.NONE))),
      f"00000020 19 {NO_TIME} 01 0000 11 0002 10 3f000000 10 c0000000 0a 00 0a"),
-    ("3.15.8", S.GlobalVariablesUpdate(values=(MATRIX,)),
+    ("3.15.8", V.GlobalVariablesUpdate(values=(MATRIX,)),
      f"00000034 19 {NO_TIME} 01 0000 12 0002 0003 0f 00000001 0f 00000002 0f 00000003"
      "0f 00000004 0f 00000005 0f 00000006 0a"),
-    ("3.15.8", S.VariableUpdate(title="x", text="1.5"), f"00000013 19 {NO_TIME} 02 01 78 312e35"),
+    ("3.15.8", V.VariableUpdate(title="x", text="1.5"), f"00000013 19 {NO_TIME} 02 01 78 312e35"),
 ]  # fmt: skip
 IDS = [f"{type(message).__name__} {version} {i}" for i, (version, message, _) in enumerate(MESSAGES)]
 
@@ -77,7 +76,7 @@ IDS = [f"{type(message).__name__} {version} {i}" for i, (version, message, _) in
 @pytest.mark.parametrize(("version", "message", "data"), MESSAGES, ids=IDS)
 def test_messages_by_four_methods(version, message, data):
     version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
-    assert S.encode_program_state(message, version).hex(" ") == data.hex(" ")
+    assert V.encode_program_state(message, version).hex(" ") == data.hex(" ")
     assert read(data, version) == [message]
     assert read(data, version, step=1) == [message]
     assert read(data + data[:7], version) == [message]
@@ -204,20 +203,20 @@ def test_messages_that_do_not_add_up_are_refused(body, problem):
 
 def test_an_unknown_sub_type_comes_out_as_it_is():
     (message,) = read(encode_package(25, bytes.fromhex(f"{NO_TIME} 07 0102")))
-    assert message == S.UnknownProgramState(sub_type=7, body=b"\x01\x02")
+    assert message == V.UnknownProgramState(sub_type=7, body=b"\x01\x02")
     with pytest.raises(LocalProtocolError, match="UnknownProgramState has no table"):
-        S.encode_program_state(message, V3_15)
+        V.encode_program_state(message, V3_15)
 
 
 @pytest.mark.parametrize(
     ("message", "problem"),
     [
-        (S.GlobalVariablesSetup(start_index=70_000), "start index 70000"),
-        (S.GlobalVariablesUpdate(timestamp=-1), "timestamp -1"),
-        (S.GlobalVariablesSetup(names=("a\nb",)), "no line feed"),
-        (S.VariableUpdate(title="x" * 256), "256 characters"),
+        (V.GlobalVariablesSetup(start_index=70_000), "start index 70000"),
+        (V.GlobalVariablesUpdate(timestamp=-1), "timestamp -1"),
+        (V.GlobalVariablesSetup(names=("a\nb",)), "no line feed"),
+        (V.VariableUpdate(title="x" * 256), "256 characters"),
     ],
 )
 def test_messages_that_do_not_fit_are_named(message, problem):
     with pytest.raises(LocalProtocolError, match=problem):
-        S.encode_program_state(message, V3_15)
+        V.encode_program_state(message, V3_15)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.realtime.columns import COLUMNS, VERSIONS
 from protocol.realtime.layout import (
+    COLUMNS,
     MAX_FRAME_SIZE,
     SNAPSHOT_FIELDS,
+    VERSIONS,
     layout_for_size,
     layout_for_version,
 )

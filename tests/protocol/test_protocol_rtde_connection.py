@@ -10,12 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde import messages as M
+from protocol.rtde import codec as M
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
 from protocol.rtde.fields import input_fields, output_fields
-from protocol.rtde.server_connection import InputReceived, RtdeServerConnection, request_limits
-from protocol.rtde.states import TRANSITIONS, RtdeState, cycles_per_package
+from protocol.rtde.server_connection import (
+    TRANSITIONS,
+    InputReceived,
+    RtdeServerConnection,
+    cycles_per_package,
+    request_limits,
+)
+from protocol.rtde.types import RtdeState
 from protocol.ur_types import SoftwareVersion
 
 V3_15 = SoftwareVersion(3, 15, 8)

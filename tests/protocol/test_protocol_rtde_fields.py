@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from protocol.realtime.columns import COLUMNS
+from protocol.realtime.layout import COLUMNS
 from protocol.rtde.fields import INPUTS, OUTPUTS, input_fields, output_fields
 from protocol.rtde.types import RtdeType
 from protocol.ur_types import SoftwareVersion

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde import messages as M
+from protocol.rtde import codec as M
 from protocol.rtde.codec import HEADER_SIZE, MAX_NAMES_SIZE, data_header, decode_message, encode_message
 from protocol.rtde.fields import OUTPUTS, input_fields, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder

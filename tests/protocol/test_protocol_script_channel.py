@@ -6,8 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.controller_words import CONTROLLER_WORDS
-from protocol.script_channel import MAX_LINE, ControlLine, Overflow, ProgramText, ScriptChannel
+from protocol.script_channel import (
+    CONTROLLER_WORDS,
+    MAX_LINE,
+    ControlLine,
+    Overflow,
+    ProgramText,
+    ScriptChannel,
+)
 
 NESTED = """\
 def outer():

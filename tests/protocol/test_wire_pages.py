@@ -10,11 +10,11 @@ import pytest
 from docs.generate import ports_page, primary_page, realtime_page, rtde_page, scripts_page
 from docs.generate.page_parts import table
 from protocol.__main__ import _parser
-from protocol.controller_words import CONTROLLER_WORDS
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.messages import MESSAGES
-from protocol.realtime.columns import COLUMNS, VERSIONS
+from protocol.realtime.layout import COLUMNS, VERSIONS
 from protocol.rtde.fields import input_fields, output_fields
+from protocol.script_channel import CONTROLLER_WORDS
 from protocol.ur_types import Ports, SoftwareVersion
 from protocol.wire_record import wire_fields
 

@@ -16,7 +16,7 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.command import Submitted
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
@@ -24,6 +24,11 @@ from urscript import compile_program
 
 VERSION = SoftwareVersion(3, 15, 8)
 TIMEOUT = 20.0  # s; a limit for hangs, no test waits for it
+
+
+def inside(box):
+    """The box behind one that runs in this process."""
+    return box._rack.boxes[box._index]
 
 
 class FakeSocket:

@@ -16,7 +16,7 @@ from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
-from urscript.program import check_program
+from urscript.check.checking import check_program
 
 MAX_CYCLES = 6_000
 

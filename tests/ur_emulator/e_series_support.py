@@ -3,7 +3,7 @@
 from box_support import Bench
 
 from ur_emulator.commands.programs import StartProgram
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import E_SERIES
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

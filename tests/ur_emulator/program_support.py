@@ -11,7 +11,7 @@ from box_support import Bench, FakeNetwork
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
 from ur_emulator.commands.programs import StartProgram, StopProgram
 from ur_emulator.controller.controller import Controller
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.network import RemoteCallError
 from ur_emulator.scripting.program_slot import ProgramSlot

@@ -3,7 +3,7 @@
 import struct
 from itertools import chain
 
-from protocol.rtde import messages as M
+from protocol.rtde import codec as M
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import encode_message
 from protocol.rtde.types import RtdeType

@@ -23,7 +23,7 @@ from ur_emulator.commands.safety import (
     UnlockProtectiveStop,
 )
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
-from ur_emulator.controller.modbus.robot_map import read_coil, read_register
+from ur_emulator.controller.modbus_map import read_coil, read_register
 from ur_emulator.controller.safety.modes import SafetyEvent
 from ur_emulator.servers.primary.robot_state import state_records
 

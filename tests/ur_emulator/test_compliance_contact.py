@@ -9,8 +9,8 @@ from protocol.ur_types import ControlMode, SafetyMode
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
 
 DEEP = DOWN.format(z=-0.15)

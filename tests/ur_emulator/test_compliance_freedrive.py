@@ -9,8 +9,8 @@ from protocol.ur_types import ControlMode, ProgramState, SafetyMode
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
 from ur_emulator.commands.programs import StartProgram, StopProgram
-from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.commands.surroundings import AttachPayload, Push
 from ur_emulator.errors import ArgumentError
 from urscript import compile_program
 from urscript.catalogue import catalogue_for

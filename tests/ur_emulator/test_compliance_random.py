@@ -17,8 +17,8 @@ from ur_emulator.commands.programs import (
     StartProgram,
     StopProgram,
 )
-from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.commands.surroundings import AttachPayload, Push
 from ur_emulator.motion.overlay import LastDisplacement
 from urscript import compile_program
 

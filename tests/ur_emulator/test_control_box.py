@@ -2,19 +2,18 @@
 
 import queue
 import threading
+import time
 from pathlib import Path
 
 import pytest
-from box_support import TIMEOUT, Bench, connect
+from box_support import TIMEOUT, Bench, connect, inside
 from control_support import control_box
 
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
-from ur_emulator.commands.obstacles import RemoveObstacle
 from ur_emulator.commands.operator import AnswerRequest
 from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.push import Push
+from ur_emulator.commands.surroundings import Push, RemoveObstacle, SetAnalogInput, SetDigitalInput
 from ur_emulator.errors import (
     ArgumentError,
     ControlError,
@@ -86,7 +85,7 @@ def test_what_is_done_is_logged_and_what_is_asked_is_not(box):
     box.push((1, 0, 0), duration=0.1)
     box.run_program(MOVE)
     texts = [entry.text for entry in box.log[before:] if entry.source == "Control"]
-    assert texts[0] == "push force=(1, 0, 0) point=(0.0, 0.0, 0.0) duration=0.1"
+    assert texts[0] == "push force=(1.0, 0.0, 0.0) point=(0.0, 0.0, 0.0) duration=0.1"
     assert texts[1].startswith("run_program script=def move(): movej([0.5")
     assert len(texts[1]) < 100
 
@@ -348,6 +347,31 @@ def test_a_program_that_is_played_is_paused_by_a_protective_stop_and_one_that_is
         box.wait_until(program_state="STOPPED")
 
 
+def test_a_program_that_was_asked_for_before_one_that_has_begun_does_not_begin():
+    with control_box(control_port=None, in_process=True) as box:
+        inside(box)._box.newest = time.monotonic() + 3600.0
+        with pytest.raises(RefusedError, match="newer one"):
+            box.run_program(MOVE)
+        assert box.state.program_state == "STOPPED"
+
+
+def test_a_program_whose_file_cannot_be_used_leaves_the_one_that_runs(tmp_path):
+    (tmp_path / "broken.urp").write_bytes(b"no program")
+    with control_box(programs=tmp_path, control_port=None) as box:
+        box.run_program(LOOP)
+        for name in ("nowhere.script", "broken.urp"):
+            with pytest.raises(RefusedError, match=name):
+                box.run_program(file=name)
+        assert box.state.program_state == "PLAYING"
+
+
+def test_a_program_can_be_waited_for_with_its_error(box):
+    box.run_program(MOVE, wait=True)
+    assert (box.state.program_state, box.state.steady) == ("STOPPED", True)
+    with pytest.raises(RefusedError, match=r"program f ended with an error: .*zero"):
+        box.run_program("def f():\n  sync()\n  x = 1 / 0\nend\n", wait=True)
+
+
 def test_a_secondary_program_runs_beside_the_other(box):
     box.run_program(LOOP)
     box.run_program("sec beside():\n  set_standard_digital_out(2, True)\nend\n")
@@ -580,7 +604,7 @@ def test_an_operation_that_is_refused_at_its_time_stands_in_the_log(box):
 
 def test_times_and_operations_that_cannot_be_are_refused_at_once(box):
     now = box.state.time
-    for time, name, arguments, problem in (
+    for at, name, arguments, problem in (
         (now, "protective_stop", None, "the time has passed"),
         (now + 1, "dance", None, "there is no operation 'dance'"),
         (now + 1, "wait_until", {"steady": True}, "does not act within one cycle"),
@@ -588,7 +612,7 @@ def test_times_and_operations_that_cannot_be_are_refused_at_once(box):
         (now + 1, "push", {}, "push needs force"),
     ):
         with pytest.raises(ControlError, match=problem):
-            box.at(time, name, arguments)
+            box.at(at, name, arguments)
     with pytest.raises(RefusedError, match="too far ahead"):
         box.wait_until(time=now + 4000)
     assert box.state.time == now

@@ -8,11 +8,11 @@ import sys
 import pytest
 from control_support import control_box
 
+from ur_emulator.box_options import TOKEN_VARIABLE
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.control.command_line import main, make_parser, plain
 from ur_emulator.control.http_client import ControlClient
 from ur_emulator.control.operations import OPERATIONS
-from ur_emulator.control.token import TOKEN_VARIABLE
 from ur_emulator.errors import ControlError
 
 
@@ -131,6 +131,15 @@ def test_a_program_of_this_machine_runs_and_its_question_is_answered(box, ctl, t
     assert "INFO Program: said 42" in out
     assert "said 42" not in ctl("log", "--after", str(10**6))[1]
     assert ctl("log", "--level", "FAULT")[1] == "\n"
+
+
+def test_a_program_that_fails_is_a_failure_of_the_command_that_waits_for_it(ctl):
+    fails = ("run_program", "--script", "def f():\n  sync()\n  x = 1 / 0\nend\n")
+    assert ctl(*fails)[0] == 0
+    code, _, err = ctl(*fails, "--wait")
+    assert code == 1
+    assert "program f ended with an error" in err
+    assert ctl("run_program", "--script", "sleep(0.1)\n", "--wait")[0] == 0
 
 
 def test_the_whole_log_comes_although_the_box_gives_some_entries_at_a_time(box, ctl):

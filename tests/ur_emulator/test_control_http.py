@@ -6,6 +6,7 @@ import socket
 import struct
 
 import pytest
+from box_support import inside
 from control_support import Http, control_box
 
 from protocol.primary.messages import ReportLevel
@@ -19,7 +20,7 @@ JSON = "Content-Type: application/json"
 @pytest.fixture(scope="module")
 def box():
     """One box for all: whatever is done to it, it must go on."""
-    with control_box() as box:
+    with control_box(in_process=True) as box:
         yield box
 
 
@@ -82,9 +83,9 @@ def test_the_log_is_read_on_where_it_was_left_off(http):
 
 
 def test_an_answer_has_some_entries_of_a_long_log_and_the_next_one_the_others(box, http):
-    start = box._box.log.count
+    start = inside(box)._box.log.count
     for k in range(2 * BUDGETS.log_entries + 10):
-        box._box.log.write(0, "Test", f"{k}", ReportLevel.FAULT if k % 2 else ReportLevel.INFO)
+        inside(box)._box.log.write(0, "Test", f"{k}", ReportLevel.FAULT if k % 2 else ReportLevel.INFO)
     texts, sizes, after = [], [], start
     while not sizes or sizes[-1]:
         page = http.ask("GET", f"/v1/log?after={after}")[1]
@@ -137,7 +138,7 @@ def test_a_whole_program_goes_through(http):
         ("POST", "/v1/run_program", {"script": "def f("}, 400, "does not compile"),
         ("POST", "/v1/unlock_protective_stop", {}, 409, "no protective stop"),
         ("POST", "/v1/answer", {"value": 3}, 409, "none is open"),
-        ("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 0}, 409, "in vain"),
+        ("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 0}, 408, "in vain"),
         ("POST", "/v1/wait_until", {"robot_mode": "idle"}, 400, "RUNNING"),
         ("GET", "/v1/log?after=-1", None, 400, "after -1"),
         ("GET", "/v1/log?after=x", None, 400, "after 'x'"),
@@ -223,7 +224,7 @@ def test_the_own_address_and_localhost_are_taken(http, host):
 
 def test_a_box_on_all_addresses_takes_any_address_but_no_name():
     token = ["Authorization: Bearer abc"]
-    with control_box(host="0.0.0.0", control_token="abc") as box, Http(box) as http:
+    with control_box(in_process=True, host="0.0.0.0", control_token="abc") as box, Http(box) as http:
         assert http.ask("GET", "/v1/state", host="192.168.7.7:80", headers=token)[0] == 200
         assert http.ask("GET", "/v1/state", host="evil.example", headers=token)[0] == 403
 
@@ -362,7 +363,7 @@ def test_who_says_no_more_still_gets_its_answers(http):
 
 
 def test_requests_sent_ahead_are_answered_in_order(box, http):
-    start = box._box.log.count
+    start = inside(box)._box.log.count
     texts = [f"line {n}" for n in range(50)]
     http.send(b"".join(http.request("POST", "/v1/add_to_log", {"text": text}) for text in texts))
     assert [http.answer()[0] for _ in texts] == [200] * 50
@@ -378,7 +379,7 @@ def test_who_sends_ahead_is_read_when_its_answer_has_been_sent(box, http):
     with Http(box) as other:
         for _ in range(50):
             assert other.ask("GET", "/v1/state")[0] == 200
-        sessions = box._port_set._ports["control"]._sessions.values()
+        sessions = inside(box)._port_set._ports["control"]._sessions.values()
         (waiting,) = (s for s in sessions if s._request and s._request.target == b"/v1/wait_until")
         assert len(waiting.http.trailing_data[0]) <= 2 * BUDGETS.read_bytes
         assert other.ask("POST", "/v1/add_to_log", {"text": "go on"})[0] == 200
@@ -392,7 +393,7 @@ def test_who_goes_while_it_waits_is_forgotten(box):
     with Http(box) as http:
         for _ in range(1000):
             assert http.ask("GET", "/v1/state")[0] == 200
-            if not box._access.steps._under_way:
+            if not inside(box)._access.steps._under_way:
                 return
     raise AssertionError("they are waited for still")
 
@@ -452,7 +453,7 @@ def test_the_most_silent_client_makes_room_for_a_new_one(box):
 
 
 def test_clients_of_a_box_that_ends_are_informed():
-    with control_box() as box:
+    with control_box(in_process=True) as box:
         http = Http(box)
         http.send(http.request("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 60}))
         with Http(box) as other:  # so that the wait has begun
@@ -464,6 +465,6 @@ def test_clients_of_a_box_that_ends_are_informed():
 
 
 def test_there_is_no_port_unless_it_is_asked_for(box):
-    with control_box(control_port=None) as other:
+    with control_box(in_process=True, control_port=None) as other:
         assert other.control_port == 0
         assert "control" not in other.identity["ports"]

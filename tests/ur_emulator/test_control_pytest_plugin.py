@@ -2,12 +2,13 @@
 
 import subprocess
 import sys
+from inspect import signature
 
 import pytest
 
 import ur_emulator.emulator  # noqa: F401 - numpy cannot be loaded a second time, as pytester would
+from ur_emulator import ControlBox
 from ur_emulator.pytest_plugin import OPTIONS, _own_addresses
-from ur_emulator.rack import BoxOptions
 
 pytest_plugins = ["pytester"]
 
@@ -87,21 +88,51 @@ def test_the_factory_makes_as_many_as_are_wanted_and_ends_them(suite):
     result.assert_outcomes(passed=2)
 
 
-def test_a_failing_test_shows_the_log_of_its_box(suite):
+@pytest.mark.parametrize("mark", ["ur()", "ur(in_process=True)"])
+def test_a_failing_test_shows_state_and_log_of_its_box_and_no_frames_of_ours(suite, mark):
     result = suite(
-        """
+        f"""
+        import pytest
+        @pytest.mark.{mark}
         def test_fails(ur_box):
             ur_box.add_to_log("the last words of the box")
-            assert False
+            ur_box.wait_until(robot_mode="IDLE", timeout=0)
         def test_passes(ur_box):
             ur_box.add_to_log("nobody wants to know")
+        def test_calls_wrongly(ur_box):
+            ur_box.wait_until(robot="IDLE")
         """
     )
-    result.assert_outcomes(failed=1, passed=1)
+    result.assert_outcomes(failed=2, passed=1)
     result.stdout.fnmatch_lines(
-        ["*log of the box at 127.0.0.1:*", "*INFO Control: the last words of the box"]
+        [
+            "E  *WaitTimeoutError: waited 0 s in vain: robot_mode is RUNNING, not IDLE",
+            "*state of the UR3 CB3 3.15.8 at 127.0.0.1:*",
+            "robot mode RUNNING, safety mode NORMAL",
+            "joints [[]0.3944, *[]] rad, at rest, after 60.008 s",
+            "*log of the UR3 CB3 3.15.8 at 127.0.0.1:*",
+            "*INFO Control: the last words of the box",
+            "E  *ArgumentError: wait_until: got an unexpected keyword argument 'robot'; it takes time, robot_mode*",
+        ]
     )
-    result.stdout.no_fnmatch_line("*nobody wants to know*")
+    for never in ("*nobody wants to know*", "*/ur_emulator/*.py:*"):
+        result.stdout.no_fnmatch_line(never)
+
+
+def test_one_line_makes_a_test_of_several_robots(suite):
+    result = suite(
+        """
+        import pytest
+        ROBOTS = ["ur3", "ur5 3.4.0", {"robot": "ur5e", "version": "5.12", "seed": 3}]
+        @pytest.mark.ur(seed=5)
+        @pytest.mark.parametrize("ur_box", ROBOTS, indirect=True)
+        def test_all(ur_box):
+            print(*(ur_box.identity[name] for name in ("robot", "software", "seed")))
+        """,
+        "-s",
+    )
+    result.assert_outcomes(passed=3)
+    result.stdout.fnmatch_lines(["*UR3 3.15.8* 5*", "*UR5 3.4.0 5*", "*UR5e 5.12.* 3*"])
 
 
 @pytest.mark.parametrize(
@@ -138,6 +169,33 @@ def test_the_command_line_names_defaults(suite):
             assert (ur_box.identity["robot"], ur_box.identity["software"]) == ("UR3", "3.5.0")
         """,
         "--ur-robot=ur10",
+        "--ur-version=3.5.0",
+    )
+    result.assert_outcomes(passed=2)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--ur-robot=ur5e", "--ur-version=3.5.0"], "*version 3.5.0 given: software of the e-Series is 5.x*"),
+        (["--ur-robot=ur9"], "*unknown robot 'ur9'*"),
+    ],
+)
+def test_defaults_that_cannot_be_are_one_line(suite, words, text):
+    result = suite("def test_never(ur_box): pass\n" * 3, *words)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines([text])
+    assert len(result.errlines) <= 2
+
+
+def test_the_default_software_is_for_the_arms_that_run_it(suite):
+    result = suite(
+        """
+        import pytest
+        @pytest.mark.parametrize("ur_box", ["ur3", "ur5e"], indirect=True)
+        def test_all(ur_box):
+            assert ur_box.identity["software"][:2] in ("3.", "5.")
+        """,
         "--ur-version=3.5.0",
     )
     result.assert_outcomes(passed=2)
@@ -181,7 +239,7 @@ def test_workers_look_for_addresses_in_blocks_of_their_own(monkeypatch):
 
 
 def test_a_mark_takes_what_a_box_takes():
-    assert set(OPTIONS) == set(BoxOptions.__annotations__) | {"standard_ports"}
+    assert set(OPTIONS) == set(signature(ControlBox).parameters) - {"generation"} | {"standard_ports"}
 
 
 def test_the_plug_in_loads_nothing_heavy():

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ur_emulator.commands.obstacles import SIZES
-from ur_emulator.commands.parameters import Kind
+from ur_emulator.commands.operation import Kind
+from ur_emulator.commands.surroundings import SIZES
 from ur_emulator.control.operations import OPERATIONS, BoxOperations, Reading, describe, make
-from ur_emulator.control.waiting import CONDITIONS
+from ur_emulator.control.step_operation import CONDITIONS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
 from ur_emulator.plant.obstacles import SHAPES

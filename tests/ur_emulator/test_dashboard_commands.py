@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from box_support import MessageReader, connect
+from box_support import MessageReader, connect, inside
 from dashboard_support import Dashboard, write_programs
 
 from protocol.dashboard.commands import COMMANDS, commands_of, match_command
@@ -21,7 +21,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def box(folder):
-    with ControlBox(pace="lockstep", port_base=None, seed=7, programs=folder) as box:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7, programs=folder) as box:
         yield box
 
 
@@ -38,13 +38,13 @@ def protective_stop(box, dashboard, folder):
 
 def five_seconds_later(box, dashboard, folder):
     protective_stop(box, dashboard, folder)
-    controller = box._box.controller
+    controller = inside(box)._box.controller
     while not controller.state.safety.may_unlock(controller.snapshot.timestamp):
         dashboard.ask("safetymode")
 
 
 def booting(box, dashboard, folder):
-    box._box.controller.state.mode.mode = RobotMode.BOOTING
+    inside(box)._box.controller.state.mode.mode = RobotMode.BOOTING
     dashboard.ask("close popup")
 
 
@@ -163,7 +163,13 @@ E_SERIES_CASES = {
 def test_reply_of_a_ur5e(folder, line, expected):
     with (
         ControlBox(
-            robot="ur5e", version="5.15.0", pace="lockstep", port_base=None, seed=7, programs=folder
+            in_process=True,
+            robot="ur5e",
+            version="5.15.0",
+            pace="lockstep",
+            port_base=None,
+            seed=7,
+            programs=folder,
         ) as box,
         Dashboard(box) as dashboard,
     ):
@@ -253,7 +259,7 @@ def test_a_popup_is_shown_to_all_clients(box, dashboard):
 
 
 def test_a_popup_stays_without_power_until_it_is_closed(box, dashboard):
-    operator = box._box.controller.state.operator
+    operator = inside(box)._box.controller.state.operator
     dashboard.ask_all("popup first", "power off", "popup second")
     assert operator.shown == ("first", "second")
     assert "Popup: Popup: first" in [entry.text for entry in box.log]
@@ -268,7 +274,7 @@ def test_stop_ends_when_the_arm_rests(box, folder, dashboard):
         "while True:\n  speedj([1, 0, 0, 0, 0, 0], 5, 0.5)\n  speedj([-1, 0, 0, 0, 0, 0], 5, 0.5)\nend\n"
     )
     dashboard.ask_all("load go.script", "play")
-    motion = box._box.controller.state.motion
+    motion = inside(box)._box.controller.state.motion
     while abs(motion.target.qd[0]) < 0.5:
         dashboard.ask("running")
     assert dashboard.ask("stop") == "Stopped"
@@ -319,7 +325,9 @@ def test_each_software_knows_its_commands_and_no_others(folder, robot, version):
         if row.name not in ("quit", "shutdown")
     ]
     with (
-        ControlBox(robot=robot, version=version, pace="lockstep", port_base=None, programs=folder) as box,
+        ControlBox(
+            in_process=True, robot=robot, version=version, pace="lockstep", port_base=None, programs=folder
+        ) as box,
         Dashboard(box) as dashboard,
     ):
         unknown = [
@@ -333,7 +341,7 @@ def test_each_software_knows_its_commands_and_no_others(folder, robot, version):
 
 def test_software_up_to_3_2_answers_load_before_it_is_done(folder):
     with (
-        ControlBox(version="3.2", pace="lockstep", port_base=None, programs=folder) as box,
+        ControlBox(in_process=True, version="3.2", pace="lockstep", port_base=None, programs=folder) as box,
         Dashboard(box) as dashboard,
     ):
         assert dashboard.ask("load strange.urp") == "Loading program: /programs/strange.urp"

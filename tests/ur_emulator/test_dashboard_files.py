@@ -20,7 +20,7 @@ def folder(tmp_path):
 def session(folder, *lines):
     """Let a box answer lines; return the replies and the log."""
     with (
-        ControlBox(pace="lockstep", port_base=None, seed=7, programs=folder) as box,
+        ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7, programs=folder) as box,
         Dashboard(box) as dashboard,
     ):
         return dashboard.ask_all(*lines), [str(entry) for entry in box.log]
@@ -91,7 +91,7 @@ def test_equal_runs_write_equal_bytes(tmp_path):
 
 def test_without_a_folder_the_files_go_to_a_temporary_one_that_goes_with_the_box(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with ControlBox(pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
         replies = dashboard.ask_all("saveLog", "generate support file .", "generate support file .")
         assert replies[0] == "Log saved to disk"
         (written,) = tmp_path.iterdir()

@@ -17,9 +17,8 @@ from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc
-from ur_emulator.programs.installation_files import load_installation
-from ur_emulator.programs.loading import load_program, split_header
-from ur_emulator.programs.script_text import as_one_program
+from ur_emulator.programs.installation_reader import load_installation
+from ur_emulator.programs.loading import as_one_program, load_program, split_header
 
 
 @pytest.fixture

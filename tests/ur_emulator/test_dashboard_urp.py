@@ -34,7 +34,7 @@ from ur_emulator.programs.loading import load_program
         (move("MoveL", direction('<Until type="EXPRESSION"/>')), "an <Until> of type 'EXPRESSION' cannot"),
         (direction(until_distance("1"), 'selectedDirection="XPlus"'), "stands outside of a <Move> and has no toolParams"),
         ('<Force type="Point"/>', "a <Force> of type 'Point' cannot"),
-        ("<SafeHome/>", "the installation has no position for the <SafeHome>"),
+        ("<SafeHome/>", "time of a <SafeHome> is '', a number"),
         ('<Timer action="Jump"><variable name="t"/></Timer>', "a timer's action 'Jump' cannot"),
         (branch("If", "", "1") + branch("ElseIf", "", "2") * 51, "an <If> node has more than 50 branches"),
         (branch("If", "", "1") + branch("Else") * 2, "an Else node stands behind no If"),

@@ -6,7 +6,7 @@ from e_series_support import DT, ESeriesBench, program
 
 from protocol.ur_types import ControlMode, ProgramState, SafetyMode
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
-from ur_emulator.commands.push import Push
+from ur_emulator.commands.surroundings import Push
 
 ALL = "viscous_scale=[1,1,1,1,1,1], coulomb_scale=[1,1,1,1,1,1]"
 NONE = "viscous_scale=[0,0,0,0,0,0], coulomb_scale=[0,0,0,0,0,0]"
@@ -47,15 +47,19 @@ def test_zero_torque_holds_the_arm_with_its_payload(robot, fidelity):
 def test_a_joint_accelerates_as_its_inertia_says(joint, torque):
     bench = ESeriesBench(fidelity="ideal")
     bench.run(program("global m = get_mass_matrix(get_actual_joint_positions(), True)"))
-    wanted = torque / np.array(list(bench["m"]))[joint, joint]
+    inertia = np.array(list(bench["m"]))[joint, joint]
     torques = [0.0] * 6
     torques[joint] = torque
     bench.start(endless(torques))
     start = truth(bench)[joint]
-    n = 60
+    n = 40
     bench.tick(n - 1)
-    # The other joints yield a little, so that this one feels less than its inertia with them at rest.
-    assert truth(bench)[joint] - start == pytest.approx(0.5 * wanted * (n * DT) ** 2, rel=0.12)
+    # Full scales leave two thirds of the viscous friction. The other joints yield a little, so that this one
+    # feels less than its inertia with them at rest.
+    damping = 2.0 / 3.0 * bench.controller.state.robot.viscous[joint]
+    lost = damping * n * DT / inertia
+    way = torque * inertia / damping**2 * (lost + np.expm1(-lost))
+    assert truth(bench)[joint] - start == pytest.approx(way, rel=0.12)
     assert bench.now.target_moment[joint] - gravity(bench)[joint] == pytest.approx(torque, abs=0.5)
 
 
@@ -72,6 +76,69 @@ def test_friction_brakes_what_is_not_compensated():
         bench.tick(100)
         moved[name] = truth(bench)[5] - start
     assert moved["all"] > moved["default"] > moved["none"] == moved["old"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "periods", "speed", "way"),
+    [pytest.param("ur5e", 10, 2.5, 3.5, marks=pytest.mark.slow), ("ur3e", 2, 5.8, 9.2)],
+    ids=["ur5e", "ur3e"],
+)
+def test_the_example_of_the_maker_swings_wrist_3(robot, periods, speed, way):
+    """Universal_Robots_Client_Library, examples/direct_torque_control.cpp: full scales at wrist 3, ten periods."""
+    bench = ESeriesBench(robot=robot, fidelity="ideal")
+    bench.start(
+        program(
+            "q = get_actual_joint_positions()",
+            "q[5] = 0",
+            "movej(q)",
+            "t = 0.0",
+            f"while t < {5 * periods}:",
+            "  t = t + get_steptime()",
+            "  tau = 2.5 * sin(2 * 3.141592653589793 * 0.2 * t)",
+            "  direct_torque([0,0,0,0,0,tau], viscous_scale=[0,0,0,0,0,1], coulomb_scale=[0,0,0,0,0,1])",
+            "end",
+            "stopj(4)",
+        )
+    )
+    while bench.controller.is_active:
+        bench.tick()
+    swung = [s.actual_q[5] for s in bench.snapshots if s.control_mode == ControlMode.TORQUE]
+    speeds = [s.actual_qd[5] for s in bench.snapshots if s.control_mode == ControlMode.TORQUE]
+    assert bench.errors == []
+    assert len(swung) == pytest.approx(5.0 * periods / DT, abs=2)
+    # Out and back once a period; the friction that is left damps it.
+    assert max(swung) == pytest.approx(way, abs=0.1)
+    assert np.diff(np.sign(np.array(swung) - 0.5 * max(swung))).nonzero()[0].size == 2 * periods
+    assert [min(speeds), max(speeds)] == pytest.approx([-speed, speed], abs=0.1)
+    assert swung[-1] == pytest.approx(0.0, abs=0.15)
+
+
+@pytest.mark.parametrize("robot", ["ur3e", "ur10e"])
+@pytest.mark.parametrize("joint", range(6))
+def test_full_compensation_leaves_damping_in_every_joint(robot, joint):
+    bench = ESeriesBench(robot=robot, fidelity="ideal")
+    torques = ["0"] * 6
+    torques[joint] = "tau"
+    push = 0.2 * bench.controller.state.robot.tau_max[joint]
+    bench.start(
+        program(
+            "i = 0",
+            "while True:",
+            "  i = i + 1",
+            "  tau = 0",
+            "  if i < 20:",
+            f"    tau = {push}",
+            "  end",
+            f"  direct_torque([{','.join(torques)}], {ALL})",
+            "end",
+        )
+    )
+    bench.tick(30)
+    pushed = bench.now.actual_qd[joint]
+    bench.tick(250)
+    assert pushed > 0.1
+    assert 0.0 <= bench.now.actual_qd[joint] < 0.7 * pushed
+    assert bench.errors == []
 
 
 def test_the_deprecated_argument_is_logged_once_and_does_not_count_beside_a_scale():

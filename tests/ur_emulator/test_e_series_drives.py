@@ -13,11 +13,10 @@ from box_support import Bench
 from plant_support import target
 
 from ur_emulator.models.calibration import NOMINAL
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.e_series_arms import UR5E, UR10E
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import arm_spec
 from ur_emulator.models.robots import ROBOTS
-from ur_emulator.models.ur5e import UR5E
-from ur_emulator.models.ur10e import UR10E
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 from ur_emulator.plant.physics import ServoGains, build_physics

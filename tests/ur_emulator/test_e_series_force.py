@@ -9,7 +9,7 @@ import pytest
 from box_support import Bench
 from compliance_support import push, reported, said, truth
 
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import GRAVITY
 
 DOWN = "p[{x},0,{z},3.14159265,0,0]"

@@ -7,7 +7,7 @@ from e_series_support import DT, ESeriesBench, program
 from protocol.pose import pose_inv, pose_trans, rotvec_to_matrix
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.commands.power import StartFreedrive
-from ur_emulator.commands.push import Push
+from ur_emulator.commands.surroundings import Push
 
 TURNED = "p[0.1, 0, 0, 0, 0, 0.7853981633974483]"  # 45 degrees about z
 

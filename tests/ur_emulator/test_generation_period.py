@@ -12,7 +12,7 @@ from protocol.primary.layout import RobotModeData
 from ur_emulator import ControlBox
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.errors import EmulatorError
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 
 # Control cycle and physics step [us].
 CYCLES = [(8_000, 2_000), (4_000, 2_000), (4_000, 1_000), (2_000, 2_000)]
@@ -144,7 +144,7 @@ def test_joint_positions_are_remembered_for_a_second(generation):
 def test_frames_and_packages_come_at_the_period(generation):
     period, rate = generation.period_s, generation.cycle_rate
     with (
-        ControlBox(pace="lockstep", port_base=None, generation=generation) as box,
+        ControlBox(in_process=True, pace="lockstep", port_base=None, generation=generation) as box,
         connect(box, "realtime") as sock,
         connect(box, "primary") as sender,
     ):
@@ -164,7 +164,7 @@ def test_frames_and_packages_come_at_the_period(generation):
 @pytest.mark.parametrize(("frequency", "seconds"), [(None, None), (125.0, 0.008), (10.0, 0.1)])
 def test_rtde_has_the_full_rate_and_whole_parts_of_it(generation, frequency, seconds):
     with (
-        ControlBox(pace="lockstep", port_base=None, generation=generation) as box,
+        ControlBox(in_process=True, pace="lockstep", port_base=None, generation=generation) as box,
         connect(box, "rtde") as sock,
     ):
         client = RtdeClient(sock)
@@ -181,5 +181,5 @@ def test_rtde_has_the_full_rate_and_whole_parts_of_it(generation, frequency, sec
 
 def test_a_box_of_another_generation_names_its_software():
     other = replace(CB3, name="test series", major=4)
-    with pytest.raises(EmulatorError, match=r"this box is a test series, its software is 4\.x"):
-        ControlBox(generation=other)
+    with pytest.raises(EmulatorError, match=r"software of the test series is 4\.x"):
+        ControlBox(in_process=True, generation=other)

@@ -4,27 +4,27 @@ from dataclasses import fields, replace
 from functools import partial
 
 import pytest
-from box_support import Bench, FrameReader, MessageReader, connect
+from box_support import Bench, FrameReader, MessageReader, connect, inside
 from dashboard_support import Dashboard
 from generation_support import MISSING_BUILTIN, SECOND
 from rtde_support import RtdeClient
 
 from protocol.primary.layout import ConfigurationData, ForceModeData, MasterboardData
 from protocol.primary.messages import VersionMessage
-from protocol.rtde import messages as R
+from protocol.rtde import codec as R
 from protocol.ur_types import SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.controller.safety.configured_limits import limits_of
+from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.controller.safety.speed_scaling import ModeLimits, limits_of_mode
 from ur_emulator.errors import ArgumentError, EmulatorError
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.cb3_arms import UR3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.safety_limits import ArmLimits
-from ur_emulator.models.ur3 import UR3
 
 
 @pytest.fixture(scope="module")
 def box():
-    with ControlBox(pace="lockstep", port_base=None, generation=SECOND) as box:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, generation=SECOND) as box:
         yield box
 
 
@@ -34,7 +34,7 @@ def test_the_second_record_differs_in_every_field():
 
 def test_every_arm_names_its_generation_and_the_box_follows_it(box):
     assert UR3.generation is CB3
-    assert box.generation is SECOND
+    assert inside(box)._box.controller.generation is SECOND
     assert box.identity["software"] == "5.1.0"
 
 
@@ -88,7 +88,7 @@ def test_an_arm_is_as_good_as_one_of_its_fidelities():
     bench = Bench(generation=SECOND, fidelity="ideal")
     assert bench.controller.plant.dead_time == pytest.approx(CB3.fidelity("ideal").dead_time + 0.004)
     with pytest.raises(EmulatorError, match="unknown fidelity 'poor': choose one of exact, ideal, typical"):
-        ControlBox(fidelity="poor", generation=SECOND)
+        ControlBox(in_process=True, fidelity="poor", generation=SECOND)
 
 
 def test_reduced_and_recovery_mode_have_its_limits():

@@ -9,7 +9,7 @@ from dashboard_support import Dashboard, write_programs
 from rtde_support import RtdeClient
 
 from protocol.primary import messages as M
-from protocol.rtde import messages as R
+from protocol.rtde import codec as R
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 

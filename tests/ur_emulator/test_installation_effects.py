@@ -4,25 +4,25 @@ import gzip
 import math
 
 import pytest
-from box_support import Bench, MessageReader, connect
+from box_support import Bench, MessageReader, connect, inside
 from dashboard_support import Dashboard, script_line, urp
 from installation_support import SAFETY, TCP, installation, listed, pose_feature
 
-from protocol.primary.layout import SafetyData
+from protocol.primary.layout import ConfigurationData, SafetyData
 from protocol.primary.messages import TextMessage
-from protocol.primary.setup import ConfigurationData
 from protocol.ur_types import SafetyMode
-from ur_emulator.commands.programs import SetUp
-from ur_emulator.commands.push import Push
+from ur_emulator.commands.programs import SetUp, StartProgram
+from ur_emulator.commands.surroundings import Push
+from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.controller.io.run_states import RunState
-from ur_emulator.controller.safety.configured_limits import SafetySettings, limits_of
 from ur_emulator.controller.safety.inputs import SafetyInput
+from ur_emulator.controller.safety.safety_state import SafetySettings, limits_of
 from ur_emulator.emulator import ControlBox
+from ur_emulator.errors import RefusedError
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.safety_limits import ArmLimits
-from ur_emulator.models.ur3 import UR3
 from ur_emulator.programs.installation import (
     DeclaredPayload,
     DeclaredSignal,
@@ -30,7 +30,7 @@ from ur_emulator.programs.installation import (
     Installation,
     OutputRule,
 )
-from ur_emulator.programs.script_header import header_lines, setup_script
+from ur_emulator.programs.script_writer import header_lines, setup_script
 from ur_emulator.servers.primary.robot_state import safety_checksum
 from urscript import compile_program
 
@@ -58,7 +58,7 @@ CELL = Installation(
 
 @pytest.fixture
 def box(tmp_path):
-    with ControlBox(pace="lockstep", port_base=None, seed=7, programs=tmp_path) as box:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7, programs=tmp_path) as box:
         yield box
 
 
@@ -126,7 +126,7 @@ def test_an_installation_is_effective_when_it_is_loaded(box, dashboard, tmp_path
         dashboard.ask("load installation cell.installation")
         == "Loading installation: /programs/cell.installation"
     )
-    state = box._box.controller.snapshot
+    state = inside(box)._box.controller.snapshot
     assert (state.tcp_offset, state.payload, state.payload_cog) == (
         (0.0, 0.0, 0.12, 0.0, 0.0, 0.5),
         1.25,
@@ -171,10 +171,10 @@ def test_the_limits_of_an_installation_bind_the_arm(box, dashboard, tmp_path):
         assert reader.message(TextMessage).text == "True"
         dashboard.until("programState", "STOPPED p.urp")
     assert any("joint 0 cannot be at 1 rad; allowed: -6.3355 to 0.0524" in entry.text for entry in box.log)
-    limits = box._box.controller.state.safety.limits
+    limits = inside(box)._box.controller.state.safety.limits
     assert limits.reduced_speed == (1.5, 1.5, 1.5, 3.0, 3.0, 3.0)
     dashboard.ask("load installation default.installation")
-    assert box._box.controller.state.safety.limits == limits_of(robot_by_name("ur3"))
+    assert inside(box)._box.controller.state.safety.limits == limits_of(robot_by_name("ur3"))
 
 
 INPUTS = """
@@ -211,11 +211,11 @@ def test_an_installation_sets_up_inputs_of_an_e_series_box(tmp_path, robot, assi
     (tmp_path / "cell.installation").write_bytes(installation(settings))
     (tmp_path / "plain.installation").write_bytes(installation(""))
     with (
-        ControlBox(robot=robot, pace="lockstep", port_base=None, programs=tmp_path) as box,
+        ControlBox(in_process=True, robot=robot, pace="lockstep", port_base=None, programs=tmp_path) as box,
         Dashboard(box) as dashboard,
     ):
         dashboard.ask("load installation cell.installation")
-        assert box._box.controller.safety.inputs.assigned == assigned
+        assert inside(box)._box.controller.safety.inputs.assigned == assigned
         if assigned:
             box.set_operational_mode("automatic")
             assert box.state.safety_status == "AUTOMATIC_MODE_SAFEGUARD_STOP"
@@ -226,7 +226,7 @@ def test_an_installation_sets_up_inputs_of_an_e_series_box(tmp_path, robot, assi
                 box.set_digital_input("configurable", n, True)
             assert box.state.safety_status == "NORMAL"
         dashboard.ask("load installation plain.installation")
-        assert box._box.controller.safety.inputs.assigned == {}
+        assert inside(box)._box.controller.safety.inputs.assigned == {}
 
 
 def test_an_installation_cannot_widen_the_limits_of_the_arm():
@@ -267,7 +267,7 @@ def test_inverse_kinematics_and_what_clients_are_told_keep_the_limits_of_an_inst
     texts = " ".join(entry.text for entry in box.log)
     unknown = "SafetyLimits BoundaryPlane0 with the unknown mode FAR is not watched"
     assert f"/programs/cell.installation: {unknown}" in texts
-    assert [plane.name for plane in box._box.controller.state.safety.limits.boundaries.planes] == [
+    assert [plane.name for plane in inside(box)._box.controller.state.safety.limits.boundaries.planes] == [
         "BoundaryPlane1"
     ]
     with connect(box, "primary") as sock:
@@ -280,6 +280,32 @@ def set_up(bench, **settings):
     """Make the limits of an installation effective."""
     limits = limits_of(bench.controller.state.robot).within(SafetySettings(**settings))
     bench.tick(1, SetUp(compile_program("sec installation():\n  sync()\nend\n"), limits, {}))
+
+
+def test_an_installation_does_not_act_in_the_middle_of_a_motion():
+    bench = Bench(fidelity="ideal")
+    bench.tick(1, StartProgram(compile_program("movej([-1.0, -1.7, -1.7, -0.1, 1.2, 1.8])\n")))
+    with pytest.raises(RefusedError, match="a program runs"):
+        SetUp(compile_program("sec s():\n  sync()\nend\n"), bench.controller.state.safety.limits, {}).apply(
+            bench.controller
+        )
+
+
+def test_what_is_loaded_stays_when_a_program_begins_while_another_is_read(tmp_path):
+    (tmp_path / "next.urp").write_bytes(urp(script_line("x = 1")))
+    (tmp_path / "default.installation").write_bytes(installation())
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box:
+        access, player = inside(box)._access, inside(box)._player
+        runs = StartProgram(compile_program("def p():\n  while True:\n    sync()\n  end\nend\n"))
+
+        def both():
+            access.start_alone(player.load("next.urp"))
+            access.submit(runs)
+
+        inside(box)._loop.call_soon_threadsafe(both, lambda error: None)
+        box.wait_until(log="load next.urp failed: a program runs")
+        assert player.loaded is None
+        assert box.state.program_state == "PLAYING"
 
 
 @pytest.mark.parametrize("robot", ["ur3", "ur5"])
@@ -404,7 +430,7 @@ def test_an_input_starts_nothing_in_local_control(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("sleep(1000)")))
     with (
-        ControlBox("ur5e", pace="lockstep", port_base=None, programs=tmp_path) as box,
+        ControlBox("ur5e", in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
         Dashboard(box) as dashboard,
     ):
         assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
@@ -438,7 +464,7 @@ def test_the_default_installation_loads_a_program_that_a_line_starts(tmp_path, l
     names = listed("DigitalInputNames", *[""] * 6, "go", "")
     (tmp_path / "default.installation").write_bytes(installation(start_up(line, str(level).lower()), names))
     with (
-        ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box,
+        ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
         Dashboard(box) as dashboard,
         connect(box, "primary") as sock,
     ):
@@ -456,7 +482,10 @@ def test_what_a_client_loads_at_start_up_stays(tmp_path):
     for name in ("sub/p.urp", "other.urp"):
         (tmp_path / name).write_bytes(urp(script_line("x = 1")))
     (tmp_path / "default.installation").write_bytes(installation(start_up()))
-    with ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box, Dashboard(box) as dashboard:
+    with (
+        ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
+        Dashboard(box) as dashboard,
+    ):
         assert dashboard.ask("load other.urp") == "Loading program: /programs/other.urp"
         loaded = [entry.text for entry in box.log if entry.text.startswith("Loaded program")]
         assert loaded == ["Loaded program: /programs/sub/p.urp", "Loaded program: /programs/other.urp"]
@@ -473,7 +502,10 @@ def test_a_start_line_that_is_no_input_is_said(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("x = 1")))
     (tmp_path / "default.installation").write_bytes(installation(start_up("digital_in[9]")))
-    with ControlBox(pace="lockstep", port_base=None, programs=tmp_path) as box, Dashboard(box) as dashboard:
+    with (
+        ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
+        Dashboard(box) as dashboard,
+    ):
         assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
         dashboard.ask("running")
         assert any("'digital_in[9]': it is no digital input" in entry.text for entry in box.log)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.controller.modbus import robot_map as port_map
-from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, MapAddressError
+from ur_emulator.controller import modbus_map as port_map
+from ur_emulator.controller.modbus_map import COILS, REGISTERS, MapAddressError
 
 BENCH = Bench()
 

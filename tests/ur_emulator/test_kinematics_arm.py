@@ -12,8 +12,8 @@ from ur_emulator.errors import KinematicsError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.kinematics.closed_form import closed_form_inverse
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import TYPICAL
-from ur_emulator.models.ur3 import UR3
 
 TCP = (0.01, -0.02, 0.13, 0.3, -0.2, 0.7)
 

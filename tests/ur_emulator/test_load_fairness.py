@@ -8,23 +8,23 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from box_support import TIMEOUT, connect
+from box_support import TIMEOUT, connect, inside
 from rtde_support import RtdeClient, input_package
 
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.realtime import served_box
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
-from ur_emulator.servers.tcp import client_lines, places
+from ur_emulator.servers.tcp import client_lines, listener
 from ur_emulator.servers.tcp.client_lines import ClientLines
-from ur_emulator.servers.tcp.places import Places
+from ur_emulator.servers.tcp.listener import Places
 
 REGISTER = "input_double_register_0"
 
 
 @pytest.fixture
 def box():
-    with ControlBox(pace="lockstep", port_base=None, seed=7) as made:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7) as made:
         yield made
 
 
@@ -37,7 +37,7 @@ def standing_still(box):
         has_stopped.set()
         may_go_on.wait(TIMEOUT)
 
-    box._loop.call_soon_threadsafe(stand, pytest.fail)
+    inside(box)._loop.call_soon_threadsafe(stand, pytest.fail)
     assert has_stopped.wait(TIMEOUT)
     try:
         yield
@@ -65,7 +65,7 @@ def is_refused(box, port):
 def test_a_client_too_many_is_closed_at_once_with_one_line_and_a_place_that_is_left_is_taken(
     box, monkeypatch
 ):
-    monkeypatch.setattr(places, "BUDGETS", replace(BUDGETS, clients_of_port=3))
+    monkeypatch.setattr(listener, "BUDGETS", replace(BUDGETS, clients_of_port=3))
     with ExitStack() as stack:
         inside = [stack.enter_context(connect(box, "dashboard")) for _ in range(3)]
         for sock in inside:
@@ -90,7 +90,7 @@ def test_a_client_too_many_is_closed_at_once_with_one_line_and_a_place_that_is_l
 
 def test_an_address_cannot_take_all_places_and_nobody_can_take_more_than_there_are(monkeypatch):
     monkeypatch.setattr(
-        places, "BUDGETS", replace(BUDGETS, clients_of_port=2, clients_of_address=3, clients=5)
+        listener, "BUDGETS", replace(BUDGETS, clients_of_port=2, clients_of_address=3, clients=5)
     )
     taken, refused = Places(), Counter()
     for address in ("a", "b", "c"):
@@ -177,7 +177,7 @@ def test_lines_of_a_client_that_is_gone_are_not_worked_off(box, monkeypatch):
         for _ in range(1000):
             other.sendall(b"PolyscopeVersion\n")
             read_lines(other, 1)
-            if len(box._port_set._listeners["dashboard"].connections) == 1:
+            if len(inside(box)._port_set._listeners["dashboard"].connections) == 1:
                 break
         else:
             raise AssertionError("a client that is gone is still connected")
@@ -187,7 +187,7 @@ def test_lines_of_a_client_that_is_gone_are_not_worked_off(box, monkeypatch):
 def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their_order(box, monkeypatch):
     monkeypatch.setattr(served_box, "BUDGETS", replace(BUDGETS, commands=10))
     taken, values = [], []
-    controller = box._box.controller
+    controller = inside(box)._box.controller
     tick = controller.tick
 
     def counted(commands):

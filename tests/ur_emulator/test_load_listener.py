@@ -12,9 +12,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp import listener
-from ur_emulator.servers.tcp.listener import PAUSE, Listener
-from ur_emulator.servers.tcp.places import Places
-from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
+from ur_emulator.servers.tcp.listener import PAUSE, Listener, Places, SpareDescriptor
 
 
 class Clients:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 from test_rtde_port import PortBench
 
-from protocol.rtde import messages as M
+from protocol.rtde import codec as M
 from protocol.rtde import server_connection
 
 Q = ("timestamp", "actual_q", "actual_qd")

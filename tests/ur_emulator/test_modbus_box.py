@@ -27,7 +27,7 @@ from ur_emulator.servers.modbus import link as modbus_link
 
 @pytest.fixture(scope="module", params=["lockstep", "realtime"])
 def box(request):
-    with ControlBox(pace=request.param, port_base=None) as running:
+    with ControlBox(in_process=True, pace=request.param, port_base=None) as running:
         yield running
 
 
@@ -202,7 +202,7 @@ def test_an_own_request_reaches_the_unit_and_its_connection_ends():
         ended.connected = sock.recv(1)
         ended.set()
 
-    with ControlBox(pace="lockstep", port_base=None) as box, peer(behave) as port:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None) as box, peer(behave) as port:
         run(
             box, f'modbus_send_custom_command("127.0.0.1:{port}", 103, 6, [17, 32, 2, 88])', 'textmsg("sent")'
         )
@@ -223,7 +223,7 @@ def test_a_box_that_ends_closes_its_connections():
             answers_42(sock)
 
     with peer(behave) as port:
-        with ControlBox(pace="lockstep", port_base=None) as box:
+        with ControlBox(in_process=True, pace="lockstep", port_base=None) as box:
             assert run(box, add(port, 2, "in"), until(f"{status('in')} == 42"), 'textmsg("up")') == ["up"]
         assert ended.wait(TIMEOUT)
 

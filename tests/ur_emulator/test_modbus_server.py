@@ -4,7 +4,7 @@ import socket
 import struct
 
 import pytest
-from box_support import TIMEOUT, Bench, MessageReader, bare_access, connect
+from box_support import TIMEOUT, Bench, MessageReader, bare_access, connect, inside
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
@@ -12,20 +12,19 @@ from pymodbus.client import ModbusTcpClient
 from protocol.primary.messages import TextMessage
 from ur_emulator import ControlBox, cli, rack
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.modbus.robot_map import COILS, REGISTERS, read_coil, read_register
+from ur_emulator.controller.modbus_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.modbus.server import ModbusPort
 from ur_emulator.servers.tcp import listener
-from ur_emulator.servers.tcp.listener import Listener
-from ur_emulator.servers.tcp.places import Places
+from ur_emulator.servers.tcp.listener import Listener, Places
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
 
 @pytest.fixture(scope="module", params=["lockstep", "realtime"])
 def box(request):
-    with ControlBox(pace=request.param, port_base=None, seed=7) as running:
+    with ControlBox(in_process=True, pace=request.param, port_base=None, seed=7) as running:
         yield running
 
 
@@ -38,7 +37,7 @@ def client(box):
 @pytest.fixture
 def still():
     """A box in which time stands still once nothing goes on."""
-    with ControlBox(pace="lockstep", port_base=None, seed=7) as running:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7) as running:
         yield running
 
 
@@ -55,7 +54,7 @@ def run(box, *lines):
 
 @pytest.mark.parametrize("rows", [REGISTERS, COILS], ids=["registers", "coils"])
 def test_every_address_of_the_map_can_be_read_and_gives_what_scripts_read(still, rows):
-    state = still._box.controller.state
+    state = inside(still)._box.controller.state
     is_registers = rows is REGISTERS
     with ModbusTcpClient(still.host, port=still.ports.modbus, timeout=TIMEOUT, retries=0) as client:
         reads = (
@@ -319,7 +318,7 @@ def test_any_request_gets_an_answer(pdus):
 
 def _any_box():
     if not _BOXES:
-        box = ControlBox(pace="lockstep", port_base=None)
+        box = ControlBox(in_process=True, pace="lockstep", port_base=None)
         box.__enter__()
         _BOXES.append(box)
     return _BOXES[0]
@@ -443,7 +442,7 @@ def test_a_forbidden_port_is_distinguished_from_a_taken_one(monkeypatch):
 
 def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch):
     forbid_low_ports(monkeypatch)
-    with ControlBox(pace="lockstep") as box:
+    with ControlBox(in_process=True, pace="lockstep") as box:
         assert box.ports.modbus == 0
         assert box.ports.dashboard > 0
         assert run(box, 'textmsg("up")') == "up"
@@ -454,7 +453,7 @@ def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch
 
 def test_the_command_says_so_in_one_line(monkeypatch, capfd):
     forbid_low_ports(monkeypatch)
-    monkeypatch.setattr(rack.BoxRack, "serve_forever", rack.BoxRack.close)
+    monkeypatch.setattr(rack.LoopRack, "serve_forever", rack.LoopRack.close)
     assert not cli.app(["serve", "--pace", "lockstep"], standalone_mode=False)
     out, err = capfd.readouterr()
     assert err.startswith("ur-emulator: no Modbus server: port 502 on 127.0.0.1 needs privileges")

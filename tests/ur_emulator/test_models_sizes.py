@@ -10,7 +10,7 @@ import pytest
 from box_support import FakeNetwork, connect
 
 from pc_client.kinematics.robot_model import robot_model
-from protocol.calibration_hash import calibration_hash
+from protocol.primary.layout import calibration_hash
 from protocol.serial_numbers import parse_serial
 from protocol.ur_types import RobotType
 from ur_emulator import ControlBox
@@ -18,7 +18,7 @@ from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ModelError
 from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import arm_spec
 from ur_emulator.models.robots import ROBOTS
 from ur_emulator.scripting.program_slot import ProgramSlot

@@ -11,12 +11,11 @@ import pytest
 
 from ur_emulator.errors import EmulatorError, ModelError
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL
+from ur_emulator.models.cb3_arms import UR3
+from ur_emulator.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL, random_stream
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.mjcf import arm_spec
-from ur_emulator.models.random_streams import random_stream
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.ur3 import UR3
 
 
 def test_moving_mass_is_that_of_the_vendor_table():

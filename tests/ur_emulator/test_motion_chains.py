@@ -25,13 +25,13 @@ from motion_support import (
 
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
-from ur_emulator.controller.safety.configured_limits import limits_of
-from ur_emulator.controller.safety.limit_checks import find_invalid_setpoint
+from ur_emulator.controller.safety.limit_checks import SetpointCheck, find_invalid_setpoint
+from ur_emulator.controller.safety.safety_state import limits_of
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import PoseLine, arc_through
 from ur_emulator.motion.path_samples import JOINT_ACCELERATION
-from ur_emulator.motion.target import JointTarget
 from ur_emulator.motion.tool import UnreachableError
 
 V, A = 0.25, 1.2
@@ -229,6 +229,19 @@ def test_near_a_singularity_the_tool_slows_down_for_the_joints():
     assert distance_to_polyline(positions(targets), [start[:3], goal[:3]]).max() < 1e-4
     for before, after in itertools.pairwise(targets):
         assert find_invalid_setpoint(LIMITS, before, after, ARM.robot.stop_deceleration, DT) is None
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["q", "qd"])
+def test_a_set_point_that_is_not_a_finite_number_is_invalid(joint, value, field):
+    before = JointTarget(HOME)
+    values = list(getattr(before, field))
+    values[joint] = value
+    check = SetpointCheck(ARM.robot.stop_deceleration, DT)
+    found = check.find_invalid(LIMITS, before, before._replace(**{field: tuple(values)}))
+    assert found is not None
+    assert (found.error.code, found.error.argument) == (204, joint)
 
 
 # --- random chains

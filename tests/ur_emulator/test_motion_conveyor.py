@@ -14,14 +14,14 @@ from ur_emulator.commands.programs import StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.io.encoders import RANGES, Encoder
 from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.conveyor import (
+from ur_emulator.motion.move import Move
+from ur_emulator.motion.overlay import (
     CATCH_UP_ACCELERATION,
     BeltEstimate,
     CircularBelt,
     Conveyor,
     LinearBelt,
 )
-from ur_emulator.motion.move import Move
 
 PLACE = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
 

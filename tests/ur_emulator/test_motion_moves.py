@@ -22,10 +22,10 @@ from motion_support import (
 )
 
 from ur_emulator.models.robot_model import ZERO6
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
 from ur_emulator.motion.path import arc_through
-from ur_emulator.motion.target import JointTarget
 
 offsets = st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 V, A = 0.25, 1.2

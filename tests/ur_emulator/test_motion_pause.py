@@ -10,11 +10,10 @@ from motion_support import DT, HOME, START, TOOL, at, distance_to_polyline, line
 
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.generators import PAUSE_DECELERATION, SpeedJ
+from ur_emulator.motion.generators import PAUSE_DECELERATION, ServoJ, SpeedJ
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Move
 from ur_emulator.motion.path import arc_through
-from ur_emulator.motion.servo_j import ServoJ
 
 CORNERS = [START, at(0.06, 0, 0), at(0.06, 0.06, 0)]
 

@@ -8,6 +8,8 @@ from protocol.pose import pose_trans
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.commands.programs import SetSpeedSlider, StopProgram
 from ur_emulator.controller.events import ErrorReported, ReportLevel, ScriptFailed
+from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.models.robots import robot_by_name
 
 PLACE = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
 POSE = (0.25, -0.25, 0.25, 2.2, -2.2, 0.0)
@@ -177,6 +179,24 @@ def test_servoc_may_be_called_with_the_same_pose_all_the_time(bench):
     assert not bench.events[1:]
 
 
+@pytest.mark.parametrize(("robot", "generation"), [("ur3", CB3), ("ur5", CB3), ("ur5e", E_SERIES)])
+@pytest.mark.parametrize("r", [0.0, 0.05])
+def test_a_duration_that_the_arm_cannot_keep_is_made_longer(robot, generation, r):
+    """As the maker's live tests ask: no stop."""
+    bench = Bench(robot=robot, generation=generation)
+    bench.run("movej([-1.57,-1.57,0,-1.57,1.57,0], t=4)\n")
+    bench.run(
+        f"def f():\n  movej([1.57,-1.57,0,-1.57,1.57,0], t=0.1, r={r})\n  movej([1.2,-1.4,-1.9,-1.4,1.57,0], t=0.1)\n"
+        "  p = get_target_tcp_pose()\n  p[2] = p[2] - 0.1\n  movel(p, t=0.05)\nend\n"
+    )
+    assert not errors(bench)
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    assert bench.now.target_q[0] == pytest.approx(1.2, abs=0.05)
+    fastest = max(max(map(abs, s.target_qd)) for s in bench.snapshots)
+    qd_max = robot_by_name(robot).qd_max
+    assert 0.9 * qd_max[0] < fastest <= max(qd_max)
+
+
 def test_an_absurd_duration_is_just_slow(bench):
     bench.start(f"movel({shifted(0.1)}, t=1e15)\n")
     bench.tick(20)
@@ -214,3 +234,27 @@ def test_the_speed_slider_is_taken_on_without_a_jump(bench):
     speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])
     assert speed[-1] == pytest.approx(0.01, abs=1e-6)
     assert np.abs(np.diff(speed)).max() <= 1.2 * 0.008 * 1.01
+
+
+@pytest.mark.parametrize("slider", [0.25, 0.3, 1.0])
+@pytest.mark.parametrize("generation", [CB3, E_SERIES])
+def test_a_spline_of_short_speedj_keeps_its_path_at_any_speed(slider, generation):
+    """As the maker's driver script streams splines; its live test sets 25 %."""
+    bench = Bench(fidelity="exact", generation=generation)
+    bench.tick(1, SetSpeedSlider(slider))
+    bench.tick(200)
+    bench.snapshots.clear()
+    bench.run(
+        "def spline():\n  qd = [0,0,0,0,0,0]\n  k = 0\n  dt = get_steptime()\n  while k * dt < 1:\n    k = k + 1\n"
+        "    s = k * dt\n    last = qd[5]\n    qd[5] = 12 * s * (1 - s) * (1 - 2 * s)\n"
+        "    write_output_float_register(1, s)\n    speedj(qd, norm(qd[5] - last) / dt, dt)\n  end\nend\n"
+    )
+    start = bench.snapshots[0].target_q[5]
+    assert bench.now.target_q[5] == pytest.approx(start, abs=2e-3)
+    rows = [(s.registers.output_floats[1], s.target_q[5] - start) for s in bench.snapshots]
+    assert max(q for _, q in rows) == pytest.approx(6 * 0.0625, abs=2e-3)
+    # The register is ahead of the target by at most one call.
+    dt = bench.controller.period_s
+    assert (
+        max(min(abs(q - 6 * (x * (1 - x)) ** 2) for x in (s, s - 0.5 * dt, s - dt)) for s, q in rows) < 5e-3
+    )

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motion_support import DT, HOME, TOOL, tool_accelerations, tool_velocities
+from motion_support import DT, HOME, START, TOOL, tool_accelerations, tool_velocities
 
+from protocol.pose import pose_sub
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.servo_j import LOST_DECELERATION, ServoJ
-from ur_emulator.motion.speed_l import SpeedL, StopL
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedL, StopL
 
 FAST = (math.inf,) * 6  # no joint is too slow
 
@@ -111,6 +110,29 @@ def test_speedl_accelerates_on_a_straight_line():
     v = tool_velocities(targets)[1:]
     assert np.abs(v[:, 1] - 0.5 * v[:, 0]).max() < 1e-3
     assert np.abs(v[:, 2]).max() < 1e-3
+
+
+@pytest.mark.parametrize("renewed", [1250, 25, 1])
+def test_speedl_stays_on_its_line_for_ten_seconds_and_through_the_stop(renewed):
+    """One command of 10 s, and the same motion in many commands."""
+    motion = ArmMotion(HOME, 20.0)
+    owner = object()
+    v = np.array([0.004, 0.012, 0.016, 0.0, 0.0, 0.03])
+    for k in range(1250):
+        if k % renewed == 0:
+            motion.command(owner, SpeedL(tuple(v), 1.0, 1.0, TOOL))
+        motion.renew()
+        motion.step(DT, 1.0)
+    half = TOOL.pose(motion.target.q)
+    motion.command(owner, StopL(1.0, 1.0, TOOL))
+    while motion.is_moving:
+        motion.step(DT, 1.0)
+    for pose, t in ((half, 1250 * DT), (TOOL.pose(motion.target.q), 1251 * DT)):
+        moved = pose_sub(pose, START)
+        along = np.dot(moved[:3], v[:3]) / np.dot(v[:3], v[:3])
+        assert along == pytest.approx(t, abs=0.03)
+        assert moved[:3] == pytest.approx(v[:3] * along, abs=1e-6)
+        assert moved[3:] == pytest.approx(v[3:] * along, abs=1e-3)
 
 
 @settings(max_examples=20)

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.motion.smooth_plan import SmoothPlan
-from ur_emulator.motion.speed_plan import Interval, plan
+from ur_emulator.motion.speed_plan import Interval, SmoothPlan, plan
 
 GOAL = "[0.6, -1.3, -1.6, -0.5, 1.2, 1.2]"
 AHEAD = "pose_add(get_target_tcp_pose(), p[0, 0.25, 0, 0, 0, 0])"

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from plant_support import HOME, SpeedRamp
 
 from protocol.ur_types import ControlMode
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.cb3_arms import UR3
+from ur_emulator.models.e_series_arms import UR5E
 from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
-from ur_emulator.models.ur3 import UR3
-from ur_emulator.models.ur5e import UR5E
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import Plant
 

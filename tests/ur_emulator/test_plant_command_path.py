@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.command_path import CommandPath, trace_cycle
 
 N, DT = 4, 0.002

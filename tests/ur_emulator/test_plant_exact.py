@@ -10,11 +10,11 @@ from box_support import Bench
 from protocol.ur_types import ControlMode
 from ur_emulator.commands.power import StartFreedrive
 from ur_emulator.commands.programs import SetSpeedSlider
-from ur_emulator.commands.push import Push
+from ur_emulator.commands.surroundings import Push
 from ur_emulator.errors import PlantError, RefusedError
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import EXACT
-from ur_emulator.models.ur3 import UR3
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.exact import ExactPlant
 
 MOVES = """

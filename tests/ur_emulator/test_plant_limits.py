@@ -9,9 +9,9 @@ import pytest
 from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
 from ur_emulator.errors import EmulatorError, ModelError, PlantError
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.models.ur3 import UR3
+from ur_emulator.models.generations import CB3
 from ur_emulator.plant.plant import Plant
 
 TABLE = -0.02

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, POOR, TYPICAL
-from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
 
 RAISED = HOME - np.array((1.0, 0.3, 0.3, 1.0, 1.0, 1.0))

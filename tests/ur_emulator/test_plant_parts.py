@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.mjcf import GRAVITY
-from ur_emulator.models.ur3 import UR3
-from ur_emulator.plant.force_drift import ForceDrift
+from ur_emulator.plant.feedback import GearRipple
 from ur_emulator.plant.friction import Friction
-from ur_emulator.plant.gear import GearRipple
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 from ur_emulator.plant.physics import ServoGains
-from ur_emulator.plant.thermometers import Thermometers
+from ur_emulator.plant.plant import Thermometers
+from ur_emulator.plant.sensors import ForceDrift
 
 Q = np.array([0.4, -1.3, 1.1, -0.6, 0.9, 2.0])
 STILL = np.zeros(6)

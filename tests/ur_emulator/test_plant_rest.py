@@ -7,8 +7,8 @@ import pytest
 from plant_support import HOME, SpeedRamp, column, hold
 
 from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.models.ur3 import UR3
 from ur_emulator.plant.plant import Plant
 
 IN_ARM_PLANE = np.cos(HOME[0])  # share of a lever along x that the shoulder feels

@@ -13,14 +13,13 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs import reading, xml_tree
+from ur_emulator.programs import reading
 from ur_emulator.programs.compiling import compile_loaded
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.loading import load_program
 from ur_emulator.programs.script_writer import Header
 from urscript.catalogue import catalogue_for
 
-BLANKS = '<ExpressionChar character=" "/>' * 50_000
 LAUGHS = "".join(f'<!ENTITY {chr(98 + n)} "{("&" + chr(97 + n) + ";") * 10}">' for n in range(7))
 DOCTYPES = {
     "laughs": f'<!DOCTYPE URProgram [<!ENTITY a "<c/><c/><c/>">{LAUGHS}]><URProgram>&h;</URProgram>',
@@ -108,26 +107,8 @@ def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path):
 # --- trees
 
 
-def test_references_lead_past_a_bounded_number_of_elements(tmp_path, monkeypatch):
-    monkeypatch.setattr(reading, "BUDGETS", replace(BUDGETS, reference_steps=100_000))
-    first = f'<If type="If"><expression>{BLANKS}<ExpressionChar character="1"/></expression><children/></If>'
-    again = '<If type="If"><expression reference="../../If/expression"/><children/></If>'
-    assert "references lead past more than 100000" in refused(tmp_path, urp(first + again * 5))
-    many = (
-        "<Comment/>" * 1000 + '<Assignment><variable reference="../../Assignment[1]/x"/></Assignment>' * 100
-    )
-    assert "leads nowhere" in refused(tmp_path, urp(many))
-    named = '<Assignment><variable name="a"/><expression><ExpressionChar character="1"/></expression></Assignment>'
-    other = named.replace('name="a"', 'reference="../../Assignment[1]/variable"')
-    assert "references lead past more than 100000" in refused(
-        tmp_path, urp("<Comment/>" * 1000 + named + other * 100)
-    )
-    far = f'<variable reference="{"../" * 20_000}variable"/>'
-    assert "lead" in refused(tmp_path, urp(f"<Assignment>{far}</Assignment>" * 10))
-
-
 def test_levels_of_a_file_are_counted_exactly(tmp_path, monkeypatch):
-    monkeypatch.setattr(xml_tree, "BUDGETS", replace(BUDGETS, program_depth=9))
+    monkeypatch.setattr(reading, "BUDGETS", replace(BUDGETS, program_depth=9))
     load(tmp_path, urp(nested(2, "<Halt/>")))
     assert "nested more than 9 deep" in refused(tmp_path, urp(nested(3, "<Halt/>")))
 

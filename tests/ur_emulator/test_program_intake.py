@@ -1,5 +1,6 @@
 """Script text becomes commands: words at once, programs in the turns of their senders, and never too much of it."""
 
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,8 +12,7 @@ from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import PauseProgram, SetSpeedSlider, StartProgram, StopProgram
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.errors import WorkerError
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.servers.programs import intake as module
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.sender import Sender
@@ -47,6 +47,7 @@ class Box:
     def __init__(self):
         self.stops = 0
         self.remote_period = 1
+        self.newest = 0.0
         self.done = []
 
     def submit(self, command, *, in_place_of=""):
@@ -159,6 +160,15 @@ def test_a_program_that_takes_long_holds_up_nobody_and_does_not_replace_a_newer_
         "b paused",
         "program long does not begin: a newer one was compiled before it",
     ]
+
+
+def test_a_program_does_not_replace_one_that_somebody_else_started_since(intake, tasks, box, one):
+    intake.received(one, program("long"))
+    box.newest = time.monotonic()  # `play`, or the control API
+    tasks.finish()
+    intake.received(one, program("next"))
+    tasks.finish()
+    assert box.take() == ["program long does not begin: a newer one was compiled before it", "next"]
 
 
 def test_a_stop_ends_all_that_came_before_it_and_nothing_else(intake, tasks, box, one, two):

@@ -18,7 +18,7 @@ from protocol.primary.state import RobotState
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.servers.primary.port import PrimaryPort
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
@@ -147,7 +147,7 @@ def test_a_call_of_the_program_below_it_is_another_program(box):
     assert (error.line, error.column, error.text) == (1, 1, "compile_error_name_not_found:prog:")
 
 
-def test_the_secondary_port_reports_nothing():
+def test_the_secondary_port_reports_nothing_but_states():
     class Client:
         sent = ()
 
@@ -177,7 +177,8 @@ def test_the_secondary_port_reports_nothing():
     assert {"ScriptFailed", "TextPrinted", "PopupShown", "ErrorReported", "SafetyModeChanged"} <= kinds
     for event in bench.events:
         port.send_message(event)
-    assert client.sent == ()
+    sent = [decode_package(package, VERSION) for package in client.sent]
+    assert [type(package) for package in sent] == [RobotState]  # of the stop
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.programs import ResumeProgram, StartProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.controller import events
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from urscript import compile_program
 
 

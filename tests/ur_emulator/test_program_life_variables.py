@@ -15,20 +15,32 @@ from protocol.primary.messages import (
     ThreadLabel,
 )
 from protocol.primary.packages import decode_package
-from protocol.primary.program import GlobalVariablesSetup, GlobalVariablesUpdate
 from protocol.primary.state import RobotState
-from protocol.primary.values import TypedValue, ValueType, encode_value
+from protocol.primary.values import (
+    GlobalVariablesSetup,
+    GlobalVariablesUpdate,
+    TypedValue,
+    ValueType,
+    encode_value,
+)
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import StopProgram
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.servers.primary import variable_reporter
-from ur_emulator.servers.primary.label_reporter import MAX_THREADS, LabelReporter, parse_label
+from ur_emulator.models.generations import CB3
+from ur_emulator.servers.primary import program_reports
 from ur_emulator.servers.primary.port import PrimaryPort
+from ur_emulator.servers.primary.program_reports import (
+    MAX_BODY,
+    MAX_THREADS,
+    MAX_VALUE,
+    LabelReporter,
+    parse_label,
+    size_of,
+    typed_value,
+)
 from ur_emulator.servers.primary.robot_state import StateEncoder
-from ur_emulator.servers.primary.variable_reporter import MAX_BODY, MAX_VALUE, size_of, typed_value
-from urscript import Matrix, Pose
+from urscript import Matrix, Pose, RunningProgram
 
 FOREVER = "  while True:\n    sync()\n  end\nend\n"
 
@@ -324,7 +336,7 @@ def large_values(n, length):
 def test_an_update_encodes_a_bounded_number_of_elements_and_all_take_turns(monkeypatch):
     encoded = []
     monkeypatch.setattr(
-        variable_reporter,
+        program_reports,
         "encode_value",
         lambda value, version: encoded.append(value) or encode_value(value, version),
     )
@@ -351,7 +363,7 @@ def test_a_value_that_cannot_fit_is_not_encoded_at_all():
 
 
 def test_all_values_of_a_program_have_a_limit_together(monkeypatch):
-    monkeypatch.setattr(variable_reporter, "BUDGETS", replace(BUDGETS, variable_bytes=3_000))
+    monkeypatch.setattr(program_reports, "BUDGETS", replace(BUDGETS, variable_bytes=3_000))
     bench = PortBench()
     client = bench.client()
     bench.start(large_values(4, 400))
@@ -360,13 +372,83 @@ def test_all_values_of_a_program_have_a_limit_together(monkeypatch):
     assert [i for i, value in known.items() if value is not None] == [0]
 
 
+def test_the_names_of_a_program_have_a_limit_together():
+    bench = PortBench()
+    client = bench.client()
+    names = [f"v{i}".ljust(255, "_") for i in range(300)]
+    bench.start("def p():\n" + "".join(f"  global {name} = 1\n" for name in names) + FOREVER)
+    bench.tick(20)
+    packages = client.packages()
+    assert list(names_of(packages).values()) == names[: BUDGETS.variable_name_bytes // 256]
+    assert len(values_of(packages)) == BUDGETS.variable_name_bytes // 256
+
+
+@pytest.fixture
+def encoded(monkeypatch):
+    """The indices of the first names or values of packages that were encoded."""
+    starts = {"encode_names": [], "encode_values": []}
+    for name, found in starts.items():
+        encode = getattr(program_reports, name)
+
+        def count(timestamp, start, items, *, encode=encode, found=found):
+            found.append(start)
+            return encode(timestamp, start, items)
+
+        monkeypatch.setattr(program_reports, name, count)
+    return starts
+
+
+def test_clients_that_come_in_one_cycle_get_what_is_encoded_once(encoded):
+    bench = PortBench()
+    declarations = "".join(f"  global variable_{i} = {i}\n" for i in range(400))
+    bench.start(f"def p():\n{declarations}" + FOREVER)
+    bench.tick(20)
+    clients = [bench.client() for _ in range(5)]
+    n_packages = len(encoded["encode_names"])
+    assert n_packages == len(set(encoded["encode_names"])) > 1
+    told = [client.packages() for client in clients]
+    assert told[0] == told[-1]
+    assert values_of(told[0]) == dict(enumerate(range(400)))
+    bench.tick()
+    bench.client()
+    assert len(encoded["encode_names"]) == 2 * n_packages
+
+
+def test_clients_that_come_and_go_do_not_make_the_values_be_read_more_often(monkeypatch):
+    looked = []
+    read = RunningProgram.read_global
+    monkeypatch.setattr(
+        RunningProgram, "read_global", lambda run, name: looked.append(name) or read(run, name)
+    )
+    bench = PortBench()
+    bench.start("def p():\n  global n = 0\n  while True:\n    n = n + 1\n    sync()\n  end\nend\n")
+    seen = []
+    for _ in range(50):  # 0.4 s
+        bench.tick()
+        client = bench.client()
+        seen.append(values_of(client.packages())[0])
+        bench.port.closed(client)
+    assert len(looked) == 4
+    assert sorted(set(seen)) == [2, 15, 28, 41]
+
+
+def test_what_a_program_held_is_given_back_at_its_end_also_when_nobody_listens():
+    bench = PortBench()
+    bench.start("def p():\n  global x = [1, 2, 3]\n" + FOREVER)
+    bench.tick(3)
+    bench.port.closed(bench.client())
+    assert bench.port._variables._seen == [[1, 2, 3]]
+    bench.tick(1, StopProgram())
+    assert bench.port._variables._seen == []
+
+
 # --- labels
 
 
 def test_long_labels_of_many_threads_stay_within_a_package():
     bench = PortBench()
     client = bench.client()
-    label = f'    $ 1 "{"x" * 5_000}"\n'
+    label = f'    $ 1 "{"x" * 1_000}"\n'
     runs = "  run t()\n" * 100
     bench.start(f"def p():\n  thread t():\n{label}    sleep(9)\n  end\n{runs}" + FOREVER)
     bench.tick(3)
@@ -443,7 +525,7 @@ def test_a_label_that_is_none_is_not_reported():
 
 
 def test_on_the_wire():
-    with ControlBox(pace="lockstep", port_base=None) as box, connect(box, "primary") as sock:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None) as box, connect(box, "primary") as sock:
         reader = MessageReader(sock)
         sock.sendall(
             b'def p():\n  $ 1 "Robot Program"\n  global speed = 0.5\n  speed = speed * 2\n  textmsg("done")\n  sleep(0.5)\nend\n'

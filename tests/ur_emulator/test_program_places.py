@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+import tempfile
 import zipfile
 from dataclasses import replace
 from pathlib import PurePosixPath
@@ -15,12 +16,13 @@ from dashboard_support import Dashboard, script_line, urp, write_programs
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
-from ur_emulator.programs.inner_files import PART_NAME
+from ur_emulator.programs.folder import PART_NAME, FoundFile, ProgramFolder
 from ur_emulator.programs.loading import load_program
 from ur_emulator.servers.reports import report_files
 from ur_emulator.servers.reports.report_files import BoxFacts, flight_report, save_log, support_file
-from ur_emulator.servers.reports.temporary_folder import TemporaryFolder
+from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove_left_folders
+from ur_emulator.servers.robot_api import program_files
+from ur_emulator.servers.robot_api.program_files import KINDS, Outcome, write_program
 
 SECRET = 'def secret():\n  textmsg("secret of another user")\nend\n'
 FACTS = BoxFacts("20193000007", {"software": "3.15"}, 12.0, {"actual_q": [0.0]}, "the log\n")
@@ -43,7 +45,7 @@ def folder(tmp_path, outside):
 def session(folder, *lines):
     """Let a box answer lines; return the replies and the log."""
     with (
-        ControlBox(pace="lockstep", port_base=None, seed=7, programs=folder) as box,
+        ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7, programs=folder) as box,
         Dashboard(box) as dashboard,
     ):
         return dashboard.ask_all(*lines), [str(entry) for entry in box.log]
@@ -155,6 +157,16 @@ def test_a_pipe_that_is_put_there_after_the_check_does_not_block(folder):
 # --- budgets and disks
 
 
+@pytest.mark.parametrize(
+    ("below", "beyond"), [("./" * 63, "./" * 64), (" " * 4_087, " " * 4_088)], ids=["parts", "characters"]
+)
+def test_a_long_path_is_no_file_and_is_not_looked_up(folder, below, beyond):
+    place = ProgramFolder(folder)
+    assert place.find(f"{below}hello.urp").wire_path == "/programs/hello.urp"
+    with pytest.raises(FileMissingError, match=r"more than 4096 and 64"):
+        place.find(f"{beyond}hello.urp")
+
+
 def test_reports_are_counted_and_the_next_is_refused(folder, monkeypatch):
     monkeypatch.setattr(report_files, "BUDGETS", replace(BUDGETS, report_files=4))
     place = ProgramFolder(folder)
@@ -189,6 +201,24 @@ def test_the_dashboard_reports_that_no_report_is_written_any_more(folder):
     assert all("remove some" in reply for reply in replies[:2])
     assert replies[2] == "Program running: false"
     assert not list(folder.glob("*.zip"))
+
+
+def test_uploads_have_one_total_with_the_programs_that_are_there(folder, monkeypatch):
+    place = ProgramFolder(folder)
+
+    def upload(name, size, is_new=True):
+        head = f'--XX\r\nContent-Disposition: form-data; name="file"; filename="{name}"\r\n\r\n'
+        body = head.encode() + b"#" * size + b"\r\n--XX--\r\n"
+        return write_program(place, "multipart/form-data; boundary=XX", body, is_new, "")[1]
+
+    n_programs = len([path for path in folder.rglob("*") if path.suffix in KINDS])
+    total = (n_programs + 3) * 4_096
+    monkeypatch.setattr(program_files, "BUDGETS", replace(BUDGETS, uploads_bytes=total))
+    assert upload("one.script", 1) is upload("two.script", 8_192) is Outcome.WRITTEN
+    with pytest.raises(ProgramFileError, match=f"three.script has 1 bytes, .* {total} are allowed, remove"):
+        upload("three.script", 1)
+    assert upload("two.script", 4_096, is_new=False) is Outcome.WRITTEN
+    assert upload("three.script", 1) is Outcome.WRITTEN
 
 
 def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):
@@ -239,7 +269,7 @@ def test_without_rights_it_is_one_line(folder, line):
 
 def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
-    with ControlBox(pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
         assert "no temporary folder" in dashboard.ask("generate flight report")
         assert dashboard.ask("running") == "Program running: false"
         assert str(tmp_path) not in "".join(map(str, box.log))
@@ -257,10 +287,27 @@ def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, m
     for path in others:
         path.mkdir()
     living = TemporaryFolder()
-    with ControlBox(pace="lockstep", port_base=None):
+    with ControlBox(in_process=True, pace="lockstep", port_base=None):
         assert set(tmp_path.iterdir()) == {living.path, *others}
     living.close()
     assert set(tmp_path.iterdir()) == set(others)
+
+
+def test_a_folder_that_another_box_removes_before_it_is_locked_is_made_again(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    make, made = tempfile.mkdtemp, []
+
+    def make_and_lose(**options):
+        made.append(make(**options))
+        if len(made) == 1:
+            remove_left_folders()
+        return made[-1]
+
+    monkeypatch.setattr("tempfile.mkdtemp", make_and_lose)
+    folder = TemporaryFolder()
+    remove_left_folders()
+    assert [str(folder.path)] == made[1:] == [str(path) for path in tmp_path.iterdir()]
+    folder.close()
 
 
 # --- what is told

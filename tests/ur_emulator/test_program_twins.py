@@ -107,5 +107,6 @@ def test_a_saved_script_that_does_not_compile_is_said(tmp_path):
         ]
         texts = [entry.text for entry in box.log]
     assert any("instead of the nodes runs p.script, saved by software 5.x" in text for text in texts)
-    end = "the script is p.script, saved by software 5.x"
-    assert any(text.startswith("p.urp will not start: ") and text.endswith(end) for text in texts)
+    end = "this is CB3 3.15); the script is p.script, saved by software 5.x"
+    said = [text for text in texts if text.startswith("p.urp will not start: ") and text.endswith(end)]
+    assert any("; known since e-Series 5.0, " in text for text in said)

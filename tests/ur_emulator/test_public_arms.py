@@ -10,7 +10,7 @@ import pytest
 from public_arms import MENAGERIE, ROS, Body, menagerie_model, ros_model
 
 from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import GRAVITY, arm_spec
 from ur_emulator.models.robots import ROBOTS
 

@@ -5,7 +5,7 @@ import socket
 from types import SimpleNamespace
 
 import pytest
-from box_support import FrameReader, MessageReader, connect, listening_socket
+from box_support import FrameReader, MessageReader, connect, inside, listening_socket
 from control_support import Http, control_box
 from dashboard_support import Dashboard
 
@@ -110,7 +110,7 @@ def test_an_error_that_nobody_takes_ends_the_loop(loop):
 
 @pytest.fixture
 def box():
-    with control_box(pace="realtime") as running, connect(running, "realtime") as sock:
+    with control_box(pace="realtime", in_process=True) as running, connect(running, "realtime") as sock:
         running.frames = FrameReader(sock)
         running.frames.next()
         yield running
@@ -120,7 +120,7 @@ def box():
 
 
 def faults(box):
-    return [entry.text for entry in box._log_entries() if entry.level is ReportLevel.FAULT]
+    return [entry.text for entry in box.log if entry.level is ReportLevel.FAULT]
 
 
 def is_closed(sock):
@@ -145,7 +145,7 @@ PORTS = ("primary", "secondary", "realtime_ro", "rtde", "dashboard", "modbus", "
 @pytest.mark.parametrize("method", ["opened", "received"])
 @pytest.mark.parametrize("name", PORTS)
 def test_an_error_of_a_port_ends_the_connection_that_has_caused_it(box, name, method, monkeypatch):
-    port, connections = box._port_set._ports[name], box._port_set._listeners[name].connections
+    port, connections = inside(box)._port_set._ports[name], inside(box)._port_set._listeners[name].connections
     with open_port(box, name) as other:
         until(box, lambda: connections)  # it is let in
         with monkeypatch.context() as patch:
@@ -161,8 +161,8 @@ def test_an_error_of_a_port_ends_the_connection_that_has_caused_it(box, name, me
 
 
 def test_an_error_of_a_port_that_forgets_a_client_harms_nobody(box, monkeypatch):
-    connections = box._port_set._listeners["rtde"].connections
-    monkeypatch.setattr(box._port_set._ports["rtde"], "closed", fail)
+    connections = inside(box)._port_set._listeners["rtde"].connections
+    monkeypatch.setattr(inside(box)._port_set._ports["rtde"], "closed", fail)
     with connect(box, "rtde") as sock:
         until(box, lambda: connections)
         address = "{}:{}".format(*sock.getsockname())
@@ -174,7 +174,7 @@ def test_an_error_of_a_port_that_forgets_a_client_harms_nobody(box, monkeypatch)
 def test_an_error_while_requests_are_answered_ends_their_connection(box, monkeypatch):
     with Dashboard(box) as other, Dashboard(box) as dashboard:
         with monkeypatch.context() as patch:
-            patch.setattr(box._port_set._ports["dashboard"]._answers, "answer", fail)
+            patch.setattr(inside(box)._port_set._ports["dashboard"]._answers, "answer", fail)
             dashboard.send("robotmode")
             assert dashboard.is_closed()
         assert other.ask("robotmode") == "Robotmode: RUNNING"
@@ -209,10 +209,10 @@ def test_an_error_in_a_command_ends_who_has_sent_it(box, monkeypatch):
 def test_a_port_that_cannot_publish_is_reported_once_and_the_others_publish(box, method, monkeypatch):
     with connect(box, "primary") as reader, connect(box, "secondary") as sock:
         assert reader.recv(1)
-        monkeypatch.setattr(box._port_set._ports["primary"], method, fail)
+        monkeypatch.setattr(inside(box)._port_set._ports["primary"], method, fail)
         for k in range(3):
             sock.sendall(f"def p():\n  textmsg({k})\nend\n".encode())
-            until(box, lambda k=k: any(entry.text == str(k) for entry in box._log_entries()))
+            until(box, lambda k=k: any(entry.text == str(k) for entry in box.log))
     (line,) = faults(box)
     assert line.startswith(f"a port cannot publish: {DEFECT}")
 
@@ -258,11 +258,11 @@ def test_an_error_in_accepting_costs_a_pause_of_that_port(box, monkeypatch):
 def test_an_error_after_a_task_is_reported_to_the_caller(box, monkeypatch):
     with connect(box, "secondary") as sock:
         with monkeypatch.context() as patch:
-            patch.setattr(box._intake, "_start", fail)
+            patch.setattr(inside(box)._intake, "_start", fail)
             sock.sendall(b"def lost():\nend\n")
-            until(box, lambda: any("a program is lost" in entry.text for entry in box._log_entries()))
+            until(box, lambda: any("a program is lost" in entry.text for entry in box.log))
         sock.sendall(b"def next():\n  textmsg(1)\nend\n")
-        until(box, lambda: any(entry.text == "1" for entry in box._log_entries()))
+        until(box, lambda: any(entry.text == "1" for entry in box.log))
 
 
 def test_an_error_in_a_connection_of_a_script_closes_it(box, monkeypatch):
@@ -270,7 +270,7 @@ def test_an_error_in_a_connection_of_a_script_closes_it(box, monkeypatch):
     with listening_socket() as server, connect(box, "secondary") as sock:
         port = server.getsockname()[1]
         sock.sendall(f'def p():\n  textmsg(socket_open("127.0.0.1", {port}))\nend\n'.encode())
-        until(box, lambda: any(entry.text == "False" for entry in box._log_entries()))
+        until(box, lambda: any(entry.text == "False" for entry in box.log))
     (line,) = faults(box)
     assert line.startswith(f"the connection of a script to 127.0.0.1:{port} is closed: {DEFECT}")
 

@@ -9,10 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from ur_emulator.errors import EmulatorError
-from ur_emulator.realtime import loop_runner
+from ur_emulator import rack
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.realtime.loop_runner import LoopRunner
 
 
 @pytest.fixture
@@ -132,29 +130,22 @@ def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiti
     assert story.count("call") > 9
 
 
-class BareRunner(LoopRunner):
-    """A loop without boxes."""
-
-    def __init__(self, *services):
-        self._loop = EventLoop()
-        for service in services:
-            self._loop.add(service)
-
-    def listen(self):
-        pass
-
-    def close(self):
-        self._loop.close()
-
-    def _failure(self):
-        return None
-
-
 def test_a_loop_that_does_not_end_is_an_error(monkeypatch):
-    monkeypatch.setattr(loop_runner, "_JOIN_TIMEOUT", 0.0)
+    monkeypatch.setattr(rack, "_JOIN_TIMEOUT", 0.0)
     may_end = threading.Event()
-    runner = BareRunner(SimpleNamespace(advance=lambda now: may_end.wait(20.0)))
-    with pytest.raises(EmulatorError, match="its ports are still open; end the process"), runner:
-        pass
+    runner = rack.LoopRack(())
+    runner.loop.add(SimpleNamespace(advance=lambda now: may_end.wait(20.0)))
+    runner.start()
+    assert "its ports are still open; end the process" in str(runner.join())
     may_end.set()
     runner._thread.join()
+
+
+def test_a_call_for_later_comes_after_its_time_and_in_order():
+    loop, called = EventLoop(), []
+    for delay in (0.002, 0.001, 0.0):
+        loop.call_later(delay, lambda delay=delay: called.append(delay), pytest.fail)
+    loop.call_later(0.003, loop.stop, pytest.fail)
+    loop.run()
+    loop.close()
+    assert called == [0.0, 0.001, 0.002]

@@ -8,7 +8,7 @@ from ur_emulator.commands.programs import SetSpeedSlider
 from ur_emulator.commands.safety import TriggerFault
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import SafetyModeChanged
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.realtime.pacing import (
     HANG_LIMIT,

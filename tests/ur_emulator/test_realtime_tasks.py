@@ -8,11 +8,14 @@ import sys
 import threading
 import time
 
+import psutil
 import pytest
+from box_support import TIMEOUT
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
 from ur_emulator.programs.compiling import compile_text
+from ur_emulator.realtime import processes
 from ur_emulator.realtime import tasks as module
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.tasks import Place
@@ -61,11 +64,14 @@ def bench():
 
 
 def has_ended(pid):
-    """Whether a process has ended and nothing of it is left, not even its entry in the system's table."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return True
+    """Wait until nothing of a process is left, not even its entry in the system's table."""
+    end = time.monotonic() + TIMEOUT
+    while time.monotonic() < end:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.001)
     return False
 
 
@@ -88,7 +94,7 @@ def test_tasks_are_done_in_order_and_what_they_raise_is_reported(bench):
 def test_all_is_done_by_one_process_that_no_ctrl_c_reaches(bench):
     pid = bench.ask(os.getpid)
     assert pid != os.getpid()
-    assert bench.ask(os.getsid, 0) == pid
+    assert bench.ask(os.getsid, 0) != os.getsid(0)
     assert bench.ask(signal.raise_signal, signal.SIGINT) is None
     assert bench.ask(os.getpid) == pid
 
@@ -96,14 +102,6 @@ def test_all_is_done_by_one_process_that_no_ctrl_c_reaches(bench):
 def test_long_tasks_and_long_answers_go_through(bench):
     data = bytes(range(256)) * (1 << 14)
     assert bench.ask(operator.add, data, data) == data + data
-
-
-def test_the_next_loop_has_the_idle_process(bench):
-    pid = bench.ask(os.getpid)
-    bench.loop.close()
-    other = Bench()
-    assert other.ask(os.getpid) == pid
-    other.loop.close()
 
 
 def test_a_process_that_dies_costs_one_task(bench):
@@ -116,6 +114,45 @@ def test_a_process_that_dies_costs_one_task(bench):
     assert str(killed) == "the process that did it was ended by SIGKILL: try again"
     assert has_ended(pid)
     assert has_ended(other)
+
+
+def test_a_process_that_is_stopped_costs_one_task_and_does_not_outlive_the_loop(bench):
+    pid = bench.ask(os.getpid)
+    os.kill(pid, signal.SIGSTOP)
+    bench.submit(operator.add, 1, 2)
+    bench.submit(os.getpid)
+    stopped, other = bench.run()
+    assert isinstance(stopped, WorkerError)
+    assert str(stopped) == "the process that did it was stopped: try again"
+    assert has_ended(pid)
+    os.kill(other, signal.SIGSTOP)
+    bench.loop.close()
+    assert has_ended(other)
+
+
+def test_a_task_does_not_take_long_while_its_process_has_not_begun(bench, monkeypatch):
+    bench.ask(os.getpid)  # there is a server
+    server = processes._server.process.pid
+    other = Bench()
+
+    def go_on():
+        monkeypatch.undo()
+        os.kill(server, signal.SIGCONT)
+
+    monkeypatch.setattr(module, "LONG", 0.1)
+    os.kill(server, signal.SIGSTOP)
+    other.loop.call_later(0.6, go_on, pytest.fail)
+    for number in range(3):
+        other.submit(operator.add, number, 1)
+    assert other.run() == [1, 2, 3]
+    other.loop.close()
+
+
+def test_a_task_that_never_ends_is_given_up(bench, monkeypatch):
+    pid = bench.ask(os.getpid)
+    monkeypatch.setattr(module, "_FOR_EVER", 0.0)
+    assert str(bench.ask(signal.pause)) == "it takes more than 0 s: make it shorter"
+    assert has_ended(pid)
 
 
 def test_a_task_may_take_so_much_processor_time_and_no_more(bench):
@@ -178,11 +215,11 @@ def test_a_loop_that_ends_does_not_wait_for_its_task(bench):
 
 
 def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, monkeypatch):
-    def fail():
+    def fail(role):
         raise OSError("too many")
 
     with monkeypatch.context() as patch:
-        patch.setattr(module, "take_process", fail)
+        patch.setattr(module, "start_child", fail)
         bench.loop.tasks.start()
         bench.submit(operator.add, 1, 2)
         bench.submit(operator.add, 3, 4)
@@ -191,37 +228,43 @@ def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, mon
     assert bench.ask(operator.add, 1, 2) == 3
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_the_process_ends_with_the_one_that_started_it(how):
-    """It holds the pipe for errors open as long as it lives."""
+@pytest.mark.parametrize(
+    ("how", "stopped"),
+    [(signal.SIGKILL, ""), (signal.SIGTERM, ""), (signal.SIGINT, ""), (signal.SIGKILL, "worker")],
+)
+def test_the_process_ends_with_the_one_that_started_it(how, stopped):
+    """So do the box and the server of both: they hold the pipe for errors open as long as they live."""
     code = (
         "from ur_emulator import ControlBox\n"
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell may ignore it in the background
         "with ControlBox(pace='lockstep', port_base=None) as box:\n"
-        "    print(box._loop.tasks._process._process.pid, flush=True)\n"
+        "    print(box.run_program('textmsg(1)'), flush=True)\n"
         "    signal.pause()\n"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as parent:
-        worker = int(parent.stdout.readline())
+        parent.stdout.readline()
+        children = psutil.Process(parent.pid).children(recursive=True)
+        if stopped:
+            children[-1].suspend()
         os.kill(parent.pid, how)
         errors = parent.stderr.read()
-    assert worker != parent.pid
+    assert len(children) == 3
+    assert not psutil.wait_procs(children, timeout=TIMEOUT)[1]
     assert errors.count("Traceback") == (how is signal.SIGINT)
 
 
 def test_a_fork_leaves_the_process_to_its_parent(bench):
+    """A copy of the user's process keeps no end of theirs, and has a server of its own."""
     pid = bench.ask(os.getpid)
-    bench.loop.close()
     child = os.fork()
     if not child:
-        os._exit(len(module.take_process.__globals__["_idle"]))
+        mine = processes.start_child(processes.Role.WORKER)
+        os._exit(set(processes._children) != {mine})
     assert os.waitpid(child, 0)[1] == 0
-    other = Bench()
-    assert other.ask(os.getpid) == pid
-    other.loop.close()
+    assert bench.ask(os.getpid) == pid
 
 
 def test_a_script_without_a_main_guard_is_not_run_again(tmp_path):

@@ -5,8 +5,14 @@ import math
 import pytest
 from box_support import VERSION, Bench, MessageReader, connect
 
-from protocol.primary.message_codec import decode_message, encode_message
-from protocol.primary.messages import PopupMessage, RequestedType, RequestValueMessage, TextMessage
+from protocol.primary.messages import (
+    PopupMessage,
+    RequestedType,
+    RequestValueMessage,
+    TextMessage,
+    decode_message,
+    encode_message,
+)
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.emulator import ControlBox

@@ -4,8 +4,8 @@ import pytest
 from box_support import Bench
 
 from protocol.ur_types import RobotMode
-from ur_emulator.controller.error_settings import ErrorSettings
 from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION
+from ur_emulator.controller.settings import ErrorSettings
 
 
 @pytest.mark.parametrize("kind", ["def", "sec"])

@@ -9,7 +9,7 @@ import zipfile
 from contextlib import contextmanager
 
 import pytest
-from box_support import TIMEOUT
+from box_support import TIMEOUT, inside
 
 from protocol.robot_api import BASE, CALLS
 from protocol.ur_types import Ports
@@ -48,7 +48,9 @@ def urpx(name, script, **information):
 
 @contextmanager
 def x_box(version="10.12.0", **options):
-    with ControlBox(robot="ur5e", version=version, pace="lockstep", port_base=None, seed=7, **options) as box:
+    with ControlBox(
+        in_process=True, robot="ur5e", version=version, pace="lockstep", port_base=None, seed=7, **options
+    ) as box:
         yield box
 
 
@@ -98,7 +100,7 @@ def test_it_takes_the_place_of_the_dashboard_and_other_ports_wait_for_their_serv
     with x_box(services=("rtde",)) as box:
         assert box.ports.rtde
         assert not box.ports.secondary
-    with ControlBox(robot="ur5e", pace="lockstep", port_base=None) as box:
+    with ControlBox(in_process=True, robot="ur5e", pace="lockstep", port_base=None) as box:
         assert box.ports.dashboard
         assert not box.ports.robot_api
 
@@ -107,11 +109,11 @@ def test_services_and_versions_that_do_not_exist():
     with pytest.raises(
         EmulatorError, match="'dashboard' given: PolyScope X has no such service, choose of primary"
     ):
-        ControlBox(robot="ur5e", version="10.11", services=["dashboard"])
+        ControlBox(in_process=True, robot="ur5e", version="10.11", services=["dashboard"])
     with pytest.raises(EmulatorError, match="CB3 has no such service, all ports are open"):
-        ControlBox(services=["rtde"])
+        ControlBox(in_process=True, services=["rtde"])
     with pytest.raises(EmulatorError, match=r"10\.11 given"):
-        ControlBox(robot="ur3", version="10.11")
+        ControlBox(in_process=True, robot="ur3", version="10.11")
 
 
 def test_standard_number():
@@ -188,7 +190,7 @@ def test_files_stay_in_the_folder_and_are_programs(box, file_name, status):
 
 
 def box_folder(box):
-    return box._player.folder._root
+    return inside(box)._player.folder._root
 
 
 def test_a_program_of_polyscope_x_plays_the_script_that_it_contains(box):

@@ -10,7 +10,7 @@ from socketserver import ThreadingMixIn
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
-from box_support import TIMEOUT, MessageReader, connect, listening_socket
+from box_support import TIMEOUT, MessageReader, connect, inside, listening_socket
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.budgets import BUDGETS
@@ -52,7 +52,7 @@ def procedures(**functions):
 
 @pytest.fixture(scope="module")
 def box():
-    with ControlBox(pace="lockstep", port_base=None) as running:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None) as running:
         yield running
 
 
@@ -234,7 +234,7 @@ def test_an_address_that_is_none_is_a_run_time_error(box, url):
 
 
 def test_the_control_port_is_closed_to_remote_procedures():
-    with ControlBox(pace="lockstep", port_base=None, control_port=0) as box:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, control_port=0) as box:
         assert "control API" in fail(box, box.control_port).text
 
 
@@ -266,7 +266,7 @@ def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
         )
         send(sock, port, (*loop, "  i = i + 1", "end", 'textmsg("done")'))
         while not [entry for entry in box.log if entry.text == "done"]:
-            most = max(most, len(box._network._remotes._connected))
+            most = max(most, len(inside(box)._network._remotes._connected))
         MessageReader(sock).message(TextMessage)
         assert len(Handler.connections) == 30
     assert 1 <= most <= 3
@@ -285,15 +285,17 @@ def test_more_calls_at_the_same_time_than_connections_fail(box, monkeypatch):
 
 
 def test_calls_leave_no_thread_and_no_connection(box):
-    threads = threading.active_count()
+    before = set(threading.enumerate())
     with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:
         send(sock, port, ("textmsg(h.one())",))
         reader = MessageReader(sock)
         reader.message(TextMessage)
         while not reader.message(KeyMessage).title.endswith("STOPPED"):
             pass
-    assert threading.active_count() <= threads
-    assert not any(one.is_open for one in tuple(box._network._buffers.connections))
+    # The server of this test answers each connection in a thread, which may outlast the connection.
+    since = [thread.name for thread in set(threading.enumerate()) - before]
+    assert not [name for name in since if "process_request_thread" not in name]
+    assert not any(one.is_open for one in tuple(inside(box)._network._buffers.connections))
 
 
 def test_stopping_the_program_breaks_off_a_call_that_nobody_answers(box):

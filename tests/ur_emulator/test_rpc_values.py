@@ -4,8 +4,7 @@ import pytest
 from box_support import Bench
 
 from ur_emulator.commands.programs import StopProgram
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.scripting.network import RemoteCallError
 
 
@@ -114,6 +113,14 @@ def test_results_without_counterpart_end_the_program(result):
     bench.tick()
     assert any("the result" in text or "rows of equal length" in text for text in bench.texts)
     assert not bench.controller.programs.is_running
+
+
+@pytest.mark.parametrize(("n", "told"), [(255, "got {"), (256, "has no counterpart in a script")])
+def test_members_of_a_struct_have_names_of_a_script(n, told):
+    bench = RpcBench(robot="ur5e", generation=E_SERIES)
+    bench.call().answer({"m" * n: 1})
+    bench.tick()
+    assert told in bench.texts[-1]
 
 
 def test_a_failed_call_is_a_run_time_error_where_it_stands():

@@ -12,7 +12,7 @@ from protocol.rtde.types import RtdeType
 from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.controller.safety.status_bits import safety_status_bits
+from ur_emulator.controller.snapshot import safety_status_bits
 
 V3_15 = SoftwareVersion(3, 15, 8)
 

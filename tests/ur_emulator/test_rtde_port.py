@@ -4,10 +4,11 @@ import pytest
 from box_support import Bench, bare_access
 from rtde_support import input_package
 
-from protocol.rtde import messages as M
+from protocol.rtde import codec as M
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.models.generations import CB3
 from ur_emulator.servers.rtde_port import RtdePort
 
 V3_15 = SoftwareVersion(3, 15, 8)
@@ -244,6 +245,36 @@ def test_inputs_are_free_as_soon_as_their_owner_is_gone(bench):
     assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 0
     owner.close()
     assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 1
+
+
+def test_equal_input_recipes_are_one_object(bench):
+    client = bench.client()
+    names = ("input_int_register_0", "input_int_register_1") * 48
+    assert [client.ask(M.SetupInputs(names)).recipe_id for _ in range(3)] == [1, 2, 3]
+    (session,) = bench.port._sessions.values()
+    held = session.protocol.input_recipes
+    assert held[1] is held[2] is held[3]
+    client.close()
+    other = bench.client()
+    other.ask(M.SetupInputs(names))
+    (session,) = bench.port._sessions.values()
+    assert session.protocol.input_recipes[1] is held[1]
+
+
+@pytest.mark.parametrize(
+    ("names", "n_taken"),
+    [
+        (("input_int_register_0",), BUDGETS.rtde_recipes),
+        (("input_int_register_0",) * 90, BUDGETS.rtde_variables // 90),
+    ],
+)
+def test_a_client_has_so_many_input_recipes_and_variables(bench, names, n_taken):
+    client = bench.client()
+    taken = [client.ask(M.SetupInputs(names)) for _ in range(n_taken)]
+    assert [reply.recipe_id for reply in taken] == list(range(1, n_taken + 1))
+    assert client.ask(M.SetupInputs(names)) == M.SetupInputsReply(("NOT_FOUND",) * len(names), 0)
+    other = ("input_int_register_1",)
+    assert bench.client().ask(M.SetupInputs(other)) == M.SetupInputsReply(("INT32",), 1)
 
 
 def test_the_script_line_is_wanted_while_a_recipe_has_it(bench):

@@ -8,9 +8,8 @@ import pytest
 from box_support import TIMEOUT, FrameReader, MessageReader, connect
 from rtde_support import RtdeClient
 
-from protocol.primary.layout import MasterboardData
-from protocol.primary.tool import ToolData
-from protocol.rtde import messages as M
+from protocol.primary.layout import MasterboardData, ToolData
+from protocol.rtde import codec as M
 from protocol.rtde.fields import INPUTS, output_fields
 from protocol.ur_types import ProgramState, SoftwareVersion
 from ur_emulator import ControlBox

@@ -8,12 +8,12 @@ from box_support import Bench
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.events import ScriptFailed, TextPrinted
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 from urscript import ProgramStatus, RecordingHost, compile_program
 from urscript.dialect import STATEMENT_BUDGET
 from urscript.recording_host import FakeSocket
-from urscript.run.metering import MOST_AT_ONCE, WorkBudget
+from urscript.run.metering import CLOSING, FREE_CALLS, MOST_AT_ONCE, WorkBudget
+from urscript.run.waits import CHECKPOINT
 
 NEAR = "p[0.25, -0.25, 0.25, 2.2, -2.2, 0]"
 LOOP = "    i = 0\n    while i < {n}:\n      {body}\n      i = i + 1\n    end\n"
@@ -100,6 +100,77 @@ def test_an_operation_that_would_take_too_long_is_an_error():
     running = compile_program(text).start(RecordingHost())
     assert running.step() is ProgramStatus.FAILED
     assert "too much time" in running.error.message
+
+
+def in_depth(n_threads, n_calls, body):
+    """A program with threads that do `body`, each inside so many calls."""
+    functions = "".join(f"  def f{i}():\n    f{i + 1}()\n  end\n" for i in range(1, n_calls))
+    return (
+        f"def p():\n  global turns = 0\n  thread t():\n    f1()\n  end\n{functions}  def f{n_calls}():\n{body}  end\n"
+        f"  global j = 0\n  while j < {n_threads}:\n    h = run t()\n    j = j + 1\n  end\n"
+        "  while True:\n    turns = turns + 1\n    sync()\n  end\nend\n"
+    )
+
+
+WAITING = "    while True:\n      sync()\n    end\n"
+
+
+def test_resuming_a_thread_costs_its_depth():
+    shallow, deep = (
+        units_of_cycles(in_depth(45, n_calls, WAITING), 20, WorkBudget(1e6, 1e6)) for n_calls in (10, 190)
+    )
+    assert max(shallow[2:]) < 45 * 20
+    assert min(deep[2:]) > 45 * (190 - FREE_CALLS)
+
+
+def test_deep_threads_make_their_program_slower_not_the_cycle():
+    work = WorkBudget(3_000, 3_000)
+    running = compile_program(in_depth(45, 190, WAITING)).start(RecordingHost(), work)
+    for cycle in range(200):
+        work.renew()
+        left = work.left
+        running.step()
+        assert left - work.left <= 3_000 + 400
+        if cycle == 100:
+            half = running.read_global("turns")
+    assert 20 < running.read_global("turns") - half < 100 * 3_000 / (45 * (190 - FREE_CALLS))
+
+
+def test_a_read_that_never_waits_costs_its_depth_each_time():
+    reads = []
+
+    def read(thread, number, name, timeout):
+        yield CHECKPOINT
+        reads.append(number)
+        return [1, 5]
+
+    class Host(RecordingHost):
+        def builtins(self):
+            return {**super().builtins(), "socket_read_binary_integer": read}
+
+    body = "    while True:\n      x = socket_read_binary_integer(1)\n    end\n"
+    work = WorkBudget(30_000, 30_000)
+    running = compile_program(in_depth(1, 190, body)).start(Host(), work)
+    for _ in range(20):
+        work.renew()
+        running.step()
+    assert 0 < len(reads) <= 20 * 30_000 / (190 - FREE_CALLS)
+
+
+def test_killing_a_thread_and_the_end_of_a_program_cost_the_depth():
+    levels = 190 - FREE_CALLS
+    text = in_depth(10, 190, WAITING).replace(
+        "turns = turns + 1", "if turns == 9:\n      kill h\n    end\n    turns = turns + 1"
+    )
+    used = units_of_cycles(text, 20, WorkBudget(1e6, 1e6))
+    assert used[9] > used[8] + (CLOSING - 1) * levels
+    assert used[10] < used[8] - levels
+    work = WorkBudget(1e6, 1e6)
+    running = compile_program(in_depth(10, 190, WAITING)).start(RecordingHost(), work)
+    running.step()
+    before = work.left
+    running.kill()
+    assert before - work.left >= 10 * CLOSING * levels
 
 
 def test_what_was_saved_lets_a_program_begin_with_thousands_of_assignments():

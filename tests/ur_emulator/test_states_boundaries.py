@@ -14,9 +14,14 @@ from states_support import BRAKING, power_up
 from protocol.pose import rotvec_to_matrix
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.boundaries import LimitToolDirection, SetSafetyPlane
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes
-from ur_emulator.commands.safety import ReducedMode, RestartSafety, UnlockProtectiveStop
+from ur_emulator.commands.safety import (
+    LimitToolDirection,
+    ReducedMode,
+    RestartSafety,
+    SetSafetyPlane,
+    UnlockProtectiveStop,
+)
 from ur_emulator.controller.events import ErrorReported, SafetyModeChanged
 from ur_emulator.controller.safety.boundaries import (
     DIRECTION_TOLERANCE,
@@ -29,8 +34,7 @@ from ur_emulator.controller.safety.boundaries import (
 )
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
 

@@ -8,8 +8,8 @@ from box_support import Bench
 from states_support import infos
 
 from protocol.ur_types import SafetyMode
-from ur_emulator.commands.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.commands.safety import UnlockProtectiveStop
+from ur_emulator.commands.surroundings import AddObstacle, RemoveObstacle
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.errors import EmulatorError
 from ur_emulator.plant.obstacles import SLOTS

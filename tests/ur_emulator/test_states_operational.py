@@ -8,9 +8,13 @@ from states_support import BRAKING, ENDLESS, failures, infos
 
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
-from ur_emulator.commands.inputs import SetDigitalInput
-from ur_emulator.commands.operational import ChooseModeByDashboard, MoveEnablingDevice, SetOperationalMode
-from ur_emulator.commands.power import ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.power import (
+    ChooseModeByDashboard,
+    MoveEnablingDevice,
+    ReleaseBrakes,
+    SetOperationalMode,
+    StartFreedrive,
+)
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
     PressButton,
@@ -19,24 +23,22 @@ from ur_emulator.commands.safety import (
     ResetSafeguard,
     SafeguardStop,
 )
-from ur_emulator.controller.safety.enabling_device import (
+from ur_emulator.commands.surroundings import SetDigitalInput
+from ur_emulator.controller.safety.inputs import (
     ACTIVE,
+    OPERATIONAL_MODES,
     STOPPING,
     TRANSITIONS,
     EnablingAct,
     EnablingDevice,
     EnablingState,
-)
-from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.controller.safety.operational_mode import (
-    OPERATIONAL_MODES,
     ModeSource,
     OperationalMode,
     OperationalModeChoice,
 )
+from ur_emulator.controller.safety.modes import SafetyEvent
 from ur_emulator.errors import RefusedError
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 
 MANUAL, AUTOMATIC = SetOperationalMode("manual"), SetOperationalMode("automatic")
 PRESS, RELEASE = MoveEnablingDevice("pressed"), MoveEnablingDevice("released")

@@ -10,8 +10,14 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 from states_support import BRAKING, COMMANDS, ENDLESS, ENTRY, check_wires, failures
 
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.operational import ChooseModeByDashboard, MoveEnablingDevice, SetOperationalMode
-from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.power import (
+    ChooseModeByDashboard,
+    MoveEnablingDevice,
+    PowerOn,
+    ReleaseBrakes,
+    SetOperationalMode,
+    StartFreedrive,
+)
 from ur_emulator.commands.programs import (
     PauseProgram,
     ResumeProgram,
@@ -32,10 +38,9 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
+from ur_emulator.controller.safety.inputs import OperationalMode
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
-from ur_emulator.controller.safety.operational_mode import OperationalMode
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 from urscript import compile_program
 
 STREAM = "def s():\n  while True:\n    speedj([0, 0, 0, 0, 0, 0.8], 4, 0.008)\n  end\nend\n"

@@ -30,10 +30,10 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed, SafetyModeChanged
-from ur_emulator.controller.safety.configured_limits import limits_of
+from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.controller.safety.speed_scaling import TOLERANCE, ModeLimits, limits_of_mode
 from ur_emulator.errors import EmulatorError
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.safety_limits import UNLIMITED
 from ur_emulator.motion.arm_motion import ArmMotion
@@ -433,3 +433,14 @@ def test_faults_and_violations_are_reported_and_end_with_a_restart():
     bench.tick(1, RestartSafety())
     assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
     assert power_up(bench).robot_mode == RobotMode.RUNNING
+
+
+@pytest.mark.parametrize("mode", [RobotMode.RUNNING, RobotMode.IDLE, RobotMode.POWER_OFF])
+def test_a_requested_stop_is_one_whatever_the_robot_mode(mode):
+    """A program may ask for it in the cycle in which the arm loses its power."""
+    bench = Bench(mode=mode)
+    bench.tick(20)
+    bench.controller.state.requests.protective_stop()
+    bench.tick(5)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert [e.code for e in bench.events if isinstance(e, ErrorReported)] == [209]

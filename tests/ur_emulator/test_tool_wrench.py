@@ -5,8 +5,8 @@ import pytest
 from box_support import Bench
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.controller.planning import PlanningSettings, ToolWrenchLimit
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.controller.settings import PlanningSettings, ToolWrenchLimit
+from ur_emulator.models.generations import E_SERIES
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -22,4 +22,4 @@ def test_a_node_becomes_its_statements(tmp_path, nodes, expected):
 
 
 def test_every_kind_of_node_has_a_sample():
-    assert set(KINDS) - set(SAMPLES) == {"SafeHome"}  # it needs an installation: test_urp_program.py
+    assert set(KINDS) <= set(SAMPLES)

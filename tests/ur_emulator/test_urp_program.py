@@ -26,12 +26,13 @@ from protocol.pose import pose_inv, pose_trans
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.ur5 import UR5
+from ur_emulator.models.cb3_arms import UR5
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import DeclaredSignal, Feature, Installation
+from ur_emulator.programs.installation import NEW_HOME, DeclaredSignal, Feature, Installation
+from ur_emulator.programs.installation_reader import load_installation
 from ur_emulator.programs.loading import load_program
-from ur_emulator.programs.script_names import identifier, is_identifier
-from ur_emulator.programs.urp_positions import pose_text
+from ur_emulator.programs.script_writer import identifier, is_identifier
+from ur_emulator.programs.urp_expressions import pose_text
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 
@@ -438,6 +439,10 @@ def test_safe_home_is_a_position_of_the_installation(tmp_path):
         f"movej([{JOINTS}], a=1.4, v=1.0)",
     ]
     assert lines_of(tmp_path, node.format("TIME"), CELL)[-1] == f"movej([{JOINTS}], t=2.0)"
+    (tmp_path / "cell.installation").write_bytes(
+        b"<Installation><SafeHomeSettings enabled='false'/></Installation>"
+    )
+    assert load_installation(ProgramFolder(tmp_path), "cell.installation").safe_home == NEW_HOME
 
 
 def test_the_pc_of_external_control_has_a_name_in_the_installation(tmp_path):

@@ -6,14 +6,14 @@ import pytest
 from wire_story import Story
 
 from protocol.primary import layout as L
+from protocol.primary.layout import ToolData
 from protocol.primary.packages import decode_package
-from protocol.primary.tool import ToolData
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.fields import output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)

@@ -6,13 +6,12 @@ from wire_story import ESeriesStory, Story
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.packages import decode_package
 from protocol.primary.state import state_types
-from protocol.realtime.columns import COLUMNS
-from protocol.realtime.layout import layout_for_version
+from protocol.realtime.layout import COLUMNS, layout_for_version
 from protocol.rtde.fields import OUTPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ValueOrigin, wire_fields
-from ur_emulator.models.cb3 import CB3
+from ur_emulator.models.generations import CB3
 from ur_emulator.servers.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)

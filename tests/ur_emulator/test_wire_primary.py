@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from box_support import Bench
 
-from protocol.controller_words import CONTROLLER_WORDS
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary import layout as L
 from protocol.primary import messages as M
-from protocol.primary import setup as U
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
 from protocol.primary.packages import SafetyTolerances, decode_package
-from protocol.primary.program import ProgramStateMessage
 from protocol.primary.state import RobotState, state_size
+from protocol.primary.values import ProgramStateMessage
+from protocol.script_channel import CONTROLLER_WORDS
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator.commands.power import ReleaseBrakes
+from ur_emulator.commands.power import PowerOff, ReleaseBrakes
 from ur_emulator.commands.safety import (
     PressEmergencyStop,
     ReducedMode,
@@ -26,14 +25,12 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
 )
 from ur_emulator.controller import events
-from ur_emulator.controller.safety.configured_limits import limits_of
 from ur_emulator.controller.safety.limit_checks import most_loaded_joint
+from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.models.calibration import calibrated_dh
-from ur_emulator.models.cb3 import CB3
-from ur_emulator.models.e_series import E_SERIES
+from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.servers.primary.event_messages import message_for
-from ur_emulator.servers.primary.port import PrimaryPort
+from ur_emulator.servers.primary.port import PrimaryPort, message_for
 from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, setup_records
 from ur_emulator.servers.programs.sender import Sender
 from ur_emulator.servers.programs.words import SPEED_WORD, WORDS
@@ -133,7 +130,7 @@ def test_the_box_marks_itself_in_every_version(version):
     bench = PortBench(version)
     for port in bench.ports:
         (state,) = (package for package, _ in Client(port).take(version) if isinstance(package, RobotState))
-        assert state.find(U.ConfigurationData).masterboard_version == SIMULATED_MASTERBOARD
+        assert state.find(L.ConfigurationData).masterboard_version == SIMULATED_MASTERBOARD
 
 
 @pytest.mark.parametrize(
@@ -170,9 +167,33 @@ def test_setup_comes_again_when_the_brakes_open():
     bench.tick(600)
     states = [state for state, _ in client.take(V3_15)]
     running = [state.find(L.RobotModeData).robot_mode == RobotMode.RUNNING for state in states]
-    has_setup = [state.find(U.ConfigurationData) is not None for state in states]
+    has_setup = [state.find(L.ConfigurationData) is not None for state in states]
     assert has_setup.count(True) == 1
     assert has_setup.index(True) == running.index(True)
+
+
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [
+        (TriggerProtectiveStop(), lambda mode: mode.is_protective_stopped),
+        (PressEmergencyStop("robot"), lambda mode: mode.is_emergency_stopped),
+        (PowerOff(), lambda mode: not mode.is_robot_power_on),
+    ],
+)
+@pytest.mark.parametrize("cycles", range(3))
+def test_a_change_of_mode_and_a_state_that_shows_it_are_one_write(command, shown, cycles):
+    bench = PortBench()
+    clients = [Client(port) for port in bench.ports]
+    bench.tick(13 + cycles)  # wherever the next of the ten states a second lies
+    for client in clients:
+        client.segments.clear()
+    bench.tick(1, command)
+    for client, has_messages in zip(clients, (True, False) * 2, strict=True):
+        client.segments[:] = [next(segment for segment in client.segments if len(segment) > 400)]
+        *messages, state = (package for package, _ in client.take(V3_15))
+        assert shown(state.find(L.RobotModeData))
+        told = has_messages and not isinstance(command, PowerOff)  # no client knows a message of robot modes
+        assert [type(message) for message in messages] == [M.SafetyModeMessage] * told
 
 
 def test_messages_go_to_the_primary_ports_only():
@@ -290,7 +311,7 @@ def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     configuration = next(
         record
         for record in setup_records(robot, robot.dh, limits_of(robot))
-        if isinstance(record, U.ConfigurationData)
+        if isinstance(record, L.ConfigurationData)
     )
     assert configuration.robot_type == robot_type
     assert configuration.controller_box_type == box_type
@@ -306,7 +327,7 @@ def test_configuration_of_a_ur5e_is_that_of_the_capture():
     (state,) = (p for p, _ in Client(bench.primary).take(bench.version) if isinstance(p, RobotState))
     assert len(state.sub_packages) == 13
     assert state_size(bench.version, first=True) == 1386
-    told = state.find(U.ConfigurationData)
+    told = state.find(L.ConfigurationData)
     assert told.joint_max_limit == pytest.approx((6.3355451848,) * 6)
     assert told.joint_min_limit == pytest.approx((-6.3355451848,) * 6)
     assert told.joint_max_speed == pytest.approx((3.341592653589793,) * 6, rel=1e-15)

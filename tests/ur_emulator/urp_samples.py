@@ -71,6 +71,11 @@ POINT = """\
   end"""
 
 SAMPLES = {
+    "SafeHome": ('<SafeHome positionOptionType="SPEED_AND_ACCELERATION" speed="1.0" acceleration="1.4"/>', """
+  $ 1 "Robot Program"
+  $ 2 "Home"
+  movej([0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0], a=1.4, v=1.0)
+"""),
     "Assignment": (assignment("part", "1 + 2"), """
   $ 1 "Robot Program"
   $ 2 "part≔1 + 2"

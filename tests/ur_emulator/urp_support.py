@@ -3,7 +3,7 @@
 from dashboard_support import urp
 
 from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation_files import NEW_BOX
+from ur_emulator.programs.installation_reader import NEW_BOX
 from ur_emulator.programs.reading import ProgramReader
 from ur_emulator.programs.script_writer import Gap
 from ur_emulator.programs.urp_program import make_script

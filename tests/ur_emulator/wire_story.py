@@ -15,7 +15,6 @@ from ur_emulator.commands.programs import (
     StartProgram,
     StopProgram,
 )
-from ur_emulator.commands.push import Push
 from ur_emulator.commands.safety import (
     BUTTON_BITS,
     PressButton,
@@ -28,7 +27,8 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.modbus.robot_map import read_register
+from ur_emulator.commands.surroundings import Push
+from ur_emulator.controller.modbus_map import read_register
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -36,10 +36,11 @@ import pytest
 from tree_printer import print_program
 
 from urscript.catalogue import Catalogue, catalogue_for
+from urscript.check.checking import check_program
 from urscript.compile.inference import StaticTypes, Type
 from urscript.compile.statements import NO_NAMES, CompiledStatements, compile_statements
 from urscript.errors import ScriptCompileError, ScriptError
-from urscript.program import ProgramStatus, check_program, compile_program
+from urscript.program import ProgramStatus, compile_program
 from urscript.recording_host import FakeSocket, RecordingHost
 from urscript.run.host import EnterMode, HostFunction
 from urscript.run.threads import ScriptThread

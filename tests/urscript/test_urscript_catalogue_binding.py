@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urscript.catalogue import ALL_ROWS, CB3_3_15, Builtin, catalogue_for
-from urscript.catalogue.binding import static_bind
+from urscript.catalogue.calls import static_bind
 from urscript.errors import ScriptTypeError
 
 
@@ -51,7 +51,6 @@ def test_bind_orders_and_fills_in() -> None:
         ("3.15", "socket_open", 1, ["socket_name"], "socket_open() missing required argument 'port'"),
         ("3.15", "movej", 1, ["q"], "movej() got multiple values for keyword argument 'q'"),
         ("3.15", "movej", 1, ["a", "a"], "movej() got multiple values for keyword argument 'a'"),
-        ("3.15", "freedrive_mode", 1, [], "freedrive_mode takes exactly 0 arguments (1 given)"),
     ],
 )
 def test_wrong_calls(version: str, name: str, n_positional: int, keywords: list[str], text: str) -> None:
@@ -61,6 +60,22 @@ def test_wrong_calls(version: str, name: str, n_positional: int, keywords: list[
     assert caught.value.message == text
     assert caught.value.hint == f"use {catalogue[name].signature}"
     assert caught.value.wire_text == f"Type error: {text}"
+
+
+@pytest.mark.parametrize(
+    ("version", "name", "n_positional", "keywords", "hint"),
+    [
+        ("3.15", "modbus_add_signal", 7, [], "5.15, PolyScope X 10.0; this is CB3 3.15"),
+        ("5.12", "modbus_add_signal", 5, ["register_count"], "5.15, PolyScope X 10.0; this is e-Series 5.12"),
+        ("3.15", "freedrive_mode", 1, [], "5.10, PolyScope X 10.0; this is CB3 3.15"),
+    ],
+)
+def test_a_call_that_other_software_knows_names_it(
+    version: str, name: str, n_positional: int, keywords: list[str], hint: str
+) -> None:
+    with pytest.raises(ScriptTypeError) as caught:
+        catalogue_for(version).static_bind(name, n_positional, keywords)
+    assert caught.value.hint == f"with these arguments it is known since e-Series {hint}"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,8 @@ from urscript.catalogue import (
     Version,
     catalogue_for,
 )
-from urscript.catalogue.argument_checks import compile_check, fits
+from urscript.catalogue.calls import compile_check, fits
+from urscript.catalogue.tables import read_rows
 
 # Script manual CB3 3.15.4, chapter by chapter.
 CB3_MANUAL = {
@@ -505,3 +506,25 @@ def test_a_catalogue_of_the_tables_is_pickled_by_its_version_and_any_other_whole
     assert pickle.loads(pickle.dumps(CB3_3_15)) is CB3_3_15
     own = catalogue_for("5.11", rows=ALL_ROWS[:30])
     assert pickle.loads(pickle.dumps(own)).names == own.names < catalogue_for("5.11").names
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("f(a: number)\n    sum\n    exact", "write name"),
+        ("f(a: number) -> None", "write name"),
+        ("f(a: float) -> None\n    sum\n    exact", "'a: float' of .* is not a parameter"),
+        ("f(a: number = 1 2) -> None\n    sum\n    exact", "'a: number = 1 2' of .* is not a parameter"),
+        ("f() -> None\n    sum\n    exactly", "exactly in 'exactly'; allowed: zero, motion"),
+    ],
+)
+def test_a_row_that_cannot_be_read_is_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        list(read_rows(text, "motion"))
+
+
+def test_what_holds_by_default_ends_with_the_section():
+    text = "by default:\n    exact, nan ok\nf() -> int\n    one\ng() -> int\n    two\n    motion, exact\n\n"
+    f, g, h = read_rows(text + "h() -> int\n    three\n    approximate: why", "motion")
+    assert [row.nan_ok for row in (f, g, h)] == [True, False, False]
+    assert (g.time, h.support, h.note) == (TimeClass.MOTION, Support.APPROXIMATE, "why")

@@ -33,6 +33,17 @@ def outcome(host, running):
     return host.messages, [str(call) for call in calls], error and error.message, running.status
 
 
+def test_a_line_counts_the_calls_of_the_functions_that_it_reaches():
+    text = "def f1():\nf2()\nend\ndef f2():\nsync()\nend\ninterpreter_mode()\n"
+    host = InterpretingHost(CATALOGUE, ["def g(): f1() end", "g()", "sync()"])
+    running = compile_program(text, catalogue=CATALOGUE).start(host)
+    seen = []
+    while running.step() is ProgramStatus.RUNNING:
+        seen.append(running.threads[0].open_calls)
+    # The body, and in the second line the line itself, g, f1 and f2.
+    assert [n for n, before in zip(seen, [0, *seen], strict=False) if n != before] == [5, 2]
+
+
 @settings(some)
 @given(st.lists(statements, max_size=6))
 def test_lines_do_what_the_same_statements_of_a_program_do(body):

@@ -2,8 +2,9 @@
 
 import pytest
 
+from urscript.check.checking import check_program
 from urscript.errors import ScriptCompileError, ScriptSyntaxError
-from urscript.program import check_program, compile_program
+from urscript.program import compile_program
 from urscript.recording_host import RecordingHost
 
 
@@ -51,6 +52,24 @@ def test_all_syntax_errors_are_found_in_one_pass():
     errors, _ = check_program(text)
     found = [(error.line, error.column) for error in errors]
     assert found == [(3, 3), (4, 3), (5, 5), (7, 6), (8, 9)]
+
+
+def test_a_message_shows_no_more_of_a_line_than_a_client_can_hold():
+    text = "x = [" + "1, " * 100_000 + "@"
+    assert _error_of(text).wire_text == f"syntax_error_on_line:1:{text[:1_000]}:"
+
+
+@pytest.mark.parametrize("form", ["{} = 1", "global {} = 1", "def {}():\nend", "thread {}():\nend"])
+def test_every_name_has_a_longest_length(form):
+    assert _error_of(form.format("n" * 255)) is None
+    error = _error_of(form.format("n" * 256))
+    assert error.message == "a name of 256 characters; allowed: up to 255"
+    assert (error.line, error.column, error.width) == (1, 1 + form.index("{"), 256)
+
+
+def test_a_string_literal_is_no_longer_than_a_string():
+    assert _error_of(f'x = "{"a" * 65_536}"') is None
+    assert _error_of(f'x = "{"a" * 65_537}"').message == "a string of 65537 characters; allowed: up to 65536"
 
 
 def test_a_syntax_error_in_the_middle_of_garbage_names_its_line():

@@ -5,7 +5,9 @@ import gc
 import pytest
 
 from urscript import NEXT_CYCLE, Blocked, ProgramStatus, RecordingHost, ScriptRuntimeError, compile_program
+from urscript.catalogue import catalogue_for
 from urscript.dialect import Dialect
+from urscript.errors import ScriptContextError
 from urscript.run.variables import UNDEFINED
 
 
@@ -185,11 +187,27 @@ def test_a_fault_of_the_host_is_reported_as_such_and_keeps_its_cause():
     assert isinstance(running.error.__cause__, KeyError)
 
 
-def test_a_chain_of_a_thousand_functions_is_too_deep():
-    functions = "".join(f"def f{i}():\n  return f{i + 1}()\nend\n" for i in range(1_000))
-    running = RecordingHost().run(compile_program(f"{functions}def f1000():\n  return 1\nend\nx = f0()\n"))
-    assert running.error.message == "calls are nested too deeply"
-    assert running.error.stack[0] == ("f0", 3004, 5)
+def chain(n):
+    """A body that calls, and `n` functions that call one another."""
+    functions = "".join(f"def f{i}():\n  return f{i + 1}()\nend\n" for i in range(1, n))
+    return f"{functions}def f{n}():\n  return 1\nend\nx = f1()\n"
+
+
+def test_functions_may_call_one_another_two_hundred_deep_and_not_deeper():
+    assert RecordingHost().run(compile_program(chain(199))).error is None
+    for n in (200, 900, 3_000):
+        with pytest.raises(ScriptContextError) as caught:
+            compile_program(chain(n))
+        assert caught.value.message == "functions call one another 201 deep from here on; allowed: 200"
+        # The body of a program without `def` has no place of its own.
+        assert (caught.value.line, caught.value.column) == ((1, 1) if n == 200 else (3 * (n - 201) + 1, 1))
+
+
+def test_recursive_functions_count_for_the_depth_of_a_chain_when_they_run():
+    loop = "def a(n):\n  if n > 0:\n    b(n - 1)\n  end\n  f1()\nend\ndef b(n):\n  a(n)\nend\n"
+    program = compile_program(loop + chain(198) + "a(50)\n")
+    assert program.depth == 199  # the body, and those that are not recursive
+    assert RecordingHost().run(program).error is None
 
 
 def test_a_builtin_that_nobody_offers_says_so():
@@ -220,6 +238,15 @@ def test_globals_can_be_read():
     assert (running.read_global("x"), running.read_global("y")) == (1, UNDEFINED)
     running.step()
     assert running.read_global("y") == [2]
+
+
+def test_what_a_program_held_is_given_back_at_its_end():
+    text = 'a = 1\nb = make_list(4000, 0)\nc = make_list(65536, 0)\nd = "0123456789abcdef"\n'
+    text += "while str_len(d) < 32768:\n  d = d + d\nend\n"
+    running = compile_program(text, catalogue=catalogue_for("5.15")).start(RecordingHost())
+    assert running.step() is ProgramStatus.FINISHED
+    assert (running.read_global("a"), running.read_global("b")) == (1, [0] * 4000)
+    assert running.read_global("c") is running.read_global("d") is UNDEFINED
 
 
 def test_handles_have_methods_that_may_wait():
@@ -275,8 +302,6 @@ def test_short_circuit_is_a_switch():
 
 
 def test_pause_is_a_word_of_later_software_only():
-    from urscript.catalogue import catalogue_for
-
     def pause(thread):
         yield NEXT_CYCLE
 

@@ -12,9 +12,10 @@ from random_trees import WORDS, expressions, node_classes, programs
 from tree_printer import print_expression, print_program
 
 from urscript.catalogue import CB3_3_15
+from urscript.check.checking import check_program
 from urscript.dialect import Dialect
 from urscript.errors import ScriptCompileError
-from urscript.program import ProgramStatus, check_program, compile_program
+from urscript.program import ProgramStatus, compile_program
 from urscript.recording_host import RecordingHost
 from urscript.source import Source
 from urscript.syntax import nodes

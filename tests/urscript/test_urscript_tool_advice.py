@@ -1,5 +1,8 @@
 """Programs as people get them wrong, and what `urscript check` tells them; a controller is told nothing of it."""
 
+import json
+import re
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -7,11 +10,11 @@ from random_trees import WORDS, programs
 from tree_printer import print_program
 from typer.testing import CliRunner
 
-from urscript.advice import check_with_advice
-from urscript.advice.checking import RULES, advise, first_syntax_error
+from urscript.check import check_with_advice
+from urscript.check.checking import RULES, advise, check_program, first_syntax_error
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
-from urscript.program import check_program, compile_program
+from urscript.program import compile_program
 from urscript.source import Source, as_utf8
 
 
@@ -378,6 +381,24 @@ WRONG = {
         "2:3: Syntax error: there is no 'try' in URScript (an error ends the program; check conditions before)",
         "4:3: Syntax error: there is no 'except' in URScript (an error ends the program; check conditions before)",
     ),
+    "run without parentheses": (
+        body("thread watch():", "  sync()", "end", "w = run watch", "kill w", "run watch"),
+        "5:11: Syntax error: 'run' needs parentheses after the name (write run watch())",
+        "7:7: Syntax error: 'run' needs parentheses after the name (write run watch())",
+    ),
+    "keywords called": (
+        body("if True:", "  halt()", "end", "while True:", "  break ( )", "end", "kill()", "nothing()"),
+        "3:5: Syntax error: 'halt' is a statement, not a function (write halt)",
+        "6:5: Syntax error: 'break' is a statement, not a function (write break)",
+        "8:3: Syntax error: 'kill' needs a thread (write kill t, with t = run name())",
+        "9:3: Compile error: name 'nothing' is not defined",
+    ),
+    "kill of a thread's name": (
+        body("thread watch():", "end", "thread other():", "end", "w = run watch()", "kill watch", "join(other)", "join w()"),
+        "7:8: Compile error: name 'watch' is not defined (write kill w, the handle of this thread)",
+        "8:8: Compile error: name 'other' is not defined (write t = run other(), then join t)",
+        "9:8: Compile error: name 'w' is not defined (write join w)",
+    ),
     "def call as value": (
         body("x = get_actual_tcp_pose", "textmsg(x)"),
         "2:7: Compile error: name 'get_actual_tcp_pose' is not defined ('get_actual_tcp_pose' is a function, call it as get_actual_tcp_pose(...))",
@@ -456,6 +477,38 @@ def test_names_are_looked_up_beside_syntax_errors():
     ]
 
 
+def test_constant_values_are_looked_at_beside_errors_of_all_kinds():
+    lines = (
+        "movej([90, 0, 0, 0, 0, 0])",
+        "texmsg(1)",
+        "halt() movel(p[400, 0, 0, 0, 0, 0])",
+        "x = 1",
+        "servoj([0, 0], 1)",
+    )
+    errors, warnings = check_with_advice(body(*lines), name="a")
+    assert [(error.line, error.column) for error in errors] == [(3, 3), (4, 3)]
+    # Not of the line that was repaired, nor what may follow from an error: x, which is never read.
+    assert [(warning.line, warning.rule.code) for warning in warnings] == [(2, "W117"), (6, "W116")]
+    assert [warning.source.text for warning in warnings] == 2 * [body(*lines)]
+    for others in (("movej(1, 2, 3, 4, 5, 6, 7)",), ("halt()", "x = 1")):
+        _, warnings = check_with_advice(body(lines[0], *others))
+        assert [(warning.line, warning.rule.code) for warning in warnings] == [(2, "W117")]
+
+
+def test_errors_and_warnings_are_shown_in_the_order_of_the_text(tmp_path):
+    file = tmp_path / "a.script"
+    file.write_text(body("movej([90, 0, 0, 0, 0, 0])", "halt()", "movel(p[400, 0, 0, 0, 0, 0])", "texmsg(1)"))
+    shown = CliRunner().invoke(app, ["check", str(file)]).output
+    assert re.findall(r"script:(\d+):\d+: (\w+)", shown) == [
+        ("2", "Warning"),
+        ("3", "Syntax"),
+        ("4", "Warning"),
+        ("5", "Compile"),
+    ]
+    shown = CliRunner().invoke(app, ["check", "--json", "--ignore", "W118", str(file)]).output
+    assert [one["line"] for one in json.loads(shown)["diagnostics"]] == [2, 3, 5]
+
+
 def test_names_of_what_had_to_be_left_out_are_not_missed():
     assert len(told(body("for i in [1, 2]:", "  textmsg(i)", "end"))) == 1
 
@@ -485,10 +538,10 @@ elseif for in then do && || += ++ // /* 5s 1,5 lambda \u201c \xe2\x80\x9c \xb0 -
 
 
 def assert_reports(text):
-    errors, _ = check_with_advice(text)
+    errors, warnings = check_with_advice(text)
     assert bool(errors) == bool(check_program(text)[0])
     n_lines = text.count("\n") + 1
-    for error in errors:
+    for error in (*errors, *warnings):
         assert 1 <= error.line <= n_lines
         assert error.column >= 1
         assert error.message

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from urscript.lint.rules import RULES
+from urscript.check.warnings import RULES
 
 PAGE = Path(__file__).parents[2] / "docs" / "urscript-tool.md"
 

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
-from urscript.layout.formatter import format_program
+from urscript.formatter import format_program
 from urscript.source import Source
+from urscript.syntax.nodes import same_tree
 from urscript.syntax.parser import parse
-from urscript.syntax.walk import same_tree
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = sorted(

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from urscript.cli import app
-from urscript.commands.tracing import LineTracer
+from urscript.commands.run_command import LineTracer
 from urscript.program import compile_program
 from urscript.recording_host import RecordingHost
 

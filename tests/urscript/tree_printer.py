@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from urscript.layout.formatter import INDENT
+from urscript.formatter import INDENT
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Block, Expression, Statement
 

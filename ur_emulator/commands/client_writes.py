@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from protocol.rtde.types import RtdeValue
 from ur_emulator.controller.command import Box
-from ur_emulator.controller.modbus.robot_map import write_range
+from ur_emulator.controller.modbus_map import write_range
 
 
 @dataclass(frozen=True, slots=True)

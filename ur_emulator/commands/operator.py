@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from protocol.primary.messages import RequestedType
-from ur_emulator.commands.operation import CommandOperation
-from ur_emulator.commands.parameters import parameter
+from ur_emulator.commands.operation import CommandOperation, parameter
 from ur_emulator.controller.command import Box, Result
 from ur_emulator.controller.events import PopupShown
 from ur_emulator.controller.operator import Answer

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
-from ur_emulator.commands.operation import CommandOperation
+from ur_emulator.commands.operation import CommandOperation, parameter
 from ur_emulator.controller.command import Box, inform
+from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.robot_mode import ModeCommand
+from ur_emulator.controller.safety.inputs import EnablingAct, ModeSource, OperationalMode
 from ur_emulator.controller.safety.modes import ROW
+from ur_emulator.errors import RefusedError
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.state import ControllerState
 
 
 class PowerOn(CommandOperation):
@@ -50,3 +57,84 @@ def _give_power(box: Box, command: ModeCommand) -> None:
         box.state.mode.command(command)
     else:
         inform(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].remedy}")
+
+
+# --- Operational mode, enabling device and remote control of an e-Series box
+
+
+class SetOperationalMode(CommandOperation):
+    """Choose the operational mode at the pendant; a wired selector and the dashboard override it."""
+
+    mode: Literal["none", "manual", "automatic"] = parameter("the mode; none: no password is set")
+
+    def apply(self, box: Box) -> None:
+        _choose(box, ModeSource.PENDANT, None if self.mode == "none" else OperationalMode(self.mode))
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseModeByDashboard:
+    """Choose the operational mode as `set operational mode` does; None: as `clear operational mode`."""
+
+    mode: OperationalMode | None
+
+    def apply(self, box: Box) -> None:
+        _choose(box, ModeSource.DASHBOARD, self.mode)
+
+
+class MoveEnablingDevice(CommandOperation):
+    """Press or release the three-position enabling device, which acts in manual mode."""
+
+    position: Literal["none", "released", "pressed", "fully pressed"] = parameter(
+        "pressed is its middle position; none: no device is connected"
+    )
+
+    def apply(self, box: Box) -> None:
+        needs_operational_modes(box.state)
+        box.safety.inputs.act_on_device(EnablingAct(self.position))
+
+
+class SwitchRemoteControl(CommandOperation):
+    """Switch to remote control, or to local control, in which clients may not command the box.
+
+    PolyScope X has no remote control in manual mode. Clients of the dashboard and of the script ports must
+    connect again after the switch to remote control.
+    """
+
+    on: bool = parameter("remote control, or local", default=True)
+
+    def apply(self, box: Box) -> None:
+        generation = box.state.robot.generation
+        if not generation.has_remote_control:
+            raise RefusedError(f"a box of the {generation.name} has no remote control")
+        if (
+            self.on
+            and box.state.operational.mode is OperationalMode.MANUAL
+            and not generation.has_remote_in_manual
+        ):
+            raise RefusedError(
+                f"a box of {generation.name} has no remote control in manual mode: choose automatic"
+            )
+        box.state.operator.set_remote_control(self.on)
+        box.state.events.append(LogAdded("Controller", f"{'Remote' if self.on else 'Local'} control"))
+
+
+def needs_operational_modes(state: ControllerState) -> None:
+    """Refuse what only a box with operational modes has.
+
+    Raises:
+        RefusedError: it has none.
+    """
+    generation = state.robot.generation
+    if not generation.has_operational_modes:
+        raise RefusedError(f"a box of the {generation.name} has no operational modes")
+
+
+def _choose(box: Box, source: ModeSource, mode: OperationalMode | None) -> None:
+    needs_operational_modes(box.state)
+    decides = box.state.operational.source
+    if mode is not None and decides < source:
+        raise RefusedError(
+            f"the operational mode stays {box.state.operational.mode.name}: "
+            f"the {decides.name.lower()} decides, which comes before the {source.name.lower()}"
+        )
+    box.safety.inputs.choose_mode(source, mode)

@@ -7,18 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.commands.operation import CommandOperation
-from ur_emulator.commands.parameters import parameter
+from ur_emulator.commands.operation import CommandOperation, parameter
 from ur_emulator.controller.command import Box, inform
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import ROW
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.errors import RefusedError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.state import ControllerState
     from urscript import CompiledProgram
+
+PROGRAM_RUNS = "a program runs, stop it first"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class StartProgram:
 
 @dataclass(frozen=True, slots=True)
 class SetUp:
-    """Run what makes an installation effective; unlike a program it needs no power.
+    """Run what makes an installation effective; unlike a program it needs no power. Not while a program runs.
 
     Attributes:
         program: a `sec`.
@@ -61,6 +62,8 @@ class SetUp:
     inputs: Mapping[int, SafetyInput]
 
     def apply(self, box: Box) -> None:
+        if box.programs.is_running:
+            raise RefusedError(PROGRAM_RUNS)
         limits = self.limits
         box.safety.set_limits(limits)
         box.state.arm.set_range(limits.q_min, limits.q_max)

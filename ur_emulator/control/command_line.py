@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ur_emulator.box_log import printable
+from ur_emulator.box_options import TOKEN_VARIABLE, check_token
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.parameters import Kind, Parameter
+from ur_emulator.commands.operation import Kind, Parameter
 from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
 from ur_emulator.control.operations import OPERATIONS, make
 from ur_emulator.control.program_run import read_script
-from ur_emulator.control.token import TOKEN_VARIABLE, check_token
 from ur_emulator.errors import ControlError, EmulatorError
 from ur_hil.command_line import ExitCode
 
@@ -52,7 +52,7 @@ def main(words: Sequence[str]) -> int:
     try:
         if follow:
             _follow(client, arguments, as_json)
-        result = _whole_log(client, arguments) if name == "log" else client.perform(name, arguments)
+        result = client.whole_log(arguments) if name == "log" else client.perform(name, arguments)
     except KeyboardInterrupt:
         return ExitCode.DONE if follow else ExitCode.INTERRUPTED
     except ControlError as error:
@@ -157,6 +157,8 @@ def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
     )
     about = f"{parameter.meaning} ({parameter.allowed}{default}{need})".replace("%", "%%")
     words: dict[str, Any] = {"help": about, "metavar": "X"}
+    if parameter.kind is Kind.BOOLEAN and parameter.default is False:
+        words |= {"nargs": "?", "const": "true"}
     if parameter.kind is Kind.VECTOR:
         least, most = parameter.lengths
         words |= {"nargs": most if least == most else "*"}
@@ -193,17 +195,6 @@ def _follow(client: ControlClient, arguments: dict[str, Any], as_json: bool) -> 
         arguments["after"] = result["next"]
         if len(result["entries"]) < BUDGETS.log_entries:
             time.sleep(_FOLLOW_PERIOD)
-
-
-def _whole_log(client: ControlClient, arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return all entries of the log as one result; the box gives some at a time."""
-    entries: list[Any] = []
-    while True:
-        result = client.perform("log", arguments)
-        entries += result["entries"]
-        if len(result["entries"]) < BUDGETS.log_entries:
-            return {**result, "entries": entries}
-        arguments["after"] = result["next"]
 
 
 def _log_line(entry: Mapping[str, Any]) -> str:

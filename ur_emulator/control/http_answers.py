@@ -5,6 +5,7 @@ Where the port has a token, a request must show it.
 
 from __future__ import annotations
 
+import hmac
 from collections.abc import Mapping
 from typing import Any
 from urllib.parse import parse_qsl
@@ -12,8 +13,7 @@ from urllib.parse import parse_qsl
 from ur_emulator.commands.operation import Operation
 from ur_emulator.control.operations import OPERATIONS, describe
 from ur_emulator.control.runner import OperationRunner
-from ur_emulator.control.token import shows_token
-from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError
+from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError, WaitTimeoutError
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection
@@ -91,6 +91,13 @@ def parse_request(request: HttpRequest) -> tuple[str, Mapping[str, Any]]:
     return name, request.json_object()
 
 
+def shows_token(authorization: str, token: str) -> bool:
+    """Return whether a header `Authorization: Bearer TOKEN` shows the token."""
+    scheme, _, shown = authorization.partition(" ")
+    is_equal = hmac.compare_digest(shown.strip().encode("utf-8"), token.encode("utf-8"))
+    return scheme.lower() == "bearer" and is_equal
+
+
 def _from_query(operation: type[Operation[Any]], query: str) -> dict[str, Any]:
     parameters = {parameter.name: parameter for parameter in operation.parameters}
     try:
@@ -104,5 +111,5 @@ def _status_of(error: EmulatorError) -> int:
     if isinstance(error, ArgumentError):
         return 400
     if isinstance(error, RefusedError):
-        return 409
+        return 408 if isinstance(error, WaitTimeoutError) else 409
     return 503 if isinstance(error, NotRunningError) else 500

@@ -1,17 +1,27 @@
-"""Asks the control port of a box that runs somewhere; for the command line and for tests."""
+"""Asks the control port of a box that runs somewhere: for the command line, and for `ControlBox.attach`."""
 
 from __future__ import annotations
 
 import http.client
 import json
 import socket
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
+from protocol.primary.messages import ReportLevel
+from protocol.ur_types import Ports
+from ur_emulator.box_log import LogEntry
+from ur_emulator.box_options import ServedAt
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.control.box_state import BoxState, Question
 from ur_emulator.control.operations import OPERATIONS, make
-from ur_emulator.errors import ArgumentError, ControlError, RefusedError
+from ur_emulator.control.reading import ReadState
+from ur_emulator.control.step_operation import WaitUntil
+from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTimeoutError
+
+if TYPE_CHECKING:
+    from ur_emulator.controller.command import Command, Done
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 29900
@@ -50,7 +60,7 @@ class ControlClient:
                 f"{name} with {len(body)} bytes: the control API takes {BUDGETS.body_bytes}; "
                 "send a longer program to port 30002, or put its file into the folder of programs"
             )
-        patience = PATIENCE + float(given.get("timeout", 0.0))
+        patience = None if given.get("wait") else PATIENCE + float(given.get("timeout", 0.0))
         connection = http.client.HTTPConnection(self.host, self.port, timeout=patience)
         try:
             if OPERATIONS[name].only_reads:
@@ -75,7 +85,104 @@ class ControlClient:
         if response.status == 200 and isinstance(result, dict):
             return result
         text = str(result.get("error", result)) if isinstance(result, dict) else str(result)
-        raise {400: ArgumentError, 409: RefusedError}.get(response.status, ControlError)(text)
+        raise _ERRORS.get(response.status, ControlError)(text)
+
+    def whole_log(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+        """Return all entries of the log as one result of `log`; the box gives some at a time.
+
+        Raises:
+            ControlError: no box answers.
+        """
+        entries: list[Any] = []
+        while True:
+            result = self.perform("log", arguments)
+            entries += result["entries"]
+            if len(result["entries"]) < BUDGETS.log_entries:
+                return {**result, "entries": entries}
+            arguments = {**arguments, "after": result["next"]}
+
+
+_ERRORS = {400: ArgumentError, 408: WaitTimeoutError, 409: RefusedError}
+
+
+class AttachedBox:
+    """A box that somebody else serves; it goes on when this process ends.
+
+    Its methods are those of a `Rack` (`ur_emulator.emulator`) with one box.
+    """
+
+    def __init__(self, host: str, port: int, token: str | None) -> None:
+        """Ask it who it is.
+
+        Raises:
+            ControlError: no box answers there, or not without its token.
+        """
+        self._client = ControlClient(host, port, token)
+        facts = self._client.perform("identity", {})
+        ports = facts["ports"]
+        self._served_at = ServedAt(
+            title=f"{facts['robot']} {facts['software']}",
+            serial_number=facts["serial_number"],
+            host=host,
+            ports=Ports.of({name: number for name, number in ports.items() if name != "control"}),
+            control_port=port,
+        )
+
+    def start(self) -> None:
+        """Do nothing: it runs."""
+
+    def stop(self) -> None:
+        """Do nothing: who serves it ends it."""
+
+    def join(self) -> BaseException | None:
+        """Let go of the box."""
+        return None
+
+    def served_at(self, index: int) -> ServedAt:
+        """Where it is served, and as what."""
+        return self._served_at
+
+    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+        """Have an operation done; return its result."""
+        result = self._client.perform(name, arguments)
+        return _state_of(result) if OPERATIONS[name] in (ReadState, WaitUntil) else result
+
+    def submit(self, index: int, command: Command, done: Done | None) -> None:
+        """Refuse.
+
+        Raises:
+            ControlError: always.
+        """
+        raise ControlError("a box that was attached takes operations only, no commands: see docs/control.md")
+
+    def log(self, index: int) -> tuple[LogEntry, ...]:
+        """Return the last entries of the log, the oldest first."""
+        entries = self._client.whole_log({})["entries"]
+        return tuple(LogEntry(**{**entry, "level": ReportLevel[entry["level"]]}) for entry in entries)
+
+    def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
+        """Refuse.
+
+        Raises:
+            ControlError: always.
+        """
+        raise ControlError("the log of a box that was attached cannot be followed: use `ctl log --follow`")
+
+    def end_of(self, index: int) -> tuple[bool, Exception | None]:
+        """Nobody tells."""
+        return False, None
+
+
+def _state_of(result: Mapping[str, Any]) -> BoxState:
+    questions = tuple(Question(**question) for question in result["questions"])
+    return BoxState(**{**{name: _frozen(value) for name, value in result.items()}, "questions": questions})
+
+
+def _frozen(value: Any) -> Any:
+    """Return a value of JSON with tuples in place of lists."""
+    if isinstance(value, dict):
+        return {name: _frozen(inner) for name, inner in value.items()}
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 def _reason(error: Exception) -> str:

@@ -14,19 +14,22 @@ from pathlib import Path
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
 
 from ur_emulator.box_log import LogEntry
-from ur_emulator.commands.boundaries import LimitToolDirection, SetSafetyPlane
-from ur_emulator.commands.inputs import SetAnalogInput, SetDigitalInput
-from ur_emulator.commands.obstacles import AddObstacle, RemoveObstacle
 from ur_emulator.commands.operation import Operation
-from ur_emulator.commands.operational import MoveEnablingDevice, SetOperationalMode, SwitchRemoteControl
 from ur_emulator.commands.operator import AnswerRequest, ClosePopup
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.power import (
+    MoveEnablingDevice,
+    PowerOff,
+    PowerOn,
+    ReleaseBrakes,
+    SetOperationalMode,
+    SwitchRemoteControl,
+)
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
-from ur_emulator.commands.push import AttachPayload, Push
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
     ChangeSafetySettings,
     ConfirmSafety,
+    LimitToolDirection,
     PressButton,
     PressEmergencyStop,
     ReducedMode,
@@ -35,15 +38,23 @@ from ur_emulator.commands.safety import (
     ResetSafeguard,
     RestartSafety,
     SafeguardStop,
+    SetSafetyPlane,
     TriggerFault,
     TriggerProtectiveStop,
     TriggerViolation,
     UnlockProtectiveStop,
 )
+from ur_emulator.commands.surroundings import (
+    AddObstacle,
+    AttachPayload,
+    Push,
+    RemoveObstacle,
+    SetAnalogInput,
+    SetDigitalInput,
+)
 from ur_emulator.control.program_run import RunProgram, read_script
 from ur_emulator.control.reading import AddToLog, ReadIdentity, ReadLog, ReadState
-from ur_emulator.control.scheduling import At
-from ur_emulator.control.waiting import WaitUntil
+from ur_emulator.control.step_operation import At, WaitUntil
 from ur_emulator.errors import ArgumentError
 
 P = ParamSpec("P")
@@ -55,7 +66,12 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
     signature = inspect.signature(operation)
 
     def call(box: BoxOperations, /, *args: P.args, **kwargs: P.kwargs) -> R:
-        bound = signature.bind(*args, **kwargs)
+        __tracebackhide__ = True
+        try:
+            bound = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            takes = f"it takes {', '.join(signature.parameters)}" if signature.parameters else "it takes none"
+            raise ArgumentError(f"{call.__name__}: {error}; {takes}") from None
         bound.apply_defaults()
         # Read here: the box must not wait for a disk.
         given = {
@@ -100,6 +116,7 @@ class Reading(Generic[R]):
     def __get__(self, box: BoxOperations | None, owner: type) -> R | Self:
         if box is None:
             return self
+        __tracebackhide__ = True
         if self._read is not None:
             return self._read(box)
         result: R = box._perform(self.__name__, {})

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import LogEntry
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.parameters import parameter
+from ur_emulator.commands.operation import parameter
 from ur_emulator.control.box_state import BoxState, take_state
 from ur_emulator.control.step_operation import Context, StepOperation
 from ur_emulator.controller.events import LogAdded

@@ -16,11 +16,10 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import ControlError, NotRunningError
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.steps import Steps, settle
+from ur_emulator.servers.steps import Finished, Steps, settle
 
 # Longest value of an argument in the log, in characters.
 _MAX_SHOWN = 60
-ENDED = "the box has ended: operations need one that runs"
 
 
 class OperationRunner:
@@ -49,12 +48,16 @@ class OperationRunner:
         future: Future[Any] = Future()
         with self._lock:
             if self._is_closed or not self._loop.is_running:
-                raise NotRunningError(ENDED if self._is_closed else "the box does not run: start it first")
+                raise (
+                    NotRunningError()
+                    if self._is_closed
+                    else NotRunningError("the box does not run: start it first")
+                )
             self._awaited.add(future)
 
         def start() -> None:
             if not self._is_closed:
-                self._context.access.steps.start(self.steps(name, arguments), settle(future))
+                self.begin(name, arguments, settle(future))
 
         self._loop.call_soon_threadsafe(start, future.set_exception)
         try:
@@ -62,6 +65,10 @@ class OperationRunner:
         finally:
             with self._lock:
                 self._awaited.discard(future)
+
+    def begin(self, name: str, arguments: Mapping[str, Any], finished: Finished) -> None:
+        """Begin with an operation, in the thread of the loop; `finished` gets its result or its error."""
+        self._context.access.steps.start(self.steps(name, arguments), finished)
 
     def steps(self, name: str, arguments: Mapping[str, Any]) -> Steps[Any]:
         """Check the arguments of an operation, write it into the log, do it, and return its result.
@@ -72,7 +79,8 @@ class OperationRunner:
         access = self._context.access
         operation = make(name, arguments)
         if operation.is_logged and not operation.only_reads:
-            access.announce(LogAdded("Control", _shown(name, arguments)))
+            given = {key: getattr(operation, key) for key in arguments}
+            access.announce(LogAdded("Control", _shown(name, given)))
         if isinstance(operation, StepOperation):
             return (yield from operation.steps(self._context))
         assert isinstance(operation, Command)
@@ -86,7 +94,7 @@ class OperationRunner:
             awaited = tuple(self._awaited)
         for future in awaited:
             if not future.done():
-                future.set_exception(NotRunningError(ENDED))
+                future.set_exception(NotRunningError())
 
 
 def _shown(name: str, arguments: Mapping[str, Any]) -> str:

@@ -12,11 +12,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.controller.tool_settings import Payload, ToolSettings
+from ur_emulator.controller.settings import Payload, ToolSettings
 from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.robot_model import RobotModel
-from ur_emulator.motion.generators import REST_SPEED
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import REST_SPEED, JointTarget
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 
 _STILL = np.zeros(6)

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
-from ur_emulator.kinematics.wrench import moved_wrench
+from ur_emulator.kinematics.arm_model import ArmModel, CartesianState, moved_wrench
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 
 # Time from a state to those that accelerations are the differences of [s].

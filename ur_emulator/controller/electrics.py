@@ -1,6 +1,6 @@
-"""Temperatures and currents of box and tool as functions of a snapshot.
+"""Temperatures and currents of box and tool as functions of a snapshot; the energy that the arm takes.
 
-Nothing in the notes gives numbers, so all of them are chosen: outputs drive the inputs of a PLC, the tool is
+No manual gives numbers, so all of them are chosen: outputs drive the inputs of a PLC, the tool is
 a resistor, the box warms up after it was switched on. They are computed when a port reads them.
 """
 
@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import exp
 
-from protocol.ur_types import JointMode
+from protocol.ur_types import JointMode, RobotMode
 from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
-from ur_emulator.models.measuring import Electrics
+from ur_emulator.controller.robot_mode import POWERED
+from ur_emulator.models.robot_generation import Electrics, RobotGeneration
+from ur_emulator.models.robot_model import Vector6
 
 # The part of the joints' currents that shows on the arm's bus, as the drives chop.
 BUS_SHARE = 0.1
@@ -58,3 +60,27 @@ def board_temperature(uptime: float) -> float:
 def tool_mode(last_joint: int) -> int:
     """Return the mode of the tool for that of the last joint."""
     return int(TOOL_MODES.get(last_joint, last_joint))
+
+
+# --- EnergyMeter: the energy that the arm has taken since the controller started
+
+
+class EnergyMeter:
+    """Sums up the power on the arm's bus.
+
+    Attributes:
+        consumed: energy [J].
+    """
+
+    __slots__ = ("_joules_per_ampere", "_supply", "consumed")
+
+    def __init__(self, generation: RobotGeneration) -> None:
+        """Begin with nothing; the generation has the control cycle and the voltage of the bus."""
+        self._supply = generation.electrics
+        self._joules_per_ampere = self._supply.robot_voltage * generation.period_s
+        self.consumed = 0.0
+
+    def step(self, mode: RobotMode, joint_currents: Vector6) -> None:
+        """Add the energy of a cycle with these currents [A]."""
+        if mode in POWERED:
+            self.consumed += self._joules_per_ampere * arm_current(self._supply, joint_currents)

@@ -1,4 +1,4 @@
-"""Interpreter mode: the statements that wait for the program, and how far it is.
+"""Interpreter mode: the statements that wait for the program, how far it is, and their log.
 
 The port appends what was compiled, the main thread of the program takes it; numbers are those that clients
 read. Source: script manual 5.11. Where ids begin anew, at the start of each program, is chosen.
@@ -7,16 +7,59 @@ read. Source: script manual 5.11. Where ids begin anew, at the start of each pro
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from protocol.interpreter import MAX_ID, TOO_MANY
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.interpreter_log import InterpreterLog
 from ur_emulator.errors import RefusedError
 from urscript.compile.statements import NO_NAMES
 
 if TYPE_CHECKING:
     from urscript.compile.statements import CompiledStatements
+
+
+# --- the log of interpreter mode, as the files of a controller hold it
+#
+# Source: script manual 5.11: a line `e: <id_e> c: <id_a> : <statement>` for each acknowledged line, with the
+# id of the last one that had begun and its own; the names of the files, and what moves them. The first line
+# of a file is chosen.
+
+_CURRENT: Final = "interpreter.log"
+_BEFORE: Final = "interpreter.0.log"
+_SAVED: Final = "interpreter.saved.log"
+_FIRST_LINE: Final = "interpreter log\n"
+# Characters that a file keeps; the oldest go.
+_MOST: Final = 1 << 18
+
+
+class InterpreterLog:
+    """The three files."""
+
+    def __init__(self) -> None:
+        self._text: dict[str, str] = {}
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The text of each file that there is."""
+        return dict(self._text)
+
+    def add(self, last_executed: int, number: int, statements: str) -> None:
+        """Append a line that was acknowledged."""
+        self._append(_CURRENT, f"e: {last_executed} c: {number} : {statements}\n")
+
+    def move(self) -> None:
+        """All was cleared: the file takes the place of the one before."""
+        if _CURRENT in self._text:
+            self._text[_BEFORE] = self._text.pop(_CURRENT)
+
+    def save(self) -> None:
+        """The mode ended without clearing: the file is appended to what is saved."""
+        if _CURRENT in self._text:
+            self._append(_SAVED, self._text.pop(_CURRENT).removeprefix(_FIRST_LINE))
+
+    def _append(self, name: str, text: str) -> None:
+        self._text[name] = (self._text.get(name, _FIRST_LINE) + text)[-_MOST:]
+
 
 # Until a line that calls one of these has ended, no further line is compiled: its names may be gone then.
 _CHANGE_NAMES = frozenset({"clear_interpreter", "end_interpreter"})

@@ -12,7 +12,7 @@ from operator import mul
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.

@@ -36,6 +36,11 @@ class Programs(Protocol):
         ...
 
     @property
+    def is_any_running(self) -> bool:
+        """True while there is a program, primary or secondary."""
+        ...
+
+    @property
     def has_work(self) -> bool:
         """True while any program needs cycles, and in the cycle in which one ended."""
         ...
@@ -80,6 +85,14 @@ class Programs(Protocol):
 
     def resume(self) -> None:
         """Let a paused program go on."""
+        ...
+
+    def end_for_memory(self, text: str) -> None:
+        """End the secondary programs with an error, or, if there is none, the primary program."""
+        ...
+
+    def forget(self) -> None:
+        """Drop the variables of the last program if it has ended."""
         ...
 
     def step(self) -> None:

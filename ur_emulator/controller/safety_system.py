@@ -12,8 +12,7 @@ from ur_emulator.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety.boundaries import TRIGGER_BAND
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
-from ur_emulator.controller.safety.inputs import Guard, SafetyInput, SafetyInputs
+from ur_emulator.controller.safety.inputs import Guard, OperationalMode, SafetyInput, SafetyInputs
 from ur_emulator.controller.safety.limit_checks import Violation
 from ur_emulator.controller.safety.modes import (
     EVENTS,
@@ -22,7 +21,7 @@ from ur_emulator.controller.safety.modes import (
     ProgramEffect,
     SafetyEvent,
 )
-from ur_emulator.controller.safety.operational_mode import OperationalMode
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.path_motion import SCALING_RATE

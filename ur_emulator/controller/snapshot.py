@@ -12,16 +12,55 @@ import math
 from typing import Any, NamedTuple
 
 from protocol.realtime.layout import SNAPSHOT_FIELDS
-from protocol.rtde.types import TimeScaleSource
+from protocol.rtde.types import RobotStatusBits, SafetyStatusBits, TimeScaleSource
+from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.controller import electrics
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.io.lines import CONFIGURABLE, ToolLine
 from ur_emulator.controller.io.registers import RegisterValues
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
-from ur_emulator.controller.safety.status_bits import RUNNING_STATES, robot_status_bits, safety_status_bits
-from ur_emulator.models.measuring import Electrics
+from ur_emulator.models.robot_generation import Electrics
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
+
+# --- the two words of status bits that RTDE publishes, as functions of the modes
+
+# A program counts as running until it stands still; paused it does not, nor when it has ended. Inferred from
+# a client that waits for both flags of the robot mode data to fall.
+RUNNING_STATES = frozenset({ProgramState.PLAYING, ProgramState.PAUSING, ProgramState.RESUMING})
+
+_EMERGENCY = SafetyStatusBits.EMERGENCY_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+_SAFEGUARD = int(SafetyStatusBits.SAFEGUARD_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY)
+
+# Inferred from the names of the bits: every mode has one of its own, and what keeps the arm from moving also
+# says so. The bits of a mode that is not listed are 0.
+SAFETY_BITS: dict[int, int] = {
+    SafetyMode.NORMAL: int(SafetyStatusBits.NORMAL_MODE),
+    SafetyMode.REDUCED: int(SafetyStatusBits.REDUCED_MODE),
+    SafetyMode.RECOVERY: int(SafetyStatusBits.RECOVERY_MODE),
+    SafetyMode.PROTECTIVE_STOP: int(
+        SafetyStatusBits.PROTECTIVE_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
+    ),
+    SafetyMode.SAFEGUARD_STOP: _SAFEGUARD,
+    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _SAFEGUARD,
+    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _SAFEGUARD,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: int(SafetyStatusBits.SYSTEM_EMERGENCY_STOPPED | _EMERGENCY),
+    SafetyMode.ROBOT_EMERGENCY_STOP: int(SafetyStatusBits.ROBOT_EMERGENCY_STOPPED | _EMERGENCY),
+    SafetyMode.VIOLATION: int(SafetyStatusBits.VIOLATION | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
+    SafetyMode.FAULT: int(SafetyStatusBits.FAULT | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
+}
+
+
+def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
+    """Return `robot_status_bits`, but for the buttons of the pendant."""
+    power = RobotStatusBits.POWER_ON if robot_mode in POWERED else RobotStatusBits(0)
+    running = RobotStatusBits.PROGRAM_RUNNING if runtime_state in RUNNING_STATES else RobotStatusBits(0)
+    return int(power | running)
+
+
+def safety_status_bits(safety_status: int) -> int:
+    """Return `safety_status_bits` for a SafetyStatus, but for the enabling device."""
+    return SAFETY_BITS.get(safety_status, 0)
 
 
 class _Fields(NamedTuple):
@@ -221,12 +260,12 @@ class Snapshot(_Fields):
     @property
     def configurable_inputs(self) -> int:
         """The configurable inputs, bit 0 the first."""
-        return CONFIGURABLE.word_of(self.actual_digital_input_bits)
+        return CONFIGURABLE.levels(self.actual_digital_input_bits)
 
     @property
     def configurable_outputs(self) -> int:
         """The configurable outputs, bit 0 the first."""
-        return CONFIGURABLE.word_of(self.actual_digital_output_bits)
+        return CONFIGURABLE.levels(self.actual_digital_output_bits)
 
     @property
     def target_base_acceleration(self) -> Vector6:

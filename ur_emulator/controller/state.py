@@ -13,28 +13,22 @@ from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance.compliance import Compliance
 from ur_emulator.controller.compliance.force_sense import ForceSense
-from ur_emulator.controller.energy import EnergyMeter
-from ur_emulator.controller.error_settings import ErrorSettings
-from ur_emulator.controller.events import EventQueue
+from ur_emulator.controller.electrics import EnergyMeter
+from ur_emulator.controller.events import EventQueue, ProgramRequests
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.encoders import Encoders
 from ur_emulator.controller.io.lines import InputOutput
-from ur_emulator.controller.io.modbus_memory import MapMemory
 from ur_emulator.controller.io.modbus_signals import ModbusSignals
-from ur_emulator.controller.io.registers import Registers
+from ur_emulator.controller.io.registers import MapMemory, Registers
 from ur_emulator.controller.io.watchdogs import Watchdogs
 from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.past_cycles import PastCycles
-from ur_emulator.controller.planning import PlanningSettings
-from ur_emulator.controller.program_requests import ProgramRequests
 from ur_emulator.controller.robot_mode import RobotModeMachine
-from ur_emulator.controller.safety.configured_limits import limits_of
-from ur_emulator.controller.safety.enabling_device import EnablingDevice
-from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
-from ur_emulator.controller.safety.safety_state import SafetyState
+from ur_emulator.controller.safety.inputs import EnablingDevice, OperationalModeChoice
+from ur_emulator.controller.safety.safety_state import SafetyState, limits_of
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling
-from ur_emulator.controller.tool_settings import ToolSettings
+from ur_emulator.controller.settings import ErrorSettings, PlanningSettings, ToolSettings
 from ur_emulator.controller.world_model import WorldModel
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_to_matrix
-from ur_emulator.controller.tool_settings import Payload, ToolSettings
+from ur_emulator.controller.settings import Payload, ToolSettings
 from ur_emulator.models.robot_model import ZERO6, six
 
 WORLD, BASE, FLANGE, TCP = "world", "base", "flange", "tcp"

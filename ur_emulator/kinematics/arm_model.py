@@ -17,10 +17,42 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_to_flat
 from ur_emulator.errors import KinematicsError
 from ur_emulator.kinematics.closed_form import closed_form_inverse
-from ur_emulator.kinematics.damped_inverse import joint_speeds
 from ur_emulator.models.calibration import NOMINAL, Calibration, calibrated_dh
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
+
+# --- wrenches at other points
+
+
+def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> Vector6:
+    """Return a wrench at another point, in the same axes: the moment loses lever times force.
+
+    Args:
+        wrench: [N, Nm].
+        of: point that its moment refers to, (3,) or the pose of it [m].
+        to: the other point.
+    """
+    rx, ry, rz = (b - a for a, b in zip(of[:3], to[:3], strict=True))
+    fx, fy, fz, mx, my, mz = wrench
+    return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)
+
+
+# --- the damped inverse of a Jacobian: joint speeds for a twist, finite at singularities too
+
+# Chosen: changes joint speeds away from singularities by 1e-9 relative at most.
+_DAMPING = 1e-12 * np.eye(6)
+
+
+def joint_speeds(jacobian: NDArray[np.float64], twist: NDArray[np.float64]) -> NDArray[np.floating]:
+    """Return the joint speeds (6,) [rad/s] whose twist, `jacobian @ qd`, is closest to the one given.
+
+    Args:
+        jacobian: (6, 6).
+        twist: (6,), linear first [m/s, rad/s]; a small displacement [m, rad] gives joint steps [rad].
+    """
+    transposed = jacobian.T
+    return np.linalg.solve(transposed @ jacobian + _DAMPING, transposed @ twist)
+
 
 _POSITION_TOLERANCE = 1e-11  # m and rad; a tenth of what `inverse` promises
 _MAX_ITERATIONS = 20

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.random_streams import random_stream
+from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.robot_model import ZERO6, DhRow, RobotModel, Vector6, six
 
 

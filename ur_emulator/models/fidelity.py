@@ -24,10 +24,19 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated
+from zlib import crc32
+
+import numpy as np
 
 from ur_emulator.errors import ModelError
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import Items, checked, nearest, number, record, whole, word
+
+
+def random_stream(seed: int, name: str) -> np.random.Generator:
+    """Return the generator named `name` of the box with this `seed` (any integer >= 0)."""
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, crc32(name.encode())])))
+
 
 _FILE = FileKind(MIB, ModelError, "all fields have less than 0.01 MiB")
 _LARGEST_SLOPE = 0.5

@@ -1,4 +1,4 @@
-"""RobotGeneration: all that the arms of a generation have in common, as one record; `cb3.py` is one.
+"""RobotGeneration: all that the arms of a generation have in common, as one record; see `generations.py`.
 
 The box asks its arm for its generation and never which one it is: times are seconds and become cycles here,
 and ports and compiler get the tables of a software version from here. This module holds no numbers.
@@ -12,22 +12,24 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from protocol.dashboard.commands import DashboardCommand, commands_of
 from protocol.errors import LocalProtocolError
 from protocol.primary.framing import SubPackage
-from protocol.realtime.columns import RealtimeColumn
-from protocol.realtime.layout import RealtimeLayout, frame_size
+from protocol.realtime.layout import RealtimeColumn, RealtimeLayout, frame_size
 from protocol.robot_api import ApiCall, calls_of
 from protocol.rtde.fields import RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.models.fidelity import Fidelity, read_fidelity
-from ur_emulator.models.measuring import Electrics, ForceSensing
 from ur_emulator.models.safety_limits import SafetyLimits
-from ur_emulator.models.software import Software
 from urscript.catalogue import Builtin, catalogue_for
-from urscript.catalogue.versions import Version
+from urscript.catalogue.types import Version
+
+if TYPE_CHECKING:
+    from urscript.catalogue import Catalogue
+
 
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
@@ -150,7 +152,7 @@ class RobotGeneration:
             raise ModelError(str(error)) from None
         if version.major != self.major:
             raise ModelError(
-                f"version {text} given: this box is a {self.name}, its software is {self.major}.x, "
+                f"version {text} given: software of the {self.name} is {self.major}.x, "
                 f"for example {self.default_version}"
             )
         try:
@@ -210,3 +212,84 @@ def _software(generation: RobotGeneration, version: SoftwareVersion) -> Software
         catalogue=catalogue_for(version, rows=generation.builtins),
         has_interpreter=since is not None and version >= since,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Electrics:
+    """What boxes of a generation measure of their own supply and of warm arms.
+
+    Attributes:
+        main_voltage: of the box [V].
+        robot_voltage: of the arm's bus, while it is powered [V].
+        joint_voltage: of the joints on that bus [V].
+        idle_current: of a powered arm whose motors give no torque [A].
+        joint_temperatures: of an arm that is powered and has been still for long [°C].
+    """
+
+    main_voltage: float
+    robot_voltage: float
+    joint_voltage: float
+    idle_current: float
+    joint_temperatures: tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceSensing:
+    """How arms of a generation know the wrench at the flange.
+
+    Attributes:
+        has_sensor: a sensor at the flange measures it; otherwise it is estimated from motor currents. A
+            sensor is zeroed when a program starts and when it declares a payload, and `actual_TCP_force` is
+            the wrench at the flange, not at the TCP.
+        bandwidth: pole of the measurement [Hz]; None: none shows.
+        precision: force and moment that may be an error of a measurement that was not zeroed [N], [Nm].
+        contact_force: a contact is a force that has risen by this [N].
+        least_averaging: time that is averaged at least to separate a zero from noise [s].
+        most_averaging: and at most [s].
+        filter_time: of force mode: time constant of its filter of the wrench [s].
+        control_rate: of force mode: rate at which the force approaches the one asked for at gain scaling 1
+            [1/s]. What the delay of the whole loop allows.
+    """
+
+    has_sensor: bool
+    bandwidth: float | None
+    precision: tuple[float, float]
+    contact_force: float
+    least_averaging: float
+    most_averaging: float
+    filter_time: float
+    control_rate: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Software:
+    """One version of the software; `RobotGeneration.software` makes it.
+
+    Attributes:
+        version: four numbers; the last is the build.
+        built: when; in the time of the box.
+        dashboard: commands of the dashboard server, by name.
+        robot_api: calls of the Robot API.
+        realtime: layout of the frames on port 30003.
+        sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
+        rtde_outputs: variables that a client can subscribe to, by name.
+        rtde_inputs: variables that a client can write, by name.
+        catalogue: the builtins of URScript.
+        has_interpreter: statements can be sent to a program in interpreter mode.
+    """
+
+    version: SoftwareVersion
+    built: datetime
+    dashboard: Mapping[str, DashboardCommand]
+    robot_api: tuple[ApiCall, ...]
+    realtime: RealtimeLayout
+    sub_packages: tuple[type[SubPackage], ...]
+    rtde_outputs: Mapping[str, RtdeField]
+    rtde_inputs: Mapping[str, RtdeField]
+    catalogue: Catalogue
+    has_interpreter: bool
+
+    @property
+    def day(self) -> str:
+        """The date as the dashboard writes it, "Nov 30 2021"."""
+        return self.built.strftime("%b %d %Y")

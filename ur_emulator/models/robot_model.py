@@ -1,7 +1,7 @@
 """RobotModel: the numbers of one type of arm, frozen.
 
 The physics, the kinematics and the wire read their robot from here and from nowhere else; a new arm is a
-new file of numbers beside `ur3.py` and a row in `robots.py`. This module holds no numbers of any one
+new set of numbers in a file of arms and a row in `robots.py`. This module holds no numbers of any one
 robot.
 
 Lengths are metres, angles radians, masses kilograms. Sequences of six follow the joints from the base to
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
+from math import pi, radians
 from typing import TYPE_CHECKING
 
 from ur_emulator.errors import ModelError
@@ -20,6 +20,7 @@ from ur_emulator.errors import ModelError
 if TYPE_CHECKING:
     from protocol.ur_types import SoftwareVersion
     from ur_emulator.models.robot_generation import RobotGeneration
+
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
@@ -242,3 +243,11 @@ class RobotModel:
         if first is not None and version < self.generation.parse_version(first):
             raise ModelError(f"version {text} given: a {self.title} needs {first} or newer")
         return version
+
+
+# Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees.
+RANGE_END = 2.0 * pi + radians(3.0)
+"""[rad]"""
+
+# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
+FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi

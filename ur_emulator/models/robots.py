@@ -1,27 +1,15 @@
-"""The table of arms that the emulator can be. A new arm is one file of numbers and one row here."""
+"""The table of arms that the emulator can be. A new arm is its numbers in a file of arms and one row here."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from ur_emulator.errors import ModelError
-from ur_emulator.models.e_series import E_SERIES
-from ur_emulator.models.polyscope_x import POLYSCOPE_X
+from ur_emulator.models.cb3_arms import UR3, UR5, UR10
+from ur_emulator.models.e_series_arms import UR3E, UR5E, UR7E, UR10E, UR12E, UR16E
+from ur_emulator.models.generations import E_SERIES, POLYSCOPE_X
+from ur_emulator.models.newer_arms import UR8LONG, UR15, UR18, UR20, UR30
 from ur_emulator.models.robot_model import RobotModel
-from ur_emulator.models.ur3 import UR3
-from ur_emulator.models.ur3e import UR3E
-from ur_emulator.models.ur5 import UR5
-from ur_emulator.models.ur5e import UR5E
-from ur_emulator.models.ur7e import UR7E
-from ur_emulator.models.ur8long import UR8LONG
-from ur_emulator.models.ur10 import UR10
-from ur_emulator.models.ur10e import UR10E
-from ur_emulator.models.ur12e import UR12E
-from ur_emulator.models.ur15 import UR15
-from ur_emulator.models.ur16e import UR16E
-from ur_emulator.models.ur18 import UR18
-from ur_emulator.models.ur20 import UR20
-from ur_emulator.models.ur30 import UR30
 
 # The first of each generation runs its software where no arm is named.
 _CB3 = (UR3, UR5, UR10)

@@ -9,13 +9,9 @@ from collections.abc import Iterator
 from math import inf
 
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
-from ur_emulator.motion.direct_torque import DirectTorque, TorqueCommand
-from ur_emulator.motion.generators import Generator, StopJ
+from ur_emulator.motion.generators import DirectTorque, Generator, JointTarget, StopJ, StopL, TorqueCommand
 from ur_emulator.motion.overlay import Overlay, OverlayChain
-from ur_emulator.motion.path_motion import HOLD, PathMotion
-from ur_emulator.motion.pause import ReturnToPath
-from ur_emulator.motion.speed_l import StopL
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.path_motion import HOLD, PathMotion, ReturnToPath
 
 # The way of a slow arm: at its speed for this long [s], so that rounding is less. Chosen.
 _LEAST_LOOK_AHEAD = 0.02

@@ -15,10 +15,19 @@ from math import acos, cos, dist, hypot, pi, sin, sqrt, tan
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.models.robot_model import Vector6
-from ur_emulator.motion.cubic import Cubic, Vector
-from ur_emulator.motion.joint_path import JointCurve, JointLine, JointPath, ToolPath
 from ur_emulator.motion.leg import Leg
-from ur_emulator.motion.path import PoseLine, PosePath, measure, times
+from ur_emulator.motion.path import (
+    Cubic,
+    JointCurve,
+    JointLine,
+    JointPath,
+    PoseLine,
+    PosePath,
+    ToolPath,
+    Vector,
+    measure,
+    times,
+)
 from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import UnreachableError
 

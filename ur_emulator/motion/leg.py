@@ -9,8 +9,7 @@ from math import dist, sqrt
 
 from protocol.pose import Pose
 from ur_emulator.models.robot_model import Vector3, Vector6, six
-from ur_emulator.motion.joint_path import JointLine, JointPath, ToolPath
-from ur_emulator.motion.path import PoseLine, PosePath
+from ur_emulator.motion.path import JointLine, JointPath, PoseLine, PosePath, ToolPath
 from ur_emulator.motion.path_samples import Sample, reaches_end, sample_path
 from ur_emulator.motion.tool import Tool
 
@@ -40,6 +39,7 @@ class Leg:
         process: the speed stays constant through blends (movep).
         samples: of a path of the tool, up to where the arm can follow it.
         smoothing: time in which the acceleration changes, from rest to rest [s]; 0: it has steps.
+        v_max, a_max: greatest that a duration may ask for [unit/s, unit/s^2].
     """
 
     path: JointPath
@@ -53,6 +53,8 @@ class Leg:
     process: bool = False
     samples: tuple[Sample, ...] = ()
     smoothing: float = 0.0
+    v_max: float = _FASTEST
+    a_max: float = _STRONGEST
 
     def near(self, s: float) -> Vector6:
         """Return joint angles close to those after the length s [rad], for the inverse kinematics."""
@@ -69,9 +71,9 @@ class Leg:
     def with_duration(self, *, from_blend: bool = False) -> Leg:
         """Return the same leg with `v` and `a` such that it takes `t`, if `t` is given.
 
-        From rest to rest the trapezoid of `a` and `v` is slowed down. An end with a blend has no ramp; there
-        the speed is chosen for the given acceleration, if that is enough. Source: URScript manual CB3 3.15,
-        movej: `t` has priority; how is chosen.
+        From rest to rest the trapezoid of `a` and `v` is stretched. An end with a blend has no ramp; there
+        the speed is chosen for the given acceleration, if that is enough. Where `v_max` or `a_max` is in the
+        way, the leg takes longer. Source: URScript manual CB3 3.15, movej: `t` has priority; how is chosen.
 
         Args:
             from_blend: the leg begins with a blend.
@@ -89,7 +91,10 @@ class Leg:
             top = min(self.v, sqrt(a * length))
             stretch = min(t / (length / top + top / a), _STANDSTILL)
             v, a = top / stretch, a / stretch**2
-        return replace(self, v=min(v, _FASTEST), a=min(a, _STRONGEST))
+            if a > self.a_max:  # with shorter ramps the same time may do
+                a = self.a_max
+                v = 2.0 * a * length / (a * t + sqrt(max(0.0, (a * t) ** 2 - 4.0 * a * length)))
+        return replace(self, v=min(v, self.v_max), a=min(a, self.a_max))
 
     def starting_at(self, q: Vector6, pose: Pose) -> Leg | None:
         """Return the straight path to the same joint angles from another start.
@@ -106,14 +111,15 @@ class Leg:
         if self.goal is None:
             return None
         if isinstance(path, JointLine):
-            return move_j(q, self.goal, self.tool, **limits)
-        if not isinstance(path, ToolPath) or not isinstance(path.path, PoseLine):
+            leg = move_j(q, self.goal, self.tool, **limits)
+        elif isinstance(path, ToolPath) and isinstance(path.path, PoseLine):
+            leg = move_tool(PoseLine(pose, self.goal_pose), q, self.tool, **limits, process=self.process)
+        else:
             return None
-        leg = move_tool(PoseLine(pose, self.goal_pose), q, self.tool, **limits, process=self.process)
         arrives = leg.goal is not None and all(
             abs(a - b) < _SAME for a, b in zip(leg.goal, self.goal, strict=True)
         )
-        return leg if arrives else None
+        return replace(leg, v_max=self.v_max, a_max=self.a_max) if arrives else None
 
     def last_part(self, r: float, most: float) -> float:
         """Return how much of the path's end is within `r` of the waypoint, at most `most` [unit of s]."""

@@ -8,11 +8,67 @@ movec.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import acos, cos, pi, sin, sqrt
 from typing import Protocol
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.motion.tool import Tool, UnreachableError
+
+# --- A cubic curve between two points with given derivatives: the shape of all blends
+
+
+Vector = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cubic:
+    """p(u) = c0 + c1 u + c2 u^2 + c3 u^3 for u in 0..1, in any number of coordinates."""
+
+    c0: Vector
+    c1: Vector
+    c2: Vector
+    c3: Vector
+
+    @classmethod
+    def between(
+        cls, start: Sequence[float], slope: Sequence[float], end: Sequence[float], end_slope: Sequence[float]
+    ) -> Cubic:
+        """Return the curve with these values and derivatives at u = 0 and u = 1 (Hermite's form)."""
+        difference = [b - a for a, b in zip(start, end, strict=True)]
+        return cls(
+            tuple(start),
+            tuple(slope),
+            tuple(3.0 * w - 2.0 * a - b for w, a, b in zip(difference, slope, end_slope, strict=True)),
+            tuple(a + b - 2.0 * w for w, a, b in zip(difference, slope, end_slope, strict=True)),
+        )
+
+    def at(self, u: float) -> tuple[Vector, Vector]:
+        """Return the point and the derivative with respect to u."""
+        rows = list(zip(self.c0, self.c1, self.c2, self.c3, strict=True))
+        return (
+            tuple(a + u * (b + u * (c + u * d)) for a, b, c, d in rows),
+            tuple(b + u * (2.0 * c + u * 3.0 * d) for _, b, c, d in rows),
+        )
+
+    def fastest(self) -> Vector:
+        """Return for each coordinate the greatest absolute value of the derivative."""
+        found = []
+        for b, c, d in zip(self.c1, self.c2, self.c3, strict=True):
+            values = [b, b + 2.0 * c + 3.0 * d]
+            if d != 0.0 and 0.0 < -c / (3.0 * d) < 1.0:
+                values.append(b - c * c / (3.0 * d))
+            found.append(max(map(abs, values)))
+        return tuple(found)
+
+    def bends(self) -> tuple[Vector, Vector]:
+        """Return the second derivatives at both ends; in between it is a mixture of them."""
+        return (
+            tuple(2.0 * c for c in self.c2),
+            tuple(2.0 * c + 6.0 * d for c, d in zip(self.c2, self.c3, strict=True)),
+        )
+
 
 # A rotation in place needs a speed too; nothing is published. Chosen: a rotation counts as the path of a
 # point at this distance from the tool centre point, if that is longer than the tool's own path [m/rad].
@@ -183,3 +239,94 @@ def _norm(a: Sequence[float]) -> float:
 
 def _cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+# --- Paths in joint space: a straight line, a cubic, or a path of the tool through the inverse kinematics
+#
+# `at(s, near)` gives the joint angles and their derivative with respect to s.
+
+
+class JointPath(Protocol):
+    """A path of the joints; s is radians of the leading axis or metres of the tool.
+
+    Attributes:
+        length: greatest s.
+        rate: greatest speed when s moves at 1: of the leading axis, or of the tool.
+        bend: greatest acceleration when s moves at a constant 1: of the leading axis, or of the tool.
+    """
+
+    length: float
+    rate: float
+    bend: float
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """Return joint angles [rad] and their derivative [rad per unit of s].
+
+        Args:
+            s: length travelled.
+            near: joint angles close to those at s, for the inverse kinematics [rad].
+
+        Raises:
+            UnreachableError: the arm cannot reach that point.
+        """
+        ...
+
+
+class JointLine:
+    """Straight line in joint space; s is the angle of the leading axis."""
+
+    rate = 1.0
+    bend = 0.0
+
+    def __init__(self, start: Sequence[float], goal: Sequence[float]) -> None:
+        self._start = six(start)
+        self._goal = six(goal)
+        difference = [b - a for a, b in zip(start, goal, strict=True)]
+        length = max(map(abs, difference))
+        self.length = length if length > LEAST_LENGTH else 0.0
+        self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in difference])
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """See JointPath; the end is exactly the goal."""
+        if s >= self.length:
+            return self._goal, self._share
+        return six([p + s * k for p, k in zip(self._start, self._share, strict=True)]), self._share
+
+
+class JointCurve:
+    """A cubic in joint space, in the units of the first move of a blend.
+
+    Attributes:
+        speeds: greatest speed of each joint when s moves at 1, (6,).
+    """
+
+    def __init__(self, cubic: Cubic, length: float) -> None:
+        self._cubic = cubic
+        self.length = length
+        self.speeds = six([x / length for x in cubic.fastest()])
+        self.rate = max(self.speeds)
+        self.bend = max(abs(x) for bend in cubic.bends() for x in bend) / length**2
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """See JointPath."""
+        q, slope = self._cubic.at(s / self.length)
+        return six(q), six([k / self.length for k in slope])
+
+
+class ToolPath:
+    """A path of the tool; s is its length travelled [m]."""
+
+    def __init__(self, path: PosePath, tool: Tool) -> None:
+        self.path = path
+        self.tool = tool
+        self.length = path.length
+        self.rate = path.rate
+        self.bend = path.bend
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """See JointPath."""
+        pose, twist = self.path.at(s)
+        q = self.tool.joints(pose, near)
+        if q is None:
+            raise UnreachableError
+        return q, self.tool.rates(q, twist)

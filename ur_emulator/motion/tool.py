@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from protocol.pose import Pose
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.kinematics.damped_inverse import joint_speeds
+from ur_emulator.kinematics.arm_model import ArmModel, joint_speeds
 from ur_emulator.models.robot_model import Vector6, six
 
 

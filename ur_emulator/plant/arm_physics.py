@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.mjcf import FLANGE
 from ur_emulator.models.robot_model import DhRow, RobotModel
-from ur_emulator.plant.contact import contact_wrench
 from ur_emulator.plant.drives import Drives
+from ur_emulator.plant.friction import Presliding
 from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles
-from ur_emulator.plant.physics import JointServos, ServoGains, build_physics
-from ur_emulator.plant.presliding import Presliding
+from ur_emulator.plant.physics import JointServos, ServoGains, build_physics, contact_wrench
 from ur_emulator.plant.sensors import REC_Q, REC_QD
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged

@@ -12,6 +12,7 @@ gear's transmission error. Links move with the hinge: collisions leave out that 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from operator import ge, truediv
 from typing import NamedTuple
 
@@ -21,16 +22,54 @@ from numpy.typing import NDArray
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import Calibration, calibrated_dh
-from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.random_streams import random_stream
+from ur_emulator.models.fidelity import Fidelity, random_stream
+from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
-from ur_emulator.motion.direct_torque import TorqueCommand
+from ur_emulator.motion.generators import TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
-from ur_emulator.plant.dead_time import DeadTime
 from ur_emulator.plant.drives import TARGET_MAX, Drives
 from ur_emulator.plant.feedback import Feedback
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant_state import Target
+
+# --- the dead time of an arm's drives: drawn once a box, or another one every cycle
+
+_WANDER_LEVELS = 64
+"""A dead time that wanders goes through so many values: steps of 30 us for 2 ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeadTime:
+    """From the start of a cycle to the drives acting on its target.
+
+    Attributes:
+        least_s: where it wanders, its least value [s].
+        substeps: in steps of the physics; several values take turns, one a cycle.
+    """
+
+    least_s: float
+    substeps: int | list[float]
+
+
+def draw_dead_time(fidelity: Fidelity, seed: int, generation: RobotGeneration) -> DeadTime:
+    """Draw the dead time of a box.
+
+    Args:
+        fidelity: its range.
+        seed: of the box.
+        generation: has the cycle and the physics step.
+    """
+    substep = generation.substep_us * 1e-6
+    spread = fidelity.dead_time_spread * float(random_stream(seed, "delay").uniform())
+    least = int((fidelity.dead_time + spread) / substep + 1e-9)
+    if not fidelity.dead_time_wander:
+        return DeadTime(least * substep, least)
+    n = round(fidelity.dead_time_period / generation.period_s)
+    begin = random_stream(seed, "wander").uniform()
+    share = 0.5 - 0.5 * np.cos(2.0 * np.pi * (begin + np.arange(n) / n))
+    levels = np.rint(share * _WANDER_LEVELS) / _WANDER_LEVELS
+    return DeadTime(least * substep, (least + fidelity.dead_time_wander / substep * levels).tolist())
+
 
 # Control modes in which no joint holds a position.
 _FREE = (ControlMode.TEACH, ControlMode.TORQUE)

@@ -7,16 +7,121 @@ as old as the feedback age.
 from __future__ import annotations
 
 from collections import deque
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.plant.arm_physics import ArmPhysics
-from ur_emulator.plant.gear import GearRipple, GearWithPlay
 from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
+
+# --- GearRipple: the kinematic transmission error of the strain wave gears; GearWithPlay: their backlash, too
+#
+# The ratio of a strain wave gear is not constant: the joint leads and lags the motor by up to a tenth of a
+# milliradian, in waves along the joint's angle. The motor is what the drive holds; the joint is what the
+# encoder at the output reports. The waves are those of the fidelity, their phases the box's own, by its seed.
+
+
+class GearRipple:
+    """q_joint = q_motor + e(q_motor), both counted at the joint [rad].
+
+    Args:
+        fidelity: gives the waves.
+        seed: gives the phases.
+    """
+
+    def __init__(self, fidelity: Fidelity, seed: int) -> None:
+        ripples = fidelity.ripples
+        phases = random_stream(seed, "gear").uniform(0.0, 2.0 * np.pi, (len(ripples), 6))
+        # Error and slope of each wave of all joints. Products with matrices cost less than broadcasting at
+        # this size.
+        cycles = np.repeat([ripple.cycles for ripple in ripples], 2)
+        self._cycles = np.kron(cycles[:, None], np.eye(6))
+        self._phases = np.zeros(12 * len(ripples))
+        self._sizes = np.zeros((12, 12 * len(ripples)))
+        for n, ripple in enumerate(ripples):
+            if ripple.phase is not None:
+                phases[n] = ripple.phase
+            # A speed ripple of rms r has the slope amplitude sqrt(2) r.
+            slope = sqrt(2.0) * ripple.rms
+            has_wave = np.diag(np.isin(np.arange(6), ripple.joints).astype(float))
+            error, change = slice(12 * n, 12 * n + 6), slice(12 * n + 6, 12 * n + 12)
+            self._phases[error], self._phases[change] = phases[n], phases[n] + np.pi / 2
+            self._sizes[:6, error], self._sizes[6:, change] = (
+                slope / ripple.cycles * has_wave,
+                slope * has_wave,
+            )
+        self._waves = np.zeros(12 * len(ripples))
+        # Difference of joint and motor: position and, after `apply`, speed.
+        self._sum = np.zeros(12)
+        self.error: NDArray[np.float64] = self._sum[:6]
+        self.slope: NDArray[np.float64] = self._sum[6:]
+
+    def evaluate(self, q_motor: NDArray[np.float64]) -> None:
+        """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
+        waves = self._waves
+        self._cycles.dot(q_motor, waves)
+        np.add(waves, self._phases, waves)
+        np.sin(waves, waves)
+        self._sizes.dot(waves, self._sum)
+
+    def apply(self, record: Record) -> None:
+        """Turn positions and speeds of the motors in a record into those of the joints; sets `error`."""
+        self.evaluate(record.q)
+        np.multiply(self.slope, record.qd, self.slope)
+        np.add(record.motion, self._sum, record.motion)
+
+    def undo(self) -> None:
+        """Take back the last `apply`."""
+
+    def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""
+        q_motor = np.array(q_joint, dtype=np.float64)
+        # The slope of e is a few percent, so this contracts to rounding within a dozen turns.
+        for _ in range(12):
+            GearRipple.evaluate(self, q_motor)
+            q_motor = q_joint - self.error
+        return q_motor
+
+
+class GearWithPlay(GearRipple):
+    """q_joint = play(q_motor) + e(q_motor): in the gap the joint stays where friction holds it.
+
+    The gap is centred on the motor: the joint trails by half the backlash in either direction.
+    """
+
+    def __init__(self, fidelity: Fidelity, seed: int) -> None:
+        super().__init__(fidelity, seed)
+        self._half = 0.5 * fidelity.backlash
+        # The joint without its waves, and what it was before the last record.
+        self._held = np.zeros(6)
+        self._held_before = np.zeros(6)
+
+    def evaluate(self, q_motor: NDArray[np.float64]) -> None:
+        """See `GearRipple`; a joint in the gap has the slope -1, which is no motion."""
+        super().evaluate(q_motor)
+        behind = self._held - q_motor
+        self.slope[np.abs(behind) < self._half] = -1.0
+        np.add(self.error, behind.clip(-self._half, self._half), self.error)
+
+    def apply(self, record: Record) -> None:
+        """See `GearRipple`; the joint is carried along."""
+        q_motor = record.q.copy()
+        super().apply(record)
+        self._held_before[:] = self._held
+        np.clip(self._held, q_motor - self._half, q_motor + self._half, out=self._held)
+
+    def undo(self) -> None:
+        """Take back the last `apply`."""
+        self._held[:] = self._held_before
+
+    def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
+        """See `GearRipple`; the joints are then in the middle of their gaps."""
+        self._held[:] = super().motor_position(q_joint)
+        return self._held.copy()
 
 
 class Feedback:

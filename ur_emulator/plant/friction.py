@@ -14,9 +14,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.random_streams import random_stream
+from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.robot_model import RobotModel
+
+# Share of the modelled viscous friction that a full scale of direct_torque compensates [1]: the rest damps
+# the free joints. Inferred: in the maker's example wrist 3 gets 2.5 Nm at 0.2 Hz with full scales; above 0.5
+# a UR5e would exceed its speed limit, above 0.4 a UR3e. Warm grease has about half the viscous friction of
+# cold one, and more than that must not be compensated.
+_VISCOUS_IN_TORQUE_CONTROL = 1.0 / 3.0
 
 
 class Friction:
@@ -67,12 +72,12 @@ class Friction:
         return dry
 
     def share(self, viscous: Sequence[float], coulomb: Sequence[float]) -> NDArray[np.float64]:
-        """Return shares (6,) of the viscous and of the dry part of `compensation` [Nm]."""
+        """Return what torque control compensates with these scales of direct_torque, 0..1 each (6,) [Nm]."""
         wet, dry = self._viscous[1], self.dry_compensation
         if self._excess is not None:
             slow = np.sign(dry) * self._slow[2]
             wet, dry = wet + slow, dry - slow
-        part: NDArray[np.float64] = viscous * wet + coulomb * dry
+        part: NDArray[np.float64] = viscous * (_VISCOUS_IN_TORQUE_CONTROL * wet) + coulomb * dry
         return part
 
     def evaluate(self, speeds: NDArray[np.float64]) -> None:
@@ -94,3 +99,57 @@ class Friction:
         np.multiply(beliefs, self._believed_sizes, beliefs)
         np.multiply(believed_speeds, self._believed_viscous, viscous)
         np.add(beliefs, viscous, beliefs)
+
+
+# --- presliding: joint friction with hysteresis, as the contacts of gears and seals have it
+#
+# The model is Dahl's with the size of the Stribeck curve, LuGre without its micro-damping: bristles of mean
+# deflection z in [-1, 1] follow the motion over the presliding angle,
+#
+#     dz/dq = (sign(dq) - z) / angle,    torque = -size z
+#
+# so that after a reversal friction changes its sign along the path, whatever the speed, and a joint at rest
+# is held by a spring. The equation is solved exactly for each sub-step: it is stable for all angles and
+# speeds.
+#
+# Source: C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for control of systems with
+# friction", IEEE Transactions on Automatic Control 40(3), 1995.
+
+
+class Presliding:
+    """The bristles of six joints.
+
+    Args:
+        angle: over which they follow a reversal [rad], above 0.
+        q: positions (6,) [rad], followed from now on.
+        torque: takes the friction (6,) [Nm].
+    """
+
+    def __init__(self, angle: float, q: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
+        self._angle = angle
+        self._now = q
+        self._torque = torque
+        self._last = q.copy()
+        self._bristles = np.zeros(6)
+        self._stored = (self._last.copy(), self._bristles.copy())
+
+    def reset(self) -> None:
+        """Begin at the present positions, with bristles that are not bent."""
+        self._last[:] = self._now
+        self._bristles[:] = 0.0
+
+    def apply(self, size: NDArray[np.float64]) -> None:
+        """Set the torque for the displacement since the last call; `size` of the friction (6,) [Nm]."""
+        moved = self._now - self._last
+        ahead = np.sign(moved)
+        self._bristles += (ahead - self._bristles) * -np.expm1(-np.abs(moved) / self._angle)
+        self._last[:] = self._now
+        np.multiply(self._bristles, -size, self._torque)
+
+    def store(self) -> None:
+        """Store the present state for `restore`."""
+        self._stored = (self._last.copy(), self._bristles.copy())
+
+    def restore(self) -> None:
+        """Return to the stored state."""
+        self._last[:], self._bristles[:] = self._stored

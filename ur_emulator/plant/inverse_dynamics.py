@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ur_emulator.models.calibration import Calibration, calibrated_dh
 from ur_emulator.models.mjcf import arm_spec
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
-from ur_emulator.plant.payload import set_payload_body
+from ur_emulator.plant.loads import set_payload_body
 
 
 class InverseDynamics:

@@ -14,9 +14,9 @@ from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation
-from ur_emulator.programs.installation_files import load_installation
+from ur_emulator.programs.installation_reader import load_installation
 from ur_emulator.programs.loading import LoadedProgram, load_program
-from ur_emulator.programs.script_header import setup_script
+from ur_emulator.programs.script_writer import setup_script
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
 from urscript.compile.statements import CompiledStatements, compile_statements
@@ -42,8 +42,9 @@ def compile_text(
     except ScriptError as error:
         # Arguments are counted when the call runs, so that of a `sec` is one of its exceptions.
         secondary = is_secondary and isinstance(error, ScriptTypeError)
-        # The log of a controller has the text only; people also want the place.
-        log_text = f"{error.log_text} (line {error.line}, column {error.column})"
+        # The log of a controller has the text only; people also want the place, and what would help.
+        hint = f"; {error.hint}" if error.hint else ""
+        log_text = f"{error.log_text} (line {error.line}, column {error.column}{hint})"
         return ScriptFailed(error.line, error.column, error.wire_text, secondary, log_text)
     compiled = program.compiled
     for count, limit, what in (

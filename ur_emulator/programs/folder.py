@@ -7,13 +7,16 @@ another absolute path, nor through a link. Everything below the folder is read a
 
 from __future__ import annotations
 
+import errno
+import os
+import stat
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs import inner_files
 
 # Names of the folder on the wire; the box itself uses the first.
 # Source: replies of real boxes and of the maker's simulator.
@@ -79,8 +82,14 @@ class ProgramFolder:
         """Return the path that a name stands for, from the folder on; nothing need exist there.
 
         Raises:
-            FileMissingError: the name leads out of the folder, or there is no folder.
+            FileMissingError: the name is too long or leads out of the folder, or there is no folder.
         """
+        # Before a path is made of it: each part costs a question to the file system.
+        if len(name) > BUDGETS.path_length or name.count("/") >= BUDGETS.path_parts:
+            raise FileMissingError(
+                f"a path of {len(name)} characters and {name.count('/') + 1} parts given: there is no file "
+                f"with more than {BUDGETS.path_length} and {BUDGETS.path_parts}"
+            )
         if self._root is None:
             raise FileMissingError(
                 f"{name!r} cannot be found: the box has no programs, give it --programs DIR"
@@ -126,7 +135,7 @@ class ProgramFolder:
             ProgramFileError: it cannot be read, or has more than `most` bytes.
         """
         try:
-            data = inner_files.read(self._known_root(), file.inside, most + 1)
+            data = _read(self._known_root(), file.inside, most + 1)
         except OSError as error:
             raise ProgramFileError(f"{file.name} cannot be read: {error.strerror or error}") from None
         if len(data) > most:
@@ -140,7 +149,7 @@ class ProgramFolder:
             ProgramFileError: it cannot be written; no part of it stays.
         """
         try:
-            inner_files.write(self._known_root(), inside, data)
+            _write(self._known_root(), inside, data)
         except OSError as error:
             raise ProgramFileError(f"{inside.name} cannot be written: {error.strerror or error}") from None
         return FoundFile(inside)
@@ -152,7 +161,7 @@ class ProgramFolder:
             ProgramFileError: it cannot be made, or a link of that name leads out of this folder.
         """
         try:
-            inner_files.make_folder(self._known_root(), name)
+            _make_folder(self._known_root(), name)
         except OSError as error:
             raise ProgramFileError(f"{name} cannot be made: {error.strerror or error}") from None
         return self.locate_folder(name)
@@ -163,7 +172,7 @@ class ProgramFolder:
         Raises:
             ProgramFileError: the folder has too many files.
         """
-        return inner_files.sizes(self._known_root(), BUDGETS.folder_files)
+        return _sizes(self._known_root(), BUDGETS.folder_files)
 
     def _known_root(self) -> Path:
         if self._root is None:
@@ -176,3 +185,93 @@ def _is(kind: Callable[[Path], bool], path: Path) -> bool:
         return kind(path)
     except OSError:  # a name that is too long, a folder that may not be looked into
         return False
+
+
+# --- files below a folder, read and written without following a link
+#
+# Paths are resolved before, so that links which stay in the folder work. What they resolve to is opened
+# folder by folder, each from the one before it: a link that somebody puts there in between is an error and
+# leads nowhere.
+
+# A file while it is written; every write removes what a killed process has left in the same folder.
+PART_NAME = "ur-emulator.part"
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+# A pipe without a writer is not waited for, a terminal does not become ours.
+_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
+_CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+
+
+def _read(root: Path, inside: PurePosixPath, most: int) -> bytes:
+    """Return the first `most` bytes of a file.
+
+    Raises:
+        OSError: it cannot be read, or is no regular file.
+    """
+    with _opened(root, inside.parent) as folder:
+        descriptor = os.open(inside.name, _READ, dir_fd=folder)
+    with open(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "it is not a file")
+        return file.read(most)
+
+
+def _write(root: Path, inside: PurePosixPath, data: bytes) -> None:
+    """Write a file in one step, in place of what has its name.
+
+    Raises:
+        OSError: it cannot be written; no part of it stays.
+    """
+    with _opened(root, inside.parent) as folder:
+        with suppress(FileNotFoundError):
+            os.unlink(PART_NAME, dir_fd=folder)
+        descriptor = os.open(PART_NAME, _CREATE, 0o666, dir_fd=folder)
+        try:
+            with open(descriptor, "wb") as file:
+                file.write(data)
+            os.replace(PART_NAME, inside.name, src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(PART_NAME, dir_fd=folder)
+            raise
+
+
+def _make_folder(root: Path, name: str) -> None:
+    """Make a folder, unless something has its name.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    with _opened(root, PurePosixPath()) as folder, suppress(FileExistsError):
+        os.mkdir(name, dir_fd=folder)
+
+
+def _sizes(root: Path, most: int) -> Iterator[tuple[PurePosixPath, int]]:
+    """Yield path and size [bytes] of each regular file; folders that cannot be read are left out.
+
+    Raises:
+        ProgramFileError: there are more than `most` files and folders.
+    """
+    waiting = [PurePosixPath()]
+    for inside in waiting:
+        with suppress(OSError), _opened(root, inside) as folder, os.scandir(folder) as entries:
+            for entry in entries:
+                most -= 1
+                if most < 0:
+                    raise ProgramFileError("the programs folder has too many files to write another")
+                if entry.is_dir(follow_symlinks=False):
+                    waiting.append(inside / entry.name)
+                elif entry.is_file(follow_symlinks=False):
+                    yield inside / entry.name, entry.stat(follow_symlinks=False).st_size
+
+
+@contextmanager
+def _opened(root: Path, inside: PurePosixPath) -> Iterator[int]:
+    """Open a folder below the root."""
+    descriptor = os.open(root, _FOLDER)
+    try:
+        for part in inside.parts:
+            outer, descriptor = descriptor, os.open(part, _FOLDER, dir_fd=descriptor)
+            os.close(outer)
+        yield descriptor
+    finally:
+        os.close(descriptor)

@@ -7,14 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import pi
 
+from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.controller.io.run_states import RunState
-from ur_emulator.controller.safety.configured_limits import NO_SETTINGS, SafetySettings
+from ur_emulator.controller.safety.safety_state import NO_SETTINGS, SafetySettings
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
 
 STANDARD_GRAVITY = 9.82
 """Acceleration of gravity that PolyScope writes [m/s^2]."""
+
+NEW_HOME: Vector6 = (0.0, -pi / 2.0, 0.0, -pi / 2.0, 0.0, 0.0)
+"""Home position of an e-Series box that nobody has set up [rad]. Source: users of real arms and of URSim."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +142,7 @@ class Installation:
         features: by name, in the order of the file; base and tool are not among them.
         variables: name -> value as a literal of URScript, in the order of the file.
         modbus: signals of other units.
-        safe_home: joint angles [rad]; None if there are none.
+        safe_home: joint angles [rad].
         safety: limits of the safety configuration.
         start_up: what the box does when it is switched on.
     """
@@ -160,7 +164,7 @@ class Installation:
     features: Mapping[str, Feature] = field(default_factory=dict)
     variables: Mapping[str, str] = field(default_factory=dict)
     modbus: tuple[DeclaredSignal, ...] = ()
-    safe_home: Vector6 | None = None
+    safe_home: Vector6 = NEW_HOME
     safety: SafetySettings = NO_SETTINGS
     start_up: StartUp = StartUp()
 

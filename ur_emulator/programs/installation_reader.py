@@ -7,31 +7,97 @@ software 3.5 to 5.26.
 from __future__ import annotations
 
 import math
+import posixpath
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from protocol.pose import T_to_pose
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.controller.io.run_states import RunState
-from ur_emulator.errors import ProgramFileError
-from ur_emulator.models.robot_model import Vector3, Vector6
+from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.programs.folder import WIRE_ROOTS, FoundFile, ProgramFolder
 from ur_emulator.programs.installation import (
+    NEW_HOME,
     STANDARD_GRAVITY,
     DeclaredPayload,
     DeclaredSignal,
     ExternalControlPc,
+    Feature,
     Installation,
     OutputRule,
     StartUp,
 )
-from ur_emulator.programs.installation_features import features
-from ur_emulator.programs.installation_values import InstallationValues
+from ur_emulator.programs.reading import ProgramReader, XmlTree, number
 from ur_emulator.programs.safety_text import safety_settings
-from ur_emulator.programs.xml_tree import XmlTree
+from ur_emulator.programs.variables_file import SUFFIX as VARIABLES_SUFFIX
+from ur_emulator.programs.variables_file import read_variables
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+
+# --- finds and reads installations, each with its variables
+#
+# `default.installation` always exists, perhaps without settings, as on a new box.
+
+SUFFIX = ".installation"
+DEFAULT_NAME = "default" + SUFFIX
+NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))
+"""The installation of a box that nobody has set up."""
+
+
+def load_installation(folder: ProgramFolder, name: str) -> Installation:
+    """Read an installation by the name that a client gives it.
+
+    Raises:
+        FileMissingError: there is none of that name.
+        ProgramFileError: it is not an installation.
+    """
+    return _read(ProgramReader(folder), name)
+
+
+def installation_of(reader: ProgramReader, tree: XmlTree, program: FoundFile) -> Installation:
+    """Read the installation of a program: at its path from the program's folder, else by its name.
+
+    Raises:
+        ProgramFileError: there is none of that name, or the file is not an installation.
+    """
+    given = tree.root.get("installationRelativePath") or tree.root.get("installation") or ""
+    path = given.replace("\\", "/").removesuffix(SUFFIX) + SUFFIX if given else DEFAULT_NAME
+    for place in (PurePosixPath(program.wire_path).parent, WIRE_ROOTS[0]):
+        name = posixpath.normpath(place / path)
+        if reader.folder.has(name):
+            return _read(reader, name)
+        path = PurePosixPath(path).name
+    if path == DEFAULT_NAME:
+        return _read(reader, DEFAULT_NAME)
+    raise ProgramFileError(f"{tree.name} needs the installation {path}: put it beside the program")
+
+
+def _read(reader: ProgramReader, name: str) -> Installation:
+    try:
+        file = reader.folder.find(name)
+    except FileMissingError:
+        if name.rpartition("/")[2].strip('"') != DEFAULT_NAME:
+            raise
+        return NEW_BOX
+    if file.inside.suffix != SUFFIX:
+        raise ProgramFileError(f"{file.name} is not an installation: its name must end in {SUFFIX}")
+    installation = read_installation(reader.xml(file), file.wire_path)
+    variables = str(file.inside.with_suffix(VARIABLES_SUFFIX))
+    if not reader.folder.has(variables):
+        return installation
+    return replace(installation, variables=read_variables(reader, reader.folder.find(variables)))
+
 
 # Contributor of a part of an installation. Source: the source text of the URCap.
 _EXTERNAL_CONTROL = "com.fzi.externalcontrol"
-# Longest name of a host. Source: RFC 1035.
-_MAX_HOST = 253
 # Element with the names of lines -> their own name, the index of the first.
 _LINE_NAMES = {
     "DigitalInputNames": ("digital_in", 0),
@@ -104,7 +170,7 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
         reader.output_rules(),
         0 if reader.attribute("SmoothTransitionSettings", "transitionHardness") == "HARD" else 1,
         reader.line_names(),
-        dict(features(reader)),
+        dict(_features(reader)),
         {},
         tuple(reader.signals()),
         reader.safe_home(),
@@ -128,9 +194,9 @@ def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
         ProgramFileError: the host is too long for a name, or the port is not a port number.
     """
     host = data.get("host_ip", "")
-    if len(host) > _MAX_HOST:
+    if len(host) > BUDGETS.host_length:
         raise ProgramFileError(
-            f"{file_name}: the host of External Control has more than {_MAX_HOST} characters"
+            f"{file_name}: the host of External Control has more than {BUDGETS.host_length} characters"
         )
     port = data.get("port_nr", "")
     if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
@@ -138,7 +204,58 @@ def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
     return ExternalControlPc(host, int(port or 0))
 
 
-class _Reader(InstallationValues):
+class _Values:
+    """Values of one file.
+
+    Attributes:
+        tree: of the file.
+        first: the first element of each kind.
+    """
+
+    def __init__(self, tree: XmlTree) -> None:
+        self.tree = tree
+        self.first: dict[str, Element] = {}
+        for element in tree.root.iter():
+            self.first.setdefault(element.tag.rpartition(".")[2], element)
+
+    def attribute(self, kind: str, name: str) -> str:
+        """Return an attribute of the first element of a kind; "" without one."""
+        return self.first[kind].get(name, "") if kind in self.first else ""
+
+    def value(self, element: Element, name: str) -> str:
+        """Return a list of an element: of its attribute, or of the child of that name."""
+        child = element.find(name)
+        if child is None:
+            return element.get(name, "")
+        return self.tree.resolve(child).get("value", "")
+
+    def items(self, kind: str) -> list[str]:
+        """Return the items of the list that the first element of a kind holds."""
+        given = self.attribute(kind, "value")
+        return [item.strip() for item in given.split(",")] if given else []
+
+    def number(self, text: str | None, what: str) -> float:
+        """Return a finite number; `what` names it in the error."""
+        return number(self.tree, text, what)
+
+    def numbers(self, text: str | None, count: int, what: str) -> list[float]:
+        """Return so many numbers, which commas separate."""
+        parts = (text or "").split(",")
+        if len(parts) != count:
+            raise ProgramFileError(f"{self.tree.name}: {what} has {len(parts)} values, it needs {count}")
+        return [self.number(part, what) for part in parts]
+
+    def vector3(self, text: str | None, what: str) -> Vector3:
+        """Return three numbers."""
+        x, y, z = self.numbers(text, 3, what)
+        return (x, y, z)
+
+    def vector6(self, text: str | None, what: str) -> Vector6:
+        """Return six numbers."""
+        return six(self.numbers(text, 6, what))
+
+
+class _Reader(_Values):
     """Looks up the parts of one file but its features."""
 
     def external_control(self) -> tuple[ExternalControlPc, str]:
@@ -243,10 +360,10 @@ class _Reader(InstallationValues):
                     unit.get("sequentialMode") == "true",
                 )
 
-    def safe_home(self) -> Vector6 | None:
+    def safe_home(self) -> Vector6:
         settings = self.first.get("SafeHomeSettings")
         position = "" if settings is None else self.value(settings, "position")
-        return self.vector6(position, "safe home") if position else None
+        return self.vector6(position, "safe home") if position else NEW_HOME
 
     def start_up(self) -> StartUp:
         settings = self.first.get("DefaultProgramSettings")
@@ -257,3 +374,62 @@ class _Reader(InstallationValues):
             settings.get("nameOfSensorToAutoStartProgram", ""),
             settings.get("triggerValueToStartProgram", "true") == "true",
         )
+
+
+def _features(file: _Values) -> Iterator[tuple[str, Feature]]:
+    """Yield the features of an installation with their names."""
+    container = file.first.get("Features", file.first.get("GeomFeatures"))
+    if container is not None:
+        yield from _features_in(file, container, "", is_variable=False)
+
+
+def _features_in(
+    file: _Values, node: Element, name: str, *, is_variable: bool
+) -> Iterator[tuple[str, Feature]]:
+    """Yield the features in a node; a feature may stand in another node that has its name."""
+    for given in node:
+        child = file.tree.resolve(given)
+        inner_name = child.get("name") or name
+        variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
+        pose = _pose_of(file, child)
+        if pose is not None and inner_name:
+            yield inner_name, Feature(pose, variable)
+        elif pose is None and given is child:
+            yield from _features_in(file, child, inner_name, is_variable=variable)
+
+
+def _pose_of(file: _Values, node: Element) -> Vector6 | None:
+    """Return the pose of a feature; None for a node that is none."""
+    if node.tag.endswith("GeomPlaneNode") and node.find("firstPoint") is not None:
+        return _plane(file, node)
+    if not node.tag.endswith("GeomPoseNode"):
+        return None
+    position = file.value(node, "toolPosition")
+    if not position:
+        return None
+    return (
+        *file.vector3(position, "position of a feature"),
+        *file.vector3(file.value(node, "toolAxisAngle"), "rotation of a feature"),
+    )
+
+
+def _plane(file: _Values, node: Element) -> Vector6:
+    p1, p2, p3 = (_point(file, node, name) for name in ("firstPoint", "secondPoint", "thirdPoint"))
+    y, normal = p2 - p1, np.cross(p2 - p1, p3 - p1)
+    length, area = float(np.linalg.norm(y)), float(np.linalg.norm(normal))
+    if not (length > 0.0 and area > 0.0):
+        raise ProgramFileError(f"{file.tree.name}: the points of a plane lie on a line")
+    y, z = y / length, normal / (-area if node.get("userHasPoints") == "true" else area)
+    T_base_plane = np.eye(4)
+    T_base_plane[:3, :4] = np.column_stack((np.cross(y, z), y, z, p1))
+    return six(T_to_pose(T_base_plane))
+
+
+def _point(file: _Values, node: Element, name: str) -> np.ndarray:
+    point = node.find(name)
+    inner = None if point is None else file.tree.resolve(point)
+    for element in () if inner is None else inner.iter():
+        position = file.value(element, "toolPosition")
+        if position:
+            return np.array(file.vector3(position, "point of a plane"))
+    raise ProgramFileError(f"{file.tree.name}: a plane has no <{name}>")

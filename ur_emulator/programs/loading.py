@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
-from protocol.script_channel import MAX_PROGRAM
+from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation
-from ur_emulator.programs.installation_files import NEW_BOX, installation_of
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.script_header import header_lines
-from ur_emulator.programs.script_names import identifier
-from ur_emulator.programs.script_text import as_one_program
-from ur_emulator.programs.script_writer import Gap, Header, Part
-from ur_emulator.programs.twin import is_twin, software_of
+from ur_emulator.programs.installation_reader import NEW_BOX, installation_of
+from ur_emulator.programs.reading import ProgramReader, XmlTree
+from ur_emulator.programs.script_writer import Gap, Header, Part, header_lines, identifier
 from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
 from ur_emulator.programs.urpx_program import URPX_SUFFIX
-from ur_emulator.programs.xml_tree import XmlTree
 from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"
@@ -29,6 +25,17 @@ _MOST_NOTES = 20
 # Marks of the part of a PC's program that is written once, before the rest. Source: External Control URCap.
 _HEADER_BEGIN = "# HEADER_BEGIN"
 _HEADER_END = "# HEADER_END"
+# Twin: the script that PolyScope saves beside a program, and never reads. A script of that name can be the
+# user's own. Source of the marks: scripts that PolyScope saved, and the software that saved them.
+_DEF = re.compile(r"\s*def \w+\(\):")
+_LABEL = re.compile(r'^\s*\$ \d+ "', re.MULTILINE)
+# Text in the header -> the software that writes it; the first that is found.
+_MARKS = (
+    ("_hidden_verificationVariable", "5.12 or later"),
+    ("set_target_payload", "5.10 or later"),
+    ("set_tool_communication", "5.x"),
+    ("set_tool_voltage", "3.x"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +96,25 @@ class LoadedProgram:
                 raise ProgramFileError(f"the parts of PCs together have more than {MAX_PROGRAM} bytes")
             texts.append(part.indent + f"\n{part.indent}".join(lines))
         return "\n".join(texts) + "\n"
+
+
+def as_one_program(text: str, name: str) -> str:
+    """Return a script file as one program, one character a byte.
+
+    A file with one `def` and nothing else is a program, as PolyScope saves it beside a .urp.
+    Any other file is wrapped into a program with the name of the file, as a node of type script is: several
+    functions and a call of one of them, or statements alone, are a program then.
+
+    Raises:
+        ProgramFileError: the script is longer than a box takes.
+    """
+    plain = to_script_text(text).rstrip() + "\n"
+    if len(plain) > MAX_PROGRAM:
+        raise ProgramFileError(f"the script has more than {MAX_PROGRAM} bytes")
+    items = ScriptChannel().feed(plain.encode("latin-1"))
+    if len(items) == 1 and isinstance(items[0], ProgramText) and items[0].kind == "def":
+        return items[0].text.rstrip("\n")
+    return f"def {name}():\n{plain}end"
 
 
 def split_header(text: str) -> tuple[list[str], list[str]]:
@@ -156,13 +182,23 @@ def _twin_instead(
         raise unknown
     twin = reader.folder.find(saved)
     text = as_one_program(reader.script(twin), identifier(twin.inside.stem))
-    if not is_twin(text):
+    if not _is_twin(text):
         raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} is not a script that PolyScope saved")
     if uses_external_control(tree):
         raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} has what a PC sent when it was saved")
-    origin = f"{twin.name}, saved by software {software_of(text)}"
+    origin = f"{twin.name}, saved by software {_software_of(text)}"
     note = f"{_cause(unknown)}: instead of the nodes runs {origin}"
     return LoadedProgram(file.wire_path, installation, (text,), (note,), origin)
+
+
+def _is_twin(text: str) -> bool:
+    """True for a script that PolyScope made: a program with labels."""
+    return _DEF.match(text) is not None and _LABEL.search(text) is not None
+
+
+def _software_of(text: str) -> str:
+    """Return the software that saved a twin, as far as its header shows it."""
+    return next((software for mark, software in _MARKS if mark in text), "unknown")
 
 
 def _cause(error: object) -> str:

@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Iterator
 
 from ur_emulator.controller.safety.boundaries import Boundaries, BoundaryMode, SafetyPlane, ToolDirection
-from ur_emulator.controller.safety.configured_limits import SafetySettings
 from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
+from ur_emulator.controller.safety.safety_state import SafetySettings
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.robot_model import Vector3, Vector6, six
 from ur_emulator.models.safety_limits import ArmLimits

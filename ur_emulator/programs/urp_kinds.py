@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ur_emulator.programs import urp_direction, urp_flow, urp_moves, urp_statements
+from ur_emulator.programs import urp_flow, urp_moves, urp_statements
 from ur_emulator.programs.urp_maker import NodeWriter
 
 
@@ -43,7 +43,7 @@ _ROWS = (
     NodeKind(
         "Force",
         "`force_mode` around its nodes; only the type Frame",
-        urp_direction.write_force,
+        urp_moves.write_force,
     ),
     NodeKind("Halt", "`halt`", urp_statements.write_halt),
     NodeKind(
@@ -67,7 +67,11 @@ _ROWS = (
         "`popup` of a text, a variable or an expression; one that halts the program does not wait",
         urp_statements.write_popup,
     ),
-    NodeKind("SafeHome", "`movej` to the safe home position of the installation", urp_moves.write_safe_home),
+    NodeKind(
+        "SafeHome",
+        "`movej` to the home position of the installation, or else to that of a new box: arm upright",
+        urp_moves.write_safe_home,
+    ),
     NodeKind(
         "Script",
         "a line, or the text of a file, read from its path or else from the copy in the node",
@@ -89,7 +93,7 @@ _ROWS = (
     NodeKind(
         "gui.program.direction.MoveDirectionNode",
         "a motion in a thread that its `Until` nodes end: a distance, or a contact and a way back",
-        urp_direction.write_direction,
+        urp_moves.write_direction,
     ),
 )
 

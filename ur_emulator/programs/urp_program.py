@@ -12,23 +12,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import TYPE_CHECKING
 
 from ur_emulator.programs import urp_flow
 from ur_emulator.programs.folder import FoundFile
 from ur_emulator.programs.installation import Installation
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.script_names import identifier
-from ur_emulator.programs.script_writer import Header, Part, ScriptWriter
+from ur_emulator.programs.reading import ProgramReader, XmlTree
+from ur_emulator.programs.script_writer import Header, Part, ScriptWriter, identifier
 from ur_emulator.programs.urp_expressions import expression_of, variable_name
 from ur_emulator.programs.urp_kinds import KINDS
 from ur_emulator.programs.urp_maker import Around, UrpMaker
-from ur_emulator.programs.urp_node_reader import read_nodes
-from ur_emulator.programs.urp_nodes import Node
-from ur_emulator.programs.urp_paths import last_motions
+from ur_emulator.programs.urp_nodes import Node, read_nodes
 from ur_emulator.programs.urp_statements import EXTERNAL_CONTROL, contributor
-from ur_emulator.programs.xml_tree import XmlTree
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -129,7 +125,7 @@ def _joined(parts: list[Part]) -> Iterator[Part]:
 
 def _write_section(maker: UrpMaker, node: Node, name: str, *, is_loop: bool = False, mark: str = "") -> None:
     """Write the nodes of the main program, of BeforeStart or of a sub-program."""
-    maker.last_motions |= last_motions(node, is_loop=is_loop)
+    maker.last_motions |= _last_motions(node, is_loop=is_loop)
     maker.writer.label(node.number, name, mark)
     # Software up to 3.6 has waypoints outside of moves: the program has their parameters.
     maker.write_children(node, Around(node if node.get("motionType") else None))
@@ -139,12 +135,12 @@ def _write_threads(maker: UrpMaker, nodes: Sequence[Node]) -> None:
     events = [node for node in nodes if node.kind == "Event"]
     for node in nodes:
         if node.kind == "Thread":
-            maker.last_motions |= last_motions(node, is_loop=node.get("runOnlyOnce") != "true")
+            maker.last_motions |= _last_motions(node, is_loop=node.get("runOnlyOnce") != "true")
             urp_flow.write_thread(maker, node, Around())
         elif node.kind != "Event":
             maker.write(node, Around())
     for event in events:
-        maker.last_motions |= last_motions(event, is_loop=False)
+        maker.last_motions |= _last_motions(event, is_loop=False)
     if events:
         urp_flow.write_events(maker, events, Around())
 
@@ -180,3 +176,37 @@ def _write_timers(maker: UrpMaker) -> None:
                 writer.add(f"{timer} = {timer} + get_steptime()")
         writer.add("sync()")
     writer.add("run Timer_Thread()")
+
+
+def _last_motions(section: Node, *, is_loop: bool) -> set[int]:
+    """Return the numbers of the motions of MoveP behind which no other motion of MoveP comes.
+
+    They have no blend radius. Ends of other loops than counting ones are inferred.
+
+    Args:
+        section: main program, thread or sub-program.
+        is_loop: its first node comes behind its last.
+    """
+    motions = list(_motions(section, section.get("motionType")))
+    behind = motions[0] if motions and is_loop else (0, "")
+    return {
+        number
+        for (number, kind), (_, following) in pairwise([*motions, behind])
+        if kind == "MoveP" and following != "MoveP"
+    }
+
+
+def _motions(node: Node, motion: str) -> Iterator[tuple[int, str]]:
+    """Yield number and type of each motion in the order of the nodes; the end of a loop has no type."""
+    for child in node.children:
+        match child.kind:
+            case "Waypoint" | "CircleMove":
+                yield child.number, motion
+                continue
+            case "SafeHome" | "gui.program.direction.MoveDirectionNode":
+                yield child.number, ""
+        yield from _motions(child, child.get("motionType") if child.kind == "Move" else motion)
+        for branch in child.branches:
+            yield from _motions(branch, motion)
+        if child.kind == "Loop":
+            yield 0, ""

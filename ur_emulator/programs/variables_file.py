@@ -14,8 +14,7 @@ from typing import Any
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.programs.folder import FoundFile, ProgramFolder
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.xml_tree import XmlTree, unpack
+from ur_emulator.programs.reading import ProgramReader, XmlTree, unpack
 from urscript.values import Pose
 
 SUFFIX = ".variables"

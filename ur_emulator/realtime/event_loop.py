@@ -22,10 +22,12 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from heapq import heappop, heappush
+from itertools import count
 from typing import Protocol, cast
 
 from ur_emulator.realtime.barrier import Failed, guarded
-from ur_emulator.realtime.interpreter import loop_settings
+from ur_emulator.realtime.memory import loop_settings
 from ur_emulator.realtime.tasks import TaskQueue
 
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
@@ -80,6 +82,9 @@ class EventLoop:
         self._services: list[Service] = []
         self._calls: deque[Callable[[], None]] = deque()
         self._round: deque[Callable[[], None]] = deque()
+        # Calls for later: their time, then the order in which they came.
+        self._timers: list[tuple[float, int, Callable[[], None]]] = []
+        self._order = count()
         self._stopping = False
         self.is_running = False
         self._thread = 0
@@ -150,6 +155,16 @@ class EventLoop:
         """
         self._calls.append(partial(guarded, failed, call))
 
+    def call_later(self, delay: float, call: Callable[[], None], failed: Failed) -> None:
+        """As `call_soon`, after `delay` seconds or a little later: for what needs no cycle."""
+        due = time.monotonic() + delay
+        timer: tuple[float, int, Callable[[], None]] = (
+            due,
+            next(self._order),
+            partial(guarded, failed, call),
+        )
+        heappush(self._timers, timer)
+
     # --- other threads
 
     @property
@@ -184,6 +199,10 @@ class EventLoop:
                         except Exception as error:
                             self.remove(service)
                             service.failed(error)
+                    while self._timers and self._timers[0][0] <= now:
+                        self._calls.append(heappop(self._timers)[2])
+                    if self._timers:
+                        deadline = min(deadline, self._timers[0][0])
                     self._dispatch(deadline)
         finally:
             self.is_running = False

@@ -21,6 +21,7 @@ from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import RefusedError
 from ur_emulator.realtime.barrier import Failed, guarded, place_of
+from ur_emulator.realtime.memory import MemoryWatch
 from ur_emulator.realtime.pacing import Pacer, RealtimePacer
 
 # What was sent before one of these does not begin after it. The same goes for the word that unlocks a
@@ -45,7 +46,9 @@ class ServedBox:
         controller: the box without its ports.
         log: programs, errors, modes, text messages, clients.
         backlog: the connections with bytes in their outbox; they enter and leave it themselves.
+        watch: measures the memory of a process that only serves boxes; None in a process of the user.
         stops: how many commands so far stop the program and all that waits to be compiled.
+        newest: when the newest of the programs that were started was asked for, in monotonic time [s].
     """
 
     def __init__(
@@ -78,6 +81,8 @@ class ServedBox:
         self._n_scheduled = 0
         self._awake_until = 0
         self.stops = 0
+        self.newest = 0.0
+        self.watch: MemoryWatch | None = None
         self.backlog: set[Any] = set()
         self._on_failure = on_failure
         self._given_up: set[Any] = set()
@@ -231,6 +236,8 @@ class ServedBox:
             self._submit_due()
             commands, self._commands = self._commands, {}
             snapshot = self.controller.tick(commands.values())
+            if self.watch is not None:
+                self.watch.look(self.controller.programs, now)
             # Events first, also before a cycle that is held: an error must have arrived before any state or
             # answer that shows its effect.
             if self.controller.state.events:

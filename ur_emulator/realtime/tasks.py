@@ -1,7 +1,8 @@
 """Long tasks of the services of one loop: done in another process, one at a time.
 
 A task that takes long keeps its process for itself, and the others go on in a new one, so that no client
-waits for a long program or a damaged file of somebody else for more than a moment.
+waits for a long program or a damaged file of somebody else for more than a moment. The queue looks at the
+clock itself: a process may be stopped.
 """
 
 from __future__ import annotations
@@ -20,20 +21,19 @@ from typing import Any, Protocol
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
 from ur_emulator.realtime.barrier import Failed, guarded
-from ur_emulator.realtime.worker_process import (
-    OUT_OF_MEMORY,
-    TAKES_LONG,
-    WorkerProcess,
-    leave_process,
-    out_of_memory,
-    take_process,
-)
+from ur_emulator.realtime.memory import is_stopped, resident
+from ur_emulator.realtime.processes import OUT_OF_MEMORY, Child, Pipe, Role, start_child
+from ur_emulator.realtime.worker import LONG, out_of_memory
 
 # Gets the result of a task and None, or None and what it raised.
 TaskDone = Callable[[Any, Exception | None], None]
+# How often the queue looks at the clock while there are tasks [s].
+_LOOK_PERIOD = 0.25
+# After so much real time a task ends [s]: it may wait for a disk for ever.
+_FOR_EVER = 60.0
 
 
-class Watcher(Protocol):
+class Loop(Protocol):
     """The part of a loop that a task queue uses."""
 
     def watch(
@@ -48,6 +48,10 @@ class Watcher(Protocol):
 
     def call_soon(self, call: Callable[[], None], failed: Failed) -> None:
         """Run `call` in the loop, soon, and `failed` with an error in it."""
+        ...
+
+    def call_later(self, delay: float, call: Callable[[], None], failed: Failed) -> None:
+        """Run `call` in the loop after `delay` seconds, and `failed` with an error in it."""
         ...
 
 
@@ -76,6 +80,7 @@ class Task:
         done: called at its end, unless it is dropped.
         failed: called with an error in `done`.
         is_dropped: its result is no longer wanted.
+        began: when a process got it, or began itself [s, monotonic].
     """
 
     place: Place
@@ -83,18 +88,45 @@ class Task:
     done: TaskDone
     failed: Failed
     is_dropped: bool = False
+    began: float = 0.0
+
+
+class _Process:
+    """A worker process.
+
+    Attributes:
+        child: its life.
+        pipe: takes tasks, gives answers.
+        memory_at_rest: what it held when it began [bytes].
+    """
+
+    def __init__(self) -> None:
+        self.child: Child = start_child(Role.WORKER)
+        self.pipe = Pipe(self.child.pipe)
+        self.memory_at_rest = 0
+
+    @property
+    def memory(self) -> int:
+        """What it holds [bytes]; 0 where nobody knows."""
+        return 0 if self.child.pid is None else resident(self.child.pid)
+
+    @property
+    def growth(self) -> int:
+        """What it holds beyond what it held when it began [bytes]."""
+        return max(0, self.memory - self.memory_at_rest)
 
 
 class TaskQueue:
     """Tasks in the order of their places; used in the loop's thread."""
 
-    def __init__(self, loop: Watcher) -> None:
+    def __init__(self, loop: Loop) -> None:
         self._loop = loop
         self._waiting: list[Task] = []
-        self._under_way: dict[WorkerProcess, Task] = {}
+        self._under_way: dict[_Process, Task] = {}
         # The process that does the next task; those that do long ones are only in `_under_way`.
-        self._process: WorkerProcess | None = None
-        self._killed: set[WorkerProcess] = set()
+        self._process: _Process | None = None
+        self._killed: set[_Process] = set()
+        self._is_looking = False
 
     @property
     def is_idle(self) -> bool:
@@ -136,28 +168,38 @@ class TaskQueue:
                 self._kill(process)
                 self._begin_next()
 
+    def memory(self) -> int:
+        """Return what the processes hold beyond what they began with [bytes]."""
+        return sum(process.growth for process in self._under_way)
+
+    def end_for_memory(self) -> None:
+        """End the task that holds most."""
+        process = max(self._under_way, key=lambda process: process.growth)
+        self._end(process, WorkerError(out_of_memory()))
+
     def close(self) -> None:
-        """Drop all tasks; the process stays for the next loop if it is idle."""
+        """Drop all tasks and let go of all processes."""
         self._waiting.clear()
-        process, self._process = self._process, None
-        if process is not None and process not in self._under_way:
-            self._loop.unwatch(process.sock)
-            leave_process(process)
-        for other in (*self._under_way, *self._killed):
-            self._release(other)
+        processes = {*self._under_way, *self._killed, *([self._process] if self._process else [])}
+        for process in processes:
+            process.child.kill()
+            self._release(process)
         self._under_way.clear()
+        self._process = None
 
     # --- how
 
-    def _start(self) -> WorkerProcess:
+    def _start(self) -> _Process:
         if self._process is None:
-            self._process = take_process()
-            self._watch(self._process)
+            self._process = process = _Process()
+            self._watch(process)
+            look = partial(self._look_at, process)
+            self._loop.watch(process.child.life, selectors.EVENT_READ, look, self._fail)
         return self._process
 
-    def _watch(self, process: WorkerProcess) -> None:
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if process.has_more else 0)
-        self._loop.watch(process.sock, events, partial(self._on_ready, process), partial(self._lose, process))
+    def _watch(self, process: _Process) -> None:
+        ready = partial(self._on_ready, process)
+        self._loop.watch(process.pipe.sock, process.pipe.events, ready, partial(self._lose, process))
 
     def _begin_next(self) -> None:
         if self._process in self._under_way or (task := self._take_next()) is None:
@@ -167,11 +209,14 @@ class TaskQueue:
         except OSError as error:
             problem = WorkerError(f"the process for it cannot be started ({error}): try again later")
             self._loop.call_soon(lambda: self._finish(task, None, problem), task.failed)
-        else:
-            self._under_way[process] = task
-            process.send(task.request)
-            task.request = b""  # the process keeps what it has not sent yet
-            self._watch(process)
+            return
+        self._under_way[process] = task
+        task.began = time.monotonic()
+        process.pipe.send(task.request)
+        task.request = b""  # the pipe keeps what it has not sent yet
+        self._watch(process)
+        if not self._is_looking:
+            self._look_later()
 
     def _take_next(self) -> Task | None:
         busy = {task.place.sender for task in self._under_way.values()}
@@ -182,40 +227,25 @@ class TaskQueue:
         self._waiting.remove(task)
         return task
 
-    def _on_ready(self, process: WorkerProcess, events: int) -> None:
+    def _on_ready(self, process: _Process, events: int) -> None:
         if events & selectors.EVENT_WRITE:
-            process.flush()
+            process.pipe.flush()
             self._watch(process)
         if not events & selectors.EVENT_READ:
             return
         try:
-            answers = process.receive()
+            answers = process.pipe.receive()
         except EOFError:
-            self._lose(process)
+            self._loop.unwatch(process.pipe.sock)  # `life` says how it has ended
             return
         for answer in answers:
-            if process not in self._under_way:
-                return
-            if answer == TAKES_LONG:
-                self._set_apart(process)
-            else:
+            if process in self._under_way:
                 self._answered(process, answer)
 
-    def _set_apart(self, process: WorkerProcess) -> None:
-        """Let a process go on alone with a task that takes long, if somebody wants it and not too many do."""
-        task = self._under_way[process]
-        if not task.is_dropped and len(self._under_way) <= BUDGETS.long_tasks:
-            self._process = None
-            self._begin_next()
-            return
-        self._kill(process)
-        text = "it takes long, and so does what another client has sent: make it shorter, or try again later"
-        self._finish(task, None, WorkerError(text))
-
-    def _answered(self, process: WorkerProcess, answer: bytes) -> None:
-        """Take the answer to a task; a process that was set apart has served then."""
+    def _answered(self, process: _Process, answer: bytes) -> None:
+        """Take the answer to a task; a process in which one took long has a low priority, and goes."""
         task = self._under_way.pop(process)
-        if process is not self._process:
+        if process is not self._process or time.monotonic() - task.began >= LONG:
             self._kill(process)
         try:
             result, error = pickle.loads(answer)
@@ -223,39 +253,97 @@ class TaskQueue:
             result, error = None, WorkerError(repr(problem))
         self._finish(task, result, error)
 
-    def _lose(self, process: WorkerProcess, error: Exception | None = None) -> None:
+    # --- tasks that take long
+
+    def _look_later(self) -> None:
+        self._is_looking = True
+        self._loop.call_later(_LOOK_PERIOD, self._look, self._fail)
+
+    def _look(self) -> None:
+        """Set tasks apart that take long; end those that take for ever or whose process was stopped."""
+        self._is_looking = False
+        now = time.monotonic()
+        for process, task in tuple(self._under_way.items()):
+            pid = process.child.pid
+            if pid is not None and is_stopped(pid):
+                self._end(process, WorkerError("the process that did it was stopped: try again"))
+            elif now - task.began >= _FOR_EVER:
+                self._end(process, WorkerError(f"it takes more than {_FOR_EVER:g} s: make it shorter"))
+            elif process is self._process and pid is not None and now - task.began >= LONG:
+                self._set_apart(process)
+        if self._under_way:
+            self._look_later()
+
+    def _set_apart(self, process: _Process) -> None:
+        """Let a process go on alone with a task that takes long, if somebody wants it and not too many do."""
+        if not self._under_way[process].is_dropped and len(self._under_way) <= BUDGETS.long_tasks:
+            self._process = None
+            self._begin_next()
+        else:
+            text = "it takes long, and so does what another client has sent: "
+            self._end(process, WorkerError(f"{text}make it shorter, or try again later"))
+
+    # --- ends
+
+    def _end(self, process: _Process, error: WorkerError) -> None:
+        """End a task with its process."""
+        task = self._under_way[process]
+        self._kill(process)
+        self._finish(task, None, error)
+
+    def _look_at(self, process: _Process, events: int) -> None:
+        """Take what the server tells of a process: it has begun, or ended."""
+        if process.child.look():
+            self._lose(process)
+        else:
+            process.memory_at_rest = process.memory
+            if process in self._under_way:  # its task has waited for it until now
+                self._under_way[process].began = time.monotonic()
+
+    def _lose(self, process: _Process, error: Exception | None = None) -> None:
         """Do without a process that has ended, or with which we failed; its task fails."""
         task = self._under_way.pop(process, None)
         if process is self._process:
             self._process = None
-        code = self._release(process)
+        if error is not None:
+            process.child.kill()
+        reason = repr(error) if error else _reason(process.child.exit_code)
+        self._release(process)
         if task is not None:
-            self._finish(task, None, WorkerError(repr(error) if error else _reason(code)))
+            self._finish(task, None, WorkerError(reason))
 
-    def _kill(self, process: WorkerProcess) -> None:
+    def _kill(self, process: _Process) -> None:
         """Let a process end, which takes a moment; it is released afterwards."""
-        process.kill()
+        process.child.kill()
         self._killed.add(process)
         self._under_way.pop(process, None)
         if process is self._process:
             self._process = None
 
-    def _release(self, process: WorkerProcess) -> int:
-        """Release what is left of a process that has ended or was killed; return its exit code."""
+    def _release(self, process: _Process) -> None:
+        """Release what is left of a process that has ended or was killed."""
         self._killed.discard(process)
-        self._loop.unwatch(process.sock)
-        return process.end()
+        self._loop.unwatch(process.child.life)
+        self._loop.unwatch(process.pipe.sock)
+        process.child.close()
 
     def _finish(self, task: Task, result: Any, error: Exception | None) -> None:
         if not task.is_dropped:
             guarded(task.failed, task.done, result, error)
         self._begin_next()
 
+    @staticmethod
+    def _fail(error: Exception) -> None:
+        """Let an error of ours end the loop."""
+        raise error
 
-def _reason(code: int) -> str:
+
+def _reason(code: int | None) -> str:
     if code == -signal.SIGPROF:
         return f"it takes more than {BUDGETS.task_seconds:g} s of processor time: make it shorter"
     if code == OUT_OF_MEMORY:
         return out_of_memory()
+    if code is None:
+        return "the process that did it has ended: try again"
     how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
     return f"the process that did it was ended {how}: try again"

@@ -9,12 +9,17 @@ from ur_emulator.controller.compliance.compliance import Compliance
 from ur_emulator.controller.compliance.force_sense import ForceSense
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.kinematics.wrench import moved_wrench
+from ur_emulator.kinematics.arm_model import ArmModel, moved_wrench
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.axis_hold import AxisHold, singularity_status
-from ur_emulator.motion.force_mode import ArmMeasurement, ForceMode, ForceSettings
-from ur_emulator.motion.task_frame import MIN_DISTANCE, FrameType, TaskFrame
+from ur_emulator.motion.force_mode import (
+    MIN_DISTANCE,
+    ArmMeasurement,
+    ForceMode,
+    ForceSettings,
+    FrameType,
+    TaskFrame,
+)
 from ur_emulator.plant.physics import ServoGains
 from ur_emulator.scripting.script_arm import ScriptArm, require_positive
 from urscript.errors import ScriptRuntimeError

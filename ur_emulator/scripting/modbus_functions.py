@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
+from ur_emulator.controller import modbus_map
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.io.configuration import IoConfiguration
+from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import (
     DEFAULT_ACTION,
     DEFAULT_PORT,
@@ -23,7 +25,8 @@ from ur_emulator.controller.io.modbus_signals import (
     SignalType,
     UnitAddress,
 )
-from ur_emulator.controller.io.run_states import RunState
+from ur_emulator.controller.modbus_map import MapAddressError
+from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.network import Network
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import Blocked
@@ -282,3 +285,40 @@ def _unit_address(builtin: str, text: str) -> UnitAddress:
             f'{builtin}: "{text[:80]}" is not an address; write "ip" or "ip:port", port 1 to 65535'
         )
     return UnitAddress(match[1], port)
+
+
+# --- builtins on the robot's own Modbus map. They act at once, like those for lines
+
+_SIGN = 0x8000
+
+T = TypeVar("T")
+
+
+def port_functions(state: ControllerState) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins for the Modbus map of one controller, whose whole state it shows.
+
+    What can only be read ignores writes: the manual's own example writes to an input.
+    """
+
+    def access(function: Callable[..., T], address: float, *value: int | bool) -> T:
+        try:
+            return function(state, int(address), *value)
+        except MapAddressError as error:
+            raise ScriptRuntimeError(str(error)) from None
+
+    def read_port_register(thread: object, address: float) -> int:
+        word = access(modbus_map.read_register, address)
+        return word - 2 * _SIGN if word & _SIGN else word
+
+    def write_port_register(thread: object, address: float, value: float) -> None:
+        access(modbus_map.write_register, address, int(value))
+
+    def write_port_bit(thread: object, address: float, value: bool) -> None:
+        access(modbus_map.write_coil, address, value)
+
+    return {
+        "read_port_bit": lambda thread, address: access(modbus_map.read_coil, address),
+        "read_port_register": read_port_register,
+        "write_port_bit": write_port_bit,
+        "write_port_register": write_port_register,
+    }

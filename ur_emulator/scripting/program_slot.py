@@ -69,6 +69,11 @@ class ProgramSlot:
         return self._primary is not None and self._phase in _STANDS_STILL
 
     @property
+    def is_any_running(self) -> bool:
+        """True while there is a program, primary or secondary."""
+        return self._primary is not None or bool(self._secondaries)
+
+    @property
     def has_work(self) -> bool:
         """True while any program needs cycles, and in the cycle in which one ended."""
         if self._primary is None:
@@ -170,6 +175,23 @@ class ProgramSlot:
             state.io_configuration.program_started()
             state.events.append(ProgramResumed(self.name))
             self._enter(ProgramState.RESUMING)
+
+    def end_for_memory(self, text: str) -> None:
+        """End the secondary programs with an error, or, if there is none, the primary program."""
+        if self._secondaries:
+            for program in self._secondaries:
+                program.fail(text)
+                self._report(program, secondary=True)
+            self._secondaries.clear()
+        elif self._primary is not None:
+            self._primary.fail(text)
+            self._report(self._primary)
+            self._end(unscheduled=True)
+
+    def forget(self) -> None:
+        """Drop the variables of the last program if it has ended."""
+        if self._primary is None and self.latest is not None:
+            self.latest.forget()
 
     # --- cycle
 

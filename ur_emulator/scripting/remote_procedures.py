@@ -16,7 +16,7 @@ from weakref import WeakSet
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.clock import Clock
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
-from urscript.dialect import LONGEST_STRING
+from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
 from urscript.run.threads import ScriptThread
 from urscript.run.variables import same_type
@@ -153,7 +153,7 @@ def _from_wire(value: Any, has_structs: bool) -> Any:
                 return Pose.of(numbers)
         case list():
             return _one_type([_from_wire(item, has_structs) for item in value])
-    if isinstance(value, dict) and value and has_structs:
+    if isinstance(value, dict) and value and has_structs and all(len(key) <= LONGEST_NAME for key in value):
         return Struct({to_script_text(name): _from_wire(item, True) for name, item in value.items()})
     raise RemoteCallError(f"the result has no counterpart in a script: {str(value)[:80]}")
 

@@ -7,35 +7,30 @@ from typing import Any
 
 from ur_emulator.controller.events import TextPrinted
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.scripting.clock_functions import clock_functions
 from ur_emulator.scripting.compliance_functions import compliance_functions
-from ur_emulator.scripting.conveyor_functions import ProgramConveyor
-from ur_emulator.scripting.dynamics_functions import dynamics_functions
-from ur_emulator.scripting.encoder_functions import encoder_functions
-from ur_emulator.scripting.error_functions import error_functions
-from ur_emulator.scripting.interpreter_functions import interpreter_functions
-from ur_emulator.scripting.io_configuration_functions import io_configuration_functions
-from ur_emulator.scripting.io_functions import io_functions, register_functions
-from ur_emulator.scripting.modbus_functions import modbus_functions
-from ur_emulator.scripting.motion_functions import motion_functions
+from ur_emulator.scripting.io_functions import (
+    io_configuration_functions,
+    io_functions,
+    register_functions,
+    tool_functions,
+)
+from ur_emulator.scripting.modbus_functions import modbus_functions, port_functions
+from ur_emulator.scripting.motion_functions import motion_functions, planning_functions
 from ur_emulator.scripting.move_planner import MovePlanner
 from ur_emulator.scripting.network import Network
-from ur_emulator.scripting.operator_functions import operator_functions
-from ur_emulator.scripting.path_offset_functions import ProgramPathOffset
-from ur_emulator.scripting.payload_functions import payload_functions
-from ur_emulator.scripting.planning_functions import planning_functions
-from ur_emulator.scripting.port_functions import port_functions
+from ur_emulator.scripting.operator_functions import (
+    error_functions,
+    interpreter_functions,
+    operator_functions,
+)
+from ur_emulator.scripting.overlay_functions import ProgramConveyor, ProgramPathOffset, encoder_functions
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
-from ur_emulator.scripting.rtde_functions import rtde_functions
+from ur_emulator.scripting.rtde_functions import rtde_functions, watchdog_functions
 from ur_emulator.scripting.script_arm import ScriptArm
-from ur_emulator.scripting.settings_functions import settings_functions
+from ur_emulator.scripting.settings_functions import payload_functions, settings_functions, world_functions
 from ur_emulator.scripting.socket_functions import ProgramSockets
-from ur_emulator.scripting.speed_functions import speed_functions
-from ur_emulator.scripting.state_functions import state_functions
-from ur_emulator.scripting.tool_functions import tool_functions
-from ur_emulator.scripting.torque_functions import ProgramTorque
-from ur_emulator.scripting.watchdog_functions import watchdog_functions
-from ur_emulator.scripting.world_functions import world_functions
+from ur_emulator.scripting.speed_functions import ProgramTorque, speed_functions
+from ur_emulator.scripting.state_functions import clock_functions, dynamics_functions, state_functions
 from urscript.builtins import pure_builtins
 
 

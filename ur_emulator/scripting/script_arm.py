@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from protocol.pose import Pose
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
-from ur_emulator.controller.safety.safety_state import SafetyState
-from ur_emulator.controller.tool_settings import ToolSettings
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyState
+from ur_emulator.controller.settings import ToolSettings
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ur_emulator.motion.generators import SpeedJ, StopJ, Streamed
-from ur_emulator.motion.servo_j import ServoJ
-from ur_emulator.motion.speed_l import SpeedL, StopL
+from ur_emulator.controller.compliance.compliance import Compliance
+from ur_emulator.controller.events import EventQueue, LogAdded
+from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.models.robot_model import ZERO6, Vector6
+from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.generators import (
+    DirectTorque,
+    JointTarget,
+    ServoJ,
+    SpeedJ,
+    SpeedL,
+    StopJ,
+    StopL,
+    Streamed,
+    TorqueCommand,
+)
+from ur_emulator.motion.path_motion import OwnershipError
 from ur_emulator.scripting.script_arm import MIN_LIMIT, Cycles, ScriptArm, floats, require_positive
+from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
+from urscript.values import log_form
 
 
 def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[..., Any]]:
@@ -23,13 +38,18 @@ def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[.
     motion = arm.motion
 
     def stream(thread: object, generator: Streamed, t: float | None) -> Cycles:
-        """Renew a motion for the time t [s], or until it is done."""
+        """Renew a motion for the time t [s] of the speed slider, or until it is done."""
         arm.take(thread, generator)
         if t is not None and t > 0.0:
-            # Exactly one cycle for t = step time, whatever the rounding of the division.
-            for _ in range(max(1, math.ceil(t / step_time - 1e-6))):
+            left = t - generator.surplus
+            motion.renew()
+            yield NEXT_CYCLE
+            # Exactly one cycle for t = step time at full speed, whatever the rounding.
+            while (left := left - motion.scale * step_time) > 1e-6 * step_time:
                 motion.renew()
                 yield NEXT_CYCLE
+            # A slow cycle is not lost or gained in the sum of many short commands.
+            generator.surplus = -left if motion.scale < 1.0 else 0.0
         else:
             while not generator.done:
                 motion.renew()
@@ -80,3 +100,67 @@ def _limit(function: str, t: float | None, **limit: float) -> float:
         return MIN_LIMIT
     require_positive(function, **limit)
     return value
+
+
+# --- direct_torque: the program drives the joints by torque
+#
+# Source: URScript manual e-Series 5.25.1, direct_torque: range and defaults of the scales; friction_comp is
+# the former argument, which does not count beside a scale and is logged once. Chosen: True means the
+# default scales, False none, before 5.25 too.
+
+# Shares of the modelled friction that direct_torque compensates. Source: script manual 5.25.1, direct_torque.
+_VISCOUS_SCALE = (0.9, 0.9, 0.8, 0.9, 0.9, 0.9)
+_COULOMB_SCALE = (0.8, 0.8, 0.7, 0.8, 0.8, 0.8)
+
+
+class ProgramTorque:
+    """The torque control of one program."""
+
+    def __init__(
+        self, motion: ArmMotion, compliance: Compliance, past: PastCycles, events: EventQueue
+    ) -> None:
+        self._motion = motion
+        self._compliance = compliance
+        self._past = past
+        self._events = events
+        self._has_logged = False
+
+    def functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Return the builtin."""
+        return {"direct_torque": self._direct_torque}
+
+    def _direct_torque(
+        self,
+        thread: object,
+        torque: Sequence[float],
+        friction_comp: bool | None,
+        *scales: Sequence[float] | None,
+    ) -> Cycles:
+        viscous, coulomb = scales or (None, None)  # none before 5.25
+        if scales and friction_comp is not None and not self._has_logged:
+            self._has_logged = True
+            text = "direct_torque: friction_comp is deprecated, use viscous_scale and coulomb_scale"
+            self._events.append(LogAdded("Program", text))
+        compensates = friction_comp is not False or viscous is not None or coulomb is not None
+        command = TorqueCommand(
+            floats(torque),
+            _scale("viscous_scale", viscous, _VISCOUS_SCALE) if compensates else ZERO6,
+            _scale("coulomb_scale", coulomb, _COULOMB_SCALE) if compensates else ZERO6,
+        )
+        self._compliance.end_force()
+        try:
+            self._motion.command_torque(thread, DirectTorque(command, self._measure))
+        except OwnershipError:
+            raise ScriptRuntimeError("Another thread is already controlling the robot") from None
+        yield NEXT_CYCLE
+
+    def _measure(self) -> JointTarget:
+        sensed = self._past.sensed
+        return JointTarget(sensed.actual_q, sensed.actual_qd)
+
+
+def _scale(name: str, given: Sequence[float] | None, default: Vector6) -> Vector6:
+    scale = default if given is None else floats(given)
+    if not all(0.0 <= share <= 1.0 for share in scale):
+        raise ScriptRuntimeError(f"direct_torque: {name} must have shares from 0 to 1, got {log_form(given)}")
+    return scale

@@ -1,4 +1,4 @@
-"""Builtins that read the robot: state getters and kinematics. They take no robot time.
+"""Builtins that read the robot: state, clock, kinematics and dynamics. They take no robot time.
 
 Actual and target values are those at the end of the last cycle, constant while the scripts of a cycle run. So
 the target that a script reads is the one that the packages of its cycle show.
@@ -10,11 +10,30 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ur_emulator.controller.arm_dynamics import ArmDynamics
+from ur_emulator.controller.clock import CLOCK_EPOCH, Clock
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import ZERO6, six
 from ur_emulator.scripting.script_arm import ScriptArm
 from urscript.errors import ScriptRuntimeError
-from urscript.values import Pose
+from urscript.values import Matrix, Pose, Struct
+
+# --- the builtin `time`. Source: script manual e-Series 5.19, time: modes, seconds since 1970
+
+_SYSTEM_CLOCK = 2
+
+
+def clock_functions(clock: Clock) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtin that reads the controller's clock."""
+
+    def time(thread: object, mode: float = 0) -> Struct:
+        seconds, rest = divmod(clock.tick * clock.generation.period_us, 1_000_000)
+        if mode == _SYSTEM_CLOCK:
+            seconds += int(CLOCK_EPOCH.timestamp())
+        return Struct({"sec": seconds, "nanosec": rest * 1000})
+
+    return {"time": time}
+
 
 # is_steady(): zero target velocity for this long [s]. Source: URScript manual, later text of is_steady.
 STEADY_TIME = 0.5
@@ -133,4 +152,51 @@ def state_functions(arm: ScriptArm, past: PastCycles, step_time: float) -> Mappi
         "get_inverse_kin_has_solution": get_inverse_kin_has_solution,
         "is_steady": lambda thread: past.steady_cycles * step_time >= STEADY_TIME,
         "is_within_safety_limits": is_within_safety_limits,
+    }
+
+
+# --- builtins that ask the controller's model of the arm: Jacobian, mass matrix, Coriolis torques
+#
+# Source: URScript manual e-Series 5.23, module internals. Chosen: the model carries the declared payload;
+# where a program gives no angles or speeds, the measured ones are taken.
+
+
+def dynamics_functions(
+    arm: ScriptArm, dynamics: ArmDynamics, past: PastCycles
+) -> Mapping[str, Callable[..., Any]]:
+    """Return the builtins that ask the controller's model of the arm.
+
+    Args:
+        arm: kinematics, and the active TCP.
+        dynamics: masses.
+        past: measured angles and speeds.
+    """
+
+    def angles(q: Any) -> Any:
+        return past.sensed.actual_q if q is None else q
+
+    def speeds(qd: Any) -> Any:
+        return past.sensed.actual_qd if qd is None else qd
+
+    def tool(tcp: Any) -> Any:
+        return arm.settings.tcp_offset if tcp is None else tuple(tcp)
+
+    def get_jacobian(thread: object, q: Any, tcp: Any) -> Matrix:
+        return Matrix(arm.model.jacobian(angles(q), tool(tcp)).tolist())
+
+    def get_jacobian_time_derivative(thread: object, q: Any, qd: Any, tcp: Any) -> Matrix:
+        return Matrix(arm.model.jacobian_rate(angles(q), speeds(qd), tool(tcp)).tolist())
+
+    def get_mass_matrix(thread: object, q: Any, include_rotors_inertia: bool) -> Matrix:
+        return Matrix(dynamics.mass_matrix(angles(q), with_rotors=include_rotors_inertia).tolist())
+
+    def get_coriolis_and_centrifugal_torques(thread: object, q: Any, qd: Any) -> list[float]:
+        torques: list[float] = dynamics.velocity_torque(angles(q), speeds(qd)).tolist()
+        return torques
+
+    return {
+        "get_jacobian": get_jacobian,
+        "get_jacobian_time_derivative": get_jacobian_time_derivative,
+        "get_mass_matrix": get_mass_matrix,
+        "get_coriolis_and_centrifugal_torques": get_coriolis_and_centrifugal_torques,
     }

@@ -7,18 +7,21 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from protocol.ur_types import SIMULATED_MASTERBOARD
 from ur_emulator.box_log import BoxLog
+from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.errors import ControlError
-from ur_emulator.models.software import Software
+from ur_emulator.errors import ControlError, RefusedError
+from ur_emulator.models.robot_generation import Software
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.realtime.tasks import Place
 from ur_emulator.scripting.network import Network
 from ur_emulator.servers.steps import StepRunner, Steps, settle
+from urscript import CompiledProgram
 
 T = TypeVar("T")
 
@@ -32,12 +35,14 @@ class BoxIdentity:
         model: as people write it, "UR5e".
         wire_model: as the dashboard server writes it: "UR5" for a UR5e.
         serial_number: digits; see protocol.serial_numbers.simulated_serial.
+        masterboard: its version, by which clients know the box.
     """
 
     software: Software
     model: str
     wire_model: str
     serial_number: str
+    masterboard: int = SIMULATED_MASTERBOARD
 
 
 class BoxAccess:
@@ -129,6 +134,22 @@ class BoxAccess:
         while not outcome.done():
             yield
         return outcome.result()
+
+    def start(self, program: CompiledProgram, asked: float, *, loaded: bool = False) -> Steps[None]:
+        """Start a program, and end after its first cycle.
+
+        Args:
+            program: compiled.
+            asked: when somebody asked for it, in monotonic time [s].
+            loaded: it was loaded from a file and played.
+
+        Raises:
+            RefusedError: a program has begun that was asked for later, or no program may run now.
+        """
+        if asked < self._box.newest:
+            raise RefusedError(f"program {program.name} does not begin: a newer one was compiled before it")
+        self._box.newest = asked
+        yield from self.apply(StartProgram(program, loaded=loaded))
 
     def in_worker(self, function: Callable[..., T], *arguments: Any) -> Steps[T]:
         """Do something that takes longer than a cycle in the worker process, see `TaskQueue.submit`.

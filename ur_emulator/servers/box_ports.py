@@ -9,8 +9,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.dashboard.answers import DashboardAnswers
 from ur_emulator.servers.dashboard.port import DashboardPort
-from ur_emulator.servers.interpreter.intake import InterpreterIntake
-from ur_emulator.servers.interpreter.port import InterpreterPort
+from ur_emulator.servers.interpreter.intake import InterpreterIntake, InterpreterPort
 from ur_emulator.servers.modbus.server import ModbusPort
 from ur_emulator.servers.port_set import ROBOT_API
 from ur_emulator.servers.primary.port import PrimaryPort
@@ -41,7 +40,9 @@ class SendingPorts:
     def make(cls, access: BoxAccess, intake: ProgramIntake) -> SendingPorts:
         """Make the ports; scripts that clients send go to the intake."""
         software, controller = access.identity.software, access.controller
-        states = StateEncoder(software, controller.state.arm, controller.state.safety)
+        states = StateEncoder(
+            software, controller.state.arm, controller.state.safety, access.identity.masterboard
+        )
         return cls(
             (RealtimePort(software.realtime, intake), RealtimePort(software.realtime, None)),
             RtdePort(access),

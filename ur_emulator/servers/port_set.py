@@ -8,9 +8,7 @@ from ur_emulator.errors import PortPermissionError
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.servers.tcp.client_lines import ClientLines
-from ur_emulator.servers.tcp.listener import Listener, Port
-from ur_emulator.servers.tcp.places import Places
-from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
+from ur_emulator.servers.tcp.listener import Listener, Places, Port, SpareDescriptor
 
 CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
 # Ports whose numbers need privileges, and what the box lacks without them.

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from protocol.errors import RemoteProtocolError
-from protocol.rtde.messages import RtdeTextMessage, SetupInputs, SetupOutputs
-from protocol.rtde.server_connection import InputReceived, RtdeServerConnection
-from protocol.rtde.states import cycles_per_package
+from protocol.rtde.codec import RtdeTextMessage, SetupInputs, SetupOutputs
+from protocol.rtde.server_connection import InputReceived, RtdeServerConnection, cycles_per_package
 from protocol.rtde.types import TextLevel
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.snapshot import Snapshot
@@ -72,7 +72,8 @@ class RtdePort:
         if isinstance(request, SetupInputs):
             in_use = tuple(n for n in request.names if self._owners.get(n, connection) is not connection)
         n_recipes = len(session.protocol.input_recipes)
-        reply = session.protocol.reply(in_use)
+        has_room = not isinstance(request, SetupInputs) or session.has_room(len(request.names))
+        reply = session.protocol.reply(in_use, has_room=has_room)
         if isinstance(request, SetupInputs) and len(session.protocol.input_recipes) > n_recipes:
             self._owners.update(dict.fromkeys(request.names, connection))
         if isinstance(request, SetupOutputs):
@@ -149,6 +150,12 @@ class _RtdeSession(Session):
                 return _REQUEST_COST
         self._answer(self, event)
         return _RECIPE_COST if isinstance(event, SetupInputs | SetupOutputs) else _REQUEST_COST
+
+    def has_room(self, n_variables: int) -> bool:
+        """Whether the client may have one more input recipe, of so many variables."""
+        recipes = self.protocol.input_recipes.values()
+        n_variables += sum(len(recipe.names) for recipe in recipes)
+        return len(recipes) < BUDGETS.rtde_recipes and n_variables <= BUDGETS.rtde_variables
 
     def restart(self) -> None:
         """Take over what the last request has changed; a new stream begins in the next cycle."""

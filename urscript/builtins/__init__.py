@@ -11,16 +11,10 @@ from random import Random
 from types import MappingProxyType
 from typing import Any
 
-from . import aggregates, lists, poses, strings, urmath
+from urscript.builtins import lists, poses, strings, urmath
 
 PURE: Mapping[str, Callable[..., Any]] = MappingProxyType(
-    {
-        **urmath.FUNCTIONS,
-        **lists.FUNCTIONS,
-        **poses.FUNCTIONS,
-        **strings.FUNCTIONS,
-        **aggregates.FUNCTIONS,
-    }
+    {**urmath.FUNCTIONS, **lists.FUNCTIONS, **poses.FUNCTIONS, **strings.FUNCTIONS}
 )
 """URScript name -> function of the bound arguments, for all whose result depends on nothing else."""
 

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from urscript.catalogue.argument_checks import type_error
+from urscript.builtins.poses import pose_inv
+from urscript.catalogue.calls import integer, numbers, type_error
 from urscript.catalogue.types import ParamType
+from urscript.dialect import LONGEST_LIST
 from urscript.errors import ScriptRuntimeError
-from urscript.values import Matrix, Pose, is_number, wrap_int
-
-from .arguments import integer, numbers
-from .poses import pose_inv
+from urscript.values import Matrix, Pose, Struct, a_type, is_number, list_with_capacity, wrap_int
 
 _WORD = 32
 
@@ -111,6 +110,36 @@ def binary_list_to_integer(bits: Any) -> int:
     return value - (1 << _WORD) if value >> (_WORD - 1) else value
 
 
+# --- lists with room and structs; source: e-Series script directory, Lists and Structs ------------------
+
+
+def make_list(length: Any, initial_value: Any, capacity: Any = None) -> list[Any]:
+    """A list of `length` equal elements with room for `capacity` of them, by default for no more.
+
+    Raises:
+        ScriptRuntimeError: a length below 0 or above the capacity, a list of lists.
+    """
+    count = integer("make_list", "length", length)
+    most = count if capacity is None else integer("make_list", "capacity", capacity)
+    for name, number in (("length", count), ("capacity", most)):
+        if not 0 <= number <= LONGEST_LIST:
+            raise ScriptRuntimeError(
+                f"make_list: Parameter '{name}' must be in the range 0 to {LONGEST_LIST}, got {number}"
+            )
+    if count > most:
+        raise ScriptRuntimeError(f"make_list: a length of {count} exceeds the capacity of {most}")
+    if isinstance(initial_value, (list, Matrix)):
+        raise ScriptRuntimeError(
+            f"make_list: elements must be no lists, got {a_type(initial_value)}; a list of lists is a matrix"
+        )
+    return list_with_capacity([initial_value] * count, most, initial_value)
+
+
+def struct(names: tuple[str, ...], *values: Any) -> Struct:
+    """A struct of named values; the names are those of the arguments of the call."""
+    return Struct(dict(zip(names, values, strict=True)))
+
+
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "norm": norm,
     "normalize": normalize,
@@ -121,4 +150,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "inv": inv,
     "integer_to_binary_list": integer_to_binary_list,
     "binary_list_to_integer": binary_list_to_integer,
+    "make_list": make_list,
+    "struct": struct,
 }

@@ -10,11 +10,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from protocol import pose as algebra
+from urscript.catalogue.calls import number, numbers, pose
 from urscript.catalogue.types import ParamType
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose
-
-from .arguments import number, numbers, pose
 
 
 def _computed(function: str, compute: Callable[..., Sequence[float]], *args: Any) -> Sequence[float]:

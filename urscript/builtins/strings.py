@@ -11,11 +11,9 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from urscript.catalogue.calls import integer, string
 from urscript.errors import ScriptRuntimeError
-from urscript.values import INT_MAX, INT_MIN
-
-from .arguments import integer, string
-from .text import limited, operand_text
+from urscript.values import INT_MAX, INT_MIN, TEXT_LIMIT, Pose, a_type, is_number, str_form
 
 _NUMBER = re.compile(
     r"""[ \t\n\v\f\r]*
@@ -40,12 +38,12 @@ def str_at(src: Any, index: Any) -> str:
 
 def str_cat(op1: Any, op2: Any) -> str:
     """The texts of two values, joined; at most 1023 characters."""
-    return limited("str_cat", operand_text("str_cat", op1) + operand_text("str_cat", op2))
+    return _limited("str_cat", _operand_text("str_cat", op1) + _operand_text("str_cat", op2))
 
 
 def to_str(val: Any) -> str:
     """The text of a value; at most 1023 characters."""
-    return limited("to_str", operand_text("to_str", val))
+    return _limited("to_str", _operand_text("to_str", val))
 
 
 def str_empty(text: Any) -> bool:
@@ -119,6 +117,47 @@ def _in_range(value: int, text: str) -> int:
 
 def _out_of_range(text: str) -> ScriptRuntimeError:
     return ScriptRuntimeError(f'to_num: the number is out of range: "{text[:40]}"')
+
+
+# --- what to_str and str_cat take and give; the text form is `urscript.values.str_form` -----------------
+
+_ALLOWED = "a string, bool, int, float or pose, or a list of bools, ints, floats or poses"
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, (bool, Pose)) or is_number(value)
+
+
+def _operand_text(function: str, value: Any) -> str:
+    """The text of an operand of to_str or str_cat: six decimals at most, trailing zeros removed.
+
+    Raises:
+        ScriptRuntimeError: any type but those the manual lists (none, matrices and lists of strings are not).
+
+    Source: script manual CB3 3.15.4, str_cat and to_str.
+    """
+    if not isinstance(value, str) and not _is_scalar(value):
+        if not isinstance(value, list):
+            raise ScriptRuntimeError(f"{function}: operand must be {_ALLOWED}, got {a_type(value)}")
+        odd = [item for item in value if not _is_scalar(item)]
+        if odd:
+            raise ScriptRuntimeError(
+                f"{function}: operand must be {_ALLOWED}, got a list with {a_type(odd[0])} in it"
+            )
+    return str_form(value)
+
+
+def _limited(function: str, text: str) -> str:
+    """The text, if it is not longer than a script string may become.
+
+    Raises:
+        ScriptRuntimeError: more than 1023 characters.
+    """
+    if len(text) > TEXT_LIMIT:
+        raise ScriptRuntimeError(
+            f"{function}: the resulting string has {len(text)} characters, the limit is {TEXT_LIMIT}"
+        )
+    return text
 
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {

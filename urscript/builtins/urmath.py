@@ -10,9 +10,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from urscript.catalogue.calls import fit_int, number
 from urscript.errors import ScriptRuntimeError
-
-from .arguments import fit_int, number
 
 
 def _of_angle(function: str, compute: Callable[[float], float]) -> Callable[[Any], float]:

@@ -10,33 +10,36 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any
 
-from .argument_checks import compile_check
-from .binding import Slot, static_bind
-from .interfaces import ARRAYS
-from .interfaces import ROWS as INTERFACES
-from .internals import ROWS as INTERNALS
-from .interpreter_mode import ROWS as INTERPRETER_MODE
-from .ioconfiguration import ROWS as IOCONFIGURATION
-from .methods import ValueMethod, methods_of
-from .motion import ROWS as MOTION
-from .motion import VARIABLES
-from .processpath import ROWS as PROCESSPATH
-from .types import Builtin, BuiltinArray, ModuleVariable
-from .urmath import ROWS as URMATH
-from .versions import Generation, PerGeneration, Version
-from .world_model import ROWS as WORLD_MODEL
+from urscript.catalogue.calls import Slot, compile_check, static_bind
+from urscript.catalogue.methods import ValueMethod, methods_of
+from urscript.catalogue.tables import FIELD_USE, read_chapter
+from urscript.catalogue.types import Builtin, BuiltinArray, Generation, ModuleVariable, PerGeneration, Version
+from urscript.errors import ScriptTypeError
 
 ALL_ROWS: tuple[Builtin, ...] = (
-    *MOTION,
-    *INTERNALS,
-    *URMATH,
-    *INTERFACES,
-    *IOCONFIGURATION,
-    *INTERPRETER_MODE,
-    *PROCESSPATH,
-    *WORLD_MODEL,
+    *read_chapter("motion"),
+    *read_chapter("internals"),
+    *read_chapter("urmath"),
+    *read_chapter("interfaces"),
+    *read_chapter("ioconfiguration"),
+    *read_chapter("interpreter_mode"),
+    *read_chapter("processpath"),
+    *read_chapter("world_model"),
 )
 
+VARIABLES: tuple[ModuleVariable, ...] = tuple(
+    ModuleVariable(name, value, unit, "motion", "URScript API Reference CB3 3.15.4, module motion, Variables")
+    for name, value, unit in (
+        ("a_joint_default", 1.4, "rad/s^2"),
+        ("a_tool_default", 1.2, "m/s^2"),
+        ("v_joint_default", 1.05, "rad/s"),
+        ("v_tool_default", 0.25, "m/s"),
+    )
+)
+
+ARRAYS: tuple[BuiltinArray, ...] = (
+    BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out", FIELD_USE),
+)
 
 _MOST_CALL_FORMS = 10_000
 
@@ -54,10 +57,7 @@ class Catalogue:
     """
 
     def __init__(
-        self,
-        version: Version,
-        rows: tuple[Builtin, ...] = ALL_ROWS,
-        extra: frozenset[str] = frozenset(),
+        self, version: Version, rows: tuple[Builtin, ...] = ALL_ROWS, extra: frozenset[str] = frozenset()
     ) -> None:
         self.version = version
         self._rows = rows
@@ -107,9 +107,9 @@ class Catalogue:
         matches = get_close_matches(name.lower(), by_lower_case, n=1, cutoff=0.75)
         return by_lower_case[matches[0]] if matches else None
 
-    def first_releases(self, name: str) -> PerGeneration:
-        """The first release of each generation that knows a name; none where no software does."""
-        since = [row.since for row in self._rows if row.name == name]
+    def first_releases(self, name: str, has: Callable[[Builtin], bool] = lambda row: True) -> PerGeneration:
+        """The first release of each generation with a row of that name; none where no software has one."""
+        since = [row.since for row in self._rows if row.name == name and has(row)]
         firsts = ([each.get(generation) for each in since] for generation in Generation)
         return PerGeneration(*(min(filter(None, known), default=None) for known in firsts))
 
@@ -125,7 +125,14 @@ class Catalogue:
             # A program has few forms of calls, but all programs share the catalogue: limit its size.
             if len(self._slots) > _MOST_CALL_FORMS:
                 self._slots.clear()
-            slots = self._slots[form] = static_bind(self._by_name[name], n_positional, keyword_names)
+            try:
+                slots = self._slots[form] = static_bind(self._by_name[name], n_positional, keyword_names)
+            except ScriptTypeError as error:
+                since = self.first_releases(name, lambda row: _fits(row, n_positional, keyword_names))
+                if since != PerGeneration():
+                    here = f"{self.version.generation.value} {self.version}"
+                    error.hint = f"with these arguments it is known since {since}; this is {here}"
+                raise
         return slots
 
     def check_of(self, name: str) -> Callable[[Sequence[Any]], None]:
@@ -134,6 +141,14 @@ class Catalogue:
         It raises ScriptRuntimeError with the controller's text where it is known.
         """
         return self._checks[name]
+
+
+def _fits(builtin: Builtin, n_positional: int, keyword_names: Sequence[str]) -> bool:
+    try:
+        static_bind(builtin, n_positional, keyword_names)
+    except ScriptTypeError:
+        return False
+    return True
 
 
 @lru_cache(maxsize=32)

@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from .binding import CallSignature
-from .types import Param, ParamType
-from .versions import Version, releases
+from urscript.catalogue.calls import CallSignature
+from urscript.catalogue.types import Param, ParamType, Version, releases
 
 SINCE = releases(None, "5.15", "10.0")
 

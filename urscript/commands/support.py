@@ -6,12 +6,22 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 import typer
 
 from ur_hil.command_line import ExitCode
 from urscript.catalogue import Catalogue, catalogue_for
+from urscript.check.warnings import ScriptWarning
+from urscript.errors import (
+    ScriptContextError,
+    ScriptError,
+    ScriptLexerError,
+    ScriptNameError,
+    ScriptRuntimeError,
+    ScriptSyntaxError,
+    ScriptTypeError,
+)
 from urscript.source import as_utf8, program_text
 
 STANDARD_INPUT: Final = Path("-")
@@ -60,3 +70,48 @@ def show(text: str, *, error: bool = False) -> None:
         # Python would complain again when it closes the stream at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
+
+
+# --- errors and warnings as plain records: `urscript check --json` --------------------------------------
+
+ERROR_CODES: Final[dict[type[ScriptError], str]] = {
+    ScriptSyntaxError: "E101",
+    ScriptLexerError: "E102",
+    ScriptNameError: "E103",
+    ScriptTypeError: "E104",
+    ScriptContextError: "E105",
+    ScriptRuntimeError: "E201",
+}
+"""The stable codes of errors; those of warnings are in `check.warnings`."""
+
+
+class Diagnostic(NamedTuple):
+    """An error or warning about a program, with its place.
+
+    Lines and columns count from 1 and columns count bytes, as in a controller's messages; `end_column` is the
+    one after the last character.
+    """
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+    severity: str
+    code: str
+    message: str
+    hint: str | None
+
+
+def diagnostic_of(error: ScriptError, file: str) -> Diagnostic:
+    """The record of an error or warning in `file`."""
+    if isinstance(error, ScriptWarning):
+        severity, code = "warning", error.rule.code
+        end_line, end_column = error.span.end_line, error.span.end_column
+    else:
+        severity, code = "error", ERROR_CODES.get(type(error), "E100")
+        end_line, end_column = error.line, error.column + error.width
+    hint = as_utf8(error.hint) if error.hint else None
+    return Diagnostic(
+        file, error.line, error.column, end_line, end_column, severity, code, as_utf8(error.message), hint
+    )

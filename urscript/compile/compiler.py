@@ -4,7 +4,7 @@ Every function and thread becomes one Python function of a flat module. All are 
 can stand still anywhere: it waits, or has used up the units of a cycle. Variables of the program body are
 module globals, so threads and nested functions share them. `runtime` provides the other names the code uses.
 
-Statements and units are charged at loop iterations and function entries, not one by one (see `costs`). After
+Statements and units are charged at loop iterations and function entries, not one by one (see `_Cost`). After
 a statement with operations whose cost depends on values, the code asks whether it may go on.
 """
 
@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import ast
 import marshal
+from array import array
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from types import CodeType
+from typing import Any, Final, NamedTuple
 
 from urscript.catalogue import Catalogue
-from urscript.compile.costs import Cost, block_cost, expression_cost
 from urscript.compile.expressions import ExpressionCompiler
-from urscript.compile.inference import SCALARS, StaticTypes
-from urscript.compile.positions import PositionTable, position_tables
+from urscript.compile.inference import SCALARS, StaticTypes, Type, is_numeric
 from urscript.compile.python_tree import (
     ask,
     call,
@@ -36,7 +38,7 @@ from urscript.errors import ScriptContextError
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import Block, Expression, Statement
+from urscript.syntax.nodes import Block, Expression, Statement, child_expressions
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ def compile_resolved(
             source=program.source,
         ) from None
     return CompiledCode(
-        marshal.dumps(code), expressions.constants, function_names, position_tables(code), file_name
+        marshal.dumps(code), expressions.constants, function_names, _position_tables(code), file_name
     )
 
 
@@ -121,7 +123,7 @@ class _FunctionCompiler:
                     default = self._default(name, parameter.default)
                     defaults.append(default)
                     prologue.append(self._fill_in(parameter, default))
-        cost = block_cost(scope.body, types, scope)
+        cost = _block_cost(scope.body, types, scope)
         prologue[:0] = charge(cost.statements + 1, cost.extra, span)
         for name in sorted(scope.locals - {name.removeprefix("v_") for name in parameters}):
             # Others are neither read before they are assigned nor compared with their old value.
@@ -184,9 +186,9 @@ class _FunctionCompiler:
             case nodes.While(condition=condition, body=body):
                 test = self._expressions.condition(condition, scope)
                 asks = self._expressions.asks
-                cost = block_cost(body, self._types, scope)
-                tenths = cost.tenths + expression_cost((condition,), self._types, scope)
-                cost = Cost(max(1, cost.statements), tenths)
+                cost = _block_cost(body, self._types, scope)
+                tenths = cost.tenths + _expression_cost((condition,), self._types, scope)
+                cost = _Cost(max(1, cost.statements), tenths)
                 turn = charge(cost.statements, cost.extra, condition.span)
                 loop = ast.While(test, [*turn, *self._block(body)], [], **at)
                 self._expressions.asks = asks
@@ -279,3 +281,153 @@ class _FunctionCompiler:
 
 def _first_span(block: Block) -> Span:
     return block[0].span if block else Span(1, 1, 1, 2)
+
+
+# --- costs ----------------------------------------------------------------------------------------------
+#
+# Statements, which have a limit, and units of work, which are time (see `run.metering`). Both are known for a
+# block before it runs; bodies of loops are counted at their iterations. What depends on values, such as the
+# length of a list, is charged when it runs. The weights come from measurements on one core of 2026, in tenths
+# of a unit of 50 ns.
+
+_STATEMENT: Final = 6
+_OF_NUMBERS: Final = 3
+_LEAF: Final = 1
+_STORE_ITEM: Final = 40
+_STORE_CHECKED: Final = 12
+_WEIGHTS: Final[dict[type[Expression], int]] = {
+    nodes.BinaryOperation: 32,
+    nodes.UnaryOperation: 8,
+    nodes.Subscript: 14,
+    nodes.Call: 30,
+    nodes.MethodCall: 60,
+    nodes.ListLiteral: 10,
+    nodes.PoseLiteral: 40,
+}
+_ITEMS_OF_A_STATEMENT: Final = 16
+
+
+class _Cost(NamedTuple):
+    """What one execution costs at most.
+
+    Attributes:
+        statements: As the language counts them.
+        tenths: Of units.
+    """
+
+    statements: int
+    tenths: int
+
+    @property
+    def extra(self) -> int:
+        """Units beyond one a statement."""
+        return max(0, self.tenths // 10 - self.statements)
+
+
+def _block_cost(block: Block, types: StaticTypes, scope: FunctionScope) -> _Cost:
+    """The cost of `block` in the function of `scope`."""
+    statements = tenths = 0
+    for statement in block:
+        if isinstance(statement, nodes.If):
+            conditions = [branch.condition for branch in statement.branches]
+            bodies = [branch.body for branch in statement.branches]
+            costs = [_block_cost(body, types, scope) for body in [*bodies, statement.else_body or ()]]
+            statements += 1 + max(cost.statements for cost in costs)
+            tenths += max(cost.tenths for cost in costs) + _expression_cost(conditions, types, scope)
+        elif not isinstance(statement, (nodes.Function, nodes.Label)):
+            statements += 1
+            tenths += _STATEMENT + _statement_cost(statement, types, scope)
+            value = getattr(statement, "value", None)
+            if isinstance(value, nodes.ListLiteral):
+                statements += len(value.items) // _ITEMS_OF_A_STATEMENT
+    return _Cost(statements, tenths)
+
+
+def _statement_cost(statement: Statement, types: StaticTypes, scope: FunctionScope) -> int:
+    match statement:
+        case nodes.Assign(target=nodes.Name(name=name), value=value):
+            checked = types.variable(name, scope) not in SCALARS
+            return _STORE_CHECKED * checked + _expression_cost((value,), types, scope)
+        case nodes.Assign(target=target, value=value):
+            return _STORE_ITEM + _expression_cost((target, value), types, scope)
+        case nodes.While(condition=condition):
+            return _expression_cost((condition,), types, scope)
+        case nodes.ExpressionStatement(value=value) | nodes.Return(value=value):
+            return 0 if value is None else _expression_cost((value,), types, scope)
+    return 0
+
+
+def _expression_cost(expressions: Iterable[Expression], types: StaticTypes, scope: FunctionScope) -> int:
+    """Tenths of units of evaluating `expressions` and all their parts."""
+    tenths = 0
+    todo = list(expressions)
+    while todo:
+        one = todo.pop()
+        if isinstance(one, nodes.BinaryOperation):
+            operands = types.of(one.left, scope), types.of(one.right, scope)
+            tenths += _OF_NUMBERS if _is_quick(one.operator, *operands) else _WEIGHTS[type(one)]
+        elif not isinstance(one, nodes.Call) or scope.find_function(one.function) is not None:
+            tenths += _WEIGHTS.get(type(one), _LEAF)  # builtins are charged when they are called
+        todo += child_expressions(one)
+    return tenths
+
+
+def _is_quick(operator: str, left: Type, right: Type) -> bool:
+    """Whether the operator is one of Python's in the compiled code (see `expressions`)."""
+    if operator in ("and", "or", "xor"):
+        return True
+    if not (is_numeric(left) and is_numeric(right)) or operator == "%":
+        return False
+    return operator not in ("+", "-", "*") or Type.FLOAT in (left, right) or left is right is Type.INT
+
+
+# --- positions ------------------------------------------------------------------------------------------
+#
+# Python finds a line or a column by reading the table of a function from its beginning, which takes 40 ms at
+# the end of 100,000 statements. This one is made once, when the program is compiled, and searched by halves.
+
+_WORD = 2  # bytes of an instruction of Python
+_MOST_COLUMNS = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class PositionTable:
+    """Where each instruction of a compiled function stands in the script.
+
+    Attributes:
+        starts: Instructions at which another position begins, ascending.
+        lines: In the script, from 1; of each start.
+        columns: From 1.
+    """
+
+    starts: array[int]
+    lines: array[int]
+    columns: array[int]
+
+    def at(self, offset: int) -> tuple[int, int]:
+        """Line and column of the instruction at byte `offset`."""
+        i = bisect_right(self.starts, offset // _WORD) - 1
+        return (self.lines[i], self.columns[i]) if i >= 0 else (1, 1)
+
+
+def _position_tables(code: CodeType) -> dict[str, PositionTable]:
+    """The table of each function that `code` defines, by the name of the function."""
+    return {function.co_name: _table(function) for function in _functions(code)}
+
+
+def _functions(code: CodeType) -> Iterator[CodeType]:
+    for value in code.co_consts:
+        if isinstance(value, CodeType):
+            yield value
+
+
+def _table(code: CodeType) -> PositionTable:
+    table = PositionTable(array("I"), array("I"), array("H"))
+    last: tuple[int | None, int | None] | None = None
+    for i, (line, _, column, _) in enumerate(code.co_positions()):
+        if (line, column) != last:
+            last = line, column
+            table.starts.append(i)
+            table.lines.append(line or 1)
+            table.columns.append(min(_MOST_COLUMNS, 1 if column is None else column + 1))
+    return table

@@ -10,19 +10,17 @@ from __future__ import annotations
 import ast
 from typing import Any, Final
 
+from urscript import dialect
 from urscript.catalogue import Catalogue
 from urscript.catalogue.costs import EXPENSIVE, UNITS
 from urscript.compile.inference import StaticTypes, Type, is_numeric
-from urscript.compile.interpreter_call import interpreter_call
-from urscript.compile.operators import HELPERS, logic, plain_operation
 from urscript.compile.python_tree import ask_after, call, constant, load, place
 from urscript.dialect import Dialect
-from urscript.names.own_calls import wrong_count
-from urscript.names.scopes import FunctionScope, ResolvedProgram
+from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
 from urscript.source import Span
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression
-from urscript.values import Pose
+from urscript.values import INT_MAX, INT_MIN, Pose
 
 # Operations of an expression after which the code asks whether the program may go on.
 _ASK_EVERY: Final = 8
@@ -94,8 +92,8 @@ class ExpressionCompiler:
             case nodes.RunThread(thread=thread):
                 callee = scope.find_function(thread)
                 assert callee is not None
-                made = call("_run", [load(callee.python_name, span), constant(thread, span)], span)
-                return self.asking(made)
+                names = [load(callee.python_name, span), constant(thread, span)]
+                return self.asking(call("_run", [*names, constant(callee.depth, span)], span))
             case nodes.MethodCall():
                 return self._method(expression, scope)
             case nodes.Attribute(target=target, name=name):
@@ -158,14 +156,14 @@ class ExpressionCompiler:
             self._types.of(expression.left, scope),
             self._types.of(expression.right, scope),
         )
-        plain = plain_operation(operator, left, right, (left_type, right_type), span)
-        return plain or self.asking(call(HELPERS[operator], [left, right], span))
+        plain = _plain_operation(operator, left, right, (left_type, right_type), span)
+        return plain or self.asking(call(_HELPERS[operator], [left, right], span))
 
     def _logic(self, expression: nodes.BinaryOperation, scope: FunctionScope) -> ast.expr:
         operator = expression.operator
         if operator == "xor":
             both = [self.condition(expression.left, scope), self.condition(expression.right, scope)]
-            return logic(operator, both, expression.span)
+            return _logic(operator, both, expression.span)
         # A chain of one operator is left-associative; a flat list needs no nesting.
         operands: list[Expression] = []
         chain: Expression = expression
@@ -174,7 +172,7 @@ class ExpressionCompiler:
             chain = chain.left
         operands.append(chain)
         values = [self.condition(operand, scope) for operand in reversed(operands)]
-        return logic(operator, values, expression.span, short_circuit=self._dialect.short_circuit)
+        return _logic(operator, values, expression.span, short_circuit=self._dialect.short_circuit)
 
     def _prefix(self, expression: nodes.UnaryOperation, scope: FunctionScope) -> ast.expr:
         operand, span = expression.operand, expression.span
@@ -235,7 +233,7 @@ class ExpressionCompiler:
         name = expression.function
         made: ast.expr = call(f"b_{name}", arguments, span)
         if name == "interpreter_mode":
-            return self.asking(interpreter_call(made, scope, span))
+            return self.asking(_interpreter_call(made, scope, span))
         if self._catalogue[name].may_wait:
             made = ast.YieldFrom(made, **place(span))
         return self.asking(made, _ASK_EVERY if UNITS.get(name, 0) >= EXPENSIVE else 1)
@@ -326,3 +324,95 @@ class ExpressionCompiler:
         name = self._program.python_name(variable)
         self.globals_stored.add(name)
         return name
+
+
+# --- operators ------------------------------------------------------------------------------------------
+
+_ARITHMETIC: Final[dict[str, tuple[str, type[ast.operator]]]] = {
+    "+": ("_add", ast.Add),
+    "-": ("_sub", ast.Sub),
+    "*": ("_mul", ast.Mult),
+    "/": ("_div", ast.Div),
+    "%": ("_mod", ast.Mod),
+}
+_COMPARISON: Final[dict[str, tuple[str, type[ast.cmpop]]]] = {
+    "==": ("_equal", ast.Eq),
+    "!=": ("_unequal", ast.NotEq),
+    "<": ("_less", ast.Lt),
+    "<=": ("_less_equal", ast.LtE),
+    ">": ("_greater", ast.Gt),
+    ">=": ("_greater_equal", ast.GtE),
+}
+
+_HELPERS: Final = {operator: name for operator, (name, _) in (_ARITHMETIC | _COMPARISON).items()}
+"""Operator -> the function of the run-time library that does it on values of any type."""
+
+
+def _plain_operation(
+    operator: str, left: ast.expr, right: ast.expr, types: tuple[Type, Type], span: Span
+) -> ast.expr | None:
+    """The operation as one of Python; None where the types need the run-time library."""
+    are_numbers = all(map(is_numeric, types))
+    if operator in _COMPARISON:
+        are_bools = types == (Type.BOOL, Type.BOOL) and operator in ("==", "!=")
+        if not are_numbers and not are_bools:
+            return None
+        return ast.Compare(left, [_COMPARISON[operator][1]()], [right], **place(span))
+    if not are_numbers or operator == "%":
+        return None
+    raw = ast.BinOp(left, _ARITHMETIC[operator][1](), right, **place(span))
+    if operator == "/":
+        return None if dialect.EXACT_DIVISION_GIVES_INT else raw
+    if Type.FLOAT in types:
+        return raw
+    return _wrapped(raw, span) if types == (Type.INT, Type.INT) else None
+
+
+def _logic(operator: str, values: list[ast.expr], span: Span, *, short_circuit: bool = True) -> ast.expr:
+    """Conditions joined by `and`, `or` or `xor`; without `short_circuit` all are evaluated."""
+    at = place(span)
+    if operator == "xor":
+        left, right = values
+        return ast.Compare(left, [ast.NotEq()], [right], **at)
+    if short_circuit:
+        return ast.BoolOp(ast.And() if operator == "and" else ast.Or(), values, **at)
+    result = values[0]
+    for value in values[1:]:
+        result = ast.BinOp(result, ast.BitAnd() if operator == "and" else ast.BitOr(), value, **at)
+    return result
+
+
+def _wrapped(raw: ast.expr, span: Span) -> ast.expr:
+    """`_i if INT_MIN <= (_i := raw) <= INT_MAX else _wrap(_i)`: a result of 32 bits."""
+    at = place(span)
+    bound = ast.NamedExpr(ast.Name("_i", ast.Store(), **at), raw, **at)
+    fits = ast.Compare(
+        constant(INT_MIN, span), [ast.LtE(), ast.LtE()], [bound, constant(INT_MAX, span)], **at
+    )
+    return ast.IfExp(fits, load("_i", span), call("_wrap", [load("_i", span)], span), **at)
+
+
+def _interpreter_call(made: ast.expr, scope: FunctionScope, span: Span) -> ast.expr:
+    """The call of `interpreter_mode`: the statements that it runs read and change the locals of its function.
+
+    Nobody else sees the locals of a function that waits in a call. So they are handed over at the beginning
+    and taken back at the end:
+
+        ((_l := (yield from _interpret(b_interpreter_mode(...), "f0", {"l_x": v_x})), v_x := _l[0]), None)[1]
+
+    Args:
+        made: The call of the builtin, which returns where the statements come from.
+        scope: Of the function that calls it.
+        span: Of the call.
+    """
+    at = place(span)
+    names = sorted(scope.locals)
+    keys: list[ast.expr | None] = [constant(f"l_{name}", span) for name in names]
+    values = ast.Dict(keys, [load(f"v_{name}", span) for name in names], **at)
+    run = ast.YieldFrom(call("_interpret", [made, constant(scope.python_name, span), values], span), **at)
+    steps: list[ast.expr] = [ast.NamedExpr(ast.Name("_l", ast.Store(), **at), run, **at)]
+    for i, name in enumerate(names):
+        value = ast.Subscript(load("_l", span), constant(i, span), ast.Load(), **at)
+        steps.append(ast.NamedExpr(ast.Name(f"v_{name}", ast.Store(), **at), value, **at))
+    both = ast.Tuple([ast.Tuple(steps, ast.Load(), **at), constant(None, span)], ast.Load(), **at)
+    return ast.Subscript(both, constant(1, span), ast.Load(), **at)

@@ -15,11 +15,9 @@ from typing import Any
 from urscript import dialect
 from urscript.catalogue import Catalogue
 from urscript.names.living_scope import calling_scopes
-from urscript.names.own_calls import wrong_count
-from urscript.names.scopes import FunctionScope, ResolvedProgram
+from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
 from urscript.syntax import nodes
-from urscript.syntax.nodes import Expression
-from urscript.syntax.walk import all_expressions, all_statements, falls_through, own_expressions
+from urscript.syntax.nodes import Expression, all_expressions, all_statements, falls_through, own_expressions
 
 
 class Type(Enum):

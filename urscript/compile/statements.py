@@ -29,6 +29,7 @@ class CompiledStatements:
         source: The line.
         compiled: Its functions.
         entry: Python name of the function that runs them.
+        depth: Calls inside one another that they allow, recursive ones aside.
         builtins: Builtin functions that they use.
         variables: Python names of the variables that they add.
         added: The names that the statements so far have added, these included; pickled, because they are only
@@ -39,6 +40,7 @@ class CompiledStatements:
     source: Source = field(repr=False)
     compiled: CompiledCode = field(repr=False)
     entry: str
+    depth: int
     builtins: frozenset[str]
     variables: tuple[str, ...]
     added: bytes = field(repr=False)
@@ -83,6 +85,7 @@ def compile_statements(
         source=source,
         compiled=compiled,
         entry=program.main.python_name,
+        depth=program.main.depth,
         builtins=frozenset(program.builtins),
         variables=tuple(map(program.python_name, sorted(new.variables))),
         added=pickle.dumps(now),

@@ -13,8 +13,7 @@ from urscript.errors import ScriptCompileError, ScriptContextError
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source
 from urscript.syntax import nodes
-from urscript.syntax.nodes import Block
-from urscript.syntax.walk import all_expressions, all_statements, own_expressions
+from urscript.syntax.nodes import Block, all_expressions, all_statements, own_expressions
 
 CALL = "interpreter_mode"
 """The builtin at whose call statements are accepted."""
@@ -30,6 +29,7 @@ class VisibleFunction:
         kind: "def" or "thread".
         parameters: Their names.
         optional: Those that have a default.
+        depth: Calls inside one another at most, from its own on.
     """
 
     name: str
@@ -37,6 +37,7 @@ class VisibleFunction:
     kind: str
     parameters: tuple[str, ...]
     optional: frozenset[str]
+    depth: int
 
     def as_scope(self) -> FunctionScope:
         """A scope without a body, for calls of it."""
@@ -45,7 +46,7 @@ class VisibleFunction:
             for name in self.parameters
         )
         node = nodes.Function(self.kind, self.name, parameters, ())  # type: ignore[arg-type]
-        return FunctionScope(self.name, node, None, (), self.python_name)
+        return FunctionScope(self.name, node, None, (), self.python_name, depth=self.depth)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +153,7 @@ def _visible(scope: FunctionScope) -> VisibleFunction:
         scope.node.kind,
         tuple(item.name for item in parameters),
         frozenset(item.name for item in parameters if item.default is not None),
+        scope.depth,
     )
 
 

@@ -1,10 +1,9 @@
 """Name resolution: every variable and function is found before the program runs, as a controller does.
 
-Rules (language notes 1.6): variables of the program body are global; `global x` makes one from anywhere,
-`local x` one of this function only; a plain assignment means the global of that name if there is one
-anywhere in the program, else a local; a nested function sees its own locals and the globals, not the locals
-of enclosing functions; a function may be used before its definition; names in branches that never run count
-too.
+Rules: variables of the program body are global; `global x` makes one from anywhere, `local x` one of this
+function only; a plain assignment means the global of that name if there is one anywhere in the program, else
+a local; a nested function sees its own locals and the globals, not the locals of enclosing functions; a
+function may be used before its definition; names in branches that never run count too.
 
 All errors of a program are collected, the first one in the text is raised.
 """
@@ -12,7 +11,7 @@ All errors of a program are collected, the first one in the text is raised.
 from __future__ import annotations
 
 from urscript.catalogue import Catalogue
-from urscript.dialect import MAX_LOOP_DEPTH, Dialect
+from urscript.dialect import MAX_CALL_DEPTH, MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (
     ScriptCompileError,
     ScriptContextError,
@@ -20,16 +19,16 @@ from urscript.errors import (
     ScriptSyntaxError,
     ScriptTypeError,
 )
-from urscript.names.assignment import find_maybe_unassigned
-from urscript.names.call_graph import mark_recursion, spread_blocking
-from urscript.names.declarations import Declarations, open_program
-from urscript.names.name_errors import NameErrors
-from urscript.names.own_calls import shape_of, signature_of
-from urscript.names.scopes import FunctionScope, ResolvedProgram
-from urscript.source import Source, Span
+from urscript.names.analyses import find_maybe_unassigned, mark_recursion, spread_blocking
+from urscript.names.scopes import FunctionScope, NameErrors, ResolvedProgram, shape_of, signature_of
+from urscript.source import NOWHERE, Source, Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import Block, Expression, Statement
-from urscript.syntax.walk import (
+from urscript.syntax.nodes import (
+    Block,
+    Expression,
+    Statement,
+    all_expressions,
+    all_statements,
     child_expressions,
     own_blocks,
     own_expressions,
@@ -56,8 +55,8 @@ def resolve(
         What was found, and all errors in the order of the text; with errors the program cannot be compiled.
     """
     errors = NameErrors(source, catalogue)
-    program = within or open_program(block, source, errors)
-    declarations = Declarations(program, errors)
+    program = within or _open_program(block, source, errors)
+    declarations = _Declarations(program, errors)
     declarations.declare(program.main)
     for scope in program.functions:
         declarations.declare_locals(scope)
@@ -65,6 +64,11 @@ def resolve(
     for scope in program.scopes():
         look_up.scope(scope)
     mark_recursion(program)
+    for scope in program.scopes():
+        if scope.depth == MAX_CALL_DEPTH + 1:
+            text = f"functions call one another {scope.depth} deep from here on; allowed: {MAX_CALL_DEPTH}"
+            errors.add(ScriptContextError(text), NOWHERE if scope.node is None else scope.node.span)
+            break
     spread_blocking(program)
     find_maybe_unassigned(program)
     return program, sorted(errors.found, key=lambda error: (error.line, error.column))
@@ -209,3 +213,102 @@ class _LookUp:
                 )
                 return False
         return True
+
+
+# --- which program a text is, and what it declares; nothing is looked up yet ----------------------------
+
+
+def _open_program(block: Block, source: Source, errors: NameErrors) -> ResolvedProgram:
+    """The program: a single definition is the program itself, other text is its body.
+
+    Calls of that program after its definition are ignored: on a port it has run before they come.
+    """
+    function, calls = _definition_and_calls(block)
+    if function is not None:
+        if function.parameters:
+            errors.add(ScriptContextError("a program takes no parameters"), function.parameters[0].span)
+        main = FunctionScope(function.name, function, None, function.body, "main")
+        return ResolvedProgram(source, function.kind, function.name, main, calls)
+    name = _statement_name(block)
+    return ResolvedProgram(source, "statement", name, FunctionScope(name, None, None, block, "main"))
+
+
+class _Declarations:
+    """Declares the names of one program."""
+
+    def __init__(self, program: ResolvedProgram, errors: NameErrors) -> None:
+        self._program = program
+        self._errors = errors
+
+    def declare(self, scope: FunctionScope) -> None:
+        """Declare the functions of `scope` and its globals, then those of nested functions."""
+        for statement in all_statements(scope.body):
+            if isinstance(statement, nodes.Function):
+                self._declare_function(statement, scope)
+            elif isinstance(statement, (nodes.Assign, nodes.Declaration)) and (
+                scope is self._program.main or statement.scope == "global"
+            ):
+                name = _declared_name(statement)
+                if name is not None:
+                    self._program.globals.add(name)
+                    if statement.scope == "global":
+                        self._program.declared_globals[name] = None
+
+    def _declare_function(self, function: nodes.Function, scope: FunctionScope) -> None:
+        if function.kind == "sec":
+            self._errors.add(
+                ScriptContextError("a secondary program cannot be defined inside another program"),
+                function.span,
+            )
+        python_name = f"{self._program.prefix}f{len(self._program.functions)}_{function.name}"
+        inner = FunctionScope(function.name, function, scope, function.body, python_name)
+        scope.functions[function.name] = inner
+        self._program.functions.append(inner)
+        self.declare(inner)
+
+    def declare_locals(self, scope: FunctionScope) -> None:
+        """Declare the locals of a function; all globals of the program are known already."""
+        assert scope.node is not None
+        for parameter in scope.node.parameters:
+            if parameter.name in scope.locals:
+                self._errors.add(
+                    ScriptContextError(f"duplicate parameter '{parameter.name}'"), parameter.span
+                )
+            scope.locals.add(parameter.name)
+        for statement in all_statements(scope.body):
+            if not isinstance(statement, (nodes.Assign, nodes.Declaration)) or statement.scope == "global":
+                continue
+            name = _declared_name(statement)
+            if name is not None and (statement.scope == "local" or name not in self._program.globals):
+                scope.locals.add(name)
+
+
+def _statement_name(block: Block) -> str:
+    """The name of a program without `def`: the function that its first statement calls.
+
+    Source: key messages of one-line programs on the primary interface.
+    """
+    for statement in block:
+        for expression in own_expressions(statement):
+            for part in all_expressions(expression):
+                if isinstance(part, nodes.Call):
+                    return part.function
+        if isinstance(statement, nodes.KeywordStatement):
+            return statement.keyword
+    return "unnamed"
+
+
+def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
+    """The one definition that is the whole program, and calls of it below."""
+    items = tuple(item for item in block if not isinstance(item, nodes.Label))
+    if not items or not isinstance(items[0], nodes.Function) or items[0].kind == "thread":
+        return None, ()
+    definition, calls = items[0], items[1:]
+    its_call = nodes.ExpressionStatement(nodes.Call(definition.name, ()))
+    return (definition, calls) if all(item == its_call for item in calls) else (None, ())
+
+
+def _declared_name(statement: nodes.Assign | nodes.Declaration) -> str | None:
+    if isinstance(statement, nodes.Declaration):
+        return statement.name
+    return statement.target.name if isinstance(statement.target, nodes.Name) else None

@@ -15,7 +15,7 @@ from urscript.compile.statements import CompiledStatements
 from urscript.errors import ScriptRuntimeError
 from urscript.run.host import EnterMode
 from urscript.run.metering import Meter
-from urscript.run.threads import Scheduler
+from urscript.run.threads import Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
 from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Wait
 from urscript.source import Source
@@ -83,7 +83,7 @@ class InterpreterMode:
             ScriptRuntimeError: It is called by another thread than the main one, or by a statement.
         """
         scheduler, namespace = self._scheduler, self._namespace
-        main = namespace["_T"]
+        main: ScriptThread = namespace["_T"]
         if main is not scheduler.main or self._is_secondary:
             raise ScriptRuntimeError(_NOT_IN_MAIN)
         if self._is_on:
@@ -104,7 +104,9 @@ class InterpreterMode:
                 alone = all(thread.finished or thread is main for thread in scheduler.threads)
                 yield Blocked(queue.is_ready, outside=True) if alone else NEXT_CYCLE
                 continue
+            scheduler.deepen(main, statements.depth)
             yield from self._link(statements)()
+            scheduler.deepen(main, -statements.depth)
             yield CHECKPOINT
         if queue.clears_on_end or queue.is_clearing:
             self._clear(started_before)

@@ -9,15 +9,22 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 
-from urscript.builtins.arguments import integer
-from urscript.catalogue.argument_checks import type_error
+from urscript.catalogue.calls import integer, type_error
 from urscript.catalogue.methods import ValueMethod
 from urscript.catalogue.types import ParamType
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
-from urscript.run.elements import Step, inside, not_an_element, store_inside
 from urscript.run.host import Handle
 from urscript.run.threads import ScriptThread
-from urscript.run.variables import UNDEFINED, capacity_of, same_type, sample_of
+from urscript.run.variables import (
+    UNDEFINED,
+    Step,
+    capacity_of,
+    inside,
+    not_an_element,
+    same_type,
+    sample_of,
+    store_inside,
+)
 from urscript.run.waits import Wait
 from urscript.values import (
     TEXT_LIMIT,

@@ -4,7 +4,7 @@
 |---|---|
 | `_T` | the running thread, set by the scheduler |
 | `_b`, `_x` | what is left of a grant of the meter, and the units in it beyond one a statement |
-| `_add` ... | the operators of `ops`, `elements` and `variables` |
+| `_add` ... | the operators of `ops` and `variables` |
 | `_run`, `_kill`, `_join`, `_halt`, `_enter`, `_leave` | flow |
 | `b_name` | a builtin, called with the thread first |
 """
@@ -21,7 +21,7 @@ from urscript.catalogue.costs import OF_THREAD
 from urscript.catalogue.types import FIXED_SIZE
 from urscript.dialect import Dialect
 from urscript.errors import ScriptRuntimeError
-from urscript.run import elements, ops, variables
+from urscript.run import ops, variables
 from urscript.run.host import Host
 from urscript.run.metering import Meter, host_cost, pure_cost
 from urscript.run.methods import MethodCalls, Methods, kept
@@ -44,15 +44,15 @@ _COMMON: Final[dict[str, Any]] = {
     "_UNDEFINED": variables.UNDEFINED,
     "_undefined": variables.undefined,
     "_Pose": Pose,
-    "_pose": elements.make_pose,
-    "_list": elements.make_list,
-    "_item": elements.item,
-    "_cell": elements.cell,
-    "_store_item": elements.store_item,
-    "_store_cell": elements.store_cell,
-    "_member": elements.member,
-    "_store_member": elements.store_member,
-    "_store_inside": elements.store_inside,
+    "_pose": variables.make_pose,
+    "_list": variables.make_list,
+    "_item": variables.item,
+    "_cell": variables.cell,
+    "_store_item": variables.store_item,
+    "_store_cell": variables.store_cell,
+    "_member": variables.member,
+    "_store_member": variables.store_member,
+    "_store_inside": variables.store_inside,
     "_kept": kept,
     "_refuse": _refuse,
     "_truth": ops.truth,
@@ -96,22 +96,10 @@ _ASSIGN: Final = {
 
 def base_namespace(dialect: Dialect, methods: Methods, meter: Meter) -> dict[str, Any]:
     """The names that do not depend on the host: operators and values."""
-
-    def enter(thread: ScriptThread) -> ScriptThread:
-        thread.depth += 1
-        if thread.depth > dialect.recursion_limit:
-            raise ScriptRuntimeError(f"recursion is deeper than {dialect.recursion_limit} calls")
-        return thread
-
-    def leave(thread: ScriptThread) -> None:
-        thread.depth -= 1
-
     calls = MethodCalls(methods)
     names = {
         **_COMMON,
         "_assign": _ASSIGN[dialect.list_resize],
-        "_enter": enter,
-        "_leave": leave,
         "_method": calls.call,
         "_change": calls.change,
     }
@@ -123,11 +111,11 @@ def base_namespace(dialect: Dialect, methods: Methods, meter: Meter) -> dict[str
 def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Meter) -> dict[str, Any]:
     """The names with which a program calls its scheduler."""
 
-    def run(function: Callable[[], Any], name: str) -> ScriptThread:
+    def run(function: Callable[[], Any], name: str, depth: int) -> ScriptThread:
         meter.charge(OF_THREAD, OF_THREAD)
-        return scheduler.start(function, name, namespace["_T"])
+        return scheduler.start(function, name, namespace["_T"], depth)
 
-    return {"_run": run, "_kill": scheduler.kill}
+    return {"_run": run, "_kill": scheduler.kill, "_enter": scheduler.enter, "_leave": scheduler.leave}
 
 
 # --- builtins ------------------------------------------------------------------------------------------

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from typing import Any, Final
 
-from urscript.dialect import MAX_THREADS
+from urscript.dialect import MAX_OPEN_CALLS, MAX_THREADS, Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError
-from urscript.run.metering import Meter
+from urscript.run.metering import CLOSING, FREE_CALLS, Meter
 from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Blocked, Wait
 from urscript.values import a_type
 
@@ -43,6 +43,8 @@ class ScriptThread:
         budget: Statements it may still run in its time slice.
         slice_used: Its time slice of this cycle is used up.
         depth: How deep it is in recursive functions.
+        open_calls: Calls inside one another: the most that its functions allow, and its recursive ones.
+        resuming: Units that resuming it takes, because Python passes through all of them.
         body: The generator that runs it.
     """
 
@@ -54,7 +56,9 @@ class ScriptThread:
         "finished",
         "label",
         "name",
+        "open_calls",
         "parent",
+        "resuming",
         "slice_used",
         "thread_id",
         "wait",
@@ -74,6 +78,8 @@ class ScriptThread:
         self.budget: float = 0
         self.slice_used = False
         self.depth = 0
+        self.open_calls = 0
+        self.resuming = 0
 
     def subtree(self) -> Iterator[ScriptThread]:
         """Its unfinished descendants, deepest first, then itself."""
@@ -106,7 +112,7 @@ class Scheduler:
         self,
         namespace: dict[str, Any],
         meter: Meter,
-        budget: int,
+        dialect: Dialect,
         thread_ended: Callable[[ScriptThread], None],
     ) -> None:
         """Prepare.
@@ -114,12 +120,14 @@ class Scheduler:
         Args:
             namespace: The globals of the compiled program.
             meter: Counts what its threads do.
-            budget: Statements of a time slice.
+            dialect: Says how many statements a time slice has, and how deep functions may call themselves.
             thread_ended: Called at every end.
         """
         self._namespace = namespace
         self._meter = meter
-        self._budget = budget
+        self._budget = dialect.statement_budget
+        self._recursion_limit = dialect.recursion_limit
+        self._open_calls = 0
         self._thread_ended = thread_ended
         self._turns = self._take_turns()
         self.is_between = False
@@ -129,12 +137,18 @@ class Scheduler:
         self.main: ScriptThread | None = None
 
     def start(
-        self, function: Callable[[], ThreadBody], name: str, parent: ScriptThread | None
+        self, function: Callable[[], ThreadBody], name: str, parent: ScriptThread | None, depth: int
     ) -> ScriptThread:
         """Start `function` as a thread; it first runs when its turn in the cycle comes.
 
+        Args:
+            function: Makes the generator.
+            name: Of its definition.
+            parent: The thread that starts it.
+            depth: Calls inside one another that its functions allow.
+
         Raises:
-            ScriptRuntimeError: the program has as many threads as it may.
+            ScriptRuntimeError: the program has as many threads as it may, or as many open calls.
         """
         # Those that end stay in the list until the end of the cycle.
         if len(self.threads) >= MAX_THREADS <= sum(not thread.finished for thread in self.threads):
@@ -142,12 +156,44 @@ class Scheduler:
         self._count += 1
         thread = ScriptThread(self._count, name, parent, function())
         thread.budget = self._budget
+        self.deepen(thread, depth)
         if parent is None:
             self.main = thread
         else:
             parent.children.append(thread)
         self.threads.append(thread)
         return thread
+
+    def enter(self, thread: ScriptThread) -> ScriptThread:
+        """A recursive function is called.
+
+        Raises:
+            ScriptRuntimeError: the recursion is too deep, or the program has too many open calls.
+        """
+        thread.depth += 1
+        if thread.depth > self._recursion_limit:
+            raise ScriptRuntimeError(f"recursion is deeper than {self._recursion_limit} calls")
+        self.deepen(thread, 1)
+        return thread
+
+    def leave(self, thread: ScriptThread) -> None:
+        """It returns."""
+        thread.depth -= 1
+        self.deepen(thread, -1)
+
+    def deepen(self, thread: ScriptThread, calls: int) -> None:
+        """Count so many calls more inside one another in a thread; below 0 less.
+
+        Raises:
+            ScriptRuntimeError: the program has more than it may.
+        """
+        thread.open_calls += calls
+        thread.resuming = max(0, thread.open_calls - FREE_CALLS)
+        self._open_calls += calls
+        if calls > 0 and self._open_calls > MAX_OPEN_CALLS:
+            raise ScriptRuntimeError(
+                f"calls are too deep: all threads together may have {MAX_OPEN_CALLS} inside one another"
+            )
 
     def step(self) -> None:
         """Run one control cycle; exceptions of threads are not caught."""
@@ -209,6 +255,8 @@ class Scheduler:
         proceed = thread.body.send
         try:
             while True:
+                if thread.resuming:
+                    meter.charge(0, thread.resuming)
                 wait = proceed(None)
                 if wait is NEXT_CYCLE:
                     thread.slice_used = True
@@ -237,6 +285,7 @@ class Scheduler:
         thread.finished = True
         thread.slice_used = True
         thread.wait = None
+        self._open_calls -= thread.open_calls
         # Its running children now belong to its parent: killing that one stops them too.
         if thread.parent is not None:
             thread.parent.children.remove(thread)
@@ -262,6 +311,7 @@ class Scheduler:
             if member is by:
                 kills_itself = True
                 continue
+            self._meter.charge(0, CLOSING * member.resuming)
             member.body.close()
             self._end(member)
         if kills_itself:
@@ -273,6 +323,8 @@ class Scheduler:
         for thread in reversed(self.threads):
             if thread.finished:
                 continue
+            # The cycles that follow, of this program's successor, pay for it.
+            self._meter.work.left -= CLOSING * thread.resuming
             try:
                 thread.body.close()
             except Exception as error:

@@ -1,4 +1,4 @@
-"""Text -> tree. The grammar is `grammar.lark`, `tree_builder` makes the nodes, this module the errors.
+"""Text -> tree. The grammar is `grammar.lark`, `_TreeBuilder` makes the nodes; and the errors.
 
 `parse` knows the form of a program only: names, types and scopes are for `resolver`.
 The parser is built on first use, once a process (about 0.07 s), then parses 1,000 lines in some 0.05 s.
@@ -6,17 +6,198 @@ The parser is built on first use, once a process (about 0.07 s), then parses 1,0
 
 from __future__ import annotations
 
+import re
 from functools import cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
+from urscript.dialect import LONGEST_LABEL, LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptLexerError, ScriptSyntaxError
-from urscript.source import Source
+from urscript.source import BLANKS, Source, Span
 from urscript.syntax import nodes
-from urscript.syntax.tree_builder import TreeBuilder
 
 if TYPE_CHECKING:
     from lark import Lark, Token
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
+
+# --- nodes. What the grammar leaves open is decided here: what is a pose, what can be called or assigned to.
+
+
+def _span(item: Any) -> Span:
+    """The span of a node or token; lark's own tokens, in texts with errors, have four attributes instead."""
+    span: Span | None = getattr(item, "span", None)
+    return span or Span(item.line, item.column, item.end_line, item.end_column)
+
+
+def _cover(items: list[Any]) -> Span:
+    """The span from the first to the last of `items`."""
+    first, last = _span(items[0]), _span(items[-1])
+    return Span(first.line, first.column, last.end_line, last.end_column)
+
+
+def _expressions(items: list[Any]) -> tuple[Any, ...]:
+    """The nodes among `items`, without brackets, commas and gaps."""
+    return tuple(item for item in items if isinstance(item, nodes.Node))
+
+
+def _syntax_error(message: str, span: Span) -> ScriptSyntaxError:
+    return ScriptSyntaxError(message, line=span.line, column=span.column, width=span.end_column - span.column)
+
+
+class _TreeBuilder:
+    """One method per rule of the grammar; each gets the rule's tokens and finished nodes in order."""
+
+    def start(self, items: list[Any]) -> nodes.Block:
+        return cast(nodes.Block, items[0])
+
+    def block(self, items: list[Any]) -> nodes.Block:
+        return tuple(items)
+
+    # definitions
+
+    def function(self, items: list[Any]) -> nodes.Function:
+        kind, name, _, parameters, _, _, body, end = items
+        return nodes.Function(
+            cast(Any, str(kind)), str(name), parameters, body, _span(end), span=_cover(items)
+        )
+
+    def thread(self, items: list[Any]) -> nodes.Function:
+        _, name, _, _, _, body, end = items
+        return nodes.Function("thread", str(name), (), body, _span(end), span=_cover(items))
+
+    def params(self, items: list[Any]) -> tuple[nodes.Parameter, ...]:
+        return _expressions(items)
+
+    def param(self, items: list[Any]) -> nodes.Parameter:
+        name, _, default = items
+        return nodes.Parameter(str(name), default, span=_span(name))
+
+    # statements
+
+    def if_(self, items: list[Any]) -> nodes.If:
+        first = nodes.Branch(items[1], items[3], span=_cover(items[:3]))
+        rest = tuple(item for item in items[4:] if isinstance(item, nodes.Branch))
+        else_body = items[-2]
+        return nodes.If((first, *rest), else_body, span=_cover([items[0], items[-1]]))
+
+    def elif_(self, items: list[Any]) -> nodes.Branch:
+        return nodes.Branch(items[1], items[3], span=_cover(items[:3]))
+
+    def while_(self, items: list[Any]) -> nodes.While:
+        return nodes.While(items[1], items[3], span=_cover(items))
+
+    def simple(self, items: list[Any]) -> nodes.KeywordStatement:
+        return nodes.KeywordStatement(cast(Any, str(items[0])), span=_span(items[0]))
+
+    def return_(self, items: list[Any]) -> nodes.Return:
+        word, value = items
+        return nodes.Return(value, span=_cover([word, word if value is None else value]))
+
+    def join(self, items: list[Any]) -> nodes.Join:
+        return nodes.Join(items[1], span=_cover(items))
+
+    def kill(self, items: list[Any]) -> nodes.Kill:
+        return nodes.Kill(items[1], span=_cover(items))
+
+    def declare(self, items: list[Any]) -> nodes.Statement:
+        word, name, _, value = items
+        scope = cast(Any, str(word))
+        if value is None:
+            return nodes.Declaration(str(name), scope, span=_cover([word, name]))
+        target = nodes.Name(str(name), span=_span(name))
+        return nodes.Assign(target, value, scope, span=_cover(items))
+
+    def assign(self, items: list[Any]) -> nodes.Assign:
+        target, _, value = items
+        root = target
+        while isinstance(root, (nodes.Subscript, nodes.Attribute)):
+            root = root.target
+        if not isinstance(root, nodes.Name):
+            raise _syntax_error(
+                "cannot assign to this expression, only to a variable or an element of one", target.span
+            )
+        return nodes.Assign(target, value, span=_cover(items))
+
+    def call_for_effect(self, items: list[Any]) -> nodes.ExpressionStatement:
+        return nodes.ExpressionStatement(items[0], span=items[0].span)
+
+    def label(self, items: list[Any]) -> nodes.Label:
+        return nodes.Label(str(items[0])[1:].strip(BLANKS), span=_span(items[0]))
+
+    # expressions
+
+    def binary(self, items: list[Any]) -> nodes.BinaryOperation:
+        left, operator, right = items
+        return nodes.BinaryOperation(str(operator), left, right, span=_cover(items))
+
+    def prefix(self, items: list[Any]) -> nodes.UnaryOperation:
+        operator = "not" if items[0] == "!" else str(items[0])
+        return nodes.UnaryOperation(cast(Any, operator), items[1], span=_cover(items))
+
+    def call(self, items: list[Any]) -> nodes.Expression:
+        callee, _, arguments, _ = items
+        if isinstance(callee, nodes.Name):
+            return nodes.Call(callee.name, arguments, span=_cover(items))
+        if isinstance(callee, nodes.Attribute):
+            return nodes.MethodCall(callee.target, callee.name, arguments, span=_cover(items))
+        raise _syntax_error("cannot call this expression, only a function by its name", callee.span)
+
+    def index(self, items: list[Any]) -> nodes.Expression:
+        target, indices = items[0], _expressions(items[1:])
+        # `p` is an ordinary name: only six items make it a pose. Source: maker's driver script.
+        if len(indices) == 6 and isinstance(target, nodes.Name) and target.name == "p":
+            return nodes.PoseLiteral(indices, span=_cover(items))
+        if len(indices) > 2:
+            raise _syntax_error(
+                f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}", _cover(items)
+            )
+        return nodes.Subscript(target, indices, span=_cover(items))
+
+    def member(self, items: list[Any]) -> nodes.Attribute:
+        return nodes.Attribute(items[0], str(items[2]), span=_cover(items))
+
+    def args(self, items: list[Any]) -> tuple[nodes.Argument, ...]:
+        return tuple(
+            item if isinstance(item, nodes.Argument) else nodes.Argument(item, span=item.span)
+            for item in items
+            if isinstance(item, (nodes.Argument, nodes.Expression))
+        )
+
+    def named_argument(self, items: list[Any]) -> nodes.Argument:
+        return nodes.Argument(items[2], str(items[0]), span=_cover(items))
+
+    def integer(self, items: list[Any]) -> nodes.IntLiteral:
+        span = _span(items[0])
+        if len(items[0]) > 10 or int(items[0]) > 2**31:
+            raise _syntax_error("this integer does not fit into 32 bits; write a float", span)
+        return nodes.IntLiteral(int(items[0]), span=span)
+
+    def float_(self, items: list[Any]) -> nodes.FloatLiteral:
+        return nodes.FloatLiteral(float(items[0]), str(items[0]), span=_span(items[0]))
+
+    def string(self, items: list[Any]) -> nodes.StringLiteral:
+        return nodes.StringLiteral(str(items[0])[1:-1], span=_span(items[0]))
+
+    def true(self, items: list[Any]) -> nodes.BoolLiteral:
+        return nodes.BoolLiteral(True, span=_span(items[0]))
+
+    def false(self, items: list[Any]) -> nodes.BoolLiteral:
+        return nodes.BoolLiteral(False, span=_span(items[0]))
+
+    def none(self, items: list[Any]) -> nodes.NoneLiteral:
+        return nodes.NoneLiteral(span=_span(items[0]))
+
+    def name(self, items: list[Any]) -> nodes.Name:
+        return nodes.Name(str(items[0]), span=_span(items[0]))
+
+    def group(self, items: list[Any]) -> nodes.Expression:
+        return cast(nodes.Expression, items[1])
+
+    def list_(self, items: list[Any]) -> nodes.ListLiteral:
+        return nodes.ListLiteral(_expressions(items), span=_cover(items))
+
+    def run(self, items: list[Any]) -> nodes.RunThread:
+        return nodes.RunThread(str(items[1]), span=_cover(items))
 
 
 def parse(source: Source) -> nodes.Block:
@@ -25,11 +206,12 @@ def parse(source: Source) -> nodes.Block:
     Raises:
         ScriptSyntaxError: The text does not follow the grammar; the place is the first token that
             cannot follow the text before it (a missing bracket is detected at the next statement).
-        ScriptLexerError: A character or number that starts no token.
+        ScriptLexerError: A character or number that starts no token, a name, string or label too long.
     """
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
     try:
+        _check_lengths(source)
         return cast(nodes.Block, _lark().parse(source.text))
     except UnexpectedToken as error:
         raise _unexpected_token(error, source) from None
@@ -38,6 +220,29 @@ def parse(source: Source) -> nodes.Block:
     except ScriptSyntaxError as error:
         error.source = source
         raise
+
+
+_LONGEST: Final = {
+    "NAME": (LONGEST_NAME, 0, "a name"),
+    "STRING": (LONGEST_STRING, 2, "a string"),
+    "LABEL": (LONGEST_LABEL, 1, "a label"),
+}
+"""Terminal -> most characters, without so many of its signs."""
+
+_MAY_BE_TOO_LONG: Final = re.compile(
+    rf'\w{{{LONGEST_NAME + 1}}}|"[^"\n]{{{LONGEST_STRING + 1}}}|\$[^\n]{{{LONGEST_LABEL + 1}}}', re.ASCII
+)
+
+
+def _check_lengths(source: Source) -> None:
+    """Look at the tokens one by one, if there may be one that is too long."""
+    if _MAY_BE_TOO_LONG.search(source.text) is None:
+        return
+    for token in _lark().lex(source.text):
+        most, signs, what = _LONGEST.get(token.type, (len(token), 0, ""))
+        if len(token) - signs > most:
+            text = f"{what} of {len(token) - signs} characters; allowed: up to {most}"
+            raise ScriptLexerError(text, line=token.line or 1, column=token.column or 1, width=len(token))
 
 
 def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxError]:
@@ -111,7 +316,7 @@ def _lark() -> Lark:
 
     grammar = files("urscript.syntax").joinpath("grammar.lark").read_text(encoding="utf-8")
     # The basic lexer, not the contextual one: a reserved word is reserved everywhere.
-    return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True, transformer=TreeBuilder())
+    return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True, transformer=_TreeBuilder())
 
 
 # --- errors --------------------------------------------------------------------------------------------

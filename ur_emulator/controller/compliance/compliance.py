@@ -16,16 +16,14 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.robot_mode import RobotModeMachine
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
+from ur_emulator.controller.safety.inputs import OperationalModeChoice
 from ur_emulator.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
-from ur_emulator.controller.safety.operational_mode import OperationalModeChoice
-from ur_emulator.controller.safety.safety_state import SafetyState
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyState
 from ur_emulator.models.robot_model import ZERO6, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.axis_hold import AxisHold
-from ur_emulator.motion.direct_torque import TorqueCommand
 from ur_emulator.motion.force_mode import ForceMode
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.plant_state import PlantState
 
 # An external force above this when freedrive begins means a wrong payload or a push [N]. It is twice the

@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, InputOutput
+from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, InputOutput, RunState, level
 from ur_emulator.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.controller.io.registers import Registers
-from ur_emulator.controller.io.run_states import RunState, level
 
 DEFAULT_ACTION, FREEDRIVE_ACTION = "default", "freedrive"
 

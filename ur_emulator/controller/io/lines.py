@@ -1,4 +1,4 @@
-"""Digital and analogue lines of the box and the tool.
+"""Digital, analogue and Euromap67 lines of the box and the tool, and outputs that follow the program.
 
 Digital words carry bits 0-7 standard, 8-15 configurable, 16-17 tool (UR realtime sheet; RTDE guide).
 Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V).
@@ -7,9 +7,8 @@ Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import NamedTuple
-
-from ur_emulator.controller.io.euromap import Euromap
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +34,6 @@ class DigitalGroup:
     def mask(self) -> int:
         """The bits as a mask of the digital word."""
         return (1 << self.count) - 1 << self.first
-
-    def word_of(self, digital: int) -> int:
-        """Return the lines of a digital word, bit 0 the first."""
-        return (digital & self.mask) >> self.first
 
     def levels(self, word: int) -> int:
         """Return the levels of the lines in a digital word, the first line in the lowest bit."""
@@ -138,6 +133,79 @@ class ToolLine(NamedTuple):
     stop_bits: int = 1
     rx_idle_chars: float = 1.5
     tx_idle_chars: float = 3.5
+
+
+# --- the Euromap67 interface to an injection moulding machine, as state: no machine is connected
+
+# Signals in each direction: two words of the Modbus map (docs/protocol/modbus.md).
+N_EUROMAP = 32
+
+
+@dataclass(slots=True)
+class Euromap:
+    """Words of the machine's and the robot's signals, signal 0 in the lowest bit."""
+
+    inputs: int = 0
+    outputs: int = 0
+
+    def read_input(self, port: int) -> bool:
+        """Return a signal of the machine."""
+        return bool(self.inputs >> port & 1)
+
+    def read_output(self, port: int) -> bool:
+        """Return a signal of the robot."""
+        return bool(self.outputs >> port & 1)
+
+    def write_output(self, port: int, value: bool) -> None:
+        """Switch a signal of the robot."""
+        mask = 1 << port
+        self.outputs = self.outputs | mask if value else self.outputs & ~mask
+
+
+# --- outputs that follow the program: the codes of set_runstate_*, and the level of each
+#
+# Source: URScript manuals CB3 3.15 and e-Series 5.11, module ioconfiguration. An unscheduled stop is one by a
+# protective stop, a fault, a violation or an error of the program; that an emergency stop is one: chosen.
+
+
+class RunState(IntEnum):
+    """What an output does when programs start and stop."""
+
+    KEEP = 0
+    LOW_WHEN_STOPPED = 1
+    HIGH_WHEN_STOPPED = 2
+    HIGH_WHEN_RUNNING = 3  # and low when stopped
+    # Of the e-Series:
+    LOW_WHEN_UNSCHEDULED = 4  # low after an unscheduled stop
+    HIGH_UNTIL_UNSCHEDULED = 5  # and high from the start on
+
+
+_WHEN_RUNNING = {RunState.HIGH_WHEN_RUNNING: True, RunState.HIGH_UNTIL_UNSCHEDULED: True}
+_WHEN_STOPPED = {
+    RunState.LOW_WHEN_STOPPED: False,
+    RunState.HIGH_WHEN_STOPPED: True,
+    RunState.HIGH_WHEN_RUNNING: False,
+}
+_WHEN_UNSCHEDULED = _WHEN_STOPPED | {
+    RunState.LOW_WHEN_UNSCHEDULED: False,
+    RunState.HIGH_UNTIL_UNSCHEDULED: False,
+}
+
+
+def level(rule: RunState, program_runs: bool, *, unscheduled: bool = False) -> bool | None:
+    """Return the level of an output (True is high); None does not change it.
+
+    Args:
+        rule: of the output.
+        program_runs: a primary program runs.
+        unscheduled: it has just been stopped, and not by itself or by a user.
+    """
+    if program_runs:
+        return _WHEN_RUNNING.get(rule)
+    return (_WHEN_UNSCHEDULED if unscheduled else _WHEN_STOPPED).get(rule)
+
+
+# --- all lines of one box
 
 
 @dataclass(slots=True)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, Protocol
 
-from ur_emulator.controller.io.run_states import RunState, level
+from ur_emulator.controller.io.lines import RunState, level
 
 DEFAULT_PORT = 502
 DEFAULT_FREQUENCY = 10.0

@@ -1,4 +1,4 @@
-"""Buttons and inputs of the safety system: their states, and the events of their changes.
+"""Buttons and inputs of the safety system: enabling device, operational mode, safeguard, and their events.
 
 Commands and configurable inputs may activate a function at the same time; it ends when none of them does.
 Source: UR3/CB3 user manual and UR5e hardware manual 2022, safety I/O: low is the safe state, both channels of
@@ -8,13 +8,173 @@ a pair are looked at. That a pair whose channels differ is not a fault is chosen
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import Enum
+from dataclasses import dataclass
+from enum import Enum, IntEnum
 
 from ur_emulator.controller.io.lines import CONFIGURABLE
-from ur_emulator.controller.safety.enabling_device import STOPPING, EnablingAct, EnablingDevice
 from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.controller.safety.operational_mode import ModeSource, OperationalMode, OperationalModeChoice
-from ur_emulator.controller.safety.safeguard import Safeguard
+
+# --- the three-position enabling device of an e-Series box as a table
+#
+# Source: UR5e hardware manual 2022: stop when fully released or fully pressed; from automatic to manual mode
+# it must be released and pressed again. That it enables from full pressure only after a release: IEC
+# 60947-5-8.
+
+
+class EnablingAct(Enum):
+    """What happens to the device; the values but the last are those of the control API."""
+
+    DISCONNECT = "none"
+    RELEASE = "released"
+    PRESS = "pressed"  # into its middle position
+    PRESS_FULLY = "fully pressed"
+    BEGIN_MANUAL_MODE = "manual mode begins"
+
+
+class EnablingState(Enum):
+    """Where the device is."""
+
+    NO_DEVICE = "no device"
+    RELEASED = "released"
+    ENABLING = "in the middle"
+    FULLY_PRESSED = "fully pressed"
+    TO_BE_RELEASED = "in the middle, must be released first"
+
+
+_S, _A = EnablingState, EnablingAct
+# A pair that is not listed changes nothing.
+TRANSITIONS: dict[tuple[EnablingState, EnablingAct], EnablingState] = {
+    **{(state, _A.DISCONNECT): _S.NO_DEVICE for state in _S},
+    **{(state, _A.RELEASE): _S.RELEASED for state in _S},
+    **{(state, _A.PRESS_FULLY): _S.FULLY_PRESSED for state in _S},
+    (_S.NO_DEVICE, _A.PRESS): _S.ENABLING,
+    (_S.RELEASED, _A.PRESS): _S.ENABLING,
+    (_S.FULLY_PRESSED, _A.PRESS): _S.TO_BE_RELEASED,
+    (_S.ENABLING, _A.BEGIN_MANUAL_MODE): _S.TO_BE_RELEASED,
+}
+# States in which it stops the arm in manual mode, and those in which its input is active.
+STOPPING = frozenset({_S.RELEASED, _S.FULLY_PRESSED, _S.TO_BE_RELEASED})
+ACTIVE = frozenset({_S.ENABLING, _S.TO_BE_RELEASED})
+
+
+class EnablingDevice:
+    """The device of a box, or none.
+
+    Attributes:
+        state: where it is.
+    """
+
+    def __init__(self) -> None:
+        self.state = EnablingState.NO_DEVICE
+
+    def act(self, act: EnablingAct) -> None:
+        """Let something happen to it."""
+        self.state = TRANSITIONS.get((self.state, act), self.state)
+
+
+# --- the operational mode of an e-Series box as tables: who chooses it, what each mode allows
+#
+# Sources: UR5e hardware manual 2022, safety I/O (a wired selector overrides PolyScope and dashboard; what
+# acts in which mode); PolyScope X manual SW 10.6 (rights of each mode); UR dashboard server e-Series: NONE
+# without a password. What is chosen stands in docs/fidelity.md.
+
+
+class OperationalMode(Enum):
+    """An operational mode; the values are those of the control API and of the dashboard."""
+
+    NONE = "none"
+    MANUAL = "manual"
+    AUTOMATIC = "automatic"
+
+
+class ModeSource(IntEnum):
+    """Who may choose the operational mode; the first one that has chosen counts."""
+
+    SELECTOR = 0  # configurable input: low automatic, high manual
+    DASHBOARD = 1
+    PENDANT = 2
+
+
+@dataclass(frozen=True, slots=True)
+class OperationalRow:
+    """What an operational mode allows.
+
+    Attributes:
+        allows_freedrive: by the teach button, an input or a client; programs always may.
+        is_slow: the limits of manual mode hold, see `SafetyLimits`.
+        needs_enabling: an enabling device that is not held stops the arm.
+        heeds_safeguard: the automatic-mode safeguard stops the arm.
+    """
+
+    allows_freedrive: bool
+    is_slow: bool
+    needs_enabling: bool
+    heeds_safeguard: bool
+
+
+OPERATIONAL_MODES: dict[OperationalMode, OperationalRow] = {
+    OperationalMode.NONE: OperationalRow(True, False, False, False),
+    OperationalMode.MANUAL: OperationalRow(True, True, True, False),
+    OperationalMode.AUTOMATIC: OperationalRow(False, False, False, True),
+}
+
+
+class OperationalModeChoice:
+    """Who has chosen which operational mode.
+
+    Attributes:
+        mode: that of the first source that has chosen one.
+        allows: what it allows.
+    """
+
+    def __init__(self) -> None:
+        self._choices: dict[ModeSource, OperationalMode] = {}
+        self.mode = OperationalMode.NONE
+        self.allows = OPERATIONAL_MODES[self.mode]
+
+    @property
+    def source(self) -> ModeSource:
+        """Who decides at present."""
+        return min(self._choices, default=ModeSource.PENDANT)
+
+    def choose(self, source: ModeSource, mode: OperationalMode | None) -> None:
+        """Let a source choose a mode, or leave the choice to the others."""
+        if mode is None:
+            self._choices.pop(source, None)
+        else:
+            self._choices[source] = mode
+        self.mode = self._choices.get(self.source, OperationalMode.NONE)
+        self.allows = OPERATIONAL_MODES[self.mode]
+
+
+# --- a safeguard of the cell: open or closed, with a reset button or without
+
+
+class Safeguard:
+    """A safeguard.
+
+    Attributes:
+        is_stopping: it is open, or closed and not reset.
+    """
+
+    def __init__(self) -> None:
+        self.is_stopping = False
+        self._is_open = self._needs_reset = False
+
+    def guard(self, is_open: bool) -> None:
+        """Open or close it."""
+        self._is_open = is_open
+        self.is_stopping = is_open or (self.is_stopping and self._needs_reset)
+
+    def require_reset(self, required: bool) -> None:
+        """Set up whether closing is enough."""
+        self._needs_reset = required
+        self.guard(self._is_open)
+
+    def reset(self) -> None:
+        """Press its reset button."""
+        self.is_stopping = self._is_open
+
 
 N_INPUT_PAIRS = CONFIGURABLE.count // 2
 

@@ -2,8 +2,8 @@
 
 Pure: `find_invalid_setpoint` checks the next set-point, `find_violation` the measured state.
 Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
-"invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are the
-proposal of the arm's notes.
+"invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are
+chosen (docs/fidelity.md).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from operator import sub
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
 from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.models.robot_model import RobotModel, Vector6
-from ur_emulator.motion.target import JointTarget
+from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.plant_state import PlantState
 
 # A joint this far from its (delayed) target is blocked or pushed [rad].
@@ -109,8 +109,9 @@ def find_invalid_setpoint(
     for i, (q_before, q, qd, limit, low, high) in enumerate(
         zip(before.q, target.q, target.qd, limits.speed, limits.q_min, limits.q_max, strict=True)
     ):
-        speed = max(abs(qd), abs(q - q_before) / period_s)
-        if not speed <= limit * SPEED_TOLERANCE:
+        step, most = abs(q - q_before) / period_s, limit * SPEED_TOLERANCE
+        if not (abs(qd) <= most and step <= most):  # one that is not a number is invalid
+            speed = max(step, abs(qd))
             return _stop(
                 204,
                 i,

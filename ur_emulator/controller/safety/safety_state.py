@@ -1,11 +1,109 @@
-"""SafetyState: the causes that stand, and the safety mode that they lead to."""
+"""The limits that a box is configured to, the causes that stand, and the safety mode they lead to."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.safety.boundaries import NO_BOUNDARIES, Boundaries
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
+from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW, WATCHED_MODES, SafetyEvent, after, mode_of
+from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits
+
+# --- ConfiguredLimits: what the safety system keeps the arm in, by the arm itself and by its installation
+
+
+@dataclass(frozen=True, slots=True)
+class SafetySettings:
+    """The safety configuration in an installation; limits are None where it gives none.
+
+    Attributes:
+        q_min: lower ends of the joint ranges [rad]; minus infinity where a joint has no limit.
+        q_max: upper ends [rad].
+        joint_speed: [rad/s].
+        reduced_joint_speed: in reduced mode [rad/s].
+        arm: the others.
+        reduced_arm: in reduced mode.
+        boundaries: safety planes and tool direction.
+        unwatched: settings that the safety system does not watch, for the log.
+        inputs: pairs of configurable inputs with functions that need operational modes.
+    """
+
+    q_min: Vector6 | None = None
+    q_max: Vector6 | None = None
+    joint_speed: Vector6 | None = None
+    reduced_joint_speed: Vector6 | None = None
+    arm: ArmLimits | None = None
+    reduced_arm: ArmLimits | None = None
+    boundaries: Boundaries = NO_BOUNDARIES
+    unwatched: tuple[str, ...] = ()
+    inputs: Mapping[int, SafetyInput] = field(default_factory=dict)
+
+
+NO_SETTINGS = SafetySettings()
+
+
+@dataclass(frozen=True, slots=True)
+class ConfiguredLimits:
+    """Limits of an arm.
+
+    Attributes:
+        q_min: lower ends of the ranges [rad].
+        q_max: upper ends [rad].
+        speed: at which the arm is stopped [rad/s].
+        reduced_speed: allowed in reduced mode [rad/s].
+        recovery_speed: allowed in recovery mode [rad/s].
+        arm: beside those of the joints.
+        reduced_arm: in reduced mode.
+        boundaries: safety planes and tool direction.
+    """
+
+    q_min: Vector6
+    q_max: Vector6
+    speed: Vector6
+    reduced_speed: Vector6
+    recovery_speed: Vector6
+    arm: ArmLimits
+    reduced_arm: ArmLimits
+    boundaries: Boundaries = NO_BOUNDARIES
+
+    def within(self, settings: SafetySettings) -> ConfiguredLimits:
+        """Return the limits with those of an installation, which cannot widen those of the joints."""
+        q_min, q_max = settings.q_min, settings.q_max
+        speed, reduced = settings.joint_speed, settings.reduced_joint_speed
+        top = self.speed if speed is None else _each(min, self.speed, speed)
+        arm = settings.arm or self.arm
+        return ConfiguredLimits(
+            self.q_min if q_min is None else _each(max, self.q_min, q_min),
+            self.q_max if q_max is None else _each(min, self.q_max, q_max),
+            top,
+            _each(min, top, self.reduced_speed if reduced is None else reduced),
+            self.recovery_speed,
+            arm,
+            arm.within(settings.reduced_arm or self.reduced_arm),
+            settings.boundaries,
+        )
+
+
+def limits_of(robot: RobotModel) -> ConfiguredLimits:
+    """Return the limits of an arm whose installation sets none."""
+    limits = robot.generation.limits
+    return ConfiguredLimits(
+        robot.q_min,
+        robot.q_max,
+        robot.qd_safety,
+        six([limits.reduced_share * speed for speed in robot.qd_max]),
+        (limits.recovery_speed,) * 6,
+        UNLIMITED,
+        limits.reduced,
+    )
+
+
+def _each(choose: Callable[[float, float], float], a: Vector6, b: Vector6) -> Vector6:
+    return six([choose(x, y) for x, y in zip(a, b, strict=True)])
+
 
 # The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.
 UNLOCK_DELAY = 5.0

@@ -15,8 +15,8 @@ from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.limit_checks import Violation
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits

@@ -11,13 +11,12 @@ from contextlib import suppress
 from protocol.dashboard.commands import OPERATIONAL_MODES, USER_ROLES, DashboardCommand
 from protocol.dashboard.connection import CommandReceived
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
-from ur_emulator.commands.operational import ChooseModeByDashboard
 from ur_emulator.commands.operator import ClosePopup, ShowPopup
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.power import ChooseModeByDashboard, PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
-from ur_emulator.controller.safety.operational_mode import OperationalMode
+from ur_emulator.controller.safety.inputs import OperationalMode
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.player import MissingFileRefusal, ProgramPlayer

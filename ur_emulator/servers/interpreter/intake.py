@@ -10,7 +10,18 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from protocol.interpreter import CLEANED_UP, INVALID_STATE, TOO_MANY, Word, acknowledge, discard, state
+from protocol.errors import ProtocolError
+from protocol.interpreter import (
+    CLEANED_UP,
+    INVALID_STATE,
+    TOO_MANY,
+    InterpreterConnection,
+    Statements,
+    Word,
+    acknowledge,
+    discard,
+    state,
+)
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.interpreter import AbortMove, AppendStatements, SkipStatements
 from ur_emulator.controller.command import Box, Command, Result
@@ -235,3 +246,38 @@ def _send(client: Connection, answer: bytes) -> None:
     """Answer a client; one that does not read is closed, for an answer less would shift all that follow."""
     if client.is_open and not client.send(answer) and client.dropped:
         client.close()
+
+
+# --- Port 30020: each line gets an answer; words get theirs before lines that wait
+
+
+class InterpreterPort:
+    """Takes the lines of its clients."""
+
+    def __init__(self, intake: InterpreterIntake) -> None:
+        """Serve a box; `intake` gets the lines of all its clients."""
+        self._intake = intake
+        self._lines: dict[Connection, InterpreterConnection] = {}
+
+    def opened(self, connection: Connection) -> None:
+        """Wait for lines; a client that has closed its sending side still gets its answers."""
+        connection.allow_half_close(self._intake.ended)
+        self._lines[connection] = InterpreterConnection()
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Take lines; a client whose line has no end is disconnected."""
+        lines = self._lines[connection]
+        try:
+            lines.receive_data(data)
+        except ProtocolError:
+            connection.close()
+            return
+        while (event := lines.next_event()) is not None:
+            if isinstance(event, Statements):
+                self._intake.take(connection, event.text)
+            else:
+                self._intake.take_word(connection, event)
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client; its lines are executed, as programs are whose sender has gone."""
+        self._lines.pop(connection, None)

@@ -4,7 +4,7 @@ Reads are answered at once, from the state at the end of the last cycle. Writes 
 the cycle in which they act; the next request of that client follows then, so that it reads what it has
 written. The unit number is not used. A request with an address that does not exist, or a write to one that
 can only be read, is refused as a whole with exception 2.
-Source: UR "Modbus server" article (protocol notes, section 9); exceptions: Modbus application protocol.
+Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus application protocol.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from protocol.modbus import (
     take_frame,
 )
 from ur_emulator.commands.client_writes import WriteModbus
-from ur_emulator.controller.modbus.robot_map import MapAddressError, can_write, read_coil, read_register
+from ur_emulator.controller.modbus_map import MapAddressError, can_write, read_coil, read_register
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.session import Session
 from ur_emulator.servers.steps import Steps

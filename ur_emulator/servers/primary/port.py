@@ -1,5 +1,8 @@
 """Ports 30001, 30002 and their read-only twins: greeting, states at 10 Hz, messages; script text comes in.
 
+A change of the robot or safety mode leaves in one write with its message and a state that shows it: live
+tests of the maker's client library ask for the mode once the message is there.
+
 The first state to a new client, and the first after the brakes have opened, also have kinematics and
 configuration.
 
@@ -9,26 +12,108 @@ its threads stand in PolyScope's tree.
 
 from __future__ import annotations
 
-from protocol.primary.message_codec import version_message
-from protocol.primary.messages import HardwareInfoMessage, RobotMessage, StartupMessage
+from protocol.primary.framing import NO_TIME
+from protocol.primary.messages import (
+    LONGEST_TITLE,
+    ErrorCodeMessage,
+    HardwareInfoMessage,
+    KeyMessage,
+    MessageSource,
+    PopupMessage,
+    RequestValueMessage,
+    RobotMessage,
+    RuntimeExceptionMessage,
+    SafetyModeMessage,
+    StartupMessage,
+    TextMessage,
+    version_message,
+)
 from protocol.primary.packages import (
     encode_message_package,
     encode_safety_tolerances,
     sends_safety_tolerances,
 )
 from protocol.ur_types import RobotMode
+from ur_emulator.controller import events
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import Event, ProgramStarted, ProgramStopped
+from ur_emulator.controller.events import (
+    Event,
+    ProgramStarted,
+    ProgramStopped,
+    RobotModeChanged,
+    SafetyModeChanged,
+)
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.models.software import Software
-from ur_emulator.servers.primary.event_messages import message_for
-from ur_emulator.servers.primary.label_reporter import LabelReporter
+from ur_emulator.models.robot_generation import Software
+from ur_emulator.servers.primary.program_reports import LabelReporter, VariableReporter
 from ur_emulator.servers.primary.robot_state import StateEncoder
-from ur_emulator.servers.primary.variable_reporter import VariableReporter
 from ur_emulator.servers.programs.intake import ProgramIntake
 from ur_emulator.servers.programs.script_port import ScriptPort
 from ur_emulator.servers.tcp.connection import Connection
 from urscript import RunningProgram
+
+# --- Controller events as robot messages of the primary port
+
+
+# Titles of the key messages about a program's life. Sources: captures quoted by the public client library;
+# PAUSED from Hirebotics/urscript-tools. None is known for a program that goes on after a pause.
+STARTED_TITLE = "PROGRAM_XXX_STARTED"
+PAUSED_TITLE = "PROGRAM_XXX_PAUSED"
+STOPPED_TITLE = "PROGRAM_XXX_STOPPED"
+SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
+
+
+def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
+    """Return the message for an event; None for events that stand only in the log.
+
+    Args:
+        event: what happened.
+        timestamp: microseconds since controller start.
+    """
+    match event:
+        case events.ProgramStarted(name):
+            return KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
+        case events.ProgramStopped(name):
+            return KeyMessage(timestamp=timestamp, title=STOPPED_TITLE, text=name)
+        case events.ProgramPaused(name):
+            return KeyMessage(timestamp=timestamp, title=PAUSED_TITLE, text=name)
+        case events.ProgramResumed() | events.RobotModeChanged() | events.LogAdded():
+            return None  # no client knows a message for the first; the states show the second
+        case events.TextPrinted(text):
+            return TextMessage(timestamp=timestamp, text=text)
+        case events.ScriptFailed(line, column, text, secondary):
+            if secondary:
+                return KeyMessage(timestamp=timestamp, title=SECONDARY_EXCEPTION_TITLE, text=text)
+            # A capture shows "no time" on these.
+            return RuntimeExceptionMessage(timestamp=NO_TIME, line=line, column=column, text=text)
+        case events.ErrorReported(code, argument, level, text):
+            return ErrorCodeMessage(
+                timestamp=timestamp,
+                source=MessageSource.CONTROLLER,
+                code=code,
+                argument=argument,
+                report_level=level,
+                text=text,
+            )
+        case events.SafetyModeChanged(safety_mode):
+            return SafetyModeMessage(
+                timestamp=timestamp, source=MessageSource.CONTROLLER, safety_mode=safety_mode
+            )
+        case events.ValueRequested(request_id, kind, text):
+            return RequestValueMessage(
+                timestamp=timestamp, request_id=request_id, requested_type=kind, text=text
+            )
+        case events.PopupShown(title, text, warning, error, blocking, request_id):
+            return PopupMessage(
+                timestamp=timestamp,
+                request_id=request_id,
+                is_warning=warning,
+                is_error=error,
+                is_blocking=blocking,
+                title=title[:LONGEST_TITLE],
+                text=text,
+            )
+
 
 STATE_RATE = 10  # states per second
 
@@ -79,10 +164,9 @@ class PrimaryPort(ScriptPort):
         connection.send(self._states.encode_first(self._controller.snapshot))
         if self._all_messages:
             programs = self._controller.programs
-            if not self._clients:  # the first client: what was sent before does not count
+            if not self._clients:  # the first client: nobody has looked at the program so far
                 self._begin_report(programs.latest if programs.is_running else None)
-                self._variables.changes(self._now, at_once=True)
-            for package in (*self._variables.names(self._now), *self._variables.values(self._now)):
+            for package in self._variables.greeting(self._now, is_first=not self._clients):
                 connection.send(package)
         super().opened(connection)
 
@@ -97,23 +181,32 @@ class PrimaryPort(ScriptPort):
         if self._phase < cycle_rate:
             return
         self._phase -= cycle_rate
+        state = self._state()
+        if self._clients:
+            self._send(state, *self._variables.changes(self._now))
+
+    def _state(self) -> bytes:
+        """Return the state of the present cycle; the first after the brakes have opened is a long one."""
+        snapshot = self._controller.snapshot
         running = snapshot.robot_mode == RobotMode.RUNNING
         has_started, self._was_running = running and not self._was_running, running
-        if self._clients:
-            encode = self._states.encode_first if has_started else self._states.encode
-            self._send(encode(snapshot), *self._variables.changes(self._now))
+        return (self._states.encode_first if has_started else self._states.encode)(snapshot)
 
     def send_message(self, event: Event) -> None:
-        """Send the message for an event, on the primary port."""
-        if not (self._all_messages and self._clients):
-            return
+        """Send the message for an event, on the primary port; with a state if it changes a mode."""
         if isinstance(event, ProgramStopped):
-            self._send(*self._variables.changes(self._now, at_once=True))
-            self._begin_report(None)
-        message = message_for(event, self._now)
-        if message is not None:
-            self._send(self._package(message))
-        if isinstance(event, ProgramStarted):
+            if self._all_messages and self._clients:
+                self._send(*self._variables.changes(self._now, at_once=True))
+            self._begin_report(None)  # also without clients: it holds the values
+        if not self._clients:
+            return
+        message = message_for(event, self._now) if self._all_messages else None
+        package = b"" if message is None else self._package(message)
+        if isinstance(event, RobotModeChanged | SafetyModeChanged):
+            package += self._state()
+        if package:
+            self._send(package)
+        if self._all_messages and isinstance(event, ProgramStarted):
             self._begin_report(event.run)
             self._send(*self._variables.names(self._now))
 
@@ -127,9 +220,8 @@ class PrimaryPort(ScriptPort):
 
     def _begin_report(self, run: RunningProgram | None) -> None:
         """Turn to the variables and labels of a run, or to none."""
+        self._variables.begin(run)
         if run is None:
-            self._variables.end()
             self._labels.end()
         else:
-            self._variables.begin(run)
             self._labels.begin(run)

@@ -10,21 +10,21 @@ import numpy as np
 from protocol.primary.framing import SubPackage
 from protocol.primary.layout import (
     AdditionalInfo,
+    CalibrationData,
     CartesianInfo,
+    ConfigurationData,
     ForceModeData,
     JointData,
+    KinematicsInfo,
     MasterboardData,
     RobotModeData,
     SafetyData,
-)
-from protocol.primary.setup import (
-    CalibrationData,
-    ConfigurationData,
-    KinematicsInfo,
     SingularityInfo,
+    ToolCommunicationInfo,
+    ToolData,
+    ToolModeInfo,
 )
 from protocol.primary.state import encode_state
-from protocol.primary.tool import ToolCommunicationInfo, ToolData, ToolModeInfo
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import (
     SIMULATED_MASTERBOARD,
@@ -34,15 +34,13 @@ from protocol.ur_types import (
     SafetyMode,
 )
 from ur_emulator.controller.robot_mode import POWERED
-from ur_emulator.controller.safety.configured_limits import ConfiguredLimits
 from ur_emulator.controller.safety.modes import EMERGENCY_MODES, MOVING_MODES
-from ur_emulator.controller.safety.safety_state import SafetyState
-from ur_emulator.controller.safety.status_bits import RUNNING_STATES
-from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyState
+from ur_emulator.controller.snapshot import RUNNING_STATES, Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import calibrated_dh
+from ur_emulator.models.robot_generation import Software
 from ur_emulator.models.robot_model import DhRow, RobotModel
-from ur_emulator.models.software import Software
 
 # Radius of the sphere around the elbow that the safety system watches [m]. Source: a UR5e capture.
 ELBOW_RADIUS = 0.13
@@ -153,17 +151,25 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
 class StateEncoder:
     """Encodes states for all ports of a box: each snapshot once, however many ports ask for it."""
 
-    def __init__(self, software: Software, arm: ArmModel, safety: SafetyState) -> None:
+    def __init__(
+        self,
+        software: Software,
+        arm: ArmModel,
+        safety: SafetyState,
+        masterboard: int = SIMULATED_MASTERBOARD,
+    ) -> None:
         """Prepare what stays.
 
         Args:
             software: decides sizes and contents.
             arm: the controller's kinematics.
             safety: has the limits of the installation.
+            masterboard: its version, by which clients know the box.
         """
         self._software = software
         self._arm = arm
         self._safety = safety
+        self._masterboard = masterboard
         self._limits: ConfiguredLimits | None = None
         self._checksum = 0
         self._dh = calibrated_dh(arm.robot, arm.calibration)
@@ -179,7 +185,7 @@ class StateEncoder:
 
     def encode_first(self, snapshot: Snapshot) -> bytes:
         """Return the longer state, which also has kinematics and configuration."""
-        setup = setup_records(self._arm.robot, self._dh, self._safety.limits)
+        setup = setup_records(self._arm.robot, self._dh, self._safety.limits, self._masterboard)
         return self._encode((*self._records(snapshot), *setup))
 
     def _encode(self, records: Iterable[SubPackage]) -> bytes:
@@ -193,7 +199,10 @@ class StateEncoder:
 
 
 def setup_records(
-    robot: RobotModel, calibrated_dh: tuple[DhRow, ...], limits: ConfiguredLimits
+    robot: RobotModel,
+    calibrated_dh: tuple[DhRow, ...],
+    limits: ConfiguredLimits,
+    masterboard: int = SIMULATED_MASTERBOARD,
 ) -> tuple[SubPackage, ...]:
     """Return the sub-packages of the first state of a connection.
 
@@ -201,6 +210,7 @@ def setup_records(
         robot: type and nominal kinematics.
         calibrated_dh: kinematics of this very arm.
         limits: of the arm and its installation.
+        masterboard: its version, by which clients know the box.
     """
     checksum = zlib.crc32(repr(calibrated_dh).encode())  # of the calibration, the same for every joint
     return (
@@ -220,7 +230,7 @@ def setup_records(
             dh_d=tuple(row.d for row in robot.dh),
             dh_alpha=tuple(row.alpha for row in robot.dh),
             dh_theta=tuple(row.theta for row in robot.dh),
-            masterboard_version=SIMULATED_MASTERBOARD,
+            masterboard_version=masterboard,
             controller_box_type=robot.box_type,
             robot_type=robot.robot_type,
             robot_sub_type=robot.generation.robot_subtype,

@@ -3,7 +3,7 @@
 Words act at once: they never wait for a program. What waits when a client stops the program or switches the
 power off is stopped with it, whoever has sent it: on a real controller it would run already. Programs begin
 in the order of arrival, but who sends many at once lets others go first, and no client waits for a program
-that takes long to compile: it does not begin any more when a newer one of another client has begun meanwhile.
+that takes long to compile: it does not begin any more when a newer one of anybody has begun meanwhile.
 A program is compiled also when its sender has closed the connection meanwhile, as many do.
 """
 
@@ -44,9 +44,11 @@ class Box(Protocol):
 
     Attributes:
         stops: how often clients have stopped the program so far, by any command.
+        newest: when the newest of the programs that were started was asked for, in monotonic time [s].
     """
 
     stops: int
+    newest: float
 
     @property
     def remote_period(self) -> int:
@@ -82,8 +84,8 @@ class ProgramIntake:
         self._senders: dict[Sender, None] = {}
         self._ready: deque[Program] = deque()
         self._held = self._held_gone = 0
-        # When the newest program that has begun arrived, and when it was paused last, 0 if it goes on.
-        self._newest = self._paused = 0.0
+        # When the program was paused last, 0 if it goes on.
+        self._paused = 0.0
         self._stops = 0
         self._n_programs = self._n_warnings = 0
 
@@ -237,10 +239,10 @@ class ProgramIntake:
             self._box.submit(StartProgram(outcome))
         elif program.stops != self._box.stops:
             self._warn(f"program {outcome.name} was stopped before it began")
-        elif program.place.arrived < self._newest:
+        elif program.place.arrived < self._box.newest:
             self._warn(f"program {outcome.name} does not begin: a newer one was compiled before it")
         else:
-            self._newest = program.place.arrived
+            self._box.newest = program.place.arrived
             self._box.submit(StartProgram(outcome, program.place.arrived < self._paused))
 
     def _drop_gone(self) -> None:

@@ -5,14 +5,21 @@ Every action is done in steps (see `servers.steps`). What cannot be done is refu
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
+from protocol.script_channel import MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetUp, StartProgram, StopProgram
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.commands.programs import PROGRAM_RUNS, PauseProgram, ResumeProgram, SetUp, StopProgram
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.safety.configured_limits import limits_of
+from ur_emulator.controller.io.configuration import IoConfiguration
+from ur_emulator.controller.programs import Programs
+from ur_emulator.controller.safety.safety_state import limits_of
+from ur_emulator.controller.snapshot import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.programs.compiling import (
     Outcome,
@@ -22,17 +29,172 @@ from ur_emulator.programs.compiling import (
 )
 from ur_emulator.programs.folder import ProgramFolder
 from ur_emulator.programs.installation import ExternalControlPc, Installation, StartUp
-from ur_emulator.programs.installation_files import DEFAULT_NAME, NEW_BOX
-from ur_emulator.programs.variables_file import write_variables
+from ur_emulator.programs.installation_reader import DEFAULT_NAME, NEW_BOX
+from ur_emulator.programs.script_writer import one_line
+from ur_emulator.programs.variables_file import literal, write_variables
+from ur_emulator.scripting.network import Network
 from ur_emulator.servers.box_access import BoxAccess
-from ur_emulator.servers.programs.external_control import request_program
-from ur_emulator.servers.programs.input_actions import follow_inputs
-from ur_emulator.servers.programs.kept_variables import values_at_end
-from ur_emulator.servers.programs.play_conditions import is_paused, is_running, obstacle_to_playing
 from ur_emulator.servers.steps import Steps
 
 if TYPE_CHECKING:
     from ur_emulator.programs.loading import LoadedProgram
+
+
+# --- External Control: when a program is played, the box asks a PC for a part of it
+#
+#     box -> PC    request_program\n
+#     PC -> box    lines of URScript, the last one ended
+#
+# Source: source text of the URCap and of the public client library.
+
+
+REQUEST = b"request_program\n"
+# For so long the box waits for a connection and for the first line [real s]; the first is the URCap's.
+CONNECT_LIMIT = 5.0
+ANSWER_LIMIT = 5.0
+# A PC that keeps the connection open has sent all when nothing has come for this long after a line's end.
+QUIET = 0.1
+
+
+def request_program(
+    network: Network, pc: ExternalControlPc, clock: Callable[[], float] = time.monotonic
+) -> Steps[str]:
+    """Ask a PC for its program, in steps.
+
+    Args:
+        network: connects.
+        pc: whom to ask.
+        clock: real time [s].
+
+    Returns:
+        What it has sent, one character a byte; or, as the URCap does it, a program that shows what went wrong
+        and waits for somebody to close the popup.
+    """
+    problem = ""
+    received = bytearray()
+    connection = network.open(pc.host, pc.port)
+    try:
+        since = clock()
+        while connection.is_connecting and clock() - since < CONNECT_LIMIT:
+            yield
+        if not connection.send(REQUEST):
+            problem = connection.problem or "it cannot be reached"
+        begin = since = clock()
+        while not problem:
+            inbox = connection.inbox
+            if inbox:
+                received += inbox
+                inbox.clear()
+                since = clock()
+            elif not connection.is_open:
+                break
+            silence = clock() - since
+            if silence > (QUIET if received.endswith(b"\n") else ANSWER_LIMIT):
+                break
+            if len(received) > MAX_PROGRAM:
+                problem = f"it sends more than {MAX_PROGRAM} bytes"
+            elif clock() - begin > BUDGETS.external_control_time:
+                problem = f"it has not sent all of it within {BUDGETS.external_control_time:g} s"
+            yield
+    finally:
+        connection.close()
+    if not problem and not received.strip():
+        problem = "it sends nothing"
+    return _apology(pc, problem) if problem else received.decode("latin-1")
+
+
+def _apology(pc: ExternalControlPc, problem: str) -> str:
+    text = one_line(f"No program from the remote PC at {pc.host}:{pc.port}: {problem}")
+    return f'popup("{text}", "External Control", False, True, blocking=True)\nsync()\n'
+
+
+# --- Inputs that start, pause and stop programs, as an installation sets them up
+#
+# Each acts on a rising edge. Source: the user manuals' page of I/O set-up, from memory. FREEDRIVE acts in the
+# controller.
+
+
+def follow_inputs(
+    lines: IoConfiguration,
+    declared: Sequence[tuple[str, int, str]],
+    acts: Mapping[str, Callable[[], None]],
+    is_effective: Callable[[], bool],
+) -> Steps[None]:
+    """Do what inputs ask for.
+
+    Args:
+        lines: has their levels.
+        declared: (group of inputs as in the names of builtins, index, action).
+        acts: begins an action.
+        is_effective: the installation with these inputs is still loaded.
+    """
+    inputs = [(group, index, acts[action]) for group, index, action in declared if action in acts]
+    before = [True] * len(inputs)
+    while inputs and is_effective():
+        levels = [lines.is_high(group, index) for group, index, _ in inputs]
+        for (_, _, act), was_high, is_high in zip(inputs, before, levels, strict=True):
+            if is_high and not was_high:
+                act()
+        before = levels
+        yield
+
+
+# --- The variables of an installation, which keep the values that programs leave in them
+
+
+def values_at_end(programs: Programs, variables: Mapping[str, str]) -> Steps[dict[str, str]]:
+    """Wait for the end of the program that runs; return the values that the variables have then.
+
+    Args:
+        programs: of the box.
+        variables: name and value, as a literal; one that the program does not declare keeps it.
+    """
+    run = programs.latest
+    while programs.is_running and programs.latest is run:
+        yield
+    if run is None:
+        return dict(variables)
+    declared = set(run.program.declared_globals)
+    return {
+        name: (literal(run.read_global(name)) if name in declared else "") or old
+        for name, old in variables.items()
+    }
+
+
+# --- Whether a program plays, is paused, or may be played now
+
+
+_PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
+
+
+def is_running(access: BoxAccess) -> bool:
+    """Return True while a program plays, also one that a client has sent."""
+    return access.snapshot.runtime_state in RUNNING_STATES
+
+
+def is_paused(access: BoxAccess) -> bool:
+    """Return True while a program is paused, or about to be."""
+    return access.snapshot.runtime_state in _PAUSED
+
+
+def obstacle_to_playing(access: BoxAccess, *, has_program: bool) -> str:
+    """Return what stands against playing, "" if nothing does.
+
+    Args:
+        access: to the box.
+        has_program: a program is loaded.
+    """
+    state, mode = access.controller.state, access.snapshot.robot_mode
+    if not state.safety.lets_programs_run:
+        return "the robot is stopped for safety"
+    if mode != RobotMode.RUNNING:
+        return f"the robot is in {RobotMode(mode).name}, it must be RUNNING"
+    if is_running(access) and not is_paused(access):
+        return "a program plays already"
+    if state.operator.requests:
+        return "a popup waits to be closed, or a question for its answer"
+    return "" if has_program or is_paused(access) else "no program is loaded"
+
 
 T = TypeVar("T")
 # Who External Control asks if neither a client has sent `play` nor a node or the installation names a PC.
@@ -96,9 +258,14 @@ class ProgramPlayer:
 
     # --- actions
 
-    def load(self, name: str) -> Steps[None]:
-        """Load a program and its installation; what was loaded stays if that fails."""
-        yield from self._in_turn(self._load(name))
+    def load(self, name: str, *, stops: bool = False) -> Steps[None]:
+        """Load a program and its installation; what was loaded, and runs, stays if that fails.
+
+        Args:
+            name: of the file.
+            stops: a program that runs is stopped once the file is read.
+        """
+        yield from self._in_turn(self._load(name, stops=stops))
 
     def load_installation(self, name: str) -> Steps[None]:
         """Load an installation; the one before stays if that fails."""
@@ -115,20 +282,26 @@ class ProgramPlayer:
             yield from self._load(start.program)
         return start
 
-    def _load(self, name: str) -> Steps[None]:
+    def _load(self, name: str, *, stops: bool = False) -> Steps[None]:
         what = f"load {name}"
-        self._must_be_stopped(what)
+        if not stops:
+            self._must_be_stopped(what)
         try:
             loaded, ready, set_up = yield from self._access.in_worker(
                 load_and_compile, self.folder, name, self.installation, self._catalogue, self._skip_unknown
             )
         except (EmulatorError, OSError) as error:
             self._refuse(what, error)
+        if stops:
+            with suppress(RefusedError):  # when the controller is not up, there is nothing to stop
+                yield from self.stop()
+        installation = loaded.installation or self.installation
+        yield from self._set_up(what, installation, set_up)
         self.loaded, self._ready = loaded, ready
         self._access.note(f"Loaded program: {loaded.wire_path}")
         for note in loaded.notes:
             self._access.note(note)
-        yield from self._use(loaded.installation or self.installation, set_up)
+        self._use(installation, set_up)
         if isinstance(ready, ScriptFailed):
             self._access.note(f"{loaded.file_name} will not start: {ready.log_text or ready.text}")
 
@@ -141,8 +314,9 @@ class ProgramPlayer:
             )
         except (EmulatorError, OSError) as error:
             self._refuse(what, error)
+        yield from self._set_up(what, installation, set_up)
         self._access.note(f"Loaded installation: {installation.wire_path}")
-        yield from self._use(installation, set_up)
+        self._use(installation, set_up)
 
     def play(self, client: str) -> Steps[None]:
         """Let a paused program go on, or start the loaded one from the top.
@@ -150,6 +324,7 @@ class ProgramPlayer:
         Args:
             client: address of who wants it; External Control asks there if no PC is named.
         """
+        asked = time.monotonic()
         self._must_be_able_to_play()
         if self.is_paused:
             try:
@@ -168,7 +343,7 @@ class ProgramPlayer:
         self._must_be_able_to_play()  # it took a while to get here
         if self.is_paused:
             self._refuse("play", "a program is paused")
-        yield from self._access.apply(StartProgram(program, loaded=True))
+        yield from self._access.start(program, asked, loaded=True)
         if self.installation.variables:
             self._access.start_alone(self._keep_variables())
 
@@ -207,8 +382,18 @@ class ProgramPlayer:
         finally:
             self._loading.remove(work)
 
-    def _use(self, installation: Installation, set_up: Outcome | None) -> Steps[None]:
-        """Make an installation effective, and end when it is."""
+    def _set_up(self, what: str, installation: Installation, set_up: Outcome | None) -> Steps[None]:
+        """Make an installation effective, and end when it is; not while a program runs."""
+        self._must_be_stopped(what)  # the file has taken a while
+        if set_up is not None and not isinstance(set_up, ScriptFailed):
+            limits = limits_of(self._access.controller.state.robot).within(installation.safety)
+            try:
+                yield from self._access.apply(SetUp(set_up, limits, installation.safety.inputs))
+            except RefusedError as error:
+                self._refuse(what, error)
+
+    def _use(self, installation: Installation, set_up: Outcome | None) -> None:
+        """Take an installation that is effective; the log says what of it is not."""
         if installation is not self.installation:
             self._declare(installation)
             self._access.start_alone(self._follow_inputs())
@@ -216,10 +401,8 @@ class ProgramPlayer:
             text = set_up.log_text or set_up.text
             self._access.note(f"{installation.wire_path} has no effect: {text}")
         elif set_up is not None:
-            limits = limits_of(self._access.controller.state.robot).within(installation.safety)
             for setting in installation.safety.unwatched:
                 self._access.note(f"{installation.wire_path}: {setting} not watched")
-            yield from self._access.apply(SetUp(set_up, limits, installation.safety.inputs))
 
     def _declare(self, installation: Installation) -> None:
         """Take an installation; the loaded program begins with what it declares from the next start on."""
@@ -264,7 +447,7 @@ class ProgramPlayer:
 
     def _must_be_stopped(self, what: str) -> None:
         if self._access.controller.programs.is_running:
-            self._refuse(what, "a program runs, stop it first")
+            self._refuse(what, PROGRAM_RUNS)
 
     def _must_be_able_to_play(self) -> None:
         """Refuse to play while something stands against it."""

@@ -10,7 +10,7 @@ from ur_emulator.controller.command import Command
 from ur_emulator.errors import ArgumentError
 
 # Words that change nothing here map to None.
-# Source: what PolyScope and public clients send on the script ports (protocol.controller_words).
+# Source: what PolyScope and public clients send on the script ports (protocol.script_channel).
 WORDS: dict[str, Command | None] = {
     "power on": PowerOn(),
     "power off": PowerOff(),

@@ -16,7 +16,6 @@ from pathlib import Path
 _PREFIX = "ur-emulator-box-reports-"
 # What `mkdtemp` gives its folders.
 _MODE = 0o700
-_LOCK = fcntl.LOCK_EX | fcntl.LOCK_NB
 
 
 class TemporaryFolder:
@@ -32,8 +31,14 @@ class TemporaryFolder:
         Raises:
             OSError: it cannot be made.
         """
-        self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
-        self._lock = _lock(self.path)
+        while True:
+            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
+            # Before it is locked, another box may take it for one that was left, and remove it.
+            with suppress(FileNotFoundError):
+                self._lock = _lock(self.path, fcntl.LOCK_EX)
+                if self.path.exists():
+                    return
+                os.close(self._lock)
 
     def close(self) -> None:
         """Remove it with all that is in it."""
@@ -46,7 +51,7 @@ def remove_left_folders() -> None:
     with suppress(OSError):
         for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
             with suppress(OSError):  # its box lives, or it is not ours
-                lock = _lock(path)
+                lock = _lock(path, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 try:
                     found = os.fstat(lock)
                     if (found.st_uid, stat.S_IMODE(found.st_mode)) == (os.getuid(), _MODE):
@@ -55,10 +60,10 @@ def remove_left_folders() -> None:
                     os.close(lock)
 
 
-def _lock(path: Path) -> int:
+def _lock(path: Path, how: int) -> int:
     descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        fcntl.flock(descriptor, _LOCK)
+        fcntl.flock(descriptor, how)
     except OSError:
         os.close(descriptor)
         raise

@@ -23,8 +23,8 @@ from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.clock import clock_time
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
+from ur_emulator.controller.safety.inputs import OperationalMode
 from ur_emulator.controller.safety.modes import ROW
-from ur_emulator.controller.safety.operational_mode import OperationalMode
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin

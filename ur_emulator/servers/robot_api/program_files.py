@@ -28,6 +28,8 @@ class Outcome(Enum):
     IN_USE = auto()
 
 
+# What a file takes of a disk at least [bytes].
+_BLOCK = 4_096
 KINDS = (URPX_SUFFIX, PROGRAM_SUFFIX, SCRIPT_SUFFIX)
 
 
@@ -90,7 +92,7 @@ def write_program(
 
     Raises:
         FileMissingError: the name leads out of the folder, or the box has none.
-        ProgramFileError: it cannot be written, or is no program.
+        ProgramFileError: it cannot be written, is no program, or is too much beside the others.
     """
     file_name, data = _form_file(content_type, body)
     if data.lstrip().startswith(b"{") or file_name.endswith(URPX_SUFFIX):
@@ -105,6 +107,13 @@ def write_program(
         return inside.stem, Outcome.IN_USE
     if folder.has(str(inside)) is is_new:
         return inside.stem, Outcome.EXISTS if is_new else Outcome.MISSING
+    others = (size for path, size in folder.sizes() if path.suffix in KINDS and path != inside)
+    held = sum(max(size, _BLOCK) for size in others)
+    if held + max(len(data), _BLOCK) > BUDGETS.uploads_bytes:
+        raise ProgramFileError(
+            f"{inside} has {len(data)} bytes, other programs in the folder hold {held}: "
+            f"{BUDGETS.uploads_bytes} are allowed, remove some"
+        )
     folder.write(inside, data)
     return inside.stem, Outcome.WRITTEN
 

@@ -36,7 +36,9 @@ class LoopNetwork:
     def open(self, host: str, port: int) -> ScriptConnection:
         """Begin to connect to `host`:`port`."""
         connection = ScriptConnection(self._loop, self._buffers, self._report, self._own_address)
-        if len(self._buffers.connections) < BUDGETS.outgoing_connections:
+        if len(host) > BUDGETS.host_length:
+            connection.refuse(f"{len(host)} characters given: a host has up to {BUDGETS.host_length}")
+        elif len(self._buffers.connections) < BUDGETS.outgoing_connections:
             connection.begin(host, port)
         else:
             connection.refuse(f"the box has {BUDGETS.outgoing_connections} connections, close one first")

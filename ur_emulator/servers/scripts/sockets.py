@@ -10,7 +10,7 @@ from functools import partial
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.realtime.barrier import Report
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.scripts.buffers import SHARE, Buffers
+from ur_emulator.servers.scripts.buffers import Buffers
 from ur_emulator.servers.scripts.closed_ports import is_closed
 from ur_emulator.servers.scripts.look_ups import LOOK_UPS, LookUp
 from ur_emulator.servers.tcp.buffered_socket import BufferedSocket
@@ -70,11 +70,6 @@ class ScriptConnection(BufferedSocket):
         if not self._wants_data:
             self.read_on()
         return self._inbox
-
-    @property
-    def n_received(self) -> int:
-        """Bytes that were not read yet."""
-        return len(self._inbox)
 
     def read_on(self) -> None:
         """Read from the peer, or stop reading, as the budgets say now."""
@@ -157,7 +152,6 @@ class ScriptConnection(BufferedSocket):
     def _received(self, data: bytes) -> None:
         self._inbox += data
         self._buffers.received(len(data))
-        self._read_size = SHARE if self._buffers.is_full else _READ_SIZE
         self.read_on()
 
     def _ended(self) -> None:

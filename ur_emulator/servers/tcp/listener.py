@@ -11,10 +11,13 @@ controller are not known.
 from __future__ import annotations
 
 import errno
+import os
 import re
 import selectors
 import socket
+from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Protocol
 
@@ -23,8 +26,84 @@ from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.realtime.barrier import Report, guarded
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.servers.tcp.connection import Connection
-from ur_emulator.servers.tcp.places import Places
-from ur_emulator.servers.tcp.spare_descriptor import SpareDescriptor
+
+# --- A spare descriptor: a process that has none left needs one to refuse a client
+
+
+class SpareDescriptor:
+    """A descriptor that is released for a moment when all others are in use."""
+
+    def __init__(self) -> None:
+        self._descriptor: int | None = None
+
+    def take(self) -> None:
+        """Take a descriptor, if there is one; harmless if it is held already."""
+        if self._descriptor is None:
+            with suppress(OSError):
+                self._descriptor = os.open(os.devnull, os.O_RDONLY)
+
+    def refuse_client(self, listening: socket.socket) -> bool:
+        """Accept the next client of a listening socket and close it at once.
+
+        Returns:
+            False if no client waits: without descriptors, the system does not look before it refuses.
+
+        Raises:
+            OSError: another thread or process took the descriptor first.
+        """
+        self.close()
+        try:
+            listening.accept()[0].close()
+        except BlockingIOError:
+            return False
+        finally:
+            self.take()
+        return True
+
+    def close(self) -> None:
+        """Release the descriptor."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+
+# --- How many clients a box has, by their addresses and ports: who comes on top of the limits is refused
+
+
+class Places:
+    """The places of a box that are taken."""
+
+    def __init__(self) -> None:
+        self._taken: Counter[tuple[str | int, ...]] = Counter()
+
+    def take(self, host: str, port: int) -> str:
+        """Take a place for a client; return "", or which limit stands against it.
+
+        Args:
+            host: address of the client.
+            port: number of the port that it has connected to.
+        """
+        for key, limit, what in _limits(host, port):
+            if self._taken[key] >= limit:
+                return f"{limit} clients{what} are the most"
+        self._taken.update(key for key, _, _ in _limits(host, port))
+        return ""
+
+    def release(self, host: str, port: int) -> None:
+        """Give back the place of a client that is gone."""
+        for key, _, _ in _limits(host, port):
+            self._taken[key] -= 1
+            if not self._taken[key]:
+                del self._taken[key]
+
+
+def _limits(host: str, port: int) -> tuple[tuple[tuple[str | int, ...], int, str], ...]:
+    return (
+        ((host, port), BUDGETS.clients_of_port, f" of {host} at this port"),
+        ((host,), BUDGETS.clients_of_address, f" of {host}"),
+        ((), BUDGETS.clients, ""),
+    )
+
 
 # The start of a request over HTTP; no script, no command of the dashboard and no package begins so.
 _WEB_REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|PATCH|DELETE|OPTIONS|CONNECT|TRACE) ")

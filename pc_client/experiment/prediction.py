@@ -1,0 +1,156 @@
+"""What the loop makes of a plan: the tool's largest deviation from its path, before anything moves.
+
+The guard of a run allows this deviation and a margin. A plan that the controller would leave further than its
+tolerances allow is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
+from pc_client.control.loop_model import SAMPLING_TIME, LoopModel
+from pc_client.control.reference import JointReference, ReferenceTable
+from pc_client.control.stability import LEAST_GAIN_MARGIN, loop_margins
+from pc_client.control.tool_guard import ToolGuard
+from pc_client.control.tracker import predict_run
+from pc_client.errors import DriverError
+from pc_client.experiment.command_check import posture_complaint
+from pc_client.kinematics.clearance import clearance_model
+from pc_client.kinematics.robot_model import RobotModel
+from pc_client.planning.plan import JointPlan
+
+Array = NDArray[np.float64]
+
+LEAD = 0.2
+"""Time at rest before a movement, position loop closed [s]: takes up what the approach left."""
+
+SETTLE = 0.3
+"""Time at rest after it, position loop closed [s]."""
+
+_PATH_MARGIN, _ANGLE_MARGIN = 0.005, 0.035
+"""What the guard allows beside the prediction [m, rad]: gears, friction and encoders come to .4 mm on the
+worst emulated arms, a push of 200 N at the flange to more than the margin."""
+
+_RESERVE = 1.2
+"""Factor between a prediction and what must be allowed: no run ends because the prediction is not exact."""
+
+_SLOWER = (1.1, 1.2, 1.3, 1.5, 2.0, 3.0, 5.0)
+"""Factors of duration that a refusal may name."""
+
+
+def shortest_loop(period: float) -> LoopModel:
+    """The shortest loop of a robot: one cycle until a command acts, one until the feedback shows it.
+
+    Args:
+        period: control cycle [s].
+    """
+    return LoopModel.of_delay(2.0 * period, 0.0)
+
+
+def guarded(
+    plan: JointPlan, config: Controller, model: RobotModel, loop: LoopModel, period: float
+) -> Controller:
+    """The controller with the tolerances of one movement: what the loop predicts, and a margin.
+
+    Args:
+        plan: the movement.
+        config: the controller; its own tolerances are the largest that are allowed.
+        model: the nominal arm.
+        loop: as identified, or the shortest one.
+        period: control cycle [s].
+
+    Raises:
+        DriverError: the prediction is beyond the tolerances, or leads too near to floor, arm or cell.
+    """
+    if not loop_margins(loop, config.gain_p, config.gain_i, period).gain >= LEAST_GAIN_MARGIN:
+        return config  # `identify` refuses such a controller, with its margin
+    predicted = _predict(plan.spline, config, model, loop, period)
+    complaint = ""
+    if not predicted.fits(config):
+        complaint = (
+            f"allowed is {1e3 * config.path_tolerance:g} mm (path_tolerance) and "
+            f"{math.degrees(config.angle_tolerance):.1f} deg (angle_tolerance), a sixth of it kept in reserve"
+        )
+    elif predicted.distance > _PATH_MARGIN:  # below it the clearances of the plan have room
+        complaint = posture_complaint(clearance_model(model), plan.report.limits, predicted.q)
+    if complaint:
+        raise DriverError(
+            f"{plan.name}: the controller {config.title!r} would lead the tool "
+            f"{1e3 * predicted.distance:.1f} mm and {math.degrees(predicted.angle):.1f} deg off its path, "
+            f"{complaint}: {_remedy(plan, config, model, loop, period)}"
+        )
+    return replace(
+        config,
+        path_tolerance=min(predicted.distance + _PATH_MARGIN, config.path_tolerance),
+        angle_tolerance=min(predicted.angle + _ANGLE_MARGIN, config.angle_tolerance),
+    )
+
+
+class _Prediction(NamedTuple):
+    """Where the joints go, (n, 6) [rad], and how far the tool is off its path at most [m, rad]."""
+
+    q: Array
+    distance: float
+    angle: float
+
+    def fits(self, config: Controller) -> bool:
+        """Whether the tolerances of a controller allow this."""
+        path, angle = config.path_tolerance, config.angle_tolerance
+        return _RESERVE * self.distance <= path and _RESERVE * self.angle <= angle
+
+
+class _Slower(NamedTuple):
+    """A joint reference that takes `factor` times as long."""
+
+    reference: JointReference
+    factor: float
+
+    @property
+    def duration(self) -> float:
+        return self.factor * self.reference.duration
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        q, qd = self.reference.at(t / self.factor)
+        return np.asarray(q), np.asarray(qd) / self.factor
+
+
+def _predict(
+    joints: JointReference, config: Controller, model: RobotModel, loop: LoopModel, period: float
+) -> _Prediction:
+    lookahead = loop.dead_time if config.compensates_lag else loop.delay
+    table = ReferenceTable(
+        joints,
+        period=period,
+        lead=LEAD,
+        settle=SETTLE,
+        lookahead=lookahead if config.uses_preview else None,
+        lag=loop.lag if config.compensates_lag else 0.0,
+    )
+    guard = ToolGuard(table, model, config.path_tolerance, config.angle_tolerance)
+    q = predict_run(table, config, model, loop)
+    sampled = range(0, len(q), round(SAMPLING_TIME / period))
+    off = np.array([guard.deviation(k * period - LEAD, q[k].tolist()) for k in sampled])
+    distance, angle = off.max(axis=0).tolist()
+    return _Prediction(q, distance, angle)
+
+
+def _remedy(plan: JointPlan, config: Controller, model: RobotModel, loop: LoopModel, period: float) -> str:
+    """What would do: more time for the movement, or the default controller."""
+    slower = (
+        factor
+        for factor in _SLOWER
+        if _predict(_Slower(plan.spline, factor), config, model, loop, period).fits(config)
+    )
+    other = CONTROLLERS[DEFAULT]
+    ways = []
+    if factor := next(slower, None):
+        ways.append(f"give the movement {factor:g} times its duration")
+    if config.name != other.name and _predict(plan.spline, other, model, loop, period).fits(other):
+        ways.append(f"use the controller {other.name!r}")
+    return " or ".join(ways) or "give the movement more time or less size"

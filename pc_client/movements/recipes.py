@@ -1,0 +1,417 @@
+"""Human-like movements from random target points, and the way of a movement into a robot's workspace.
+
+The paper's recipe (sections II.B and IV.A):
+
+    1. target points at random in a box of the size of a hand's movement
+    2. between each two of them a stroke: D, mu and sigma by Eq. 6 to 9, in windows that abut
+    3. the straight lines between the points, resampled with the speed of the strokes ("2.5 dimensions")
+    4. moved, scaled and rotated into the robot's box, slowed down to a speed that the robot can reach
+
+`docs/movements.md` says which sentence of the paper each step follows, and what the paper leaves open. People
+draw arcs and begin a stroke before the one before has ended; `arcs_movement` does both: the hand cuts the
+corner at an inner target point, and the speed profiles are skewed to the left.
+
+`fit_movement` changes no shape: neither of the path nor of the speed over time; slowing down is the theory's
+own scaling of time. Random numbers are those of Python's `random.Random.random()`, whose sequence the
+language promises never to change: a seed gives the same movement on every machine and version.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pc_client.errors import MovementError
+from pc_client.movements.durations import Isochrony, leg_lengths
+from pc_client.movements.geometry import UR3_BOX, Box, Similarity
+from pc_client.movements.lognormal import LiteralTiming, TwoSidedTiming
+from pc_client.movements.movement import Movement
+from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke, lift_strokes
+
+__all__ = [
+    "ARC_RULES",
+    "HAND",
+    "LEAD",
+    "TOP_SPEED",
+    "ArcRules",
+    "Fit",
+    "HandRules",
+    "TargetRules",
+    "arcs_movement",
+    "arcs_twin",
+    "fit_movement",
+    "literal_strokes",
+    "random_targets",
+    "recipe_movement",
+]
+
+
+#: Which rotations may be used: none, about the vertical, or any.
+_Rotate = Literal["none", "yaw", "any"]
+
+_N_SAMPLES = 2001
+
+
+class Fit(NamedTuple):
+    """A fitted movement and its changes; `stretch` is the factor by which it became slower (1: none)."""
+
+    movement: Movement
+    similarity: Similarity
+    stretch: float
+
+
+def fit_movement(
+    movement: Movement,
+    box: Box = UR3_BOX,
+    *,
+    rotate: _Rotate = "yaw",
+    max_scale: float = math.inf,
+    max_speed: float | None = None,
+    may_slow_down: bool = False,
+) -> Fit:
+    """The movement as large as it fits into the box, in its middle.
+
+    Args:
+        movement: where and as large as it may be.
+        box: where its path must lie, base frame, m.
+        rotate: "none"; "yaw": the angle about the vertical, of 360 half degrees, that allows the largest
+            scale; "any": the principal axes of the path are laid along the box's axes, the longest along the
+            longest.
+        max_scale: largest scale, so that a small movement need not be blown up; 1 for "only shrink".
+        max_speed: largest TCP speed, m/s, or None.
+        may_slow_down: whether the movement may be stretched in time to keep `max_speed`.
+
+    Raises:
+        MovementError: when the movement is a single point, or too fast and may not be slowed down.
+    """
+    if not max_scale > 0.0:
+        raise MovementError(f"largest scale {max_scale}: give a number greater than 0")
+    t = np.linspace(0.0, movement.duration, _N_SAMPLES)
+    path = movement.sample(t).p
+    rotation, scale = max(
+        ((R, _largest_scale(path @ R.T, box)) for R in _candidates(path, box, rotate)),
+        key=lambda found: found[1],
+    )
+    if not math.isfinite(scale):
+        raise MovementError(
+            f"movement {movement.name} stays at one point: there is nothing to fit into a box"
+        )
+    scale = min(scale, max_scale)
+    turned = scale * path @ rotation.T
+    similarity = Similarity(scale, rotation, box.centre - 0.5 * (turned.min(axis=0) + turned.max(axis=0)))
+    fitted = movement.transformed(similarity)
+    stretch = _needed_stretch(fitted, t, max_speed)
+    if stretch > 1.0:
+        if not may_slow_down:
+            raise MovementError(
+                f"movement {movement.name} reaches {stretch * (max_speed or 0.0):.3f} m/s in the box, "
+                f"{max_speed} are allowed: allow it to be slowed down, or give a smaller scale"
+            )
+        fitted = fitted.stretched(stretch)
+    return Fit(fitted, similarity, stretch)
+
+
+def _candidates(path: NDArray[np.float64], box: Box, rotate: _Rotate) -> list[NDArray[np.float64]]:
+    if rotate == "none":
+        return [np.eye(3)]
+    if rotate == "yaw":
+        return [_yaw(math.radians(0.5 * step)) for step in range(360)]
+    if rotate == "any":
+        _, axes = np.linalg.eigh(np.cov(path.T))
+        R = np.empty((3, 3))
+        R[np.argsort(box.size, kind="stable")] = axes.T
+        if np.linalg.det(R) < 0.0:
+            R[int(np.argmin(box.size))] *= -1.0
+        return [R]
+    raise MovementError(f'rotation "{rotate}": give "none", "yaw" or "any"')
+
+
+def _yaw(angle: float) -> NDArray[np.float64]:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _largest_scale(path: NDArray[np.float64], box: Box) -> float:
+    extent = np.ptp(path.T.copy(), axis=1)  # six times as quick as along the columns
+    return float(
+        min(
+            (room / need for room, need in zip(box.size, extent, strict=True) if need > 1e-12),
+            default=math.inf,
+        )
+    )
+
+
+def _needed_stretch(movement: Movement, t: NDArray[np.float64], max_speed: float | None) -> float:
+    if max_speed is None:
+        return 1.0
+    if not max_speed > 0.0:
+        raise MovementError(f"largest speed {max_speed} m/s: give a number greater than 0")
+    return max(1.0, float(movement.speed(t).max()) / max_speed)
+
+
+_TRIES_A_POINT = 100
+_TRIES = 50
+
+
+@dataclass(frozen=True, slots=True)
+class TargetRules:
+    """What target points must keep to.
+
+    Attributes:
+        min_leg: least distance between consecutive points, m.
+        max_leg: largest distance between consecutive points, m.
+        min_apart: least distance between any two points, m.
+        min_turn: least change of direction at an inner point, rad: below it two strokes look like one.
+        max_turn: largest change of direction at an inner point, rad: above it the hand goes back on itself.
+        decimals: points are rounded to so many decimals of a metre, so that files are readable.
+    """
+
+    min_leg: float = 0.10
+    max_leg: float = 0.20
+    min_apart: float = 0.05
+    min_turn: float = math.radians(30.0)
+    max_turn: float = math.radians(140.0)
+    decimals: int = 4
+
+
+def random_targets(
+    n_targets: int, box: Box, source: random.Random, rules: TargetRules | None = None
+) -> NDArray[np.float64]:
+    """Target points drawn evenly from a box and kept when they follow the rules.
+
+    Args:
+        n_targets: how many, at least 2.
+        box: where, base frame, m.
+        source: random numbers; only its `random()` is used.
+        rules: what the points must keep to; `TargetRules()` if None.
+
+    Returns:
+        (n_targets, 3), m.
+
+    Raises:
+        MovementError: when no such points are found, because the box is too small for the rules.
+    """
+    if n_targets < 2:
+        raise MovementError(f"{n_targets} target points: a movement needs at least 2")
+    rules = rules or TargetRules()
+    for _ in range(_TRIES):
+        points: list[NDArray[np.float64]] = []
+        for _ in range(_TRIES_A_POINT * n_targets):
+            point = np.array(
+                [low + (high - low) * source.random() for low, high in zip(box.low, box.high, strict=True)]
+            )
+            point = np.round(point, rules.decimals)
+            if _follows_rules(points, point, rules):
+                points.append(point)
+            if len(points) == n_targets:
+                return np.array(points)
+    raise MovementError(
+        f"no {n_targets} target points in a box of {[round(float(x), 4) for x in box.size]} m with legs of "
+        f"{rules.min_leg} to {rules.max_leg} m: give a larger box, fewer points or shorter legs"
+    )
+
+
+def _follows_rules(points: list[NDArray[np.float64]], point: NDArray[np.float64], rules: TargetRules) -> bool:
+    if not points:
+        return True
+    if any(math.dist(point, other) < rules.min_apart for other in points):
+        return False
+    leg = point - points[-1]
+    if not rules.min_leg <= math.dist(point, points[-1]) <= rules.max_leg:
+        return False
+    if len(points) == 1:
+        return True
+    before = points[-1] - points[-2]
+    turn = math.atan2(float(np.linalg.norm(np.cross(before, leg))), float(before @ leg))
+    return rules.min_turn <= turn <= rules.max_turn
+
+
+#: Lead of the command before the window of its stroke, in windows. Eq. 9 needs k = (lead + 1) / (lead + 1/2),
+#: and the paper states neither. At 1, k is 4/3, sigma .0668, the skewness .20 and the kurtosis 3.07: "close
+#: to zero but positive" and "around 3". A stroke of .1 s then has mu = -1.89, which a hand's mu (-2.2 to
+#: -1.6) allows; a lead of 1/2 gives -2.29, a lead of 2 gives -1.38.
+LEAD = 1.0
+#: Largest speed of the tool, m/s: movel's default, and within what a UR3 can do in any direction in its box.
+TOP_SPEED = 0.25
+#: What the movement keeps from the faces of the robot's box, m: its twins with bent paths stay inside, too.
+_MARGIN = 0.015
+
+
+@dataclass(frozen=True, slots=True)
+class HandRules:
+    """The movement of a hand, before it is brought to the robot.
+
+    Attributes:
+        box: where the target points lie, m: a word or a signature in the air. Only its proportions matter to
+            the robot, for the movement is scaled.
+        targets: what the points must keep to: legs of a quarter to a half of the box's length.
+        stroke: duration of a stroke of `leg`, s. Source: section II.B, "duration 0.1 sec".
+        leg: m.
+        isochrony: a stroke lasts stroke (length / leg)^isochrony: people need hardly more time for longer
+            strokes.
+        variability: factors on the duration from stroke to stroke, low and high.
+    """
+
+    box: Box
+    targets: TargetRules
+    stroke: float
+    leg: float
+    isochrony: float
+    variability: tuple[float, float]
+
+
+HAND = HandRules(
+    box=Box((0.0, 0.0, 0.0), (0.10, 0.05, 0.05)),
+    targets=TargetRules(min_leg=0.025, max_leg=0.05, min_apart=0.0125),
+    stroke=0.1,
+    leg=0.0375,
+    isochrony=0.3,
+    variability=(0.92, 1.08),
+)
+
+
+def literal_strokes(target_points: ArrayLike, durations: ArrayLike) -> SigmaLognormal:
+    """Straight strokes by Eq. 6 to 9 between target points, one after the other.
+
+    The window of a stroke begins where the one before ends, the first at 0; its peak is in the middle, and
+    all of its length is done at its end. So the movement all but rests at every target point and reaches it.
+
+    Args:
+        target_points: (n, 3), m.
+        durations: windows of the strokes, (n - 1,), s.
+    """
+    legs, windows = leg_lengths(target_points), np.asarray(durations, dtype=np.float64)
+    if windows.shape != legs.shape:
+        raise MovementError(
+            f"{windows.size} stroke durations for {len(legs) + 1} target points: give {len(legs)}"
+        )
+    edges = np.round(np.concatenate(([0.0], np.cumsum(windows))), 9).tolist()
+    planar = [
+        PlanarStroke(LiteralTiming(begin, window, LEAD * window), leg, 0.0, 0.0)
+        for begin, window, leg in zip(edges[:-1], windows.tolist(), legs.tolist(), strict=True)
+    ]
+    return SigmaLognormal(np.asarray(target_points, dtype=np.float64), lift_strokes(planar), edges[-1])
+
+
+def recipe_movement(n_targets: int, seed: int, name: str, box: Box = UR3_BOX) -> Movement:
+    """A movement by the recipe: as large as it fits into the box, as quick as `TOP_SPEED` allows.
+
+    Numbers are rounded after the fit, points to .1 mm and durations to ms, so that files are readable.
+
+    Args:
+        n_targets: number of target points, at least 2.
+        seed: 0 or more; the same seed gives the same movement everywhere.
+        name: the movement's.
+        box: where, base frame, m.
+    """
+    source = random.Random(seed)
+    targets = random_targets(n_targets, HAND.box, source, HAND.targets)
+    durations = _stroke_durations(targets, source)
+    hand = Movement(name, literal_strokes(targets, durations), durations)
+    fit = fit_movement(hand, box.shrunk(_MARGIN), rotate="yaw", max_speed=TOP_SPEED, may_slow_down=True)
+    points = np.round(fit.movement.target_points, 4)
+    rounded = np.round(fit.movement.stroke_durations, 3)
+    facts: dict[str, str | int | float] = {
+        "generator": "pc_client.movements.generate",
+        "seed": seed,
+        "scale": round(fit.similarity.scale, 3),
+        "time_stretch": round(fit.stretch, 3),
+    }
+    return Movement(name, literal_strokes(points, rounded), rounded, facts)
+
+
+def _stroke_durations(targets: NDArray[np.float64], source: random.Random) -> NDArray[np.float64]:
+    low, high = HAND.variability
+    rule = Isochrony(HAND.isochrony, HAND.stroke / HAND.leg**HAND.isochrony)
+    factors = [low + (high - low) * source.random() for _ in pairwise(targets)]
+    durations: NDArray[np.float64] = rule.durations(leg_lengths(targets)) * np.array(factors)
+    return durations
+
+
+@dataclass(frozen=True, slots=True)
+class ArcRules:
+    """Ranges from which strokes are drawn evenly; (low, high) each.
+
+    Attributes:
+        reference_leg: distance (m) that is run in `reference_window`.
+        reference_window: window (s) of a stroke of that distance, both tails included; the visible part
+            between two speed minima is shorter by the overlap. Such a slow hand keeps a UR3 far from its
+            joint limits.
+        isochrony: window = reference_window (leg / reference_leg)^isochrony: people hardly need longer for
+            longer strokes.
+        variability: factors on the window from stroke to stroke.
+        sigma: of the lognormals.
+        overlap: share of the shorter of two windows in which both strokes move.
+        arc_angle: bending of the arcs, rad.
+        rest: time at rest before the first and after the last window, s.
+    """
+
+    reference_leg: float = 0.15
+    reference_window: float = 2.7
+    isochrony: float = 0.3
+    variability: tuple[float, float] = (0.92, 1.08)
+    sigma: tuple[float, float] = (0.10, 0.20)
+    overlap: tuple[float, float] = (0.35, 0.50)
+    arc_angle: tuple[float, float] = (0.1, 0.6)
+    rest: float = 0.1
+
+
+ARC_RULES = ArcRules()
+
+
+def arcs_movement(n_targets: int, seed: int, name: str) -> Movement:
+    """A movement of arcs between random target points in the UR3's box.
+
+    Args:
+        n_targets: number of target points, at least 2.
+        seed: 0 or more; the same seed gives the same movement everywhere.
+        name: the movement's.
+    """
+    source = random.Random(seed)
+    targets = random_targets(n_targets, UR3_BOX.shrunk(_MARGIN), source)
+    facts: dict[str, str | int | float] = {"generator": "pc_client.movements.generate", "seed": seed}
+    return _movement(name, _draw_strokes(targets, source, ARC_RULES), facts)
+
+
+def arcs_twin(movement: Movement, seed: int, name: str) -> Movement:
+    """Random arcs to the same target points in the same total time.
+
+    Args:
+        movement: any movement.
+        seed: of the arcs.
+        name: the twin's.
+    """
+    trajectory = _draw_strokes(movement.target_points, random.Random(seed), ARC_RULES)
+    drawn = _movement(name, trajectory, {**movement.provenance, "twin": movement.name})
+    return drawn.stretched(movement.duration / drawn.duration)
+
+
+def _movement(name: str, trajectory: SigmaLognormal, facts: dict[str, str | int | float]) -> Movement:
+    boundaries = np.concatenate(([0.0], np.round(trajectory.speed_minima(), 3), [trajectory.duration]))
+    durations = [round(duration, 3) for duration in np.diff(boundaries).tolist()]
+    return Movement(name, trajectory, np.array(durations), facts)
+
+
+def _draw_strokes(targets: NDArray[np.float64], source: random.Random, rules: ArcRules) -> SigmaLognormal:
+    """Strokes between the targets, drawn from the rules; rounded to three decimals for readable files."""
+
+    def draw(low: float, high: float) -> float:
+        return round(low + (high - low) * source.random(), 3)
+
+    strokes: list[Stroke] = []
+    end, window_before = rules.rest, math.inf
+    for a, b in pairwise(targets):
+        ease = (math.dist(a, b) / rules.reference_leg) ** rules.isochrony
+        window = round(rules.reference_window * ease * draw(*rules.variability), 3)
+        overlap = draw(*rules.overlap) * min(window, window_before) if strokes else 0.0
+        start = round(end - overlap, 3)
+        timing = TwoSidedTiming(start, window, draw(*rules.sigma))
+        strokes.append(Stroke(timing, arc_angle=draw(*rules.arc_angle), tilt=draw(-math.pi, math.pi)))
+        end, window_before = start + window, window
+    return SigmaLognormal(targets, tuple(strokes), round(end + rules.rest, 3))

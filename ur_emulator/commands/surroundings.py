@@ -1,0 +1,154 @@
+"""What is wired to the inputs of the box and the tool: levels and values from outside.
+
+No client of a real box can send these; they are for tests and for people at the emulator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import hypot
+from typing import Literal
+
+from ur_emulator.commands.operation import CommandOperation, parameter
+from ur_emulator.controller.command import Box, inform
+from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
+from ur_emulator.errors import ArgumentError, RefusedError
+from ur_emulator.models.robot_model import Vector3, six
+
+# --- What is wired to the inputs of the box and the tool: levels and values from outside
+#
+# No client of a real box can send these; they are for tests and for people at the emulator.
+
+
+class SetDigitalInput(CommandOperation):
+    """Let a digital input be high or low from now on."""
+
+    group: Literal["standard", "configurable", "tool"] = parameter("which inputs")
+    n: int = parameter("number of the input: 0 to 7, of the tool 0 to 1", low=0, high=7)
+    level: bool = parameter("high or low")
+
+    def check_together(self) -> None:
+        count = DIGITAL_GROUPS[self.group].count
+        if self.n >= count:
+            raise ArgumentError(f"{self.group} digital input {self.n} given: allowed are 0 to {count - 1}")
+
+    def apply(self, box: Box) -> None:
+        box.state.io.write_digital_in(DIGITAL_GROUPS[self.group].bits[self.n], self.level)
+
+
+class SetAnalogInput(CommandOperation):
+    """Let an analogue input have a voltage or a current from now on."""
+
+    group: Literal["standard", "tool"] = parameter("which inputs")
+    n: int = parameter("number of the input", low=0, high=1)
+    value: float = parameter("in V, or in A where the input measures current", low=0.0, high=10.0)
+
+    def apply(self, box: Box) -> None:
+        io = box.state.io
+        line = (io.analog_in if self.group == "standard" else io.tool_analog_in)[self.n]
+        low, high = ANALOG_RANGE[line.domain]
+        if not low <= self.value <= high:
+            raise RefusedError(
+                f"{self.value:g} given for {self.group} analog input {self.n}, which measures {low:g} to "
+                f"{high:g} {'V' if line.domain else 'A'} now"
+            )
+        line.value = self.value
+
+
+# --- External forces on the flange, and a payload that no program has declared
+#
+# No client of a real box can send these; they are for tests and for people at the emulator.
+
+
+# The largest force limit of the safety settings [N]; about the length of a tool [m].
+MAX_FORCE, MAX_LEVER = 250.0, 0.3
+
+
+class Push(CommandOperation):
+    """Push the flange as a hand would; a zero force ends it."""
+
+    force: Vector3 = parameter("in base axes", "N", high=MAX_FORCE)
+    point: Vector3 = parameter(
+        "where it acts, in the flange frame", "m", high=MAX_LEVER, default=(0.0, 0.0, 0.0)
+    )
+    duration: float | None = parameter(
+        "for so long in robot time; until the next push if left out", "s", 0.0, 600.0, default=None
+    )
+
+    def apply(self, box: Box) -> None:
+        box.push.begin(self.force, self.point, self.duration)
+
+
+class AttachPayload(CommandOperation):
+    """Hang a load on the flange that no program has declared."""
+
+    mass: float = parameter("of the load", "kg", 0.0, 20.0)
+    cog: Vector3 = parameter(
+        "centre of gravity in the flange frame", "m", high=MAX_LEVER, default=(0.0, 0.0, 0.0)
+    )
+
+    def apply(self, box: Box) -> None:
+        box.plant.attach_load(self.mass, self.cog)
+
+
+# --- Obstacles around the arm: sizes and poses are checked before they reach the physics
+
+
+Shape = Literal["box", "sphere", "capsule", "plane"]
+# What the sizes of each shape mean, in order [m]. A plane has no end; its z points away from it.
+SIZES: dict[Shape, tuple[str, ...]] = {
+    "box": ("edge along x", "edge along y", "edge along z"),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length along z without the ends"),
+    "plane": (),
+}
+# How far away, how small and how large [m].
+FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
+
+
+class AddObstacle(CommandOperation):
+    """Put a fixed obstacle somewhere; one of the same name is replaced."""
+
+    name: str = parameter("to remove it by")
+    shape: Shape = parameter("what it is; a plane has no end")
+    size: Sequence[float] = parameter(
+        "box: three edges; sphere: radius; capsule: radius, length; plane: none", "m", lengths=(0, 3)
+    )
+    pose: Sequence[float] = parameter(
+        "of its middle in the base frame, position in m and rotation vector in rad", lengths=(6, 6)
+    )
+
+    def check_together(self) -> None:
+        if not self.name:
+            raise ArgumentError("obstacle without a name given: it needs one, to be removed by")
+        wanted = SIZES[self.shape]
+        if len(self.size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in self.size):
+            raise ArgumentError(
+                f"obstacle {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
+                f"numbers ({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
+            )
+        if hypot(*self.pose[:3]) > FARTHEST:
+            raise ArgumentError(
+                f"obstacle {self.name}: pose {list(self.pose)} given: six finite numbers x, y, z, rx, ry, rz "
+                f"are needed, at most {FARTHEST:g} m away"
+            )
+
+    def apply(self, box: Box) -> None:
+        try:
+            box.plant.obstacles.put(self.name, self.shape, self.size, six(self.pose))
+        except RefusedError as refusal:
+            inform(box.state, str(refusal))
+            raise
+
+
+class RemoveObstacle(CommandOperation):
+    """Take an obstacle away."""
+
+    name: str = parameter("of the obstacle")
+
+    def apply(self, box: Box) -> None:
+        known = box.plant.obstacles.names
+        if self.name not in known:
+            there = f"are {', '.join(known)}" if known else "is none"
+            raise RefusedError(f"there is no obstacle {self.name!r}: there {there}")
+        box.plant.obstacles.remove(self.name)

@@ -1,0 +1,379 @@
+"""Which argument of a call belongs to which parameter, and whether its value fits.
+
+The compiler calls `static_bind` once for each call in a program: the form of the call alone decides which
+argument is which. Values are checked at run time: type, finiteness, range.
+
+Texts: "speedl() got an unexpected keyword argument 't_min'" and "Type error: str_sub takes exact..." were
+seen from controllers; the words after "exact" and the other cases follow the same, Python-like, pattern. Of
+the texts about values, the one for poses is the controller's own (log of 5.12: "get_inverse_kin: Parameter
+must be a Pose on the form p[x,y,z,a,b,c]"); the others follow its pattern, adding what was given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence, Set
+from dataclasses import dataclass
+from math import hypot, isfinite
+from typing import Any, Literal
+
+from urscript.catalogue.types import Builtin, Param, ParamType
+from urscript.errors import ScriptRuntimeError, ScriptTypeError
+from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, is_number, type_name
+
+Slot = tuple[Literal["arg"], int] | tuple[Literal["kw"], str] | tuple[Literal["default"], object]
+"""Where a parameter's value comes from: positional argument i, keyword argument, or the default."""
+
+
+@dataclass(frozen=True, slots=True)
+class CallSignature:
+    """The signature of a function, builtin or of a program.
+
+    Attributes:
+        function: name of the function.
+        names: of its parameters, in order.
+        optional: those that have a default.
+        hint: added to the error.
+    """
+
+    function: str
+    names: Sequence[str]
+    optional: Set[str]
+    hint: str | None = None
+
+    def check(self, n_positional: int, keywords: Sequence[str]) -> None:
+        """Raise ScriptTypeError, without a place, if these arguments do not fit.
+
+        Args:
+            n_positional: number of positional arguments.
+            keywords: names of the keyword arguments, in the order of the call.
+        """
+        self.check_keywords(n_positional, keywords)
+        given = n_positional + len(keywords)
+        if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
+            raise self._wrong_count(given)
+        for name in self.names[n_positional:]:
+            if name not in keywords and name not in self.optional:
+                raise self._type_error(f"{self.function}() missing required argument '{name}'")
+
+    def check_keywords(self, n_positional: int, keywords: Sequence[str]) -> None:
+        """Raise ScriptTypeError for a name that no parameter has, or one that has its value already."""
+        seen = set(self.names[:n_positional])
+        for keyword in keywords:
+            if keyword not in self.names:
+                raise self._type_error(f"{self.function}() got an unexpected keyword argument '{keyword}'")
+            if keyword in seen:
+                raise self._type_error(
+                    f"{self.function}() got multiple values for keyword argument '{keyword}'"
+                )
+            seen.add(keyword)
+
+    def _wrong_count(self, given: int) -> ScriptTypeError:
+        most = len(self.names)
+        least = most - len(self.optional)
+        between = "" if least == most else f"{least} or " if least == most - 1 else f"{least} to "
+        arguments = "argument" if most == 1 else "arguments"
+        return self._type_error(f"{self.function} takes exactly {between}{most} {arguments} ({given} given)")
+
+    def _type_error(self, message: str) -> ScriptTypeError:
+        return ScriptTypeError(message, hint=self.hint)
+
+
+def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
+    """Decide for each parameter, in order, where its value comes from.
+
+    Args:
+        builtin: the function called.
+        n_positional: number of positional arguments.
+        keyword_names: names of the keyword arguments, in the order of the call.
+
+    Returns:
+        One slot for each parameter: `("arg", i)`, `("kw", name)` or `("default", value)`.
+
+    Raises:
+        ScriptTypeError: wrong count, unknown or repeated keyword; without a place, the caller adds it.
+    """
+    if builtin.any_names:
+        if n_positional or not keyword_names:
+            raise ScriptTypeError(f"{builtin.name} takes one or more named arguments and no others")
+        CallSignature(builtin.name, keyword_names, frozenset()).check_keywords(0, keyword_names)
+        return [("kw", name) for name in keyword_names]
+    names = [param.name for param in builtin.params]
+    optional = {param.name for param in builtin.params if not param.is_required}
+    CallSignature(builtin.name, names, optional, f"use {builtin.signature}").check(
+        n_positional, keyword_names
+    )
+    slots: list[Slot] = []
+    for index, param in enumerate(builtin.params):
+        if index < n_positional:
+            slots.append(("arg", index))
+        elif param.name in keyword_names:
+            slots.append(("kw", param.name))
+        else:
+            slots.append(("default", param.default))
+    return slots
+
+
+# --- values: a check is compiled once for each builtin and then only runs small predicates, because motion
+# commands pass here every control cycle. It never converts: an integer parameter also takes a float without
+# fraction, because programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS), so hosts call `int()`.
+
+Predicate = Callable[[Any], bool]
+
+_SHOWN_TEXT = 40
+# Larger numbers are not a length, time or angle of a robot; their products would overflow.
+_LARGEST = 1e15
+
+
+def _is_int(value: Any) -> bool:
+    return type(value) is int or (isinstance(value, float) and value.is_integer())
+
+
+def _is_numbers(value: Any, count: int | None = None) -> bool:
+    if not isinstance(value, list) or (count is not None and len(value) != count):
+        return False
+    for item in value:
+        kind = type(item)
+        if kind is not float and kind is not int and not is_number(item):
+            return False
+    return True
+
+
+def _is_six(value: Any) -> bool:
+    return _is_numbers(value, 6)
+
+
+def _is_pose(value: Any) -> bool:
+    return type(value) is Pose
+
+
+_PREDICATES: dict[ParamType, Predicate] = {
+    ParamType.BOOL: lambda value: type(value) is bool,
+    ParamType.INT: _is_int,
+    ParamType.NUMBER: is_number,
+    ParamType.STRING: lambda value: isinstance(value, str),
+    ParamType.POSE: _is_pose,
+    ParamType.JOINTS: _is_six,
+    ParamType.POSE_OR_JOINTS: lambda value: type(value) is Pose or _is_numbers(value, 6),
+    ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
+    ParamType.VECTOR6: lambda value: type(value) is Pose or _is_numbers(value, 6),
+    ParamType.NUMBERS: _is_numbers,
+    ParamType.BOOLS: lambda value: isinstance(value, list) and all(type(item) is bool for item in value),
+    ParamType.LIST: lambda value: isinstance(value, list),
+    ParamType.MATRIX: lambda value: isinstance(value, Matrix),
+    ParamType.ARRAY: lambda value: isinstance(value, (list, Pose)),
+    ParamType.SIZED: lambda value: isinstance(value, (list, str, Pose)),
+    ParamType.SHAPED: lambda value: isinstance(value, (Matrix, list, str, Pose)),
+    ParamType.LIST_OR_MATRIX: lambda value: isinstance(value, Matrix) or _is_numbers(value),
+    ParamType.POSE_OR_MATRIX: lambda value: isinstance(value, (Matrix, Pose)),
+    ParamType.NORMED: lambda value: type(value) is Pose or is_number(value) or _is_numbers(value),
+}
+
+_NUMERIC = frozenset(
+    {
+        ParamType.NUMBER,
+        ParamType.POSE,
+        ParamType.JOINTS,
+        ParamType.POSE_OR_JOINTS,
+        ParamType.VECTOR3,
+        ParamType.VECTOR6,
+        ParamType.NUMBERS,
+    }
+)
+
+
+def fits(kind: ParamType, value: Any) -> bool:
+    """Whether `value` is of the type a parameter asks for."""
+    predicate = _PREDICATES.get(kind)
+    return predicate is None or predicate(value)
+
+
+def describe(value: Any) -> str:
+    """A value in an error message: its type and, where short, itself."""
+    if value is None:
+        return "None"
+    if isinstance(value, str):
+        cut = value if len(value) <= _SHOWN_TEXT else value[:_SHOWN_TEXT] + "..."
+        return f'the string "{cut}"'
+    if isinstance(value, list):
+        if value and not all(map(is_number, value)):
+            odd = next(item for item in value if not is_number(item))
+            return f"a list of {len(value)} with a {type_name(odd)} in it"
+        return f"a list of {len(value)}"
+    if isinstance(value, (bool, int, float)):
+        return f"the {type_name(value)} {value}"
+    return f"a {type_name(value)}"
+
+
+def type_error(function: str, parameter: str, kind: ParamType, value: Any) -> ScriptRuntimeError:
+    """The error for an argument of the wrong type."""
+    if kind is ParamType.POSE:
+        return ScriptRuntimeError(f"{function}: Parameter must be {kind.value}")
+    return ScriptRuntimeError(
+        f"{function}: Parameter '{parameter}' must be {kind.value}, got {describe(value)}"
+    )
+
+
+def _is_finite(value: Any) -> bool:
+    """For a number, a list of numbers or a pose."""
+    return all(map(isfinite, value)) if isinstance(value, (list, Pose)) else isfinite(value)
+
+
+def _is_bounded(value: Any) -> bool:
+    """Like `_is_finite`, and not larger than `_LARGEST`."""
+    if isinstance(value, (list, Pose)):
+        # NaN slips through a maximum, not through a sum.
+        return not value or (isfinite(sum(value)) and max(map(abs, value)) <= _LARGEST)
+    return bool(-_LARGEST <= value <= _LARGEST)
+
+
+def _must_be_finite(builtin: Builtin, param: Param) -> bool:
+    return not builtin.nan_ok and param.type in _NUMERIC
+
+
+def _is_in_range(param: Param, value: Any) -> bool:
+    if param.choices and value not in param.choices:
+        return False
+    if param.low is not None and not value >= param.low:
+        return False
+    return param.high is None or bool(value <= param.high)
+
+
+def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
+    """The error for an argument that a check refused."""
+    if not fits(param.type, value):
+        return type_error(builtin.name, param.name, param.type, value)
+    if _must_be_finite(builtin, param) and not _is_bounded(value):
+        allowed = f"in the range {-_LARGEST:g} to {_LARGEST:g}" if _is_finite(value) else "finite"
+    elif param.choices:
+        allowed = "one of " + ", ".join(map(str, param.choices))
+    elif param.low is not None and param.high is not None:
+        allowed = f"in the range {param.low:g} to {param.high:g}"
+    elif param.low is not None:
+        allowed = f"at least {param.low:g}"
+    else:
+        allowed = f"at most {param.high:g}"
+    return ScriptRuntimeError(
+        f"{builtin.name}: Parameter '{param.name}' must be {allowed}, got {_show(value)}"
+    )
+
+
+def _show(value: Any) -> str:
+    return f"[{', '.join(map(str, value))}]" if isinstance(value, (list, Pose)) else str(value)
+
+
+def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
+    """All conditions on one argument in one predicate, or None if there is none."""
+    of_type = _PREDICATES.get(param.type)
+    if of_type is None:
+        return None
+    needs_finite = _must_be_finite(builtin, param)
+    is_ranged = bool(param.choices) or param.low is not None or param.high is not None
+    may_be_left_out = param.default is None
+
+    def accepts(value: Any) -> bool:
+        if value is None:
+            return may_be_left_out
+        if not of_type(value):
+            return False
+        if needs_finite and not _is_bounded(value):
+            return False
+        return not is_ranged or _is_in_range(param, value)
+
+    is_usual = _FAST_PREDICATES.get(param.type) if needs_finite and not is_ranged else None
+    return accepts if is_usual is None else lambda value: is_usual(value) or accepts(value)
+
+
+_NUMBER_TYPES = frozenset({int, float})
+
+
+def _is_usual_number(value: Any) -> bool:
+    return type(value) in _NUMBER_TYPES and bool(-_LARGEST <= value <= _LARGEST)
+
+
+def _is_usual_six(value: Any) -> bool:
+    # The norm is not a number, or infinite, where an element is; it is at least as large as each of them.
+    return (
+        type(value) is list
+        and len(value) == 6
+        and _NUMBER_TYPES.issuperset(map(type, value))
+        and hypot(*value) <= _LARGEST
+    )
+
+
+# Fast tests that accept nearly every argument of a motion command; others get the full test.
+_FAST_PREDICATES: dict[ParamType, Predicate] = {
+    ParamType.NUMBER: _is_usual_number,
+    ParamType.JOINTS: _is_usual_six,
+    ParamType.POSE_OR_JOINTS: _is_usual_six,
+    ParamType.VECTOR6: _is_usual_six,
+}
+
+
+def compile_check(builtin: Builtin) -> Callable[[Sequence[Any]], None]:
+    """A function that takes bound arguments and raises ScriptRuntimeError for the first that does not fit."""
+    tests = [
+        (index, accepts)
+        for index, param in enumerate(builtin.params)
+        if (accepts := _accepts(builtin, param)) is not None
+    ]
+
+    def check(args: Sequence[Any]) -> None:
+        for index, accepts in tests:
+            if not accepts(args[index]):
+                raise explain(builtin, builtin.params[index], args[index])
+
+    return check
+
+
+# --- what pure functions check their own arguments with, so that calls of them need no check of the catalogue
+
+
+def number(function: str, parameter: str, value: Any) -> float:
+    """The argument, if it is an int or a float; raises ScriptRuntimeError otherwise."""
+    kind = type(value)
+    if kind is float or kind is int or is_number(value):
+        return value  # type: ignore[no-any-return]
+    raise type_error(function, parameter, ParamType.NUMBER, value)
+
+
+def integer(function: str, parameter: str, value: Any) -> int:
+    """The argument as an int; a float without fraction will do (see dialect: INDEX_TAKES_WHOLE_FLOATS)."""
+    if type(value) is int:
+        return value
+    if isinstance(value, float) and value.is_integer() and INT_MIN <= value <= INT_MAX:
+        return int(value)
+    raise type_error(function, parameter, ParamType.INT, value)
+
+
+def string(function: str, parameter: str, value: Any) -> str:
+    """The argument, if it is a string."""
+    if isinstance(value, str):
+        return value
+    raise type_error(function, parameter, ParamType.STRING, value)
+
+
+def pose(function: str, parameter: str, value: Any) -> Pose:
+    """The argument, if it is a pose."""
+    if type(value) is Pose:
+        return value
+    raise type_error(function, parameter, ParamType.POSE, value)
+
+
+def numbers(function: str, parameter: str, value: Any, kind: ParamType = ParamType.NUMBERS) -> list[float]:
+    """The argument, if it is a list of numbers: 3 for VECTOR3, 6 or a pose for VECTOR6, else any number."""
+    count = {ParamType.VECTOR3: 3, ParamType.VECTOR6: 6}.get(kind)
+    if kind is ParamType.VECTOR6 and type(value) is Pose:
+        return list(value)
+    if isinstance(value, list) and (count is None or len(value) == count) and all(map(is_number, value)):
+        return value
+    raise type_error(function, parameter, kind, value)
+
+
+def fit_int(function: str, value: float) -> int:
+    """A whole number as a 32-bit int.
+
+    A controller converts by a C cast, arbitrary for numbers out of range; here that is an error.
+    """
+    if INT_MIN <= value <= INT_MAX:
+        return int(value)
+    raise ScriptRuntimeError(f"{function}: result {value} does not fit into a 32-bit integer")

@@ -1,0 +1,229 @@
+"""Warnings about what is never used, defined twice, hiding a builtin; methods of values without methods."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from urscript.catalogue import Catalogue
+from urscript.check.warnings import (
+    CALL_WITHOUT_HANDLE,
+    DEFINED_TWICE,
+    HIDES_BUILTIN,
+    RUN_OF_DEF,
+    UNUSED_FUNCTION,
+    UNUSED_GLOBAL,
+    UNUSED_LOCAL,
+    UNUSED_PARAMETER,
+    UNUSED_THREAD,
+    UNUSED_VALUE,
+    ScriptWarning,
+)
+from urscript.names.scopes import FunctionScope, ResolvedProgram
+from urscript.source import Source, Span
+from urscript.syntax import nodes
+from urscript.syntax.nodes import Expression, Statement, all_expressions, all_statements, own_expressions
+
+Variable = tuple[FunctionScope | None, str]
+"""A local of a function, or a global (None) of the program."""
+
+
+def name_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
+    """Everything this module warns about, in no order."""
+    if not program.is_open:  # statements of interpreter mode may read them
+        yield from _unused_variables(program)
+    yield from _functions(program)
+    yield from _hidden_builtins(program, catalogue)
+
+
+def owner(name: str, scope: FunctionScope) -> Variable:
+    """The variable of `name` in `scope`."""
+    return (scope if name in scope.locals else None), name
+
+
+def read_expressions(statement: Statement) -> tuple[Expression, ...]:
+    """The expressions a statement reads: storing into `x[i]` reads `i`, not `x`."""
+    if not isinstance(statement, nodes.Assign):
+        return own_expressions(statement)
+    parts: list[Expression] = [statement.value]
+    target: Expression = statement.target
+    while isinstance(target, (nodes.Subscript, nodes.Attribute)):
+        if isinstance(target, nodes.Subscript):
+            parts.extend(target.indices)
+        target = target.target
+    return tuple(parts)
+
+
+def expressions_read(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, Expression]]:
+    """Every expression that is read, with all its parts, and the scope of its names."""
+    for scope in program.scopes():
+        for statement in all_statements(scope.body):
+            for expression in read_expressions(statement):
+                for part in all_expressions(expression):
+                    yield scope, part
+        if scope.parent is not None and scope.node is not None:
+            for parameter in scope.node.parameters:
+                if parameter.default is not None:
+                    for part in all_expressions(parameter.default):
+                        yield scope.default_scope(), part
+
+
+def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Span]]:
+    """Every declaration of a variable and assignment to a whole variable, without parameters."""
+    for scope in program.scopes():
+        for statement in all_statements(scope.body):
+            if isinstance(statement, nodes.Declaration):
+                name, span = statement.name, statement.span
+                span = span._replace(line=span.end_line, column=span.end_column - len(name))
+            elif isinstance(statement, nodes.Assign) and isinstance(statement.target, nodes.Name):
+                name, span = statement.target.name, statement.target.span
+            else:
+                continue
+            yield ((None, name) if statement.scope == "global" else owner(name, scope)), span
+
+
+def name_of(function: nodes.Function, source: Source) -> Span:
+    """The span of the name of a definition."""
+    line, after_word = function.span.line, function.span.column - 1 + len(function.kind)
+    column = source.line(line).find(function.name, after_word) + 1
+    if not column:
+        return function.span._replace(end_line=line, end_column=after_word + 1)
+    return Span(line, column, line, column + len(function.name))
+
+
+# --- never used ------------------------------------------------------------------------------------------
+
+
+def _unused_variables(program: ResolvedProgram) -> Iterator[ScriptWarning]:
+    read = {
+        owner(part.name, scope) for scope, part in expressions_read(program) if isinstance(part, nodes.Name)
+    }
+    parameters = {(scope, name) for scope, name, _ in _parameters(program)}
+    seen: set[Variable] = set()
+    for variable, span in declared_variables(program):
+        scope, name = variable
+        if variable in read or variable in seen or variable in parameters or name.startswith("_"):
+            continue
+        seen.add(variable)
+        rule, kind = (UNUSED_GLOBAL, "global") if scope is None else (UNUSED_LOCAL, "local")
+        yield ScriptWarning(rule, f"{kind} variable '{name}' is never read", span, program.source)
+    for scope, name, span in _parameters(program):
+        if (scope, name) not in read and not name.startswith("_"):
+            message = f"parameter '{name}' of '{scope.name}' is never read"
+            yield ScriptWarning(UNUSED_PARAMETER, message, span, program.source)
+
+
+def _parameters(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, str, Span]]:
+    for scope in program.functions:
+        assert scope.node is not None
+        for parameter in scope.node.parameters:
+            yield scope, parameter.name, parameter.span
+
+
+def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
+    runs: dict[FunctionScope, set[FunctionScope]] = {scope: set() for scope in program.scopes()}
+    for scope, part in expressions_read(program):
+        callee = scope.find_function(part.thread) if isinstance(part, nodes.RunThread) else None
+        if callee is None or not isinstance(part, nodes.RunThread):
+            continue
+        if scope in runs:
+            runs[scope].add(callee)
+        if not callee.is_thread:
+            message = f"'{part.thread}' is run as a thread but defined with 'def'"
+            yield ScriptWarning(RUN_OF_DEF, message, part.span, program.source)
+    reached: set[FunctionScope] = set()
+    todo = program.scopes() if program.is_open else [program.main]
+    while todo:
+        scope = todo.pop()
+        if scope not in reached:
+            reached.add(scope)
+            todo.extend(scope.callees | runs[scope])
+    for scope in program.functions:
+        assert scope.node is not None
+        span = name_of(scope.node, program.source)
+        if scope.parent is not None and scope.parent.functions[scope.name] is not scope:
+            message = f"'{scope.name}' is defined twice here; the last definition is used"
+            yield ScriptWarning(DEFINED_TWICE, message, span, program.source)
+        elif scope not in reached and not scope.name.startswith("_"):
+            rule, what = (
+                (UNUSED_THREAD, "thread '{}' is never run")
+                if scope.is_thread
+                else (UNUSED_FUNCTION, "function '{}' is never called")
+            )
+            yield ScriptWarning(rule, what.format(scope.name), span, program.source)
+
+
+# --- hiding ----------------------------------------------------------------------------------------------
+
+
+def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
+    def warning(what: str, name: str, span: Span) -> ScriptWarning:
+        return ScriptWarning(HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span, program.source)
+
+    def is_builtin(name: str) -> bool:
+        return name in catalogue or name in catalogue.variables or name in catalogue.arrays
+
+    seen: set[Variable] = {(scope, name) for scope, name, _ in _parameters(program)}
+    for variable, span in declared_variables(program):
+        if variable not in seen and is_builtin(variable[1]):
+            seen.add(variable)
+            yield warning("variable", variable[1], span)
+    for _, name, span in _parameters(program):
+        if is_builtin(name):
+            yield warning("parameter", name, span)
+    for scope in program.functions:
+        if scope.node is not None and is_builtin(scope.name):
+            yield warning(
+                scope.node.kind.replace("def", "function"), scope.name, name_of(scope.node, program.source)
+            )
+
+
+# --- values ---------------------------------------------------------------------------------------------
+
+
+def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
+    """Everything this module warns about, in no order."""
+    for scope in program.scopes():
+        for statement in all_statements(scope.body):
+            if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
+                message, hint = _unused(statement.value)
+                yield ScriptWarning(UNUSED_VALUE, message, statement.span, program.source, hint)
+    if "rpc_factory" in program.builtins or catalogue.methods:
+        return
+    for _, part in expressions_read(program):
+        if isinstance(part, nodes.MethodCall):
+            message = f"nothing in this program has a method '{part.method}'"
+            hint = _FUNCTIONS.get(part.method)
+            yield ScriptWarning(CALL_WITHOUT_HANDLE, message, part.span, program.source, hint)
+
+
+_FUNCTIONS = {
+    "append": "a list has a fixed length; write one that is long enough",
+    "length": "write length(x)",
+    "size": "write length(x)",
+    "len": "write length(x)",
+    "count": "write length(x)",
+    "find": "write str_find(x, target)",
+    "index": "write str_find(x, target)",
+    "format": "write str_cat(x, y)",
+    "strip": "write str_sub(x, first, length)",
+    "split": "write str_find and str_sub",
+}
+"""Replacements for methods of lists and strings in other languages."""
+
+
+def _has_effect(value: Expression) -> bool:
+    is_pause = isinstance(value, nodes.Name) and value.name == "pause"
+    return is_pause or isinstance(value, (nodes.Call, nodes.MethodCall, nodes.RunThread))
+
+
+def _unused(value: Expression) -> tuple[str, str | None]:
+    """Message and hint for an unused value."""
+    match value:
+        case nodes.BinaryOperation(operator="==", left=nodes.Name(name=name)):
+            return "the result of this comparison is not used", f"write {name} = ... to assign"
+        case nodes.BinaryOperation(
+            operator="+" | "-" as operator, right=nodes.UnaryOperation(operator=sign)
+        ) if sign == operator:
+            hint = f"there is no '{operator}{operator}': write x = x {operator} 1"
+            return "a value is computed and not used", hint
+    return "a value is computed and not used", None

@@ -1,1 +1,0 @@
-"""Tree to text in the canonical layout, comments kept: `urscript fmt`."""

@@ -1,1 +1,0 @@
-"""Warnings of `urscript check`: what is allowed but probably a mistake."""
