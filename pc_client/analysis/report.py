@@ -25,7 +25,7 @@ from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.cell_file import parse_cell
 from pc_client.kinematics.robot_model import ROBOTS
 from pc_client.recording.loader import load_recording
-from pc_client.results.pages import picture, render, report_libraries, write_files, zoomable
+from pc_client.results.pages import picture, render, require_report_libraries, write_files, zoomable
 from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
 
@@ -128,8 +128,9 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     Raises:
         RecordingError: matplotlib or jinja2 is not installed.
     """
-    with report_libraries():
-        from pc_client.analysis import figures
+    require_report_libraries()
+    from pc_client.analysis import figures
+
     movements = [
         {
             "row": row,

@@ -30,7 +30,7 @@ from pc_client.analysis.table import (
 )
 from pc_client.control.controller import FIELDS
 from pc_client.errors import RecordingError
-from pc_client.results.pages import picture, render, report_libraries, write_files, zoomable
+from pc_client.results.pages import picture, render, require_report_libraries, write_files, zoomable
 from pc_client.results.tables import Column, to_html, to_rich
 
 if TYPE_CHECKING:
@@ -185,8 +185,9 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
             written.
     """
     shown = side_by_side([report.table for report in reports])
-    with report_libraries():
-        from pc_client.analysis import figures
+    require_report_libraries()
+    from pc_client.analysis import figures
+
     folder = {id(report.table): report.paths[0].parent for report in reports}
     experiments = list(zip(shown.labels, shown.columns, strict=True))
     rows, (name, *columns) = shown.shown()

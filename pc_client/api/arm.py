@@ -313,7 +313,15 @@ class Arm:
         Raises:
             ClientError: the answer was no, there is no terminal, or no clear path to the start.
         """
-        self._ask(lambda: experiment_description(self._host, self._report_now(), self.model, wanted))
+        self._ask(lambda: self.describe(wanted))
+
+    def describe(self, wanted: Experiment) -> str:
+        """Describe an experiment for the people beside the arm: conditions, plan, approach; nothing moves.
+
+        Raises:
+            ClientError: there is no clear path to the start.
+        """
+        return experiment_description(self._host, self._report_now(), self.model, wanted)
 
     def _report_now(self) -> RobotReport:
         report = read_report(TcpNetwork(), self._host, self._ports)

@@ -73,6 +73,8 @@ def _run(movements: Sequence[str], robot: str, out: Path, repeat: int, settings:
 def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
     """Plan movements, ask where a real arm would move, run them, and say how it went.
 
+    A dry run shows the plan and the question, on a simulated arm too, and ends the command there.
+
     Args:
         movements: what the TCP shall do, in order.
         robot: name or address of the control box.
@@ -82,13 +84,24 @@ def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, set
 
     Raises:
         ClientError: a check failed, the robot stopped or the user interrupted; the arm rests.
+        typer.Exit: it was a dry run.
     """
     from pc_client.api.arm import plan
+    from pc_client.api.confirmation import QUESTION
+    from pc_client.experiment.prepare import Experiment, check_folder
     from pc_client.experiment.progress import Progress
+    from pc_client.results.pages import require_report_libraries
 
+    require_report_libraries()
     with console.status("planning"):
         arm = reach(robot, settings.ports, settings.cell, settings.reverse_port, yes=settings.yes)
         plans = [plan(movement, arm) for movement in movements]
+    if settings.dry_run:
+        wanted = Experiment(arm.model, tuple(plans), repeat, out, settings.overwrite)
+        check_folder(wanted)
+        say(arm.describe(wanted))
+        say(f"{QUESTION}\ndry run: not asked, nothing moved")
+        raise typer.Exit
     try:
         with Progress(console, repeat * len(plans)) as progress:
             report = arm.experiment(

@@ -19,6 +19,7 @@ from pc_client.commands.options import (
     AccelerationOption,
     CellOption,
     ControllerOption,
+    DryRunOption,
     GainIOption,
     GainPOption,
     OverwriteOption,
@@ -47,6 +48,7 @@ class RunSettings:
         reverse_port: where its programs dial back; see `ReverseServer`.
         overwrite: replace simulated recordings of the same names.
         yes: do not ask before a real arm moves.
+        dry_run: end where the arm would begin to move.
     """
 
     controller: Controller
@@ -55,6 +57,7 @@ class RunSettings:
     reverse_port: int | None
     overwrite: bool
     yes: bool
+    dry_run: bool
 
 
 def _read_settings(
@@ -67,6 +70,7 @@ def _read_settings(
     reverse_port: ReversePortOption = None,
     overwrite: OverwriteOption = False,
     yes: YesOption = False,
+    dry_run: DryRunOption = False,
 ) -> RunSettings:
     """Make the record from what was given on the command line.
 
@@ -82,7 +86,7 @@ def _read_settings(
         config = base.changed(numbers, _OPTIONS.__getitem__)
     except ControllerError as error:
         raise typer.BadParameter(str(error)) from error
-    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, overwrite, yes)
+    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, overwrite, yes, dry_run)
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from importlib import resources
+from collections.abc import Mapping
+from importlib import import_module, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
     from pc_client.results.panels import Sheet
 
-__all__ = ["picture", "render", "report_libraries", "write_files", "zoomable"]
+__all__ = ["picture", "render", "require_report_libraries", "write_files", "zoomable"]
 
 
 def picture(figure: Figure, alt: str) -> Markup:
@@ -40,22 +39,19 @@ def zoomable(sheet: Sheet, alt: str) -> Markup:
     return _element("webp", image_bytes(draw(sheet), "webp"), alt, data)
 
 
-@contextmanager
-def report_libraries() -> Iterator[None]:
-    """Say which library is missing before anything is drawn; modules that draw are imported in the block.
+def require_report_libraries() -> None:
+    """Say which library is missing, before anything is drawn and before an arm moves for a report.
 
     Raises:
         RecordingError: matplotlib, jinja2 or plotly is not installed.
     """
-    try:
-        import jinja2  # noqa: F401
-        import plotly  # noqa: F401
-
-        yield
-    except ImportError as error:
-        raise RecordingError(
-            f"the report needs {error.name}; install it with: pip install 'ur-hil[report]'"
-        ) from error
+    for name in ("matplotlib", "jinja2", "plotly"):
+        try:
+            import_module(name)
+        except ImportError as error:
+            raise RecordingError(
+                f"the report needs {name}; install it with: pip install 'ur-hil[report]'"
+            ) from error
 
 
 def render(template: str, *, scripts: bool = False, **values: Any) -> str:

@@ -14,6 +14,8 @@ from contextlib import ExitStack, contextmanager, suppress
 
 from box_under_attack import ADDRESSES, CONTROL_PORT, PATIENCE, BoxUnderAttack
 
+from ur_emulator.budgets import BUDGETS
+
 RESET = struct.pack("ii", 1, 0)
 _TURN = 1 << 16
 
@@ -126,11 +128,15 @@ def plays(box: BoxUnderAttack) -> bool:
 
 
 def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[list[dict], int]:
-    """Return all entries of the log but the first so many, and how many there are; the API gives some at a time."""
-    entries = []
-    while (answer := request(box, "GET", f"log?after={after}&level={level}")[1])["next"] > after:
+    """Return all entries of the log but the first so many, and how many there are.
+
+    The API gives some at a time. A page that is not full is the last: a flood may fill it faster than it is read.
+    """
+    entries, is_full = [], True
+    while is_full:
+        answer = request(box, "GET", f"log?after={after}&level={level}")[1]
         entries += answer["entries"]
-        after = answer["next"]
+        after, is_full = answer["next"], len(answer["entries"]) == BUDGETS.log_entries
     return entries, after
 
 

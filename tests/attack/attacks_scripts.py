@@ -44,7 +44,8 @@ def _spend(box: BoxUnderAttack, seconds: float, *lines: str, setup: tuple[str, .
 
 
 def _has_begun(box: BoxUnderAttack, after: int) -> bool:
-    return any(entry["source"] in ("Program", "Controller") for entry in log_since(box, after)[0])
+    first = request(box, "GET", f"log?after={after}")[1]["entries"]
+    return any(entry["source"] in ("Program", "Controller") for entry in first)
 
 
 def _state(box: BoxUnderAttack, after: int) -> str:

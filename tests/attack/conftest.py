@@ -10,20 +10,32 @@ from box_under_attack import KINDS
 
 
 @pytest.fixture(scope="module")
-def box_for():
-    """Serve an attack a box with an empty folder of programs; it must end when it is told to."""
+def shared_boxes():
+    """Boxes by kind; they must end when they are told to."""
     with ExitStack() as stack:
-        shared = {}
+        boxes = {}
+
+        def serve(attack, kind):
+            if kind not in boxes or boxes[kind].process.poll() is not None:
+                boxes[kind] = stack.enter_context(served(attack, kind))
+            return boxes[kind]
+
+        yield serve
+        assert all(box.stop() < math.inf for box in boxes.values() if box.process.poll() is None)
+
+
+@pytest.fixture
+def box_for(shared_boxes):
+    """Serve an attack a box with an empty folder of programs; one that is special ends with it."""
+    with ExitStack() as stack:
 
         def serve(attack):
             kind = KINDS[attack.kinds[0]]
             if attack.is_special:
                 return stack.enter_context(served(attack, kind))
-            if kind not in shared or shared[kind].process.poll() is not None:
-                shared[kind] = stack.enter_context(served(attack, kind))
-            for path in shared[kind].programs.iterdir():
+            box = shared_boxes(attack, kind)
+            for path in box.programs.iterdir():
                 shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
-            return shared[kind]
+            return box
 
         yield serve
-        assert all(box.stop() < math.inf for box in shared.values() if box.process.poll() is None)

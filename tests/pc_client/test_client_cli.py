@@ -17,6 +17,7 @@ import pc_client.api.arm as arm_module
 import pc_client.driver.transport as transport
 import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
+from pc_client.api.confirmation import QUESTION
 from pc_client.errors import DriverError
 from pc_client.recording.loader import load_recording
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
@@ -211,6 +212,7 @@ def test_commands_that_move_an_arm_share_their_options(command, capsys):
         "--port-base",
         "--overwrite",
         "--yes",
+        "--dry-run",
     ):
         assert option in text
 
@@ -234,6 +236,27 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
     out = capsys.readouterr().out
     for words in ("UR3, software 3.15.8", "box of motion", "top TCP speed", "top joint speed", "duration"):
         assert words in out
+
+
+@pytest.mark.parametrize("command", [("run", "uniform_4_1"), ("compare", "--targets", "3")])
+def test_a_dry_run_shows_plan_and_question_also_of_a_simulated_arm(command, robot, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.run([*command, "--robot", "127.0.0.1", "--dry-run", "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    for words in ("SIMULATED", "speed slider", "box of motion", "first, slowly", QUESTION, "nothing moved"):
+        assert words in text
+    assert robot.programs == []
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("library", ["matplotlib", "jinja2", "plotly"])
+def test_a_library_of_the_report_is_missed_before_the_arm_moves(
+    library, robot, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, library, None)
+    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 1
+    assert f"the report needs {library}; install it with: pip install 'ur-hil[report]'" in one_line(capsys)
+    assert robot.programs == []
 
 
 @pytest.mark.usefixtures("without_page")
