@@ -46,7 +46,7 @@ BOX_ORDER = (
     {"scripting"},
     {"box_log"},
     {"commands"},
-    {"programs"},
+    {"program_files"},
     {"realtime"},
     {"servers"},
     {"box_options"},

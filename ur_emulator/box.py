@@ -21,7 +21,7 @@ from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, NotRunningError
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.programs.folder import ProgramFolder
+from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.realtime.memory import MemoryWatch
 from ur_emulator.realtime.pacing import Pace, make_pacer

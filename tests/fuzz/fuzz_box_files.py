@@ -13,9 +13,9 @@ from urp_samples import SAMPLES as NODES
 from ur_emulator.controller.clock import Clock
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.generations import CB3
-from ur_emulator.programs.compiling import load_and_compile
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation_reader import NEW_BOX, load_installation
+from ur_emulator.program_files.compiling import load_and_compile
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
 from ur_emulator.realtime.event_loop import EventLoop
 from ur_emulator.scripting.remote_procedures import ProgramRemotes
 from ur_emulator.servers.scripts.loop_network import LoopNetwork

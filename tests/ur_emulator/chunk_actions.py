@@ -30,7 +30,7 @@ from ur_emulator.commands.programs import (
 )
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.io.lines import CONFIGURABLE, TOOL
-from ur_emulator.programs.compiling import compile_line
+from ur_emulator.program_files.compiling import compile_line
 from urscript import compile_program
 
 _SHIFTS = {"c": CONFIGURABLE.first, "t": TOOL.first}

@@ -15,10 +15,10 @@ from dashboard_support import (
 from protocol.primary.messages import KeyMessage, PopupMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc
-from ur_emulator.programs.installation_reader import load_installation
-from ur_emulator.programs.loading import as_one_program, load_program, split_header
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation import ExternalControlPc
+from ur_emulator.program_files.installation_reader import load_installation
+from ur_emulator.program_files.loading import as_one_program, load_program, split_header
 
 
 @pytest.fixture

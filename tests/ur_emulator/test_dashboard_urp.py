@@ -9,8 +9,8 @@ from urp_samples import ANGLES, branch, direction, move, pin, until_distance, wa
 from urp_support import lines_of, made
 
 from ur_emulator.errors import FileMissingError, ProgramFileError, UnknownNodeError
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.loading import load_program
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.loading import load_program
 
 
 @pytest.mark.parametrize(

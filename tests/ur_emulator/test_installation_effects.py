@@ -23,14 +23,14 @@ from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.safety_limits import ArmLimits
-from ur_emulator.programs.installation import (
+from ur_emulator.program_files.installation import (
     DeclaredPayload,
     DeclaredSignal,
     Feature,
     Installation,
     OutputRule,
 )
-from ur_emulator.programs.script_writer import header_lines, setup_script
+from ur_emulator.program_files.script_writer import header_lines, setup_script
 from ur_emulator.servers.primary.robot_state import safety_checksum
 from urscript import compile_program
 

@@ -22,9 +22,15 @@ from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.controller.safety.boundaries import NO_BOUNDARIES, BoundaryMode, ToolDirection
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.models.safety_limits import ArmLimits
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import DeclaredPayload, DeclaredSignal, Feature, OutputRule, StartUp
-from ur_emulator.programs.installation_reader import NEW_BOX, load_installation
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation import (
+    DeclaredPayload,
+    DeclaredSignal,
+    Feature,
+    OutputRule,
+    StartUp,
+)
+from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
 
 
 def read(folder, *parts, variables=None):

@@ -14,7 +14,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import RefusedError
-from ur_emulator.programs.compiling import compile_line
+from ur_emulator.program_files.compiling import compile_line
 from urscript.catalogue import catalogue_for
 from urscript.compile.statements import NO_NAMES
 from urscript.names.living_scope import LivingScope

@@ -13,11 +13,11 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs import reading
-from ur_emulator.programs.compiling import compile_loaded
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.loading import load_program
-from ur_emulator.programs.script_writer import Header
+from ur_emulator.program_files import reading
+from ur_emulator.program_files.compiling import compile_loaded
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.loading import load_program
+from ur_emulator.program_files.script_writer import Header
 from urscript.catalogue import catalogue_for
 
 LAUGHS = "".join(f'<!ENTITY {chr(98 + n)} "{("&" + chr(97 + n) + ";") * 10}">' for n in range(7))

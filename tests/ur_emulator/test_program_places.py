@@ -16,8 +16,8 @@ from dashboard_support import Dashboard, script_line, urp, write_programs
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import PART_NAME, FoundFile, ProgramFolder
-from ur_emulator.programs.loading import load_program
+from ur_emulator.program_files.folder import PART_NAME, FoundFile, ProgramFolder
+from ur_emulator.program_files.loading import load_program
 from ur_emulator.servers.reports import report_files
 from ur_emulator.servers.reports.report_files import BoxFacts, flight_report, save_log, support_file
 from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove_left_folders
@@ -222,7 +222,7 @@ def test_uploads_have_one_total_with_the_programs_that_are_there(folder, monkeyp
 
 
 def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):
-    monkeypatch.setattr("ur_emulator.programs.folder.BUDGETS", replace(BUDGETS, folder_files=5))
+    monkeypatch.setattr("ur_emulator.program_files.folder.BUDGETS", replace(BUDGETS, folder_files=5))
     with pytest.raises(ProgramFileError, match="too many files"):
         flight_report(ProgramFolder(folder), "", FACTS)
 

@@ -5,8 +5,8 @@ from dashboard_support import Dashboard, external_control, script_line, urp
 
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.loading import load_program
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.loading import load_program
 
 GRIPPER = '<Contributed strategyURCapName="Gripper"/>'
 KNOWN, UNKNOWN = urp(script_line('textmsg("nodes")')), urp(GRIPPER + script_line('textmsg("nodes")'))

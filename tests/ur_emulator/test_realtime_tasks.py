@@ -14,7 +14,7 @@ from box_support import TIMEOUT
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
-from ur_emulator.programs.compiling import compile_text
+from ur_emulator.program_files.compiling import compile_text
 from ur_emulator.realtime import processes
 from ur_emulator.realtime import tasks as module
 from ur_emulator.realtime.event_loop import EventLoop

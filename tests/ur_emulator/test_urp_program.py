@@ -27,12 +27,12 @@ from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.cb3_arms import UR5
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import NEW_HOME, DeclaredSignal, Feature, Installation
-from ur_emulator.programs.installation_reader import load_installation
-from ur_emulator.programs.loading import load_program
-from ur_emulator.programs.script_writer import identifier, is_identifier
-from ur_emulator.programs.urp_expressions import pose_text
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation import NEW_HOME, DeclaredSignal, Feature, Installation
+from ur_emulator.program_files.installation_reader import load_installation
+from ur_emulator.program_files.loading import load_program
+from ur_emulator.program_files.script_writer import identifier, is_identifier
+from ur_emulator.program_files.urp_expressions import pose_text
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -2,11 +2,11 @@
 
 from dashboard_support import urp
 
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation_reader import NEW_BOX
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.script_writer import Gap
-from ur_emulator.programs.urp_program import make_script
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation_reader import NEW_BOX
+from ur_emulator.program_files.reading import ProgramReader
+from ur_emulator.program_files.script_writer import Gap
+from ur_emulator.program_files.urp_program import make_script
 
 
 def made(folder, data, installation=NEW_BOX, name="sample.urp", **options):

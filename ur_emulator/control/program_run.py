@@ -61,7 +61,7 @@ class RunProgram(StepOperation[int]):
         else:
             # The command line loads this module, too: nothing heavy at its top.
             from ur_emulator.controller.events import ScriptFailed
-            from ur_emulator.programs.compiling import compile_text
+            from ur_emulator.program_files.compiling import compile_text
 
             catalogue = access.identity.software.catalogue
             outcome = yield from access.in_worker(compile_text, str(self.script), catalogue)

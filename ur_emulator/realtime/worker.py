@@ -33,7 +33,7 @@ _MANY_OBJECTS = 300_000
 
 def prepare() -> None:
     """Load the compiler."""
-    from ur_emulator.programs import compiling  # noqa: F401
+    from ur_emulator.program_files import compiling  # noqa: F401
     from urscript.syntax.parser import prepare
 
     prepare()

@@ -27,7 +27,7 @@ from ur_emulator.commands.interpreter import AbortMove, AppendStatements, SkipSt
 from ur_emulator.controller.command import Box, Command, Result
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.errors import NotRunningError, RefusedError, WorkerError
-from ur_emulator.programs.compiling import compile_line
+from ur_emulator.program_files.compiling import compile_line
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.steps import Steps
 from ur_emulator.servers.tcp.connection import Connection

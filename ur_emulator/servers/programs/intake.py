@@ -22,7 +22,7 @@ from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProg
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, Event, ScriptFailed
 from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.programs.compiling import compile_text
+from ur_emulator.program_files.compiling import compile_text
 from ur_emulator.realtime.barrier import place_of
 from ur_emulator.realtime.tasks import Place, TaskQueue
 from ur_emulator.servers.programs.sender import Program, Sender

@@ -21,23 +21,23 @@ from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.controller.snapshot import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
-from ur_emulator.programs.compiling import (
+from ur_emulator.program_files.compiling import (
     Outcome,
     compile_loaded,
     load_and_compile,
     load_installation_and_compile,
 )
-from ur_emulator.programs.folder import ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc, Installation, StartUp
-from ur_emulator.programs.installation_reader import DEFAULT_NAME, NEW_BOX
-from ur_emulator.programs.script_writer import one_line
-from ur_emulator.programs.variables_file import literal, write_variables
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation import ExternalControlPc, Installation, StartUp
+from ur_emulator.program_files.installation_reader import DEFAULT_NAME, NEW_BOX
+from ur_emulator.program_files.script_writer import one_line
+from ur_emulator.program_files.variables_file import literal, write_variables
 from ur_emulator.scripting.network import Network
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.steps import Steps
 
 if TYPE_CHECKING:
-    from ur_emulator.programs.loading import LoadedProgram
+    from ur_emulator.program_files.loading import LoadedProgram
 
 
 # --- External Control: when a program is played, the box asks a PC for a part of it

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from protocol.script_channel import ScriptChannel
 from ur_emulator.budgets import KIB
-from ur_emulator.programs.compiling import Outcome
+from ur_emulator.program_files.compiling import Outcome
 from ur_emulator.realtime.tasks import Place, Task
 
 # A program costs so much beside its text [bytes].

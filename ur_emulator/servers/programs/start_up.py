@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 from ur_emulator.errors import RefusedError
-from ur_emulator.programs.installation_reader import DEFAULT_NAME
+from ur_emulator.program_files.installation_reader import DEFAULT_NAME
 from ur_emulator.servers.box_access import BoxAccess
 from ur_emulator.servers.programs.player import THIS_MACHINE, ProgramPlayer
 from ur_emulator.servers.steps import Steps

@@ -18,7 +18,7 @@ from typing import Any
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.clock import clock_time
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import FoundFile, ProgramFolder
 from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove_left_folders
 
 REPORT_KINDS = ("controller", "software", "system")

@@ -13,10 +13,10 @@ from pathlib import PurePosixPath
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
-from ur_emulator.programs.loading import PROGRAM_SUFFIX, SCRIPT_SUFFIX
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.urpx_program import URPX_SUFFIX, Information, information_of, read_urpx
+from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.loading import PROGRAM_SUFFIX, SCRIPT_SUFFIX
+from ur_emulator.program_files.reading import ProgramReader
+from ur_emulator.program_files.urpx_program import URPX_SUFFIX, Information, information_of, read_urpx
 
 
 class Outcome(Enum):

@@ -15,16 +15,16 @@ from functools import partial
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING
 
-from ur_emulator.programs import urp_flow
-from ur_emulator.programs.folder import FoundFile
-from ur_emulator.programs.installation import Installation
-from ur_emulator.programs.reading import ProgramReader, XmlTree
-from ur_emulator.programs.script_writer import Header, Part, ScriptWriter, identifier
-from ur_emulator.programs.urp_expressions import expression_of, variable_name
-from ur_emulator.programs.urp_kinds import KINDS
-from ur_emulator.programs.urp_maker import Around, UrpMaker
-from ur_emulator.programs.urp_nodes import Node, read_nodes
-from ur_emulator.programs.urp_statements import EXTERNAL_CONTROL, contributor
+from ur_emulator.program_files import urp_flow
+from ur_emulator.program_files.folder import FoundFile
+from ur_emulator.program_files.installation import Installation
+from ur_emulator.program_files.reading import ProgramReader, XmlTree
+from ur_emulator.program_files.script_writer import Header, Part, ScriptWriter, identifier
+from ur_emulator.program_files.urp_expressions import expression_of, variable_name
+from ur_emulator.program_files.urp_kinds import KINDS
+from ur_emulator.program_files.urp_maker import Around, UrpMaker
+from ur_emulator.program_files.urp_nodes import Node, read_nodes
+from ur_emulator.program_files.urp_statements import EXTERNAL_CONTROL, contributor
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
-from ur_emulator.programs.urpx_program import UrpxProgram, read_urpx
+from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.urpx_program import UrpxProgram, read_urpx
 from urscript.source import as_utf8, program_text
 
 if TYPE_CHECKING:

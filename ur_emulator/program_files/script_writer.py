@@ -13,7 +13,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.configuration import FREEDRIVE_ACTION
 from ur_emulator.controller.io.lines import RunState
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.programs.installation import ExternalControlPc, Installation, OutputRule
+from ur_emulator.program_files.installation import ExternalControlPc, Installation, OutputRule
 from urscript.values import to_script_text
 
 # --- names of programs, functions, threads and variables in scripts

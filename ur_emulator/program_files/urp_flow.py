@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from functools import partial
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.programs.reading import number_text
-from ur_emulator.programs.urp_expressions import expression_of, variable_name
-from ur_emulator.programs.urp_maker import Around, UrpMaker
-from ur_emulator.programs.urp_nodes import Node
+from ur_emulator.program_files.reading import number_text
+from ur_emulator.program_files.urp_expressions import expression_of, variable_name
+from ur_emulator.program_files.urp_maker import Around, UrpMaker
+from ur_emulator.program_files.urp_nodes import Node
 
 # Value of the case of a `<Switch>` that is taken when no other one is.
 _DEFAULT_CASE = "2147483647"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ur_emulator.programs import urp_flow, urp_moves, urp_statements
-from ur_emulator.programs.urp_maker import NodeWriter
+from ur_emulator.program_files import urp_flow, urp_moves, urp_statements
+from ur_emulator.program_files.urp_maker import NodeWriter
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from ur_emulator.errors import UnknownNodeError
-from ur_emulator.programs.installation import Installation
-from ur_emulator.programs.reading import ProgramReader
-from ur_emulator.programs.script_writer import ScriptWriter
-from ur_emulator.programs.urp_nodes import Node, ProgramNodes
+from ur_emulator.program_files.installation import Installation
+from ur_emulator.program_files.reading import ProgramReader
+from ur_emulator.program_files.script_writer import ScriptWriter
+from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 
 
 @dataclass(frozen=True, slots=True)

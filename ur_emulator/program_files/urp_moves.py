@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from protocol.pose import pose_inv
-from ur_emulator.programs.reading import number_text, number_texts
-from ur_emulator.programs.script_writer import identifier
-from ur_emulator.programs.urp_expressions import (
+from ur_emulator.program_files.reading import number_text, number_texts
+from ur_emulator.program_files.script_writer import identifier
+from ur_emulator.program_files.urp_expressions import (
     ZERO_POSE,
     expression_of,
     pose_of,
@@ -20,8 +20,8 @@ from ur_emulator.programs.urp_expressions import (
     taught_waypoint,
     variable_name,
 )
-from ur_emulator.programs.urp_maker import Around, UrpMaker
-from ur_emulator.programs.urp_nodes import CB3, Node
+from ur_emulator.program_files.urp_maker import Around, UrpMaker
+from ur_emulator.program_files.urp_nodes import CB3, Node
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -9,13 +9,13 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from ur_emulator.errors import FileMissingError
-from ur_emulator.programs.installation_reader import pc_from
-from ur_emulator.programs.reading import number_text
-from ur_emulator.programs.script_writer import one_line
-from ur_emulator.programs.urp_expressions import Line, expression_of, line_of, variable_name
-from ur_emulator.programs.urp_maker import Around, UrpMaker
-from ur_emulator.programs.urp_moves import set_tcp
-from ur_emulator.programs.urp_nodes import Node
+from ur_emulator.program_files.installation_reader import pc_from
+from ur_emulator.program_files.reading import number_text
+from ur_emulator.program_files.script_writer import one_line
+from ur_emulator.program_files.urp_expressions import Line, expression_of, line_of, variable_name
+from ur_emulator.program_files.urp_maker import Around, UrpMaker
+from ur_emulator.program_files.urp_moves import set_tcp
+from ur_emulator.program_files.urp_nodes import Node
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

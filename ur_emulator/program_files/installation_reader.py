@@ -21,8 +21,8 @@ from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.models.robot_model import Vector3, Vector6, six
-from ur_emulator.programs.folder import WIRE_ROOTS, FoundFile, ProgramFolder
-from ur_emulator.programs.installation import (
+from ur_emulator.program_files.folder import WIRE_ROOTS, FoundFile, ProgramFolder
+from ur_emulator.program_files.installation import (
     NEW_HOME,
     STANDARD_GRAVITY,
     DeclaredPayload,
@@ -33,10 +33,10 @@ from ur_emulator.programs.installation import (
     OutputRule,
     StartUp,
 )
-from ur_emulator.programs.reading import ProgramReader, XmlTree, number
-from ur_emulator.programs.safety_text import safety_settings
-from ur_emulator.programs.variables_file import SUFFIX as VARIABLES_SUFFIX
-from ur_emulator.programs.variables_file import read_variables
+from ur_emulator.program_files.reading import ProgramReader, XmlTree, number
+from ur_emulator.program_files.safety_text import safety_settings
+from ur_emulator.program_files.variables_file import SUFFIX as VARIABLES_SUFFIX
+from ur_emulator.program_files.variables_file import read_variables
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -9,13 +9,13 @@ from pathlib import PurePosixPath
 
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
-from ur_emulator.programs.folder import FoundFile, ProgramFolder
-from ur_emulator.programs.installation import ExternalControlPc, Installation
-from ur_emulator.programs.installation_reader import NEW_BOX, installation_of
-from ur_emulator.programs.reading import ProgramReader, XmlTree
-from ur_emulator.programs.script_writer import Gap, Header, Part, header_lines, identifier
-from ur_emulator.programs.urp_program import ROOT, make_script, uses_external_control
-from ur_emulator.programs.urpx_program import URPX_SUFFIX
+from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.installation import ExternalControlPc, Installation
+from ur_emulator.program_files.installation_reader import NEW_BOX, installation_of
+from ur_emulator.program_files.reading import ProgramReader, XmlTree
+from ur_emulator.program_files.script_writer import Gap, Header, Part, header_lines, identifier
+from ur_emulator.program_files.urp_program import ROOT, make_script, uses_external_control
+from ur_emulator.program_files.urpx_program import URPX_SUFFIX
 from urscript.values import to_script_text
 
 SCRIPT_SUFFIX = ".script"

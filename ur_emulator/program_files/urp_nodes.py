@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError, UnknownNodeError
-from ur_emulator.programs.folder import FoundFile
-from ur_emulator.programs.reading import ProgramReader, XmlTree
-from ur_emulator.programs.script_writer import Names
+from ur_emulator.program_files.folder import FoundFile
+from ur_emulator.program_files.reading import ProgramReader, XmlTree
+from ur_emulator.program_files.script_writer import Names
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
