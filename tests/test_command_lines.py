@@ -16,8 +16,8 @@ import pc_client.cli
 import ur_emulator.cli
 import ur_hil
 import urscript.cli
-from ur_emulator.control import command_line
-from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control_api import command_line
+from ur_emulator.control_api.operations import OPERATIONS
 from ur_hil.command_line import EXIT_CODES, ExitCode
 
 APPS = {"ur-client": pc_client.cli.app, "ur-emulator": ur_emulator.cli.app, "urscript": urscript.cli.app}

@@ -23,7 +23,7 @@ MAY_IMPORT = {
 EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "asyncio"}
 MAY_HAVE_EFFECTS = {
     "protocol": {"__main__.py"},
-    "ur_emulator": {"realtime", "servers", "control"}
+    "ur_emulator": {"realtime", "servers", "control_api"}
     | {f"{part}.py" for part in ("box", "rack", "box_process", "cli", "pytest_plugin")},
     "pc_client": {
         "driver",
@@ -50,7 +50,7 @@ BOX_ORDER = (
     {"realtime"},
     {"servers"},
     {"box_options"},
-    {"control"},
+    {"control_api"},
     {"box"},
     {"rack"},
     {"box_process"},

@@ -14,9 +14,9 @@ from protocol.serial_numbers import simulated_serial
 from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotMode, RobotType
 from ur_emulator.box_log import BoxLog
 from ur_emulator.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
-from ur_emulator.control.operations import make
-from ur_emulator.control.runner import OperationRunner
-from ur_emulator.control.step_operation import Context
+from ur_emulator.control_api.operations import make
+from ur_emulator.control_api.runner import OperationRunner
+from ur_emulator.control_api.step_operations import Context
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, NotRunningError
@@ -135,7 +135,7 @@ class Box:
         self.operations = OperationRunner(self._loop, context)
         self._wanted_control_port = options.control_port
         if options.control_port is not None:
-            from ur_emulator.control.http_answers import ControlAnswers
+            from ur_emulator.control_api.http_answers import ControlAnswers
             from ur_emulator.servers.http.port import HttpPort
 
             answers = ControlAnswers(self.operations, host, options.control_token)

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from ur_emulator.box_log import MAX_ENTRIES, LogEntry
 from ur_emulator.box_options import BoxOptions, ServedAt
-from ur_emulator.control.operations import make
+from ur_emulator.control_api.operations import make
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
 from ur_emulator.realtime.processes import Child, Pipe, Role, framed, read_message, start_child
 

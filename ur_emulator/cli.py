@@ -201,7 +201,7 @@ class _CtlCommand(TyperCommand):
 
 
 def _next_words(context: typer.Context, incomplete: str) -> list[str]:
-    from ur_emulator.control.command_line import next_words
+    from ur_emulator.control_api.command_line import next_words
 
     words = next_words(context.params.get("words") or [])
     return [word for word in words if word.startswith(incomplete)]
@@ -218,7 +218,7 @@ def ctl(
     ] = None,
 ) -> None:
     """Do something to a box that runs with --control-port: set inputs, push, stop, answer, read the log."""
-    from ur_emulator.control.command_line import main as control
+    from ur_emulator.control_api.command_line import main as control
 
     raise typer.Exit(control(words or ()))
 

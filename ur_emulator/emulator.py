@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, overload
 from protocol.ur_types import Ports
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import BoxOptions, ServedAt, check_count, counted_up
-from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
-from ur_emulator.control.operations import BoxOperations
+from ur_emulator.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
+from ur_emulator.control_api.operations import BoxOperations
 from ur_emulator.errors import EmulatorError
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
-from ur_emulator.commands.operator import AnswerRequest, ClosePopup
-from ur_emulator.commands.programs import StartProgram, StopProgram
+from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram, StopProgram
 from ur_emulator.controller import events as ev
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller

@@ -12,10 +12,10 @@ from protocol.ur_types import Ports
 from ur_emulator.box_options import TOKEN_VARIABLE, ServedAt
 from ur_emulator.budgets import BUDGETS, KIB
 from ur_emulator.commands.operation import Kind, Operation, Parameter
-from ur_emulator.control.box_state import BoxState, Question
-from ur_emulator.control.http_client import DEFAULT_PORT
-from ur_emulator.control.operations import OPERATIONS
-from ur_emulator.control.reading import ReadState
+from ur_emulator.control_api.box_state import BoxState, Question
+from ur_emulator.control_api.http_client import DEFAULT_PORT
+from ur_emulator.control_api.operations import OPERATIONS
+from ur_emulator.control_api.step_operations import ReadState
 
 
 def _attributes(described: type, names: Iterable[str]) -> Iterator[str]:

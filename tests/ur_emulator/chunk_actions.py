@@ -18,13 +18,16 @@ push 0 0 -20          push the flange, base axes, N; zeros end it
 from ast import literal_eval
 
 from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.interpreter import AbortMove, AppendStatements, SkipStatements
-from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.commands.programs import (
+    AbortMove,
+    AnswerRequest,
+    AppendStatements,
+    ClosePopup,
     PauseProgram,
     ResumeProgram,
     SetSpeedSlider,
+    SkipStatements,
     StartProgram,
     StopProgram,
 )

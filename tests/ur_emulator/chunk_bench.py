@@ -9,8 +9,7 @@ from chunk_actions import act
 from chunk_peers import ChunkNetwork
 
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.commands.operator import AnswerRequest, ClosePopup
-from ur_emulator.commands.programs import StartProgram
+from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.program_slot import ProgramSlot

@@ -12,7 +12,7 @@ from control_support import control_box
 from dashboard_support import Dashboard
 
 from ur_emulator import ControlBox
-from ur_emulator.commands.operator import ClosePopup
+from ur_emulator.commands.programs import ClosePopup
 from ur_emulator.errors import (
     ArgumentError,
     ControlError,

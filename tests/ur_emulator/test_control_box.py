@@ -11,8 +11,7 @@ from control_support import control_box
 
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.operator import AnswerRequest
-from ur_emulator.commands.programs import StopProgram
+from ur_emulator.commands.programs import AnswerRequest, StopProgram
 from ur_emulator.commands.surroundings import Push, RemoveObstacle, SetAnalogInput, SetDigitalInput
 from ur_emulator.errors import (
     ArgumentError,

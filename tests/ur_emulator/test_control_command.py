@@ -10,9 +10,9 @@ from control_support import control_box
 
 from ur_emulator.box_options import TOKEN_VARIABLE
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.control.command_line import main, make_parser, plain
-from ur_emulator.control.http_client import ControlClient
-from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control_api.command_line import main, make_parser, plain
+from ur_emulator.control_api.http_client import ControlClient
+from ur_emulator.control_api.operations import OPERATIONS
 from ur_emulator.errors import ControlError
 
 

@@ -11,7 +11,7 @@ from control_support import Http, control_box
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control_api.operations import OPERATIONS
 from ur_emulator.servers.http.messages import MAX_HEADER
 
 JSON = "Content-Type: application/json"

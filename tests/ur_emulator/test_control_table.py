@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from ur_emulator.commands.operation import Kind
 from ur_emulator.commands.surroundings import SIZES
-from ur_emulator.control.operations import OPERATIONS, BoxOperations, Reading, describe, make
-from ur_emulator.control.step_operation import CONDITIONS
+from ur_emulator.control_api.operations import OPERATIONS, BoxOperations, Reading, describe, make
+from ur_emulator.control_api.step_operations import CONDITIONS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
 from ur_emulator.plant.obstacles import SHAPES
@@ -166,6 +166,6 @@ def test_the_table_is_json():
 
 
 def test_the_command_line_loads_no_physics():
-    code = "import sys, ur_emulator.control.command_line; print(*sorted({'mujoco', 'numpy', 'lark'} & set(sys.modules)))"
+    code = "import sys, ur_emulator.control_api.command_line; print(*sorted({'mujoco', 'numpy', 'lark'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.strip() == ""

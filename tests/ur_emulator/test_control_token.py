@@ -5,7 +5,7 @@ from control_support import Http, control_box
 
 from ur_emulator import ControlBox
 from ur_emulator.box_options import MAX_TOKEN
-from ur_emulator.control.operations import OPERATIONS
+from ur_emulator.control_api.operations import OPERATIONS
 from ur_emulator.errors import EmulatorError
 
 TOKEN = "correct-horse"

@@ -16,8 +16,7 @@ from protocol.primary.messages import (
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
-from ur_emulator.commands.operator import AnswerRequest, ClosePopup
-from ur_emulator.commands.programs import ResumeProgram, StartProgram
+from ur_emulator.commands.programs import AnswerRequest, ClosePopup, ResumeProgram, StartProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.controller import events
 from ur_emulator.models.generations import CB3

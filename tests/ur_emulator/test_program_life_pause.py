@@ -7,8 +7,7 @@ import pytest
 from box_support import Bench
 
 from protocol.ur_types import ProgramState
-from ur_emulator.commands.operator import ClosePopup
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.commands.programs import ClosePopup, PauseProgram, ResumeProgram, StopProgram
 from ur_emulator.controller.events import (
     ErrorReported,
     ProgramPaused,

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.operator import ClosePopup
 from ur_emulator.commands.power import PowerOff, ReleaseBrakes
 from ur_emulator.commands.programs import (
+    ClosePopup,
     PauseProgram,
     ResumeProgram,
     SetSpeedSlider,

@@ -13,8 +13,7 @@ from protocol.primary.messages import (
     decode_message,
     encode_message,
 )
-from ur_emulator.commands.operator import AnswerRequest, ClosePopup
-from ur_emulator.commands.programs import StopProgram
+from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StopProgram
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
 

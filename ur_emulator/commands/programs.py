@@ -1,15 +1,22 @@
-"""The running program: start, stop, pause and resume it, and the speed slider."""
+"""The running program: start, stop, pause and resume it, and the speed slider.
+
+Interpreter mode: what clients of its port do with the running program.
+
+What the operator does at the screen: answer questions, close popups; and popups that clients show.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
+from protocol.primary.messages import RequestedType
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import Box, inform
-from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.controller.command import Box, Result, inform
+from ur_emulator.controller.events import PopupShown, ScriptFailed
+from ur_emulator.controller.operator import Answer
 from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits
@@ -18,6 +25,7 @@ from ur_emulator.errors import RefusedError
 if TYPE_CHECKING:
     from ur_emulator.controller.state import ControllerState
     from urscript import CompiledProgram
+    from urscript.compile.statements import CompiledStatements
 
 PROGRAM_RUNS = "a program runs, stop it first"
 
@@ -123,3 +131,75 @@ def _why_not_running(state: ControllerState) -> str:
 
 def _program_state(box: Box) -> str:
     return ProgramState(box.state.past.snapshot.runtime_state).name
+
+
+@dataclass(frozen=True, slots=True)
+class AppendStatements:
+    """Add a compiled line to what the program runs in interpreter mode.
+
+    Attributes:
+        statements: compiled.
+        epoch: of the queue, when its names were taken.
+    """
+
+    statements: CompiledStatements
+    epoch: int
+
+    def apply(self, box: Box) -> dict[str, int]:
+        """Return its id; 0 if its names do not hold any more."""
+        return {"id": box.state.interpreter.append(self.statements, self.epoch)}
+
+
+@dataclass(frozen=True, slots=True)
+class SkipStatements:
+    """Drop the lines that have not begun."""
+
+    def apply(self, box: Box) -> None:
+        box.state.interpreter.skip()
+
+
+@dataclass(frozen=True, slots=True)
+class AbortMove:
+    """End a movej or movel of any program; the instruction returns."""
+
+    def apply(self, box: Box) -> None:
+        box.state.motion.abort()
+
+
+class AnswerRequest(CommandOperation):
+    """Answer a question of a program."""
+
+    value: Answer = parameter("of the type that was asked for")
+    id: int | None = parameter(
+        "number of the question; the oldest that fits if left out", low=1, default=None
+    )
+    result: ClassVar[str] = "`id`: number of the question, and `tick`"
+
+    def apply(self, box: Box) -> Result:
+        operator = box.state.operator
+        asked = [r for r in operator.requests if r.kind is not RequestedType.NONE]
+        answered = operator.answer(self.value, self.id)
+        if answered is None:
+            questions = ", ".join(f"{r.request_id} ({r.kind.name.lower()}): {r.text}" for r in asked)
+            raise RefusedError(
+                f"{self.value!r} answers no question: {f'asked is {questions}' if asked else 'none is open'}"
+            )
+        return {"id": answered}
+
+
+class ClosePopup(CommandOperation):
+    """Press the button of all popups."""
+
+    def apply(self, box: Box) -> None:
+        box.state.operator.close_popups()
+
+
+@dataclass(frozen=True, slots=True)
+class ShowPopup:
+    """Show a popup that does not block a program; it stays until it is closed."""
+
+    text: str
+
+    def apply(self, box: Box) -> None:
+        box.state.operator.show(self.text)
+        box.state.events.append(PopupShown("Popup", self.text, False, False, False))

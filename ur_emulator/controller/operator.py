@@ -2,7 +2,7 @@
 
 There is no person at the box: a client answers.
 
-Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.commands.operator`.
+Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.commands.programs`.
 """
 
 from __future__ import annotations

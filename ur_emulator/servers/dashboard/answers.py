@@ -11,8 +11,8 @@ from contextlib import suppress
 from protocol.dashboard.commands import OPERATIONAL_MODES, USER_ROLES, DashboardCommand
 from protocol.dashboard.connection import CommandReceived
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
-from ur_emulator.commands.operator import ClosePopup, ShowPopup
 from ur_emulator.commands.power import ChooseModeByDashboard, PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.programs import ClosePopup, ShowPopup
 from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded

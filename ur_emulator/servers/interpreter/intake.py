@@ -23,7 +23,7 @@ from protocol.interpreter import (
     state,
 )
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.interpreter import AbortMove, AppendStatements, SkipStatements
+from ur_emulator.commands.programs import AbortMove, AppendStatements, SkipStatements
 from ur_emulator.controller.command import Box, Command, Result
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.errors import NotRunningError, RefusedError, WorkerError

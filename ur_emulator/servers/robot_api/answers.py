@@ -17,8 +17,8 @@ from protocol.robot_api import (
     match_call,
 )
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.operator import ClosePopup, ShowPopup
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.commands.programs import ClosePopup, ShowPopup
 from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
 from ur_emulator.controller.clock import clock_time
 from ur_emulator.controller.command import Command

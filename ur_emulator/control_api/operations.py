@@ -15,7 +15,6 @@ from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
 
 from ur_emulator.box_log import LogEntry
 from ur_emulator.commands.operation import Operation
-from ur_emulator.commands.operator import AnswerRequest, ClosePopup
 from ur_emulator.commands.power import (
     MoveEnablingDevice,
     PowerOff,
@@ -24,7 +23,14 @@ from ur_emulator.commands.power import (
     SetOperationalMode,
     SwitchRemoteControl,
 )
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
+from ur_emulator.commands.programs import (
+    AnswerRequest,
+    ClosePopup,
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StopProgram,
+)
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
     ChangeSafetySettings,
@@ -52,9 +58,16 @@ from ur_emulator.commands.surroundings import (
     SetAnalogInput,
     SetDigitalInput,
 )
-from ur_emulator.control.program_run import RunProgram, read_script
-from ur_emulator.control.reading import AddToLog, ReadIdentity, ReadLog, ReadState
-from ur_emulator.control.step_operation import At, WaitUntil
+from ur_emulator.control_api.step_operations import (
+    AddToLog,
+    At,
+    ReadIdentity,
+    ReadLog,
+    ReadState,
+    RunProgram,
+    WaitUntil,
+    read_script,
+)
 from ur_emulator.errors import ArgumentError
 
 P = ParamSpec("P")

@@ -14,10 +14,9 @@ from protocol.ur_types import Ports
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import ServedAt
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.control.box_state import BoxState, Question
-from ur_emulator.control.operations import OPERATIONS, make
-from ur_emulator.control.reading import ReadState
-from ur_emulator.control.step_operation import WaitUntil
+from ur_emulator.control_api.box_state import BoxState, Question
+from ur_emulator.control_api.operations import OPERATIONS, make
+from ur_emulator.control_api.step_operations import ReadState, WaitUntil
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTimeoutError
 
 if TYPE_CHECKING:

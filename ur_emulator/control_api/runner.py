@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from ur_emulator.control.operations import make
-from ur_emulator.control.step_operation import Context, StepOperation
+from ur_emulator.control_api.operations import make
+from ur_emulator.control_api.step_operations import Context, StepOperation
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import ControlError, NotRunningError

@@ -11,8 +11,8 @@ from typing import Any
 from urllib.parse import parse_qsl
 
 from ur_emulator.commands.operation import Operation
-from ur_emulator.control.operations import OPERATIONS, describe
-from ur_emulator.control.runner import OperationRunner
+from ur_emulator.control_api.operations import OPERATIONS, describe
+from ur_emulator.control_api.runner import OperationRunner
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError, WaitTimeoutError
 from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.servers.steps import Steps

@@ -18,9 +18,9 @@ from ur_emulator.box_log import printable
 from ur_emulator.box_options import TOKEN_VARIABLE, check_token
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.operation import Kind, Parameter
-from ur_emulator.control.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
-from ur_emulator.control.operations import OPERATIONS, make
-from ur_emulator.control.program_run import read_script
+from ur_emulator.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
+from ur_emulator.control_api.operations import OPERATIONS, make
+from ur_emulator.control_api.step_operations import read_script
 from ur_emulator.errors import ControlError, EmulatorError
 from ur_hil.command_line import ExitCode
 

@@ -1,18 +1,26 @@
-"""Operations that take no cycle or several, done in steps (see `servers.steps`); `wait_until` and `at`."""
+"""Operations that take no cycle or several, done in steps (see `servers.steps`); `wait_until` and `at`.
+
+Operations that ask the box what is going on, and the one that writes into its log.
+
+`run_program`: a program from its text or from a file in the folder of programs.
+"""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from protocol.primary.messages import RequestedType
+from protocol.primary.messages import ReportLevel, RequestedType
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.operation import CommandOperation, Operation, R_co, parameter
-from ur_emulator.control.box_state import BoxState, is_steady, take_state
+from ur_emulator.box_log import LogEntry
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.commands.operation import CommandOperation, Kind, Operation, R_co, parameter
+from ur_emulator.control_api.box_state import BoxState, is_steady, take_state
 from ur_emulator.controller.events import LogAdded
-from ur_emulator.errors import ArgumentError, WaitTimeoutError
+from ur_emulator.errors import ArgumentError, RefusedError, WaitTimeoutError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.command import Result
@@ -175,3 +183,134 @@ class At(StepOperation[int]):
         tick = access.controller.generation.tick_at(self.time)
         access.schedule(tick, operation, done)
         return {"tick": tick}
+
+
+class ReadState(StepOperation[BoxState]):
+    """What the box is doing at the end of its last cycle."""
+
+    result: ClassVar[str] = (
+        "modes, joints, tool, force, inputs and outputs, program, popups and questions, time"
+    )
+    only_reads: ClassVar[bool] = True
+
+    def steps(self, context: Context) -> Steps[Any]:
+        """Take the state."""
+        yield from ()
+        return take_state(context.access.controller)
+
+
+class ReadLog(StepOperation[tuple[LogEntry, ...]]):
+    """What PolyScope's log tab would show."""
+
+    after: int = parameter("leave out so many entries: the `next` of the call before", low=0, default=0)
+    level: str = parameter(
+        "leave out what weighs less", choices=tuple(ReportLevel.__members__), default="DEBUG"
+    )
+    result: ClassVar[str] = (
+        f"`entries`, the oldest first, at most {BUDGETS.log_entries} of them, and `next`, to be given as "
+        "`after` in the next call"
+    )
+    only_reads: ClassVar[bool] = True
+
+    def steps(self, context: Context) -> Steps[Any]:
+        """Pick the entries."""
+        yield from ()
+        log, least = context.access.log, ReportLevel[self.level]
+        new = log.since(self.after)
+        entries, seen = list[LogEntry](), log.count - len(new)
+        for entry in new:
+            if len(entries) == BUDGETS.log_entries:
+                break
+            seen += 1
+            if entry.level >= least:
+                entries.append(entry)
+        return {"entries": entries, "next": max(self.after, seen)}
+
+
+class ReadIdentity(StepOperation[dict[str, Any]]):
+    """What the box is."""
+
+    result: ClassVar[str] = "software, robot model, serial number, pace, seed, fidelity, address and ports"
+    only_reads: ClassVar[bool] = True
+
+    def steps(self, context: Context) -> Steps[Any]:
+        """Ask the box."""
+        yield from ()
+        return context.identity()
+
+
+class AddToLog(StepOperation[int]):
+    """Write a line into the log."""
+
+    text: str = parameter("the line")
+    is_logged: ClassVar[bool] = False
+
+    def steps(self, context: Context) -> Steps[Any]:
+        """Write it; that needs no cycle."""
+        yield from ()
+        context.access.announce(LogAdded("Control", self.text))
+        return {"tick": context.access.snapshot.tick}
+
+
+def read_script(path: Path) -> str:
+    """Return the text of a program file of this machine.
+
+    Raises:
+        ArgumentError: it is UTF-16.
+        OSError: it cannot be read.
+    """
+    from urscript.source import as_utf8, program_text
+
+    try:
+        return as_utf8(program_text(path.read_bytes(), str(path)))
+    except ValueError as error:
+        raise ArgumentError(str(error)) from None
+
+
+class RunProgram(StepOperation[int]):
+    """Run a program in place of the one that runs.
+
+    In Python the script may also be the path of a file of this machine.
+
+    Raises:
+        ArgumentError: the program does not compile.
+        RefusedError: the box does not run programs now, cannot use the file, or has begun a newer program;
+            with `wait`: the program ended with an error.
+    """
+
+    script: str | Path | None = parameter(
+        "text of a program, as sent to port 30002", kind=Kind.SCRIPT, default=None
+    )
+    file: str | None = parameter("or a file in the folder of programs, as for `load`", default=None)
+    wait: bool = parameter("return when the program has ended, with its error if it has one", default=False)
+    result: ClassVar[str] = "`program`: its name, and `tick`: the cycle in which it began"
+
+    def steps(self, context: Context) -> Steps[Any]:
+        """Compile and start a text, or play a file as the dashboard does; what runs is stopped before."""
+        access, player, asked = context.access, context.player, context.clock()
+        programs = access.controller.programs
+        if (self.script is None) == (self.file is None):
+            raise ArgumentError("run_program needs either script, the text, or file, a name")
+        if self.file is not None:
+            yield from player.load(self.file, stops=True)
+            yield from player.play("127.0.0.1")
+            assert programs.latest is not None
+            program = programs.latest.program
+        else:
+            # The command line loads this module, too: nothing heavy at its top.
+            from ur_emulator.controller.events import ScriptFailed
+            from ur_emulator.program_files.compiling import compile_text
+
+            catalogue = access.identity.software.catalogue
+            outcome = yield from access.in_worker(compile_text, str(self.script), catalogue)
+            if isinstance(outcome, ScriptFailed):
+                raise ArgumentError(f"the program does not compile: {outcome.log_text or outcome.text}")
+            program = outcome
+            yield from access.start(program, asked)
+        name, tick, run = program.name, access.snapshot.tick, programs.latest
+        if self.wait and run is not None and run.program is program:  # a `sec` has ended already
+            while programs.latest is run and access.snapshot.runtime_state != ProgramState.STOPPED:
+                yield
+            if run.error is not None:
+                raise RefusedError(f"program {name} ended with an error: {run.error}")
+        return {"program": name, "tick": tick}
