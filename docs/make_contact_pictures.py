@@ -27,7 +27,7 @@ from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import TYPICAL
 from ur_emulator.models.mjcf import LINKS, arm_spec, to_body
-from ur_emulator.plant.physics import TABLE_HEIGHT
+from ur_emulator.plant.arm_physics import TABLE_HEIGHT
 from ur_emulator.scripting.program_slot import ProgramSlot
 from urscript import compile_program
 

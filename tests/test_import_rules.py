@@ -59,14 +59,14 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"arm_in_space", "clock", "interpreter_queue", "operator", "programs", "robot_mode"},
+    {"arm_in_space", "clock", "interpreter_queue", "pendant", "programs", "robot_mode"},
     {"io"},
     {"safety"},
     {"settings"},
     {"arm_dynamics", "client_inputs", "world_model"},
     {"electrics", "snapshot"},
     {"past_cycles"},
-    {"compliance"},
+    {"compliance", "force_sense"},
     {"state"},
     {"modbus_map", "safety_system"},
     {"command"},

@@ -93,7 +93,7 @@ class Box:
             mode=RobotMode.RUNNING,
             version=(asked.major, asked.minor),
         )
-        controller.state.operator.set_remote_control(options.remote_control)
+        controller.state.pendant.set_remote_control(options.remote_control)
         self._box = ServedBox(
             controller,
             make_pacer(pace, controller.period_s, options.speed, phase, lead),

@@ -522,7 +522,7 @@ def test_two_equal_runs_are_equal_to_the_last_bit():
 
 
 def test_what_is_not_in_use_is_not_looked_after(monkeypatch):
-    from ur_emulator.controller.compliance.compliance import Compliance
+    from ur_emulator.controller.compliance import Compliance
 
     def never(*_):
         raise AssertionError("compliance was looked after in a cycle that needs none")

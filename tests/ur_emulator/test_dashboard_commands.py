@@ -259,7 +259,7 @@ def test_a_popup_is_shown_to_all_clients(box, dashboard):
 
 
 def test_a_popup_stays_without_power_until_it_is_closed(box, dashboard):
-    operator = inside(box)._box.controller.state.operator
+    operator = inside(box)._box.controller.state.pendant
     dashboard.ask_all("popup first", "power off", "popup second")
     assert operator.shown == ("first", "second")
     assert "Popup: Popup: first" in [entry.text for entry in box.log]

@@ -17,9 +17,10 @@ from ur_emulator.models.e_series_arms import UR5E, UR10E
 from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import arm_spec
 from ur_emulator.models.robots import ROBOTS
+from ur_emulator.plant.arm_physics import build_physics
+from ur_emulator.plant.drives import ServoGains
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
-from ur_emulator.plant.physics import ServoGains, build_physics
 from ur_emulator.plant.plant import Plant
 
 ARMS = [pytest.param(robot, id=name) for name, robot in ROBOTS.items() if robot.generation is E_SERIES]

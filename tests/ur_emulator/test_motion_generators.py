@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.motion.generators import JointTarget, SpeedJ, StopJ
 from ur_emulator.motion.leg import move_j
 from ur_emulator.motion.move import Move
-from ur_emulator.motion.path_motion import OwnershipError
 from ur_emulator.motion.tool import Tool
 
 DT = 0.008

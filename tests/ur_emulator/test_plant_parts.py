@@ -10,10 +10,10 @@ from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.mjcf import GRAVITY
+from ur_emulator.plant.drives import ServoGains
 from ur_emulator.plant.feedback import GearRipple
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
-from ur_emulator.plant.physics import ServoGains
 from ur_emulator.plant.plant import Thermometers
 from ur_emulator.plant.sensors import ForceDrift
 

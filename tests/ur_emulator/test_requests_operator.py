@@ -47,7 +47,7 @@ def test_a_program_waits_for_its_answer(kind, requested, answer, text):
     assert bench.controller.waits_outside
     bench.tick(1, AnswerRequest(answer, event.request_id))
     assert printed(bench) == [f"got {text}"]
-    assert not bench.controller.state.operator.requests
+    assert not bench.controller.state.pendant.requests
 
 
 @pytest.mark.parametrize(("answer", "text"), [("\u20acuro", "6"), ("", "0")])
@@ -104,7 +104,7 @@ def test_a_blocking_popup_waits_and_another_does_not():
 def test_a_program_that_is_stopped_takes_its_question_away():
     bench = asking("string")
     bench.tick(1, StopProgram())
-    assert bench.controller.state.operator.requests == ()
+    assert bench.controller.state.pendant.requests == ()
     bench.tick(1, AnswerRequest("late"))
     assert not printed(bench)
 

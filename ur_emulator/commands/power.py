@@ -114,7 +114,7 @@ class SwitchRemoteControl(CommandOperation):
             raise RefusedError(
                 f"a box of {generation.name} has no remote control in manual mode: choose automatic"
             )
-        box.state.operator.set_remote_control(self.on)
+        box.state.pendant.set_remote_control(self.on)
         box.state.events.append(LogAdded("Controller", f"{'Remote' if self.on else 'Local'} control"))
 
 

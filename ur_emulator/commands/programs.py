@@ -176,7 +176,7 @@ class AnswerRequest(CommandOperation):
     result: ClassVar[str] = "`id`: number of the question, and `tick`"
 
     def apply(self, box: Box) -> Result:
-        operator = box.state.operator
+        operator = box.state.pendant
         asked = [r for r in operator.requests if r.kind is not RequestedType.NONE]
         answered = operator.answer(self.value, self.id)
         if answered is None:
@@ -191,7 +191,7 @@ class ClosePopup(CommandOperation):
     """Press the button of all popups."""
 
     def apply(self, box: Box) -> None:
-        box.state.operator.close_popups()
+        box.state.pendant.close_popups()
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,5 +201,5 @@ class ShowPopup:
     text: str
 
     def apply(self, box: Box) -> None:
-        box.state.operator.show(self.text)
+        box.state.pendant.show(self.text)
         box.state.events.append(PopupShown("Popup", self.text, False, False, False))

@@ -193,7 +193,7 @@ class PressButton(CommandOperation):
     pressed: bool = parameter("pressed, or released")
 
     def apply(self, box: Box) -> None:
-        box.state.operator.press(BUTTON_BITS[self.button], self.pressed)
+        box.state.pendant.press(BUTTON_BITS[self.button], self.pressed)
         if self.button == "teach":
             box.state.compliance.press_teach_button(self.pressed)
 

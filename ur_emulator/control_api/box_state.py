@@ -109,7 +109,7 @@ def is_steady(controller: Controller) -> bool:
 
 def take_state(controller: Controller) -> BoxState:
     """Return the state of a box; in the thread of its loop, or when it does not run."""
-    now, operator = controller.snapshot, controller.state.operator
+    now, operator = controller.snapshot, controller.state.pendant
     popups = tuple(r.text for r in operator.requests if r.kind is RequestedType.NONE)
     return BoxState(
         tick=now.tick,

@@ -68,12 +68,12 @@ class StepOperation(Operation[R_co]):
 
 
 def _has_popup(controller: Controller) -> bool:
-    operator = controller.state.operator
+    operator = controller.state.pendant
     return bool(operator.shown) or any(r.kind is RequestedType.NONE for r in operator.requests)
 
 
 def _has_question(controller: Controller) -> bool:
-    return any(r.kind is not RequestedType.NONE for r in controller.state.operator.requests)
+    return any(r.kind is not RequestedType.NONE for r in controller.state.pendant.requests)
 
 
 CONDITIONS: dict[str, Callable[[Controller], object]] = {

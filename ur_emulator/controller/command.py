@@ -14,11 +14,10 @@ from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.compliance.flange_push import FlangePush
     from ur_emulator.controller.programs import Programs
     from ur_emulator.controller.safety_system import SafetySystem
     from ur_emulator.controller.state import ControllerState
-    from ur_emulator.plant.plant import Plant
+    from ur_emulator.plant.plant import FlangePush, Plant
 
 # Values that a command returns; most return none.
 Result = Mapping[str, Any] | None

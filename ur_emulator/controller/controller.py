@@ -16,9 +16,8 @@ from protocol.ur_types import ControlMode, ProgramState, RobotMode
 from ur_emulator.controller.arm_in_space import ArmInSpace
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.command import Command
-from ur_emulator.controller.compliance.flange_push import FlangePush
-from ur_emulator.controller.compliance.force_sense import VARIABLE
 from ur_emulator.controller.events import ErrorReported, RobotModeChanged
+from ur_emulator.controller.force_sense import VARIABLE
 from ur_emulator.controller.io.watchdogs import WatchdogAction
 from ur_emulator.controller.programs import Programs
 from ur_emulator.controller.robot_mode import JOINT_VECTORS, ModeCommand, RobotModeMachine
@@ -44,8 +43,7 @@ from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.exact import ExactPlant
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.plant.plant import FlangePush, Plant, PlantState
 
 # --- The snapshot of a cycle: the records of target, sensors and box one after the other
 
@@ -101,7 +99,7 @@ def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState
         script_control_line=programs.line if programs.reports_line else 0,
         control_mode=int(compliance.mode),
         is_guided_by_input=compliance.by_input,
-        buttons=state.operator.buttons,
+        buttons=state.pendant.buttons,
         payload=payload.mass,
         payload_cog=payload.cog,
         payload_inertia=payload.inertia,

@@ -110,7 +110,7 @@ class LogAdded:
 
 @dataclass(frozen=True, slots=True)
 class PopupShown:
-    """A script called `popup`. `request_id`: number of a blocking one, see `Operator`; 0 otherwise."""
+    """A script called `popup`. `request_id`: number of a blocking one, see `Pendant`; 0 otherwise."""
 
     title: str
     text: str
@@ -125,7 +125,7 @@ class ValueRequested:
     """A script asks the operator for a value.
 
     Attributes:
-        request_id: number of the question, see `Operator`.
+        request_id: number of the question, see `Pendant`.
         kind: type of the value.
         text: the question.
     """

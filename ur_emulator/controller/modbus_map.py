@@ -117,8 +117,8 @@ def flag(state: ControllerState, offset: int) -> int:
             state.mode.mode in POWERED,
             safety is SafetyMode.PROTECTIVE_STOP,
             safety in EMERGENCY_MODES,
-            bool(state.operator.buttons & RobotStatusBits.TEACH_BUTTON_PRESSED),
-            bool(state.operator.buttons & RobotStatusBits.POWER_BUTTON_PRESSED),
+            bool(state.pendant.buttons & RobotStatusBits.TEACH_BUTTON_PRESSED),
+            bool(state.pendant.buttons & RobotStatusBits.POWER_BUTTON_PRESSED),
             state.safety.is_stopped,
         )[offset]
     )

@@ -13,7 +13,7 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.plant.plant import PlantState
 
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.
 HISTORY_TIME = 1.0

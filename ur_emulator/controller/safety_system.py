@@ -24,8 +24,8 @@ from ur_emulator.controller.safety.modes import (
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.motion.path_motion import SCALING_RATE
-from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.motion.arm_motion import SCALING_RATE
+from ur_emulator.plant.plant import PlantState
 
 # The drives lag behind their targets by 30 to 50 ms. The brakes wait for them, at most the second time [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
@@ -186,7 +186,7 @@ class SafetySystem:
         self._update()
         state.events.append(LogAdded("Safety", f"Operational mode: {mode.name}"))
         if mode is OperationalMode.MANUAL and not state.robot.generation.has_remote_in_manual:
-            state.operator.set_remote_control(False)
+            state.pendant.set_remote_control(False)
 
     def _wait(self) -> None:
         """Pause program and arm until the mode ends; a program that was paused before stays paused."""

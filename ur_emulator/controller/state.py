@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from ur_emulator.controller.arm_dynamics import ArmDynamics
 from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
-from ur_emulator.controller.compliance.compliance import Compliance
-from ur_emulator.controller.compliance.force_sense import ForceSense
+from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.electrics import EnergyMeter
 from ur_emulator.controller.events import EventQueue, ProgramRequests
+from ur_emulator.controller.force_sense import ForceSense
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.encoders import Encoders
@@ -22,8 +22,8 @@ from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.controller.io.registers import MapMemory, Registers
 from ur_emulator.controller.io.watchdogs import Watchdogs
-from ur_emulator.controller.operator import Operator
 from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.controller.pendant import Pendant
 from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety.inputs import EnablingDevice, OperationalModeChoice
 from ur_emulator.controller.safety.safety_state import SafetyState, limits_of
@@ -66,7 +66,7 @@ class ControllerState:
         modbus_map: words of the robot's own Modbus map.
         compliance: force mode, and hand guiding.
         force_sense: zero and history of the wrench.
-        operator: what programs ask of the operator, and the buttons that are pressed.
+        pendant: what programs ask of the operator, and the buttons that are pressed.
         interpreter: statements that arrive for the running program.
         error_settings: what programs have set up about errors.
         requests: stops that programs and clients have asked for in this cycle.
@@ -100,7 +100,7 @@ class ControllerState:
     modbus_map: MapMemory
     compliance: Compliance
     force_sense: ForceSense
-    operator: Operator
+    pendant: Pendant
     interpreter: InterpreterQueue
     error_settings: ErrorSettings
     requests: ProgramRequests
@@ -152,7 +152,7 @@ def make_state(
         modbus_map=MapMemory(version),
         compliance=Compliance(motion, mode, safety, operational, io_configuration, past),
         force_sense=ForceSense(clock.generation),
-        operator=Operator(),
+        pendant=Pendant(),
         interpreter=InterpreterQueue(),
         error_settings=ErrorSettings(),
         requests=ProgramRequests(),

@@ -6,9 +6,20 @@ from dataclasses import replace
 
 from ur_emulator.errors import ModelError
 from ur_emulator.models.cb3_arms import UR3, UR5, UR10
-from ur_emulator.models.e_series_arms import UR3E, UR5E, UR7E, UR10E, UR12E, UR16E
+from ur_emulator.models.e_series_arms import (
+    UR3E,
+    UR5E,
+    UR7E,
+    UR8LONG,
+    UR10E,
+    UR12E,
+    UR15,
+    UR16E,
+    UR18,
+    UR20,
+    UR30,
+)
 from ur_emulator.models.generations import E_SERIES, POLYSCOPE_X
-from ur_emulator.models.newer_arms import UR8LONG, UR15, UR18, UR20, UR30
 from ur_emulator.models.robot_model import RobotModel
 
 # The first of each generation runs its software where no arm is named.

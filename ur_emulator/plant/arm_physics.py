@@ -1,4 +1,9 @@
-"""ArmPhysics: one arm in MuJoCo, the forces on it, and the state of one cycle before.
+"""The plant's MuJoCo model: the mechanism with hull, friction, drives, table and raw sensors.
+
+The law of the joint servos is that of MuJoCo's actuators, force = kp (ctrl - q) - kv qd + bias, so that it
+acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
+
+ArmPhysics: one arm in MuJoCo, the forces on it, and the state of one cycle before.
 
 The hinges are the motor side of the gears.
 """
@@ -6,19 +11,211 @@ The hinges are the motor side of the gears.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.models.mjcf import FLANGE
+from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.models.robot_model import DhRow, RobotModel
-from ur_emulator.plant.drives import Drives
+from ur_emulator.plant.drives import Drives, ServoGains
 from ur_emulator.plant.friction import Presliding
 from ur_emulator.plant.loads import Loads
-from ur_emulator.plant.obstacles import Obstacles
-from ur_emulator.plant.physics import JointServos, ServoGains, build_physics, contact_wrench
+from ur_emulator.plant.obstacles import Obstacles, add_slots
 from ur_emulator.plant.sensors import REC_Q, REC_QD
+
+# --- contact forces of the surroundings on the arm, as one wrench at the flange
+
+
+def contact_wrench(
+    model: mujoco.MjModel, data: mujoco.MjData, flange: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the sum of the contact forces of fixed bodies (table, base, obstacles) on the arm.
+
+    Contacts between two links of the arm do not count: they are internal forces.
+
+    Args:
+        model: the plant's model.
+        data: its state after a step.
+        flange: the point that moments refer to, in the base frame (3,) [m].
+
+    Returns:
+        Wrench (6,) on the arm, base axes, force first [N, Nm].
+    """
+    wrench = np.zeros(6)
+    fixed_to = model.body_weldid
+    in_contact_frame = np.zeros(6)
+    for i in range(data.ncon):
+        contact = data.contact[i]
+        first, second = (int(fixed_to[model.geom_bodyid[geom]]) for geom in contact.geom)
+        if (first == 0) == (second == 0):
+            continue
+        mujoco.mj_contactForce(model, data, i, in_contact_frame)
+        # MuJoCo gives the force on the second body, in the contact's axes (rows of `frame`).
+        force = contact.frame.reshape(3, 3).T @ in_contact_frame[:3]
+        if second == 0:
+            force = -force
+        fx, fy, fz = force.tolist()
+        rx, ry, rz = (contact.pos - flange).tolist()
+        wrench += (fx, fy, fz, ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx)
+    return wrench
+
+
+TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
+
+# MuJoCo's Coulomb friction is a soft constraint. These numbers make it set in like a steep viscous friction,
+# over some hundredths of a radian a second, instead of holding the joint against its servo: measured friction
+# rises from small values at rest, and real arms neither stick nor hunt around a target. Arms whose model of
+# friction changes its sign faster say over which speed it sets in, see `RobotModel.friction_rise`.
+_FRICTION_SOLREF = (0.02, 1.0)
+_FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
+
+# In freedrive a joint would creep with the soft constraint above. There the friction holds, up to its size.
+_STICTION_SOLIMP = (0.999, 0.999, 0.001, 0.5, 2.0)
+
+# Contacts give like a tool and a table of some elasticity: 0.1 mm under 20 N, 0.4 mm under 120 N. Harder ones
+# rattle under a tool that is drawn over them.
+_CONTACT_SOLREF = (0.010, 1.0)
+_CONTACT_SOLIMP = (0.3, 0.95, 0.0005, 0.5, 2.0)
+# Sliding friction of what touches; assumed: a tool of metal or plastic on a table.
+_SLIDING_FRICTION = 0.3
+
+
+class JointServos:
+    """Switches the joints of a compiled model between servo control and freedrive.
+
+    Free: the actuators give `ctrl` as torque, and friction holds resting joints.
+
+    Attributes:
+        bias: torque beside the law (6,) [Nm].
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._gain = model.actuator_gainprm
+        self._law = model.actuator_biasprm
+        self._servo_gain, self._servo_law = self._gain.copy(), self._law.copy()
+        self._solimp = model.dof_solimp
+        self._servo_solimp = model.dof_solimp.copy()
+        self.bias: NDArray[np.float64] = self._law[:, 0]
+
+    def set_free(self, free: bool) -> None:
+        """Free the joints, or return them to servo control."""
+        self._gain[:, 0] = 1.0 if free else self._servo_gain[:, 0]
+        self._law[:] = 0.0 if free else self._servo_law
+        self._solimp[:] = _STICTION_SOLIMP if free else self._servo_solimp
+
+
+def build_physics(
+    robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float], gains: ServoGains, substep: float
+) -> mujoco.MjModel:
+    """Compile the plant's model; see `arm_spec` for the mechanism.
+
+    Args:
+        robot: the type of arm.
+        dh: its six true rows.
+        mass_scale: six factors on the link masses.
+        gains: of the joint servos.
+        substep: physics time step [s].
+    """
+    spec = arm_spec(robot, dh, mass_scale)
+    option = spec.option
+    option.timestep = substep
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # Round friction cones: on a pyramid a drawn tool jumps from edge to edge.
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    # A diverged state must reach the caller instead of being reset silently. Islands and the midphase
+    # are for scenes with many bodies and only cost time here.
+    off = mujoco.mjtDisableBit
+    option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_ISLAND | off.mjDSBL_MIDPHASE
+    _add_joint_physics(spec, robot)
+    _add_drives(spec, robot, gains)
+    _add_hulls(spec, robot, dh)
+    _add_sensors(spec)
+    model = spec.compile()
+    if robot.friction_rise is not None:
+        _set_friction_rise(model, robot.friction_rise)
+    return model
+
+
+def _set_friction_rise(model: mujoco.MjModel, speed: float) -> None:
+    """Let dry friction grow from zero to its size over a speed [rad/s], by backward Euler.
+
+    With w a joint's inverse inertia, MuJoCo solves f (w + R) = -2 v / (d t) - a for the force f, where a is
+    the acceleration without it, R = w (1 - d) / d, and d, t are the impedance and time constant set here.
+    R = speed / (size step) and d t = 2 step make that f = -size / speed times the speed after the step.
+    """
+    step = model.opt.timestep
+    slope = step * model.dof_invweight0 * model.dof_frictionloss / speed
+    impedance = slope / (1.0 + slope)
+    model.dof_solimp[:, :2] = impedance[:, None]
+    model.dof_solref[:, 0] = 2.0 * step / impedance
+
+
+def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
+    for i, name in enumerate(JOINTS):
+        joint = spec.joint(name)
+        joint.armature = robot.armature[i]
+        joint.damping = [robot.viscous_beyond_kink[i], 0.0, 0.0]
+        joint.frictionloss = robot.coulomb[i]
+        joint.solref_friction = _FRICTION_SOLREF
+        joint.solimp_friction = _FRICTION_SOLIMP
+
+
+def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:
+    for i, name in enumerate(JOINTS):
+        drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        drive.gainprm[0] = gains.kp[i]
+        drive.biasprm[1] = -gains.kp[i]
+        drive.biasprm[2] = -gains.kv[i]
+        drive.forcelimited = True
+        drive.forcerange = [-robot.tau_max[i], robot.tau_max[i]]
+
+
+def _add_hulls(spec: mujoco.MjSpec, robot: RobotModel, dh: Sequence[DhRow]) -> None:
+    world = spec.worldbody
+    world.add_geom(
+        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=[0.0, 0.0, TABLE_HEIGHT]
+    )
+    add_slots(spec)
+    base, *hulls = robot.outline.hulls(robot.dh)
+    _add_capsule(world, base.start, base.end, base.radius)
+    for name, hull, row in zip(LINKS, hulls, dh, strict=True):
+        _add_capsule(spec.body(name), to_body(row, hull.start), to_body(row, hull.end), hull.radius)
+    # Neighbours touch in their common joint by construction; in the wrist the next but one is out of reach.
+    neighbours = [*pairwise(("world", *LINKS)), (LINKS[2], LINKS[4]), (LINKS[3], LINKS[5])]
+    for geom in spec.geoms:
+        geom.solref = _CONTACT_SOLREF
+        geom.solimp = _CONTACT_SOLIMP
+        geom.friction[0] = _SLIDING_FRICTION
+    for one, other in neighbours:
+        spec.add_exclude(bodyname1=one, bodyname2=other)
+
+
+def _add_capsule(body: mujoco.MjsBody, start: Sequence[float], end: Sequence[float], radius: float) -> None:
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[*start, *end], size=[radius, 0.0, 0.0], mass=0.0
+    )
+
+
+def _add_sensors(spec: mujoco.MjSpec) -> None:
+    """Add raw sensors in the order of `sensors.REC_SIMULATED`; they are taken at the start of a sub-step."""
+    kinds, objects = mujoco.mjtSensor, mujoco.mjtObj
+    for kind, of in (
+        (kinds.mjSENS_JOINTPOS, objects.mjOBJ_JOINT),
+        (kinds.mjSENS_JOINTVEL, objects.mjOBJ_JOINT),
+        (kinds.mjSENS_ACTUATORFRC, objects.mjOBJ_ACTUATOR),
+    ):
+        for name in JOINTS:
+            spec.add_sensor(type=kind, objtype=of, objname=name)
+    for kind, of in (
+        (kinds.mjSENS_ACCELEROMETER, objects.mjOBJ_SITE),
+        (kinds.mjSENS_FRAMELINVEL, objects.mjOBJ_SITE),
+    ):
+        spec.add_sensor(type=kind, objtype=of, objname=FLANGE)
+
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 

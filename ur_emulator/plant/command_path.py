@@ -37,7 +37,7 @@ from struct import Struct
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.plant.plant_state import Target
+from ur_emulator.motion.generators import JointTarget
 
 N_SIGNALS = 3  # position, speed, deflection
 _TRIM, _ERROR = -2, -1  # of the rows that go from a cycle to the next
@@ -143,7 +143,7 @@ class CommandPath:
         self._final[_TRIM:] = q_motor - set_point, np.zeros(6)
         self.keep()
 
-    def take(self, target: Target) -> None:
+    def take(self, target: JointTarget) -> None:
         """Fill `newest`; its third row with qdd, for the caller to replace by the deflection."""
         # One call for three assignments of tuples.
         _PACK(self._newest_memory, 0, *target.q, *target.qd, *target.qdd)

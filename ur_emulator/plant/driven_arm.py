@@ -25,12 +25,10 @@ from ur_emulator.models.calibration import Calibration, calibrated_dh
 from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
-from ur_emulator.motion.generators import TorqueCommand
+from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
-from ur_emulator.plant.drives import TARGET_MAX, Drives
+from ur_emulator.plant.drives import TARGET_MAX, Drives, ServoGains
 from ur_emulator.plant.feedback import Feedback
-from ur_emulator.plant.physics import ServoGains
-from ur_emulator.plant.plant_state import Target
 
 # --- the dead time of an arm's drives: drawn once a box, or another one every cycle
 
@@ -75,7 +73,7 @@ def draw_dead_time(fidelity: Fidelity, seed: int, generation: RobotGeneration) -
 _FREE = (ControlMode.TEACH, ControlMode.TORQUE)
 
 
-class Command(NamedTuple):
+class ArmCommand(NamedTuple):
     """What the arm gets in a cycle, see `Plant.step`.
 
     Attributes:
@@ -86,7 +84,7 @@ class Command(NamedTuple):
     """
 
     cycle: int
-    target: Target | None
+    target: JointTarget | None
     mode: ControlMode
     torque: TorqueCommand | None
 
@@ -162,7 +160,7 @@ class DrivenArm:
 
     # --- the cycle ---
 
-    def advance(self, command: Command) -> None:
+    def advance(self, command: ArmCommand) -> None:
         """Advance by a cycle.
 
         Raises:
@@ -253,7 +251,7 @@ class DrivenArm:
 
     # --- control modes ---
 
-    def _switch(self, mode: ControlMode, target: Target) -> None:
+    def _switch(self, mode: ControlMode, target: JointTarget) -> None:
         """Change the control mode without a jump of the torques."""
         self.undo_run_ahead()
         was_free, self._mode = self._mode in _FREE, mode

@@ -15,7 +15,8 @@ In freedrive there is no set-point: see `Freedrive`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
+from dataclasses import dataclass
+from math import hypot, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +24,36 @@ from numpy.typing import NDArray
 from ur_emulator.models.calibration import Calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
-from ur_emulator.motion.generators import TorqueCommand
+from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.command_path import CommandPath
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
-from ur_emulator.plant.physics import ServoGains
-from ur_emulator.plant.plant_state import Target
+
+
+@dataclass(frozen=True, slots=True)
+class ServoGains:
+    """Gains of the joint servos.
+
+    Attributes:
+        kp: (6,) [Nm/rad].
+        lead: kv / kp, the same for all joints since they are equally fast and damped [s].
+    """
+
+    kp: NDArray[np.float64]
+    lead: float
+
+    @property
+    def kv(self) -> NDArray[np.float64]:
+        """Gains in speed (6,) [Nm s/rad]."""
+        return self.kp * self.lead
+
+    @classmethod
+    def of(cls, robot: RobotModel) -> ServoGains:
+        """Gains that give the robot's servo frequency and damping at its layout inertia."""
+        omega = 2.0 * pi * robot.servo_frequency
+        inertia = np.array(robot.servo_inertia)
+        return cls(kp=omega**2 * inertia, lead=2.0 * robot.servo_damping / omega)
+
 
 # --- freedrive: the torque of the drives while a person guides the arm by hand
 #
@@ -184,7 +209,7 @@ class Drives:
         still = np.zeros(6)
         self._path.reset(q, self._dynamics.evaluate(q, still, still) * self._per_kp, q_motor)
 
-    def follow_moving(self, target: Target, q_motor: NDArray[np.float64]) -> None:
+    def follow_moving(self, target: JointTarget, q_motor: NDArray[np.float64]) -> None:
         """Follow a target that begins now, the motors being at q_motor (6,) [rad].
 
         The servo begins without a torque of its own: the difference of the motors from the set-point is
@@ -198,7 +223,7 @@ class Drives:
         """Give no torque: the brakes hold the arm."""
         self.target_moment = self.target_current = ZERO6
 
-    def command(self, target: Target) -> bool:
+    def command(self, target: JointTarget) -> bool:
         """Set the target of this cycle.
 
         Returns:

@@ -16,11 +16,10 @@ from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
-from ur_emulator.motion.generators import TorqueCommand
+from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.plant_state import PlantState, Target
+from ur_emulator.plant.plant import Plant, PlantState
 
 
 class ExactPlant(Plant):
@@ -42,7 +41,7 @@ class ExactPlant(Plant):
 
     def step(
         self,
-        target: Target | None,
+        target: JointTarget | None,
         mode: ControlMode = ControlMode.POSITION,
         torque: TorqueCommand | None = None,
     ) -> None:

@@ -11,12 +11,15 @@ Part of the work needs not wait for the next target: `run_ahead` does it while a
 |                                                   | undoes it                                              |
 | `DrivenArm.moves_later`: measurements are a cycle | the present cycle: its report did not need it, so the  |
 | old when they are reported, targets act at once   | step of the next cycle computes it, or `run_ahead`     |
+
+Input and output of the plant, once a control cycle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import exp
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +30,9 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
-from ur_emulator.motion.generators import TorqueCommand
-from ur_emulator.plant.driven_arm import Command, DrivenArm, draw_dead_time
+from ur_emulator.motion.generators import JointTarget, TorqueCommand
+from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
 from ur_emulator.plant.obstacles import Obstacles
-from ur_emulator.plant.plant_state import PlantState, Target
 
 # --- thermometers: joint temperatures that follow the heat of the motors; deterministic
 #
@@ -99,7 +101,7 @@ class Plant:
         self._reports_control_as_target = generation.reports_control_as_target
         self._state: PlantState | None = None
         # The command of the present cycle, by which the arm has not moved yet.
-        self._command: Command | None = None
+        self._command: ArmCommand | None = None
         self.reset(robot.home_q)
 
     # --- state for tests and for the control API ---
@@ -220,7 +222,7 @@ class Plant:
 
     def step(
         self,
-        target: Target | None,
+        target: JointTarget | None,
         mode: ControlMode = ControlMode.POSITION,
         torque: TorqueCommand | None = None,
     ) -> None:
@@ -239,7 +241,7 @@ class Plant:
         self._finish()
         self._state = None
         self.cycle += 1
-        self._command = Command(self.cycle, target, mode, torque)
+        self._command = ArmCommand(self.cycle, target, mode, torque)
         if not self._arm.moves_later:
             self._finish()
 
@@ -293,3 +295,80 @@ class Plant:
         return now._replace(
             target_current=current, target_moment=before.target_moment, joint_control_output=control
         )
+
+
+class PlantState(NamedTuple):
+    """The state of the arm after a cycle, as the control box reads it; names as in RTDE where one exists.
+
+    The first group is measured: noisy, and as old as the feedback age. The second group is computed inside
+    the box for the present target. The third is for the safety system: the present state.
+
+    Attributes:
+        actual_q: joint angles [rad].
+        actual_qd: joint speeds [rad/s]; exactly 0 at rest.
+        actual_current: motor currents [A].
+        joint_voltage: joint supply voltages [V].
+        tool_accelerometer: specific force in the flange frame [m/s²]; +g upwards at rest.
+        tcp_force: the box's estimate of the external wrench at the flange, base axes [N, Nm].
+        joint_temperatures: [°C].
+        target_current: current that the controller's model expects for the target, friction included [A].
+        target_moment: torque of the controller's rigid-body model for the target [Nm].
+        joint_control_output: current that the drives ask for at the end of the cycle [A].
+        torque_saturated: some joint was at its torque limit at the start and at the end of the cycle.
+        position_error: set-point of the drives (after delay and lag) minus true angle, end of cycle [rad].
+    """
+
+    actual_q: Vector6
+    actual_qd: Vector6
+    actual_current: Vector6
+    joint_voltage: Vector6
+    tool_accelerometer: Vector3
+    tcp_force: Vector6
+    joint_temperatures: Vector6
+    target_current: Vector6
+    target_moment: Vector6
+    joint_control_output: Vector6
+    torque_saturated: bool
+    position_error: Vector6
+
+
+_NOTHING: Vector3 = (0.0, 0.0, 0.0)
+
+
+class FlangePush:
+    """Applies an external force and counts the cycles of one with a duration.
+
+    Args:
+        plant: the arm.
+        period_s: duration of a cycle [s].
+    """
+
+    __slots__ = ("_cycles_left", "_period_s", "_plant")
+
+    def __init__(self, plant: Plant, period_s: float) -> None:
+        self._plant = plant
+        self._period_s = period_s
+        self._cycles_left = 0
+
+    @property
+    def will_end(self) -> bool:
+        """True during a push with a duration."""
+        return self._cycles_left > 0
+
+    def begin(self, force: Vector3, point: Vector3, duration: float | None) -> None:
+        """Push from this cycle on.
+
+        Args:
+            force: in base axes [N]; zero ends the push before.
+            point: where it acts, in the flange frame [m].
+            duration: of the push [s]; None: until the next one.
+        """
+        n_cycles = 0 if duration is None else round(duration / self._period_s)
+        self._plant.push(force if duration is None or n_cycles else _NOTHING, point)
+        self._cycles_left = n_cycles
+
+    def step(self) -> None:
+        """Count a cycle of a push with a duration; end it after the last."""
+        self._cycles_left -= 1
+        if not self._cycles_left:
+            self._plant.push(_NOTHING)

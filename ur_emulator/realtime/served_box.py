@@ -110,7 +110,7 @@ class ServedBox:
     @property
     def remote_period(self) -> int:
         """Number of the present period of remote control, 0 in local control."""
-        return self.controller.state.operator.remote_period
+        return self.controller.state.pendant.remote_period
 
     def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
         """Take a command for the next cycle.

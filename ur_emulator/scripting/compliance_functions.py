@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ur_emulator.controller.compliance.compliance import Compliance
-from ur_emulator.controller.compliance.force_sense import ForceSense
+from ur_emulator.controller.compliance import Compliance
+from ur_emulator.controller.force_sense import ForceSense
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.kinematics.arm_model import ArmModel, moved_wrench
@@ -20,7 +20,7 @@ from ur_emulator.motion.force_mode import (
     FrameType,
     TaskFrame,
 )
-from ur_emulator.plant.physics import ServoGains
+from ur_emulator.plant.drives import ServoGains
 from ur_emulator.scripting.script_arm import ScriptArm, require_positive
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Pose, log_form

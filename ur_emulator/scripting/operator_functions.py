@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 from protocol.primary.messages import RequestedType
 from ur_emulator.controller.events import EventQueue, PopupShown, ProgramRequests, ValueRequested
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
-from ur_emulator.controller.operator import Answer, Operator, OperatorRequest
 from ur_emulator.controller.past_cycles import PastCycles
+from ur_emulator.controller.pendant import Answer, Pendant, PendantRequest
 from ur_emulator.controller.settings import ErrorSettings
 from ur_emulator.models.robot_model import six
 from urscript.errors import ScriptRuntimeError
@@ -30,14 +30,14 @@ _KINDS = {
 }
 
 
-def operator_functions(operator: Operator, events: EventQueue) -> Mapping[str, Callable[..., Any]]:
+def operator_functions(pendant: Pendant, events: EventQueue) -> Mapping[str, Callable[..., Any]]:
     """Return the builtins for popups and requests."""
 
-    def wait_for(request: OperatorRequest) -> Generator[Blocked, None, Answer | None]:
+    def wait_for(request: PendantRequest) -> Generator[Blocked, None, Answer | None]:
         try:
             yield Blocked(lambda: request.is_answered, outside=True)
         finally:
-            operator.withdraw(request)  # the program may have been stopped meanwhile
+            pendant.withdraw(request)  # the program may have been stopped meanwhile
         return request.answer
 
     def popup(
@@ -45,16 +45,16 @@ def operator_functions(operator: Operator, events: EventQueue) -> Mapping[str, C
     ) -> Generator[Blocked, None, None]:
         text = log_form(s)
         if not blocking:
-            operator.show(text)
+            pendant.show(text)
             events.append(PopupShown(title, text, warning, error, blocking))
             return
-        request = operator.ask(RequestedType.NONE, text)
+        request = pendant.ask(RequestedType.NONE, text)
         events.append(PopupShown(title, text, warning, error, blocking, request.request_id))
         yield from wait_for(request)
 
     def requester(kind: RequestedType) -> Callable[..., Generator[Blocked, None, Answer | None]]:
         def request_value(thread: object, text: str) -> Generator[Blocked, None, Answer | None]:
-            request = operator.ask(kind, text)
+            request = pendant.ask(kind, text)
             events.append(ValueRequested(request.request_id, kind, text))
             return (yield from wait_for(request))
 

@@ -83,7 +83,7 @@ class RobotHost:
             **self._conveyor.functions(),
             **self._path_offset.functions(),
             **ProgramTorque(state.motion, state.compliance, state.past, state.events).functions(),
-            **operator_functions(state.operator, state.events),
+            **operator_functions(state.pendant, state.events),
             **interpreter_functions(state.interpreter),
             **clock_functions(state.clock),
             **error_functions(state.error_settings, state.past, state.requests),

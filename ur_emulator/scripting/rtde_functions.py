@@ -8,7 +8,7 @@ from typing import Any
 from protocol.rtde.fields import INPUTS, RtdeField
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from ur_emulator.controller.clock import Clock
-from ur_emulator.controller.compliance.force_sense import VARIABLE, ExternalSensor, ForceSense
+from ur_emulator.controller.force_sense import VARIABLE, ExternalSensor, ForceSense
 from ur_emulator.controller.io.watchdogs import WatchdogAction, Watchdogs
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import Vector3

@@ -11,9 +11,8 @@ from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyS
 from ur_emulator.controller.settings import ToolSettings
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
-from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
-from ur_emulator.motion.path_motion import OwnershipError
 from ur_emulator.motion.tool import Tool
 from urscript.errors import ScriptRuntimeError
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from protocol.pose import pose_inv, pose_sub, pose_trans, rotvec_to_matrix
-from ur_emulator.controller.compliance.force_sense import ForceSense
 from ur_emulator.controller.events import ProgramRequests
+from ur_emulator.controller.force_sense import ForceSense
 from ur_emulator.controller.settings import Payload, ToolSettings
 from ur_emulator.controller.world_model import WorldModel, WorldModelError
 from ur_emulator.models.robot_model import RobotModel, Vector3, six

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ur_emulator.controller.compliance.compliance import Compliance
+from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import ZERO6, Vector6
-from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.motion.generators import (
     DirectTorque,
     JointTarget,
@@ -21,7 +21,6 @@ from ur_emulator.motion.generators import (
     Streamed,
     TorqueCommand,
 )
-from ur_emulator.motion.path_motion import OwnershipError
 from ur_emulator.scripting.script_arm import MIN_LIMIT, Cycles, ScriptArm, floats, require_positive
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE

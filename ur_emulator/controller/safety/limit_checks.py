@@ -18,7 +18,7 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.models.robot_model import RobotModel, Vector6
 from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.plant.plant import PlantState
 
 # A joint this far from its (delayed) target is blocked or pushed [rad].
 MAX_POSITION_DEVIATION = 0.15

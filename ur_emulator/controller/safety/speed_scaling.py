@@ -20,9 +20,8 @@ from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
-from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.path_motion import SCALING_RATE
-from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.motion.arm_motion import SCALING_RATE, ArmMotion
+from ur_emulator.plant.plant import PlantState
 
 TOLERANCE = radians(1.15)
 # Tolerance of the limits of TCP, force, power and momentum, as a share; chosen.

@@ -74,7 +74,7 @@ class DashboardAnswers:
             "get operational mode": lambda row, *_: row.reply(mode=self._operational_mode()),
             "clear operational mode": self._clear_operational_mode,
             "is in remote control": lambda row, *_: row.reply(
-                remote=str(bool(access.controller.state.operator.remote_period)).lower()
+                remote=str(bool(access.controller.state.pendant.remote_period)).lower()
             ),
             "power on": lambda row, *_: self._applied(row, PowerOn()),
             "power off": lambda row, *_: self._applied(row, PowerOff()),

@@ -63,7 +63,7 @@ class _DashboardSession(Session):
         self._remote_period = self._period_now()
 
     def _period_now(self) -> int:
-        return self._access.controller.state.operator.remote_period
+        return self._access.controller.state.pendant.remote_period
 
     def _take(self, data: bytes) -> None:
         try:

@@ -191,7 +191,7 @@ def obstacle_to_playing(access: BoxAccess, *, has_program: bool) -> str:
         return f"the robot is in {RobotMode(mode).name}, it must be RUNNING"
     if is_running(access) and not is_paused(access):
         return "a program plays already"
-    if state.operator.requests:
+    if state.pendant.requests:
         return "a popup waits to be closed, or a question for its answer"
     return "" if has_program or is_paused(access) else "no program is loaded"
 
@@ -427,7 +427,7 @@ class ProgramPlayer:
         )
 
     def _start_by_input(self) -> Steps[None]:
-        if not self._access.controller.state.operator.remote_period:
+        if not self._access.controller.state.pendant.remote_period:
             self._refuse("play", "an input starts programs only in remote control")
         yield from self.play(THIS_MACHINE)
 

@@ -20,7 +20,7 @@ class Sender:
     """A client that sends scripts.
 
     Attributes:
-        remote_period: number of the period of remote control in which it has connected, see `Operator`.
+        remote_period: number of the period of remote control in which it has connected, see `Pendant`.
         channel: what it has sent of a program that is not complete.
         waiting: its programs that wait, in order.
         compiling: its program that is being compiled, or whose result waits for the next cycle.

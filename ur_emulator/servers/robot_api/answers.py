@@ -96,7 +96,7 @@ class RobotApiAnswers:
             "PUT /program/v1/loaded": lambda request, _: programs.load(request, "name"),
             "GET /program/v1/loaded": lambda *_: _at_once({"name": programs.loaded_name()}),
             "GET /system/v1/controlmode": lambda *_: _at_once(
-                {"mode": "REMOTE" if access.controller.state.operator.remote_period else "LOCAL"}
+                {"mode": "REMOTE" if access.controller.state.pendant.remote_period else "LOCAL"}
             ),
             "GET /system/v1/operationalmode": lambda *_: _at_once({"mode": self._operational_mode()}),
             "GET /programs/v1": lambda *_: programs.list_all(),
@@ -132,7 +132,7 @@ class RobotApiAnswers:
             if argument:
                 raise HttpError(405, f"{request.path} is asked with {argument}", ("Allow", argument))
             raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {BASE}/openapi.json")
-        if call.needs_remote and not self._access.controller.state.operator.remote_period:
+        if call.needs_remote and not self._access.controller.state.pendant.remote_period:
             raise HttpError(403, _LOCAL)
         try:
             answer = yield from self._methods[f"{call.method} {call.path}"](request, argument)
@@ -189,7 +189,7 @@ class RobotApiAnswers:
         return (yield from self._applied(ShowPopup(request.text("message"))))
 
     def _close_popups(self, *_: object) -> Steps[HttpAnswer]:
-        operator = self._access.controller.state.operator
+        operator = self._access.controller.state.pendant
         if not operator.shown and not any(popup.kind is RequestedType.NONE for popup in operator.requests):
             return HttpAnswer(409, _NOT_CLOSED)
         yield from self._access.apply(ClosePopup())

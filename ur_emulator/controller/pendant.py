@@ -36,7 +36,7 @@ def _as_asked(kind: RequestedType, value: Answer) -> Answer | None:
 
 
 @dataclass(slots=True)
-class OperatorRequest:
+class PendantRequest:
     """A question on the screen.
 
     Attributes:
@@ -54,7 +54,7 @@ class OperatorRequest:
     is_answered: bool = False
 
 
-class Operator:
+class Pendant:
     """All open questions, the oldest first.
 
     Attributes:
@@ -67,11 +67,11 @@ class Operator:
         self.buttons = 0
         self.remote_period = self._n_periods = 1
         self._count = 0
-        self._open: dict[int, OperatorRequest] = {}
+        self._open: dict[int, PendantRequest] = {}
         self._shown: deque[str] = deque(maxlen=MAX_SHOWN)
 
     @property
-    def requests(self) -> tuple[OperatorRequest, ...]:
+    def requests(self) -> tuple[PendantRequest, ...]:
         """The questions that wait for an answer."""
         return tuple(self._open.values())
 
@@ -94,13 +94,13 @@ class Operator:
         """Show a popup that does not block a program; it stays, also without power, until it is closed."""
         self._shown.append(text)
 
-    def ask(self, kind: RequestedType, text: str) -> OperatorRequest:
+    def ask(self, kind: RequestedType, text: str) -> PendantRequest:
         """Put a question on the screen."""
         self._count += 1
-        request = self._open[self._count] = OperatorRequest(self._count, kind, text)
+        request = self._open[self._count] = PendantRequest(self._count, kind, text)
         return request
 
-    def withdraw(self, request: OperatorRequest) -> None:
+    def withdraw(self, request: PendantRequest) -> None:
         """Take a question off the screen, answered or not."""
         self._open.pop(request.request_id, None)
 
@@ -126,6 +126,6 @@ class Operator:
             if request.kind is RequestedType.NONE:
                 self._finish(request)
 
-    def _finish(self, request: OperatorRequest) -> None:
+    def _finish(self, request: PendantRequest) -> None:
         request.is_answered = True
         self.withdraw(request)

@@ -24,7 +24,7 @@ from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.axis_hold import AxisHold
 from ur_emulator.motion.force_mode import ForceMode
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
-from ur_emulator.plant.plant_state import PlantState
+from ur_emulator.plant.plant import PlantState
 
 # An external force above this when freedrive begins means a wrong payload or a push [N]. It is twice the
 # stated precision of the estimate.

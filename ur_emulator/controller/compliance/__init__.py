@@ -1,1 +1,0 @@
-"""Force and compliance: the measured wrench, external pushes, force mode, freedrive."""
