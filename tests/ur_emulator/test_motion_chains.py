@@ -25,7 +25,7 @@ from motion_support import (
 
 from protocol.ur_types import SafetyMode
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
-from ur_emulator.controller.safety.limit_checks import SetpointCheck, find_invalid_setpoint
+from ur_emulator.controller.safety.limit_checks import SetpointCheck
 from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.motion.leg import move_j, move_tool
@@ -39,6 +39,7 @@ V, A = 0.25, 1.2
 LONGEST = 60.0
 
 LIMITS = limits_of(ARM.robot)
+CHECK = SetpointCheck(ARM.robot.stop_deceleration, DT)
 
 
 def straight(goal, **limits):
@@ -228,7 +229,7 @@ def test_near_a_singularity_the_tool_slows_down_for_the_joints():
     assert TOOL.pose(targets[-1].q) == pytest.approx(goal, abs=1e-9)
     assert distance_to_polyline(positions(targets), [start[:3], goal[:3]]).max() < 1e-4
     for before, after in itertools.pairwise(targets):
-        assert find_invalid_setpoint(LIMITS, before, after, ARM.robot.stop_deceleration, DT) is None
+        assert CHECK.find_invalid(LIMITS, before, after) is None
 
 
 @pytest.mark.parametrize("joint", range(6))
@@ -238,8 +239,7 @@ def test_a_set_point_that_is_not_a_finite_number_is_invalid(joint, value, field)
     before = JointTarget(HOME)
     values = list(getattr(before, field))
     values[joint] = value
-    check = SetpointCheck(ARM.robot.stop_deceleration, DT)
-    found = check.find_invalid(LIMITS, before, before._replace(**{field: tuple(values)}))
+    found = CHECK.find_invalid(LIMITS, before, before._replace(**{field: tuple(values)}))
     assert found is not None
     assert (found.error.code, found.error.argument) == (204, joint)
 
@@ -263,7 +263,7 @@ moves = st.one_of(
 
 def is_accepted(targets):
     pairs = itertools.pairwise(targets)
-    return all(find_invalid_setpoint(LIMITS, a, b, ARM.robot.stop_deceleration, DT) is None for a, b in pairs)
+    return all(CHECK.find_invalid(LIMITS, a, b) is None for a, b in pairs)
 
 
 def can_be_executed_one_by_one(makers):

@@ -131,7 +131,7 @@ def test_stops_end_all_overlays(end):
     run_cycles(motion, 40)
     if end == "stop":
         before = motion.target.qd
-        motion.stop(20.0)
+        motion.stop()
         assert np.abs(np.subtract(motion.step(DT, 1.0).qd, before)).max() <= 20.0 * DT * 1.001
     else:
         motion.place(HOME)

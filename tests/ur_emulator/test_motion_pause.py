@@ -154,7 +154,7 @@ def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(pushed):
     for _ in range(20):
         motion.step(DT, 1.0)
     left_at = motion.path.q
-    motion.interrupt(20.0)
+    motion.interrupt()
     while not motion.is_paused:
         motion.step(DT, 1.0)
     assert motion.target.q != left_at
@@ -185,7 +185,7 @@ def test_a_move_that_was_not_accepted_is_taken_back():
     before = motion.target
     motion.step(DT, 1.0)
     motion.retract(before)
-    motion.interrupt(20.0)
+    motion.interrupt()
     for _ in range(30):
         motion.step(DT, 1.0)
     motion.resume()
@@ -206,7 +206,7 @@ def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
     motion.pause()
     for _ in range(10):
         motion.step(DT, 1.0)
-    motion.stop(20.0) if end == "stop" else motion.release("me")
+    motion.stop() if end == "stop" else motion.release("me")
     for _ in range(30):
         motion.step(DT, 1.0)
     assert not motion.is_moving

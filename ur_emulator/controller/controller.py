@@ -185,8 +185,8 @@ class Controller:
         self._payload = self.state.tool.payload
         self.state.past.place(motion.target, self.plant.sense())
         self.programs = make_programs(self.state)
-        self.safety = SafetySystem(self.state, self.programs)
-        self.push = FlangePush(self.plant, self.period_s)
+        self.safety = SafetySystem(self.state, self.programs, self.plant)
+        self.push = FlangePush(self.plant)
         self.state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())

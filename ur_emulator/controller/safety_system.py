@@ -25,7 +25,7 @@ from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.arm_motion import SCALING_RATE
-from ur_emulator.plant.plant import PlantState
+from ur_emulator.plant.plant import Plant, PlantState
 
 # The drives lag behind their targets by 30 to 50 ms. The brakes wait for them, at most the second time [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
@@ -39,8 +39,9 @@ class SafetySystem:
         is_busy: `step` and `find_violation` must be called in every cycle.
     """
 
-    def __init__(self, state: ControllerState, programs: Programs) -> None:
+    def __init__(self, state: ControllerState, programs: Programs, plant: Plant) -> None:
         self._state = state
+        self._plant = plant
         self._programs = programs
         self.inputs = SafetyInputs(
             self.handle, state.enabling_device, state.operational, self._begin_operational_mode
@@ -72,8 +73,13 @@ class SafetySystem:
         self._update()
 
     def set_limits(self, limits: ConfiguredLimits) -> None:
-        """Set the limits of joints and space, also those of the mode that is in force."""
+        """Set the limits of joints and space, in place of those of the arm's model.
+
+        The mode in force, the inverse kinematics and freedrive keep them too.
+        """
         self._state.safety.set_limits(limits)
+        self._state.arm.set_range(limits.q_min, limits.q_max)
+        self._plant.set_range(limits.q_min, limits.q_max)
         self._set_limits(self._state.safety.mode)
         self._update()
 
@@ -97,7 +103,7 @@ class SafetySystem:
         self._is_waiting = False
         self._programs.stop()
         state.mode.command(ModeCommand.POWER_OFF)
-        state.motion.stop(state.robot.stop_deceleration)
+        state.motion.stop()
         state.motion.place(state.past.sensed.actual_q)
         self.handle(SafetyEvent.POWERED_OFF)
 
@@ -193,7 +199,7 @@ class SafetySystem:
         state, programs = self._state, self._programs
         hard = 0.0 if state.error_settings.transition_hardness else state.robot.stop_deceleration
         if not programs.is_running:
-            state.motion.stop(state.robot.stop_deceleration)
+            state.motion.stop()
         elif not programs.is_paused:
             self._is_waiting = True
             programs.pause(hard)

@@ -1,4 +1,4 @@
-"""The motion along the path of a program: the current generator, its owner, and their pauses.
+"""The motion of the arm: along the path of the program, displaced by overlays; its pauses and its stops.
 
 The rules of ownership are the controller's behaviour as users report it:
 
@@ -9,10 +9,6 @@ The rules of ownership are the controller's behaviour as users report it:
   (drivers that stream too slowly see a stutter), and when the program ends it stops.
 
 Must not know scripts or physics: an owner is any object, compared by identity.
-
-The motion of the arm: along the path of the program, displaced by overlays; and its stops.
-
-Must not know scripts or physics.
 """
 
 from __future__ import annotations
@@ -132,6 +128,9 @@ class ReturnToPath:
 # Rate of change of the speed scaling [1/s], so that the joint speeds have no step. Chosen.
 SCALING_RATE = 4.0
 
+# The way of a slow arm: at its speed for this long [s], so that rounding is less. Chosen.
+_LEAST_LOOK_AHEAD = 0.02
+
 HOLD = Hold()
 
 
@@ -139,26 +138,35 @@ class OwnershipError(Exception):
     """Another owner has the arm."""
 
 
-class PathMotion:
-    """One generator, one owner, one target along the path.
+class ArmMotion:
+    """One generator on the path of the program, one owner, overlays, and the joint target that follows.
+
+    When a program ends, is replaced or killed during a motion, the leading axis brakes with
+    `stop_deceleration`. Users call the real stop "abrupt"; its value is not published. Chosen: the value of
+    the maker's tests of stop category 0, from the model of the arm.
 
     Attributes:
-        path: target along the path of the program; what generators see.
+        stop_deceleration: of the leading axis in every stop [rad/s^2].
+        path: target along the path of the program, which generators work on.
+        target: of the joints; the same object as `path` unless overlays displace it.
         scaling_rate: rate of change of the speed scaling [1/s].
         braking: gives the greatest deceleration of the leading axis [rad/s^2] that the drives can give in a
             stop, in the direction of the path's velocity; None: a stop brakes as it was asked to.
     """
 
-    def __init__(self, q: Vector6) -> None:
-        self.path = JointTarget(q)
+    def __init__(self, q: Vector6, stop_deceleration: float) -> None:
+        self.stop_deceleration = stop_deceleration
+        self.path = self.target = JointTarget(q)
         self.braking: Callable[[JointTarget], float] | None = None
+        self.scaling_rate = SCALING_RATE
         self._generator: Generator = HOLD
         self._owner: object | None = None
         self._renewed = False
-        self.scaling_rate = SCALING_RATE
         self._scale = 1.0
         self._time_scaling = TimeScaling()
         self._suspended: Suspended | None = None
+        self._chain = OverlayChain()
+        self._overlays = self._chain.overlays
         # Overlays or a pause: a single test in the hot path.
         self._is_special = False
 
@@ -180,12 +188,43 @@ class PathMotion:
         return self.path.q if goal is None else goal
 
     @property
+    def is_moving(self) -> bool:
+        """True while a generator or an overlay moves the arm, unless a pause has stopped it."""
+        return (self._generator is not HOLD or bool(self._overlays)) and not self.is_paused
+
+    @property
+    def is_paused(self) -> bool:
+        """True when a pause has brought the arm to rest."""
+        return self._time_scaling.paused and not any(self.target.qd)
+
+    @property
+    def is_returning(self) -> bool:
+        """True while the arm returns to the path that it left in an interruption."""
+        return isinstance(self._generator, ReturnToPath)
+
+    @property
+    def torque(self) -> TorqueCommand | None:
+        """What the drives shall give; None where they follow `target`."""
+        generator = self._generator
+        return generator.command if isinstance(generator, DirectTorque) else None
+
+    def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
+        """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
+        allowed = inf if self.braking is None else self.braking(target)
+        braking_time = max(map(abs, target.qd)) / (2.0 * min(self.stop_deceleration, allowed))
+        for share in (0.5, 1.0):
+            time = share * max(braking_time, _LEAST_LOOK_AHEAD)
+            yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
+
+    @property
     def _move(self) -> Move | None:
         """The current move, also while it is interrupted."""
         generator = self._generator if self._suspended is None else self._suspended.generator
         if isinstance(generator, ReturnToPath):
             return generator.move
         return generator if isinstance(generator, Move) else None
+
+    # --- commands of the owner
 
     def move_of(self, owner: object) -> Move | None:
         """Return the current move of `owner`, if it has one."""
@@ -205,16 +244,33 @@ class PathMotion:
         self._generator = generator
         self._renewed = True
 
+    def command_torque(self, owner: object, generator: DirectTorque) -> None:
+        """Drive the arm by torque for `owner` in the next cycle; overlays end.
+
+        Raises:
+            OwnershipError: another owner has the arm.
+        """
+        self.command(owner, generator)
+        self._chain.clear()
+
     def renew(self) -> None:
         """Renew a streamed velocity for one more cycle."""
         self._renewed = True
 
-    # --- pauses
+    def release(self, owner: object) -> None:
+        """End the ownership of `owner`, if it has the arm, and stop its motion at once.
 
-    @property
-    def is_returning(self) -> bool:
-        """True while the arm returns to the path that it left in an interruption."""
-        return isinstance(self._generator, ReturnToPath)
+        A move whose instruction has returned for a blend continues to its waypoint: the end of a program is
+        the same with and without a blend in its last move.
+        """
+        if self._owner is owner:
+            move = self._move
+            if move is not None and move.returned:
+                self._owner = None
+            else:
+                self.stop()
+
+    # --- pauses
 
     def pause(self, deceleration: float = 0.0) -> None:
         """Ramp the arm to rest on its path; a stream is stopped; overlays stand still too.
@@ -258,115 +314,39 @@ class PathMotion:
             move.abandon()
         self._suspended = None
 
-    # --- cycle
-
-    def _advance(self, dt: float, scale: float, time_factor: float) -> JointTarget:
-        """Advance on the path by one cycle."""
-        generator = self._generator
-        if scale != self._scale:
-            change = self.scaling_rate * dt
-            self._scale = scale = min(max(scale, self._scale - change), self._scale + change)
-        if isinstance(generator, Streamed):
-            if not self._renewed:
-                generator = self._generator = generator.when_lost()
-            self._renewed = False
-        if self.braking is not None and isinstance(generator, StopJ):
-            generator.allowed = self.braking(self.path)
-        path = self.path = generator.step(self.path, dt, scale * time_factor)
-        if generator.done and not isinstance(generator, Streamed):
-            self._end_of(generator)
-        return path
-
-    def _end_of(self, generator: Generator) -> None:
-        if isinstance(generator, ReturnToPath):
-            self._generator = generator.move
-            self._time_scaling.factor = 0.0
-            self._is_special = True
-        else:
-            self._generator = HOLD
-            self._owner = None
-
-
-# The way of a slow arm: at its speed for this long [s], so that rounding is less. Chosen.
-_LEAST_LOOK_AHEAD = 0.02
-
-
-class ArmMotion(PathMotion):
-    """The motion state of the arm.
-
-    When a program ends, is replaced or killed during a motion, the leading axis brakes with
-    `stop_deceleration`. Users call the real stop "abrupt"; its value is not published. Chosen: the value of
-    the maker's tests of stop category 0, from the model of the arm.
-
-    Attributes:
-        stop_deceleration: of the leading axis [rad/s^2].
-        path: target along the path of the program, which generators work on.
-        target: of the joints; the same object as `path` unless overlays displace it.
-    """
-
-    def __init__(self, q: Vector6, stop_deceleration: float) -> None:
-        super().__init__(q)
-        self.stop_deceleration = stop_deceleration
-        self.target = self.path
-        self._chain = OverlayChain()
-        self._overlays = self._chain.overlays
-
-    def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
-        """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
-        allowed = inf if self.braking is None else self.braking(target)
-        braking_time = max(map(abs, target.qd)) / (2.0 * min(self.stop_deceleration, allowed))
-        for share in (0.5, 1.0):
-            time = share * max(braking_time, _LEAST_LOOK_AHEAD)
-            yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
-
-    @property
-    def is_moving(self) -> bool:
-        """True while a generator or an overlay moves the arm, unless a pause has stopped it."""
-        return (self._generator is not HOLD or bool(self._overlays)) and not self.is_paused
-
-    @property
-    def is_paused(self) -> bool:
-        """True when a pause has brought the arm to rest."""
-        return self._time_scaling.paused and not any(self.target.qd)
-
-    @property
-    def torque(self) -> TorqueCommand | None:
-        """What the drives shall give; None where they follow `target`."""
-        generator = self._generator
-        return generator.command if isinstance(generator, DirectTorque) else None
-
-    def command_torque(self, owner: object, generator: DirectTorque) -> None:
-        """Drive the arm by torque for `owner` in the next cycle; overlays end.
-
-        Raises:
-            OwnershipError: another owner has the arm.
-        """
-        self.command(owner, generator)
-        self._chain.clear()
-
     # --- stops
 
-    def release(self, owner: object) -> None:
-        """End the ownership of `owner`, if it has the arm, and stop its motion at once.
-
-        A move whose instruction has returned for a blend continues to its waypoint: the end of a program is
-        the same with and without a blend in its last move.
-        """
-        if self._owner is owner:
-            move = self._move
-            if move is not None and move.returned:
-                self._owner = None
-            else:
-                self.stop(self.stop_deceleration)
-
-    def stop(self, deceleration: float) -> None:
-        """Take the arm from its owner and ramp it to rest, leading axis at `deceleration` [rad/s^2].
+    def stop(self) -> None:
+        """Take the arm from its owner and ramp it to rest.
 
         All overlays and a pause end; the path continues from the displaced target.
         """
         self._abandon()
-        self._brake(deceleration)
+        self._brake()
         self._time_scaling.reset()
+
+    def interrupt(self) -> None:
+        """Pause by a stop that leaves the path.
+
+        Overlays end, and with them a move that they displace.
+        """
+        if self._overlays:
+            self._abandon()
+        else:
+            self._suspend()
+        self._brake()
+        self._time_scaling.paused = self._is_special = True
+        self._time_scaling.factor = 0.0
+
+    def abort(self) -> None:
+        """End a movej or movel, as one whose waypoint is where the arm comes to rest.
+
+        The leading axis brakes with `stop_deceleration`. A real arm does not come to rest if the move has a
+        blend radius: it blends into the next one.
+        """
+        if (move := self._move) is not None and not move.leg.process:
+            self._abandon()
+            self._brake()
 
     def place(self, q: Vector6, qd: Vector6 = ZERO6) -> None:
         """Set the target to `q` [rad], where the joints are without a motion of the program.
@@ -392,34 +372,12 @@ class ArmMotion(PathMotion):
         if (move := self._move) is not None:
             move.take_back()
 
-    def _brake(self, deceleration: float) -> None:
+    def _brake(self) -> None:
+        """Take the arm from its owner and ramp the joint target to rest."""
         self._owner = None
         if self._generator is not HOLD or self._overlays:
             self._take_over_target()
-            self._generator = StopJ(deceleration)
-
-    def interrupt(self, deceleration: float) -> None:
-        """Pause by a stop that leaves the path: leading axis at `deceleration` [rad/s^2].
-
-        Overlays end, and with them a move that they displace.
-        """
-        if self._overlays:
-            self._abandon()
-        else:
-            self._suspend()
-        self._brake(deceleration)
-        self._time_scaling.paused = self._is_special = True
-        self._time_scaling.factor = 0.0
-
-    def abort(self) -> None:
-        """End a movej or movel, as one whose waypoint is where the arm comes to rest.
-
-        The leading axis brakes with `stop_deceleration`. A real arm does not come to rest if the move has a
-        blend radius: it blends into the next one.
-        """
-        if (move := self._move) is not None and not move.leg.process:
-            self._abandon()
-            self._brake(self.stop_deceleration)
+            self._generator = StopJ(self.stop_deceleration)
 
     # --- overlays
 
@@ -454,7 +412,7 @@ class ArmMotion(PathMotion):
         self._chain.clear()
         self.path = self.target
 
-    # --- cycle
+    # --- the cycle
 
     def step(self, dt: float, scale: float) -> JointTarget:
         """Advance one cycle and return the new target.
@@ -494,6 +452,32 @@ class ArmMotion(PathMotion):
             self.target = before.at_rest()
         self._is_special = bool(self._overlays) or not self._time_scaling.is_normal
         return self.target
+
+    def _advance(self, dt: float, scale: float, time_factor: float) -> JointTarget:
+        """Advance on the path by one cycle."""
+        generator = self._generator
+        if scale != self._scale:
+            change = self.scaling_rate * dt
+            self._scale = scale = min(max(scale, self._scale - change), self._scale + change)
+        if isinstance(generator, Streamed):
+            if not self._renewed:
+                generator = self._generator = generator.when_lost()
+            self._renewed = False
+        if self.braking is not None and isinstance(generator, StopJ):
+            generator.allowed = self.braking(self.path)
+        path = self.path = generator.step(self.path, dt, scale * time_factor)
+        if generator.done and not isinstance(generator, Streamed):
+            self._end_of(generator)
+        return path
+
+    def _end_of(self, generator: Generator) -> None:
+        if isinstance(generator, ReturnToPath):
+            self._generator = generator.move
+            self._time_scaling.factor = 0.0
+            self._is_special = True
+        else:
+            self._generator = HOLD
+            self._owner = None
 
 
 def _brakes(generator: Generator) -> bool:

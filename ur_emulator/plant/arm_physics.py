@@ -1,11 +1,8 @@
-"""The plant's MuJoCo model: the mechanism with hull, friction, drives, table and raw sensors.
+"""ArmPhysics: one arm in MuJoCo, the forces on it, and the state of one cycle before.
 
-The law of the joint servos is that of MuJoCo's actuators, force = kp (ctrl - q) - kv qd + bias, so that it
-acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
-
-ArmPhysics: one arm in MuJoCo, the forces on it, and the state of one cycle before.
-
-The hinges are the motor side of the gears.
+The model is the mechanism with hulls, friction, drives, table and raw sensors. Its hinges are the motor side
+of the gears. The law of the joint servos is that of MuJoCo's actuators, force = kp (ctrl - q) - kv qd + bias,
+so that it acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
 """
 
 from __future__ import annotations
@@ -24,43 +21,6 @@ from ur_emulator.plant.friction import Presliding
 from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles, add_slots
 from ur_emulator.plant.sensors import REC_Q, REC_QD
-
-# --- contact forces of the surroundings on the arm, as one wrench at the flange
-
-
-def contact_wrench(
-    model: mujoco.MjModel, data: mujoco.MjData, flange: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the sum of the contact forces of fixed bodies (table, base, obstacles) on the arm.
-
-    Contacts between two links of the arm do not count: they are internal forces.
-
-    Args:
-        model: the plant's model.
-        data: its state after a step.
-        flange: the point that moments refer to, in the base frame (3,) [m].
-
-    Returns:
-        Wrench (6,) on the arm, base axes, force first [N, Nm].
-    """
-    wrench = np.zeros(6)
-    fixed_to = model.body_weldid
-    in_contact_frame = np.zeros(6)
-    for i in range(data.ncon):
-        contact = data.contact[i]
-        first, second = (int(fixed_to[model.geom_bodyid[geom]]) for geom in contact.geom)
-        if (first == 0) == (second == 0):
-            continue
-        mujoco.mj_contactForce(model, data, i, in_contact_frame)
-        # MuJoCo gives the force on the second body, in the contact's axes (rows of `frame`).
-        force = contact.frame.reshape(3, 3).T @ in_contact_frame[:3]
-        if second == 0:
-            force = -force
-        fx, fy, fz = force.tolist()
-        rx, ry, rz = (contact.pos - flange).tolist()
-        wrench += (fx, fy, fz, ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx)
-    return wrench
-
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
@@ -81,17 +41,62 @@ _CONTACT_SOLIMP = (0.3, 0.95, 0.0005, 0.5, 2.0)
 # Sliding friction of what touches; assumed: a tool of metal or plastic on a table.
 _SLIDING_FRICTION = 0.3
 
+_RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 
-class JointServos:
-    """Switches the joints of a compiled model between servo control and freedrive.
 
-    Free: the actuators give `ctrl` as torque, and friction holds resting joints.
+class ArmPhysics:
+    """The moving arm.
+
+    Args:
+        robot: the type of arm.
+        dh: its six true rows.
+        mass_scale: six factors on the link masses.
+        gains: of the joint servos.
+        substep: physics time step [s].
+        presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
+            memory of the path.
 
     Attributes:
-        bias: torque beside the law (6,) [Nm].
+        model: of MuJoCo.
+        data: its state.
+        q: motor positions (6,) [rad].
+        qd: motor speeds (6,) [rad/s].
+        torque: of the drives in the last sub-step (6,) [Nm].
+        flange_position: (3,) in the base frame [m], at the start of the last sub-step.
+        flange_rotation: (3, 3), likewise.
+        loads: payload and push at the flange.
+        obstacles: around the arm.
+        bias: torque of the servos beside their law (6,) [Nm].
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        dh: Sequence[DhRow],
+        mass_scale: Sequence[float],
+        gains: ServoGains,
+        substep: float,
+        presliding: float,
+    ) -> None:
+        self.model = model = build_physics(robot, dh, mass_scale, gains, substep)
+        self.data = data = mujoco.MjData(model)
+        self._before = mujoco.MjData(model)
+        # Views into MuJoCo's memory: one attribute lookup each, once.
+        self.q: NDArray[np.float64] = data.qpos
+        self.qd: NDArray[np.float64] = data.qvel
+        self.torque: NDArray[np.float64] = data.actuator_force
+        self._ctrl: NDArray[np.float64] = data.ctrl
+        self._raw: NDArray[np.float64] = data.sensordata
+        self._frictionloss: NDArray[np.float64] = model.dof_frictionloss
+        self._presliding: Presliding | None = None
+        if presliding:
+            self._presliding = Presliding(presliding, self.q, data.qfrc_applied)
+            self._frictionloss[:] = 0.0
+        site: int = model.site(FLANGE).id
+        self.flange_position: NDArray[np.float64] = data.site_xpos[site]
+        self.flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
+        self.loads = Loads(model, data)
+        self.obstacles = Obstacles(model, data.qpos)
         self._gain = model.actuator_gainprm
         self._law = model.actuator_biasprm
         self._servo_gain, self._servo_law = self._gain.copy(), self._law.copy()
@@ -99,11 +104,113 @@ class JointServos:
         self._servo_solimp = model.dof_solimp.copy()
         self.bias: NDArray[np.float64] = self._law[:, 0]
 
+    @property
+    def n_contacts(self) -> int:
+        """Number of contact points of the arm with itself, its base or the table."""
+        return int(self.data.ncon)
+
+    @property
+    def has_diverged(self) -> bool:
+        """Whether the simulation has diverged."""
+        return not self.qd.dot(self.qd) < _RUNAWAY**2
+
+    @property
+    def contact_wrench(self) -> NDArray[np.float64]:
+        """True contact wrench of the surroundings on the arm (6,), at the flange in base axes [N, Nm].
+
+        Contacts between two links of the arm do not count: they are internal forces.
+        """
+        model, data = self.model, self.data
+        wrench = np.zeros(6)
+        fixed_to = model.body_weldid
+        in_contact_frame = np.zeros(6)
+        for i in range(data.ncon):
+            contact = data.contact[i]
+            first, second = (int(fixed_to[model.geom_bodyid[geom]]) for geom in contact.geom)
+            if (first == 0) == (second == 0):
+                continue
+            mujoco.mj_contactForce(model, data, i, in_contact_frame)
+            # MuJoCo gives the force on the second body, in the contact's axes (rows of `frame`).
+            force = contact.frame.reshape(3, 3).T @ in_contact_frame[:3]
+            if second == 0:
+                force = -force
+            fx, fy, fz = force.tolist()
+            rx, ry, rz = (contact.pos - self.flange_position).tolist()
+            wrench += (fx, fy, fz, ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx)
+        return wrench
+
     def set_free(self, free: bool) -> None:
-        """Free the joints, or return them to servo control."""
+        """Free the joints, or return them to servo control.
+
+        Free: the actuators give `ctrl` as torque, and friction holds resting joints.
+        """
         self._gain[:, 0] = 1.0 if free else self._servo_gain[:, 0]
         self._law[:] = 0.0 if free else self._servo_law
         self._solimp[:] = _STICTION_SOLIMP if free else self._servo_solimp
+
+    def place(self, q: NDArray[np.float64]) -> None:
+        """Put the motors at q (6,) [rad], at rest."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.q[:] = q
+        if self._presliding is not None:
+            self._presliding.reset()
+
+    def stop(self) -> None:
+        """Stand still at once, wherever the arm is."""
+        self.qd[:] = 0.0
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def touches(self, q: Sequence[float]) -> bool:
+        """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
+        data = mujoco.MjData(self.model)
+        data.qpos[:] = q
+        mujoco.mj_kinematics(self.model, data)
+        mujoco.mj_collision(self.model, data)
+        return int(data.ncon) > 0
+
+    def run(self, drives: Drives, capture_at: int, captured: NDArray[np.float64]) -> None:
+        """Advance by the sub-steps of a cycle.
+
+        Args:
+            drives: of the joints.
+            capture_at: number of the sub-step whose raw sensors are wanted, which they are at its beginning;
+                the number of sub-steps: those of the last one, with positions and speeds at its end.
+            captured: takes them, see `sensors.REC_SIMULATED`.
+        """
+        model, data, ctrl, step = self.model, self.data, self._ctrl, mujoco.mj_step
+        friction = self._presliding
+        if friction is None:
+            self._frictionloss[:] = drives.coulomb
+        self.bias[:] = drives.bias
+        if self.loads.is_unexpected:
+            self.loads.apply()
+        for row in drives.control:
+            ctrl[:] = row
+            if friction is not None:
+                friction.apply(drives.coulomb)
+            step(model, data)
+            if not capture_at:
+                captured[:] = self._raw
+            capture_at -= 1
+        if not capture_at:
+            captured[:] = self._raw
+            captured[REC_Q] = self.q
+            captured[REC_QD] = self.qd
+
+    def store_state(self) -> None:
+        """Store the present state for `restore_state`."""
+        mujoco.mj_copyData(self._before, self.model, self.data)
+        if self._presliding is not None:
+            self._presliding.store()
+
+    def restore_state(self) -> None:
+        """Return to the stored state."""
+        mujoco.mj_copyData(self.data, self.model, self._before)
+        if self._presliding is not None:
+            self._presliding.restore()
+
+
+# --- the model
 
 
 def build_physics(
@@ -215,138 +322,3 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
         (kinds.mjSENS_FRAMELINVEL, objects.mjOBJ_SITE),
     ):
         spec.add_sensor(type=kind, objtype=of, objname=FLANGE)
-
-
-_RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
-
-
-class ArmPhysics:
-    """The moving arm.
-
-    Args:
-        robot: the type of arm.
-        dh: its six true rows.
-        mass_scale: six factors on the link masses.
-        gains: of the joint servos.
-        substep: physics time step [s].
-        presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
-            memory of the path.
-
-    Attributes:
-        model: of MuJoCo.
-        data: its state.
-        q: motor positions (6,) [rad].
-        qd: motor speeds (6,) [rad/s].
-        torque: of the drives in the last sub-step (6,) [Nm].
-        flange_position: (3,) in the base frame [m], at the start of the last sub-step.
-        flange_rotation: (3, 3), likewise.
-        loads: payload and push at the flange.
-        obstacles: around the arm.
-        servos: of the joints.
-    """
-
-    def __init__(
-        self,
-        robot: RobotModel,
-        dh: Sequence[DhRow],
-        mass_scale: Sequence[float],
-        gains: ServoGains,
-        substep: float,
-        presliding: float,
-    ) -> None:
-        self.model = model = build_physics(robot, dh, mass_scale, gains, substep)
-        self.data = data = mujoco.MjData(model)
-        self._before = mujoco.MjData(model)
-        # Views into MuJoCo's memory: one attribute lookup each, once.
-        self.q: NDArray[np.float64] = data.qpos
-        self.qd: NDArray[np.float64] = data.qvel
-        self.torque: NDArray[np.float64] = data.actuator_force
-        self._ctrl: NDArray[np.float64] = data.ctrl
-        self._raw: NDArray[np.float64] = data.sensordata
-        self._frictionloss: NDArray[np.float64] = model.dof_frictionloss
-        self._presliding: Presliding | None = None
-        if presliding:
-            self._presliding = Presliding(presliding, self.q, data.qfrc_applied)
-            self._frictionloss[:] = 0.0
-        site: int = model.site(FLANGE).id
-        self.flange_position: NDArray[np.float64] = data.site_xpos[site]
-        self.flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
-        self.loads = Loads(model, data)
-        self.obstacles = Obstacles(model, data.qpos)
-        self.servos = JointServos(model)
-
-    @property
-    def n_contacts(self) -> int:
-        """Number of contact points of the arm with itself, its base or the table."""
-        return int(self.data.ncon)
-
-    @property
-    def has_diverged(self) -> bool:
-        """Whether the simulation has diverged."""
-        return not self.qd.dot(self.qd) < _RUNAWAY**2
-
-    @property
-    def contact_wrench(self) -> NDArray[np.float64]:
-        """True contact wrench of table and base on the arm (6,), at the flange in base axes [N, Nm]."""
-        return contact_wrench(self.model, self.data, self.flange_position)
-
-    def place(self, q: NDArray[np.float64]) -> None:
-        """Put the motors at q (6,) [rad], at rest."""
-        mujoco.mj_resetData(self.model, self.data)
-        self.q[:] = q
-        if self._presliding is not None:
-            self._presliding.reset()
-
-    def stop(self) -> None:
-        """Stand still at once, wherever the arm is."""
-        self.qd[:] = 0.0
-        mujoco.mj_kinematics(self.model, self.data)
-
-    def touches(self, q: Sequence[float]) -> bool:
-        """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        data = mujoco.MjData(self.model)
-        data.qpos[:] = q
-        mujoco.mj_kinematics(self.model, data)
-        mujoco.mj_collision(self.model, data)
-        return int(data.ncon) > 0
-
-    def run(self, drives: Drives, capture_at: int, captured: NDArray[np.float64]) -> None:
-        """Advance by the sub-steps of a cycle.
-
-        Args:
-            drives: of the joints.
-            capture_at: number of the sub-step whose raw sensors are wanted, which they are at its beginning;
-                the number of sub-steps: those of the last one, with positions and speeds at its end.
-            captured: takes them, see `sensors.REC_SIMULATED`.
-        """
-        model, data, ctrl, step = self.model, self.data, self._ctrl, mujoco.mj_step
-        friction = self._presliding
-        if friction is None:
-            self._frictionloss[:] = drives.coulomb
-        self.servos.bias[:] = drives.bias
-        if self.loads.is_unexpected:
-            self.loads.apply()
-        for row in drives.control:
-            ctrl[:] = row
-            if friction is not None:
-                friction.apply(drives.coulomb)
-            step(model, data)
-            if not capture_at:
-                captured[:] = self._raw
-            capture_at -= 1
-        if not capture_at:
-            captured[:] = self._raw
-            captured[REC_Q] = self.q
-            captured[REC_QD] = self.qd
-
-    def store_state(self) -> None:
-        """Store the present state for `restore_state`."""
-        mujoco.mj_copyData(self._before, self.model, self.data)
-        if self._presliding is not None:
-            self._presliding.store()
-
-    def restore_state(self) -> None:
-        """Return to the stored state."""
-        mujoco.mj_copyData(self.data, self.model, self._before)
-        if self._presliding is not None:
-            self._presliding.restore()

@@ -255,7 +255,7 @@ class DrivenArm:
         """Change the control mode without a jump of the torques."""
         self.undo_run_ahead()
         was_free, self._mode = self._mode in _FREE, mode
-        self.physics.servos.set_free(mode in _FREE)
+        self.physics.set_free(mode in _FREE)
         if was_free:
             self.drives.follow_moving(target, self.physics.q)
         self._trim_is_held = mode is ControlMode.FORCE or (self._trim_is_held and not was_free)
@@ -276,7 +276,7 @@ class DrivenArm:
         self._trim_is_held = False
         if self._mode is not ControlMode.POSITION:
             self._mode = ControlMode.POSITION
-            self.physics.servos.set_free(False)
+            self.physics.set_free(False)
         self._saturated_before = self._saturated_now = False
         self._error[:] = 0.0
         self.control_current = ZERO6

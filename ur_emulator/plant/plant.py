@@ -3,7 +3,7 @@
 The plant knows nothing of programs, modes or safety; it follows its targets or raises `PlantError`. It reads
 no clock, and all randomness comes from the seed: equal seeds and equal targets give bit-identical states.
 
-Part of the work needs not wait for the next target: `run_ahead` does it while a client computes that target.
+Part of the work need not wait for the next target: `run_ahead` does it while a client computes that target.
 
 | arm                                               | what runs ahead                                        |
 |---------------------------------------------------|--------------------------------------------------------|
@@ -11,8 +11,6 @@ Part of the work needs not wait for the next target: `run_ahead` does it while a
 |                                                   | undoes it                                              |
 | `DrivenArm.moves_later`: measurements are a cycle | the present cycle: its report did not need it, so the  |
 | old when they are reported, targets act at once   | step of the next cycle computes it, or `run_ahead`     |
-
-Input and output of the plant, once a control cycle.
 """
 
 from __future__ import annotations
@@ -33,6 +31,42 @@ from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
 from ur_emulator.plant.obstacles import Obstacles
+
+
+class PlantState(NamedTuple):
+    """The state of the arm after a cycle, as the control box reads it; names as in RTDE where one exists.
+
+    The first group is measured: noisy, and as old as the feedback age. The second group is computed inside
+    the box for the present target. The third is for the safety system: the present state.
+
+    Attributes:
+        actual_q: joint angles [rad].
+        actual_qd: joint speeds [rad/s]; exactly 0 at rest.
+        actual_current: motor currents [A].
+        joint_voltage: joint supply voltages [V].
+        tool_accelerometer: specific force in the flange frame [m/s²]; +g upwards at rest.
+        tcp_force: the box's estimate of the external wrench at the flange, base axes [N, Nm].
+        joint_temperatures: [°C].
+        target_current: current that the controller's model expects for the target, friction included [A].
+        target_moment: torque of the controller's rigid-body model for the target [Nm].
+        joint_control_output: current that the drives ask for at the end of the cycle [A].
+        torque_saturated: some joint was at its torque limit at the start and at the end of the cycle.
+        position_error: set-point of the drives (after delay and lag) minus true angle, end of cycle [rad].
+    """
+
+    actual_q: Vector6
+    actual_qd: Vector6
+    actual_current: Vector6
+    joint_voltage: Vector6
+    tool_accelerometer: Vector3
+    tcp_force: Vector6
+    joint_temperatures: Vector6
+    target_current: Vector6
+    target_moment: Vector6
+    joint_control_output: Vector6
+    torque_saturated: bool
+    position_error: Vector6
+
 
 # --- thermometers: joint temperatures that follow the heat of the motors; deterministic
 #
@@ -297,57 +331,16 @@ class Plant:
         )
 
 
-class PlantState(NamedTuple):
-    """The state of the arm after a cycle, as the control box reads it; names as in RTDE where one exists.
-
-    The first group is measured: noisy, and as old as the feedback age. The second group is computed inside
-    the box for the present target. The third is for the safety system: the present state.
-
-    Attributes:
-        actual_q: joint angles [rad].
-        actual_qd: joint speeds [rad/s]; exactly 0 at rest.
-        actual_current: motor currents [A].
-        joint_voltage: joint supply voltages [V].
-        tool_accelerometer: specific force in the flange frame [m/s²]; +g upwards at rest.
-        tcp_force: the box's estimate of the external wrench at the flange, base axes [N, Nm].
-        joint_temperatures: [°C].
-        target_current: current that the controller's model expects for the target, friction included [A].
-        target_moment: torque of the controller's rigid-body model for the target [Nm].
-        joint_control_output: current that the drives ask for at the end of the cycle [A].
-        torque_saturated: some joint was at its torque limit at the start and at the end of the cycle.
-        position_error: set-point of the drives (after delay and lag) minus true angle, end of cycle [rad].
-    """
-
-    actual_q: Vector6
-    actual_qd: Vector6
-    actual_current: Vector6
-    joint_voltage: Vector6
-    tool_accelerometer: Vector3
-    tcp_force: Vector6
-    joint_temperatures: Vector6
-    target_current: Vector6
-    target_moment: Vector6
-    joint_control_output: Vector6
-    torque_saturated: bool
-    position_error: Vector6
-
-
 _NOTHING: Vector3 = (0.0, 0.0, 0.0)
 
 
 class FlangePush:
-    """Applies an external force and counts the cycles of one with a duration.
+    """Pushes the flange of a plant, for a time or until the next push."""
 
-    Args:
-        plant: the arm.
-        period_s: duration of a cycle [s].
-    """
+    __slots__ = ("_cycles_left", "_plant")
 
-    __slots__ = ("_cycles_left", "_period_s", "_plant")
-
-    def __init__(self, plant: Plant, period_s: float) -> None:
+    def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._period_s = period_s
         self._cycles_left = 0
 
     @property
@@ -363,7 +356,7 @@ class FlangePush:
             point: where it acts, in the flange frame [m].
             duration: of the push [s]; None: until the next one.
         """
-        n_cycles = 0 if duration is None else round(duration / self._period_s)
+        n_cycles = 0 if duration is None else round(duration / self._plant.period_s)
         self._plant.push(force if duration is None or n_cycles else _NOTHING, point)
         self._cycles_left = n_cycles
 

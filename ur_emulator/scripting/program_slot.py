@@ -139,7 +139,7 @@ class ProgramSlot:
         if self._primary is not None:
             self._primary.kill()
             self._end(unscheduled=unscheduled)
-        self._state.motion.stop(self._state.robot.stop_deceleration)
+        self._state.motion.stop()
 
     def pause(self, deceleration: float = 0.0) -> None:
         """Pause the primary program; the arm comes to rest on its path.
@@ -162,7 +162,7 @@ class ProgramSlot:
             self.stop(unscheduled=True)
             return
         self._is_unscheduled = True
-        self._state.motion.interrupt(self._state.robot.stop_deceleration)
+        self._state.motion.interrupt()
         if self._phase not in _STANDS_STILL:
             self._enter(ProgramState.PAUSING)
 

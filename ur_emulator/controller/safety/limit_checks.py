@@ -1,6 +1,6 @@
 """What stops the arm by itself: limit checks, and the protective stop they lead to.
 
-Pure: `find_invalid_setpoint` checks the next set-point, `find_violation` the measured state.
+`SetpointCheck` checks the next set-point, `find_violation` the measured state.
 Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
 "invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are
 chosen (docs/fidelity.md).
@@ -86,47 +86,28 @@ class SetpointCheck:
         reach = max(map(abs, target.q)) + fastest * fastest * self._braking
         if fastest <= self._safe_speed >= steepest and reach <= self._safe_reach:
             return None
-        return find_invalid_setpoint(limits, before, target, self._stop_deceleration, self._period_s)
-
-
-def find_invalid_setpoint(
-    limits: ConfiguredLimits,
-    before: JointTarget,
-    target: JointTarget,
-    stop_deceleration: float,
-    period_s: float,
-) -> Violation | None:
-    """Return what is wrong with a set-point, joint by joint, or None; see `SetpointCheck`.
-
-    Args:
-        limits: of the joints.
-        before: set-point at the end of the last cycle.
-        target: set-point at the end of this one.
-        stop_deceleration: of a protective stop [rad/s^2].
-        period_s: control cycle [s].
-    """
-    braking_time = max(map(abs, target.qd)) / (2.0 * stop_deceleration)
-    for i, (q_before, q, qd, limit, low, high) in enumerate(
-        zip(before.q, target.q, target.qd, limits.speed, limits.q_min, limits.q_max, strict=True)
-    ):
-        step, most = abs(q - q_before) / period_s, limit * SPEED_TOLERANCE
-        if not (abs(qd) <= most and step <= most):  # one that is not a number is invalid
-            speed = max(step, abs(qd))
-            return _stop(
-                204,
-                i,
-                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.4g} rad/s, "
-                f"limit {limit:.3f}",
-            )
-        reach = q + qd * braking_time
-        if (reach > high and q > q_before) or (reach < low and q < q_before):
-            return _stop(
-                204,
-                i,
-                f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {q:.3f} rad, "
-                f"limits {low:.3f} to {high:.3f}",
-            )
-    return None
+        braking_time = max(map(abs, target.qd)) / (2.0 * self._stop_deceleration)
+        for i, (q_before, q, qd, limit, low, high) in enumerate(
+            zip(before.q, target.q, target.qd, limits.speed, limits.q_min, limits.q_max, strict=True)
+        ):
+            step, most = abs(q - q_before) / self._period_s, limit * SPEED_TOLERANCE
+            if not (abs(qd) <= most and step <= most):  # one that is not a number is invalid
+                speed = max(step, abs(qd))
+                return _stop(
+                    204,
+                    i,
+                    f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.4g} rad/s, "
+                    f"limit {limit:.3f}",
+                )
+            reach = q + qd * braking_time
+            if (reach > high and q > q_before) or (reach < low and q < q_before):
+                return _stop(
+                    204,
+                    i,
+                    f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {q:.3f} rad, "
+                    f"limits {low:.3f} to {high:.3f}",
+                )
+        return None
 
 
 # The arm cannot go where a tool path leads. The real code is not known: 204 is that of other set-points.
