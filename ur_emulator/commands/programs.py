@@ -16,7 +16,7 @@ from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.operation import CommandOperation, parameter
 from ur_emulator.controller.command import Box, Result, inform
 from ur_emulator.controller.events import PopupShown, ScriptFailed
-from ur_emulator.controller.operator import Answer
+from ur_emulator.controller.pendant import Answer
 from ur_emulator.controller.safety.inputs import SafetyInput
 from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits
@@ -72,10 +72,7 @@ class SetUp:
     def apply(self, box: Box) -> None:
         if box.programs.is_running:
             raise RefusedError(PROGRAM_RUNS)
-        limits = self.limits
-        box.safety.set_limits(limits)
-        box.state.arm.set_range(limits.q_min, limits.q_max)
-        box.plant.set_range(limits.q_min, limits.q_max)
+        box.safety.set_limits(self.limits)
         if box.state.robot.generation.has_operational_modes:
             box.safety.set_up_inputs(self.inputs)
         box.programs.start(self.program)

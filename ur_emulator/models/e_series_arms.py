@@ -1,6 +1,6 @@
-"""JointSize: e-Series arms are built from joints of a few sizes; what all joints of a size have in common.
+"""The arms with the software of the e-Series, in numbers, as in `cb3_arms`; first the sizes of their joints.
 
-Sources, cited by letter below:
+Sources of the joints, cited by letter there:
  A  Fits of the controller's own drive model to logs of a real UR10e (dynamic_calibration of S. Mamedov) and a
     real UR3e (dsn-2022-rad-artifact): target torque against target current. Size 2 is in both and agrees
     within 1 %.
@@ -8,10 +8,6 @@ Sources, cited by letter below:
  C  Assumed for the joints of the UR8 Long, UR15, UR18, UR20 and UR30, of which no log is known: the other
     sizes extrapolated by the rated torque. Rotor inertia grows with its power of 1.26; friction is
     proportional to it.
-
-The first arms of the e-Series, in numbers, as in `cb3_arms`.
-
-The newer arms with the software of the e-Series, in numbers, as in `cb3_arms`.
 """
 
 from __future__ import annotations
@@ -37,7 +33,7 @@ from ur_emulator.models.robot_model import (
 
 @dataclass(frozen=True, slots=True)
 class JointSize:
-    """One size.
+    """What all joints of a size have in common.
 
     Attributes:
         tau_max: largest torque [Nm].
@@ -139,7 +135,7 @@ def drives(*sizes: JointSize) -> DriveNumbers:
 # The UR5e. Sources:
 # A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR5e table).
 # B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.0, config/ur5e: measured inertia tensors.
-# C  Drives by joint size (3, 3, 3, 1, 1, 1), see `joint_sizes.py`.
+# C  Drives by joint size (3, 3, 3, 1, 1, 1), see above.
 UR5E = RobotModel(
     name="ur5e",
     title="UR5e",
@@ -176,7 +172,7 @@ UR5E = RobotModel(
 # The UR3e. Sources:
 # A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR3e table).
 # B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.1, config/ur3e: measured inertia tensors.
-# C  Drives by joint size (2, 2, 1, 0, 0, 0), see `joint_sizes.py`.
+# C  Drives by joint size (2, 2, 1, 0, 0, 0).
 _SIZE_2 = replace(SIZE_2, torque_constant=10.827)  # C, of this arm
 
 UR3E = RobotModel(
@@ -220,7 +216,7 @@ UR7E = replace(UR5E, name="ur7e", title="UR7e", payload_max=7.5, first_version="
 # The UR10e. Sources:
 # A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR10e table).
 # B  The same article and UniversalRobots/Universal_Robots_ROS2_Description, config/ur10e: inertia tensors.
-# C  Drives by joint size (4, 4, 3, 2, 2, 2), see `joint_sizes.py`.
+# C  Drives by joint size (4, 4, 3, 2, 2, 2).
 # G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 UR10E = RobotModel(
     name="ur10e",
@@ -263,7 +259,7 @@ UR12E = replace(UR10E, name="ur12e", title="UR12e", payload_max=12.5, first_vers
 # A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR16e table).
 # B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur16e: masses, centres and inertia tensors,
 #    turned back into the DH frames.
-# C  Drives by joint size (4, 4, 3, 2, 2, 2), see `joint_sizes.py`.
+# C  Drives by joint size (4, 4, 3, 2, 2, 2).
 UR16E = replace(
     UR10E,
     name="ur16e",
@@ -296,7 +292,7 @@ UR16E = replace(
 #    table, with its hash.
 # B  physical_parameters.yaml beside it: masses, centres and tensors, turned back into the DH frames; the
 #    offsets of the links, from which the outline follows.
-# C  Drives: torques and speeds of joint_limits.yaml there; the rest assumed, see `joint_sizes.py`.
+# C  Drives: torques and speeds of joint_limits.yaml there; the rest assumed, see above.
 # G  Rough outline: radii by the bounding boxes of a UR8 Long's parts (public notes on their STL files); only
 #    collisions depend on it.
 UR15 = RobotModel(
@@ -431,7 +427,7 @@ UR18 = replace(
 # The UR20. Sources:
 # A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR20 table).
 # B  The same article and UniversalRobots/Universal_Robots_ROS2_Description, config/ur20: inertia tensors.
-# C  Drives: assumed, see `joint_sizes.py`.
+# C  Drives: assumed, see the joints above.
 # G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 UR20 = RobotModel(
     name="ur20",
@@ -478,7 +474,7 @@ UR20 = RobotModel(
 # B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur30: masses and centres, turned back into the
 #    DH frames. Its tensors are a copy of another arm's and not used.
 # D  Assumed: the tensors of the UR20; those of the arm's tubes scaled by mass and length, of wrist 3 by mass.
-# C  Drives: assumed, see `joint_sizes.py`.
+# C  Drives: assumed, see the joints above.
 UR30 = replace(
     UR20,
     name="ur30",
