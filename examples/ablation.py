@@ -102,7 +102,7 @@ def run_case(name: str, fidelity: str, seed: int, pace: str, planned: Experiment
     from pc_client.analysis.budget import PARTS
     from pc_client.analysis.run import analyse_run
     from pc_client.analysis.table import build_table
-    from pc_client.driver.ur_driver import UrDriver
+    from pc_client.driver.session import UrDriver
     from pc_client.experiment.runner import ExperimentRunner
     from pc_client.recording.loader import load_recording
 

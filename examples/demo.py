@@ -18,7 +18,7 @@ from rich.console import Console
 from pc_client.analysis.report import build_report, build_tables
 from pc_client.analysis.side_by_side import build_side_by_side
 from pc_client.control.controller import CONTROLLERS, Controller
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.errors import ClientError
 from pc_client.experiment.prepare import Experiment, load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner

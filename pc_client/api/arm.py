@@ -21,10 +21,9 @@ from pc_client.api.confirmation import Confirm, ask_at_terminal, experiment_desc
 from pc_client.api.signals import Run, Signals
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
 from pc_client.control.tracker import ControlLaw
-from pc_client.driver.robot_info import RobotInfo
-from pc_client.driver.robot_report import RobotReport, read_report
+from pc_client.driver.report import RobotInfo, RobotReport, read_report
+from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
-from pc_client.driver.ur_driver import UrDriver
 from pc_client.errors import ClientError, ControllerError, DriverError, PlanningError
 from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw

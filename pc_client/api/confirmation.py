@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from pc_client.driver.condition import conditions_text
-from pc_client.driver.robot_report import RobotReport
+from pc_client.driver.report import RobotReport
+from pc_client.driver.watchdog import conditions_text
 from pc_client.errors import ClientError
 from pc_client.experiment.experiment_text import experiment_text
 from pc_client.experiment.preflight import preflight

@@ -10,7 +10,7 @@ from pc_client.commands.options import CellOption, PortBaseOption, RobotOption, 
 from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
-    from pc_client.driver.probe import FrameRhythm
+    from pc_client.driver.report import FrameRhythm
 
 
 def doctor(
@@ -22,9 +22,9 @@ def doctor(
     ] = 2.0,
 ) -> None:
     """Say what answers on which port, how even frames come, and whether the robot is as it must be."""
-    from pc_client.driver.condition import conditions_text
-    from pc_client.driver.probe import probe
+    from pc_client.driver.report import probe
     from pc_client.driver.transport import TcpNetwork
+    from pc_client.driver.watchdog import conditions_text
     from pc_client.experiment.preflight import model_of, preflight, refusal
 
     surroundings = cell_of(cell)

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from pc_client.driver.realtime_client import RealtimeClient
-from pc_client.driver.receiver_script import READ_TIMEOUT
+from pc_client.driver.realtime import RealtimeClient
+from pc_client.driver.receiver import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
 from pc_client.driver.watchdog import check_angles, check_streaming, is_at_full_speed
 from pc_client.errors import DriverError

@@ -7,7 +7,7 @@ import numpy as np
 from pc_client.control.controller import APPROACH
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker, TrackerStep
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.approach import Approach

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.controller import Controller
-from pc_client.driver.receiver_script import STOP_DECELERATION
+from pc_client.driver.receiver import STOP_DECELERATION
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.limits import PlanLimits

@@ -21,7 +21,7 @@ from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.stability import LEAST_GAIN_MARGIN, LoopMargins, loop_margins
 from pc_client.control.tracker import Tracker, TrackerStep
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError, GainMarginError
 from pc_client.experiment.command_check import posture_complaint, way_to_rest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from pc_client.driver.robot_info import RobotInfo
+from pc_client.driver.report import RobotInfo
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.identification import Identification
 from pc_client.planning.approach import Approach

@@ -11,10 +11,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pc_client.driver.condition import Condition
-from pc_client.driver.robot_info import UNKNOWN
-from pc_client.driver.robot_report import RobotReport
+from pc_client.driver.report import UNKNOWN, RobotReport
 from pc_client.driver.watchdog import (
+    Condition,
     control,
     program_state,
     robot_mode,

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as RichProgress
 
-from pc_client.driver.robot_info import RobotInfo
+from pc_client.driver.report import RobotInfo
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.identification import Identification
 from pc_client.planning.approach import Approach

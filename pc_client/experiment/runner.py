@@ -15,7 +15,7 @@ from pc_client.control.gear import GearObserver, MotorReference
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import ControlLaw, Tracker, TrackerStep
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.approach_run import run_approach
 from pc_client.experiment.identification import Identification, check_excitation, identify

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.errors import ClientError, GainMarginError, full_message
 from pc_client.experiment.prepare import Experiment, Plan, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner

@@ -22,12 +22,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "pc_client"))
 from fake_robot import FakeRobot, Pipe, package
 
 from pc_client.control.controller import CONTROLLERS
-from pc_client.driver.dashboard_query import LONGEST_LINE, ask_dashboard
-from pc_client.driver.package_stream import PackageStream
-from pc_client.driver.realtime_client import RealtimeClient
-from pc_client.driver.reverse_server import ReverseServer
-from pc_client.driver.rtde_query import ask_rtde
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.primary import PackageStream
+from pc_client.driver.questions import LONGEST_LINE, ask_dashboard, ask_rtde
+from pc_client.driver.realtime import RealtimeClient
+from pc_client.driver.receiver import ReverseServer
+from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError, one_line
 from pc_client.experiment.identification import identify
 from pc_client.experiment.preflight import model_of, preflight, refusal

@@ -22,7 +22,7 @@ from chunk_marks import load_box_chunks  # noqa: E402
 from wire_story import MODBUS, Story  # noqa: E402
 
 from pc_client.control.controller import CONTROLLERS  # noqa: E402
-from pc_client.driver.ur_driver import UrDriver  # noqa: E402
+from pc_client.driver.session import UrDriver  # noqa: E402
 from pc_client.experiment.prepare import load_movements, prepare_experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
 from protocol.primary.messages import encode_message  # noqa: E402

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import SimpleNamespace
 
-from pc_client.driver.receiver_script import fill_template, receiver_template
+from pc_client.driver.receiver import fill_template, receiver_template
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
 from protocol.primary.messages import KeyMessage

@@ -19,7 +19,7 @@ from integration_support import (
 )
 
 from pc_client import cli
-from pc_client.driver import dashboard_query, package_stream, realtime_client
+from pc_client.driver import primary, questions, realtime
 from protocol.primary.framing import PackageType
 from protocol.ur_types import Ports, ProgramState, SafetyMode
 
@@ -125,10 +125,10 @@ def test_the_process_leaves_with_that_code_and_one_line(arguments, code, tmp_pat
 
 @pytest.fixture
 def hasty(monkeypatch):
-    monkeypatch.setattr(package_stream, "VERSION_TIMEOUT", 0.1)
-    monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.1)
-    monkeypatch.setattr(realtime_client, "_STOPPED_TIMEOUT", 0.1)  # the greeting is that of a box in lockstep
-    monkeypatch.setattr(dashboard_query, "REPLY_TIMEOUT", 0.1)
+    monkeypatch.setattr(primary, "VERSION_TIMEOUT", 0.1)
+    monkeypatch.setattr(realtime, "FRAME_TIMEOUT", 0.1)
+    monkeypatch.setattr(realtime, "_STOPPED_TIMEOUT", 0.1)  # the greeting is that of a box in lockstep
+    monkeypatch.setattr(questions, "DASHBOARD_TIMEOUT", 0.1)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import sys
 import pytest
 from integration_support import Messages, port_base_of, programs_since
 
-from pc_client.driver import robot_info
+from pc_client.driver import report
 
 pytestmark = pytest.mark.usefixtures("without_page")
 
@@ -37,7 +37,7 @@ def run_movement(ur_client, standard_box, tmp_path, monkeypatch):
 @pytest.fixture
 def marks_hidden(monkeypatch):
     """The client finds no mark of a simulator in the box, nor a proof that it is real."""
-    monkeypatch.setattr(robot_info, "_is_simulated", lambda *told: None)
+    monkeypatch.setattr(report, "_is_simulated", lambda *told: None)
 
 
 @pytest.mark.usefixtures("marks_hidden")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pc_client.driver.probe import probe
+from pc_client.driver.report import probe
 from pc_client.driver.transport import TcpNetwork
 from ur_emulator import ControlBox
 

@@ -12,7 +12,7 @@ from integration_support import PERIOD, Frames
 
 import ur_emulator.realtime.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.loader import load_recording

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pc_client as ur
-from pc_client.driver import robot_info
+from pc_client.driver import report
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.planning.joint_path import fixed_tcp_rotation
 from pc_client.planning.limits import limits_of
@@ -294,7 +294,7 @@ def test_an_arm_that_may_be_real_is_asked_for(box, monkeypatch):
         shown.append(text)
         return False
 
-    monkeypatch.setattr(robot_info, "_is_simulated", lambda *told: None)
+    monkeypatch.setattr(report, "_is_simulated", lambda *told: None)
     real = ur.connect(box.host, box.ports, confirm=no)
     with pytest.raises(ur.ClientError, match="the answer was no"):
         real.run(ur.Movement.through(POINTS))

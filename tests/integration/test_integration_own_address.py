@@ -8,7 +8,7 @@ import pytest
 from pc_client.control.controller import APPROACH
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.planning.approach import JointLines
 from ur_emulator import ControlBox

@@ -6,7 +6,7 @@ from contextlib import ExitStack, suppress
 import pytest
 from integration_support import Messages, port_base_of, programs_since
 
-from pc_client.driver.reverse_server import REVERSE_PORT
+from pc_client.driver.receiver import REVERSE_PORT
 
 pytestmark = pytest.mark.usefixtures("without_page")
 HOST = "127.0.0.1"

@@ -6,7 +6,7 @@ import re
 import pytest
 from integration_support import at, free_port_base
 
-from pc_client.driver.robot_report import read_report
+from pc_client.driver.report import read_report
 from pc_client.driver.transport import TcpNetwork
 from pc_client.recording.loader import load_recording
 from ur_emulator import ControlBox

@@ -8,7 +8,7 @@ import pytest
 import pc_client as ur
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop_model import LoopModel
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError
 from pc_client.experiment.prediction import guarded
 from pc_client.experiment.prepare import load_movements, prepare_experiment

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fake_robot import PERIOD, FakeRobot
 
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.experiment.approach_run import run_approach
 from pc_client.kinematics.robot_model import robot_model

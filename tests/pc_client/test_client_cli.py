@@ -14,8 +14,8 @@ import typer
 from fake_robot import FakeRobot
 
 import pc_client.api.arm as arm_module
+import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
-import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.api.confirmation import QUESTION
 from pc_client.errors import DriverError

@@ -16,8 +16,8 @@ from page_support import check_needs_nothing
 
 import pc_client.api.arm as arm_module
 import pc_client.commands.draw as draw_module
+import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
-import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.errors import ClientError
 from pc_client.kinematics.robot_model import robot_model

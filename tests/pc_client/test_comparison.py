@@ -14,8 +14,8 @@ import pytest
 from fake_robot import FakeRobot
 
 import pc_client.api.arm as arm_module
+import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
-import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.comparison.figure import comparison_sheet
 from pc_client.comparison.movement_set import make_sets, save_sets

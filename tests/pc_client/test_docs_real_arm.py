@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from pc_client.control.controller import APPROACH, CONTROLLERS
-from pc_client.driver.receiver_script import MISSED_ALLOWED
-from pc_client.driver.reverse_server import REVERSE_PORT
+from pc_client.driver.receiver import MISSED_ALLOWED, REVERSE_PORT
 from pc_client.driver.watchdog import (
     control,
     program_state,

@@ -9,12 +9,10 @@ import sys
 import pytest
 from fake_robot import LAYOUT, FakeRobot, Pipe
 
-from pc_client.driver.dashboard_query import ask_dashboard
-from pc_client.driver.package_stream import PackageStream
-from pc_client.driver.receiver_script import fill_template, receiver_script
-from pc_client.driver.reverse_server import REVERSE_PORT, ReverseServer
-from pc_client.driver.stop_script import stop_script
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.primary import PackageStream
+from pc_client.driver.questions import ask_dashboard
+from pc_client.driver.receiver import REVERSE_PORT, ReverseServer, fill_template, receiver_script
+from pc_client.driver.session import UrDriver, stop_script
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.recording.origin import origin_of
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
@@ -281,7 +279,7 @@ def test_the_robot_is_as_patient_with_us_on_an_e_series():
 
 
 def test_the_client_does_not_import_the_language():
-    code = "import sys; from pc_client.driver.receiver_script import receiver_template; receiver_template();"
+    code = "import sys; from pc_client.driver.receiver import receiver_template; receiver_template();"
     code += "sys.exit(any(name.split('.')[0] in ('urscript', 'ur_emulator') for name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

@@ -12,7 +12,7 @@ from fake_robot import PERIOD, FakeRobot
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker, TrackerStep
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import check_command
 from pc_client.errors import ClientError, DriverError, RobotStoppedError
 from pc_client.kinematics.robot_model import robot_model

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 from fake_robot import LAYOUT, FakeRobot
 
-from pc_client.driver import realtime_client, transport
-from pc_client.driver.realtime_client import RealtimeClient
+from pc_client.driver import realtime, transport
+from pc_client.driver.realtime import RealtimeClient
 from pc_client.driver.transport import PortTakenError, TcpNetwork, TcpTransport
 from pc_client.errors import DriverError
 
@@ -161,7 +161,7 @@ def test_drain_takes_everything(pair):
 def test_no_frames_and_no_realtime_port(pair, monkeypatch):
     ours, theirs = pair
     client = RealtimeClient(ours, TcpNetwork(), time_waits=False)
-    monkeypatch.setattr(realtime_client, "FRAME_TIMEOUT", 0.01)
+    monkeypatch.setattr(realtime, "FRAME_TIMEOUT", 0.01)
     with pytest.raises(DriverError, match=r"no new realtime frame for 0\.01 s"):
         client.receive()
     theirs.sendall(b"HTTP/1.0 400 Bad Request\r\n\r\n")

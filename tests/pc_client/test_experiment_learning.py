@@ -15,7 +15,7 @@ from pc_client.control.gear import GearModel
 from pc_client.control.learning_filter import design_filter
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
 from pc_client.experiment.command_check import broken_limit

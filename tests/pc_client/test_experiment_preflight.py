@@ -10,10 +10,10 @@ from fake_robot import FakeRobot, package
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pc_client.driver import robot_report
-from pc_client.driver.condition import conditions_text
-from pc_client.driver.rtde_query import RtdeAnswer, ask_rtde
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.questions import RtdeAnswer, ask_rtde
+from pc_client.driver.report import read_report
+from pc_client.driver.session import UrDriver
+from pc_client.driver.watchdog import conditions_text
 from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
 from pc_client.kinematics.cell import NO_CELL
@@ -51,7 +51,7 @@ def robot(*, model="UR3", **spoilt):
 
 
 def report(fake):
-    return robot_report.read_report(fake, "robot", Ports.standard())
+    return read_report(fake, "robot", Ports.standard())
 
 
 def failing(fake, model=UR3):

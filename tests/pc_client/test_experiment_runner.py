@@ -13,7 +13,7 @@ from pc_client.api.signals import Run
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.stability import loop_margins
-from pc_client.driver.ur_driver import UrDriver
+from pc_client.driver.session import UrDriver
 from pc_client.errors import (
     ClientError,
     DriverError,

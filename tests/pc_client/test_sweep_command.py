@@ -14,8 +14,8 @@ from fake_robot import FakeRobot
 from sweep_samples import write
 
 import pc_client.api.arm as arm_module
+import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
-import pc_client.driver.ur_driver as ur_driver_module
 from pc_client import cli
 from pc_client.recording.loader import load_recording
 from pc_client.sweep.case import all_cases

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from box_support import Bench
 
-from pc_client.driver.receiver_script import MISSED_ALLOWED, STOP_DECELERATION, receiver_script
+from pc_client.driver.receiver import MISSED_ALLOWED, STOP_DECELERATION, receiver_script
 from pc_client.driver.watchdog import REST_SPEED
 from pc_client.kinematics.robot_model import ROBOTS
 from protocol.ur_types import ProgramState, SafetyMode

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pc_client.driver.receiver_script import fill_template, receiver_template
+from pc_client.driver.receiver import fill_template, receiver_template
 from urscript import ProgramStatus, RecordingHost, check_program, compile_program
 from urscript.recording_host import FakeSocket
 

@@ -1,0 +1,409 @@
+"""Which robot answers: firmware, model, serial number, and whether it is simulated, real or unknown.
+
+What a robot reports of itself: the record that `experiment.preflight` judges. Only reads.
+
+What answers at an address: every port, the rhythm of the frames, and what the robot reports of itself.
+
+It only reads; it sends nothing that could move an arm.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from pc_client.driver.primary import PackageStream
+from pc_client.driver.questions import RtdeAnswer, ask_dashboard, ask_rtde
+from pc_client.driver.realtime import RealtimeClient
+from pc_client.driver.transport import NO_ROUTE, Network
+from pc_client.errors import DriverError, UnknownHostError
+from pc_client.recording.origin import Source, origin_of
+from protocol.errors import RemoteProtocolError
+from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
+from protocol.realtime.layout import RealtimeFrame
+from protocol.serial_numbers import SerialNumber, parse_serial
+from protocol.ur_types import (
+    LOCKSTEP_MASTERBOARD,
+    SIMULATED_MASTERBOARD,
+    SIMULATOR_CHECKSUM,
+    Ports,
+    RobotType,
+    SoftwareVersion,
+)
+
+_MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
+_SERIAL, _MODEL = "get serial number", "get robot model"
+
+UNKNOWN = "unknown"
+"""Stands for what a robot does not report."""
+
+_CB3_PERIOD = 0.008
+_E_SERIES_PERIOD = 0.002
+
+_E_SERIES = ("UR3", "UR5", "UR10", "UR16")
+"""What e-Series arms report without their "e". Source: UR's client library: type 1 with software 5 is a UR5e;
+a UR7e reports the type of a UR5, a UR12e that of a UR10."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotInfo:
+    """What a robot says about itself.
+
+    Attributes:
+        version: controller software.
+        model: e.g. `UR3` or `UR5e`, or "unknown" when the robot does not report it.
+        serial: serial number, or "unknown" when the dashboard server does not report it.
+        simulated: True when the robot says so; False when its serial number is that of a real arm and it has
+            no mark of a simulator; None when this is not certain.
+        seed: of an emulated arm; None for another, and when the robot does not report it.
+        lockstep: the robot says that its time waits for its clients, as that of an emulated box may.
+        has_calibration: False when its calibration checksums are all ones, as on the maker's simulator.
+    """
+
+    version: SoftwareVersion
+    model: str
+    serial: str
+    simulated: bool | None
+    seed: int | None
+    lockstep: bool
+    has_calibration: bool = True
+
+    @property
+    def period(self) -> float:
+        """Control cycle [s]. Source: UR realtime client interface: 125 Hz on CB3, 500 Hz on e-Series."""
+        return _E_SERIES_PERIOD if self.version.major >= 5 else _CB3_PERIOD
+
+    def check_same(self, model: str, serial: str) -> None:
+        """Refuse another robot than the one of this arm and serial number.
+
+        Raises:
+            DriverError: it is another one.
+        """
+        if (self.model, self.serial) != (model, serial):
+            raise DriverError(
+                f"another robot answers: {self.model}, serial number {self.serial}, must be {model}, "
+                f"serial number {serial}; look which robot has this address, and connect again"
+            )
+
+    @property
+    def source(self) -> Source:
+        """Columns of a table of the robot's data."""
+        names = ("robot", "software", "serial", "simulated")
+        return dict(zip(names, (self.model, str(self.version), self.serial, self.simulated), strict=True))
+
+    def __str__(self) -> str:
+        origin = origin_of(self.simulated).name
+        return f"{self.model}, software {self.version}, serial number {self.serial}, {origin}"
+
+
+def read_robot_info(network: Network, host: str, dashboard_port: int, primary: PackageStream) -> RobotInfo:
+    """Ask the robot for its identity; what it does not answer stays unknown.
+
+    Args:
+        network: makes the connection.
+        host: the robot.
+        dashboard_port: its dashboard port.
+        primary: a fresh connection to the primary port: its greeting names the software; its first state the
+            marks of a simulator, and the arm when the dashboard server, before 3.12, does not.
+
+    Raises:
+        DriverError: the primary port does not report its version.
+    """
+    version = primary.wait_for_version()
+    answers = ask_dashboard(network, host, dashboard_port, (_SERIAL, _MODEL))
+    configuration = primary.wait_for_configuration()
+    try:
+        serial = parse_serial(answers.get(_SERIAL, ""))
+    except RemoteProtocolError:  # software before 3.12 does not know the question
+        serial = None
+    model = answers.get(_MODEL, "")
+    kinematics = primary.newest(KinematicsInfo)
+    has_calibration = kinematics is None or set(kinematics.checksum) != {SIMULATOR_CHECKSUM}
+    return RobotInfo(
+        version,
+        arm_name(model if _MODEL_NAME.fullmatch(model) else _model_in(configuration), version),
+        UNKNOWN if serial is None else serial.text,
+        _is_simulated(serial, configuration, has_calibration),
+        None if serial is None else serial.seed,
+        configuration is not None and configuration.masterboard_version == LOCKSTEP_MASTERBOARD,
+        has_calibration,
+    )
+
+
+def _is_simulated(
+    serial: SerialNumber | None, configuration: ConfigurationData | None, has_calibration: bool
+) -> bool | None:
+    """Whether the robot is a simulated one; None when neither is certain.
+
+    A missing calibration proves nothing: a real arm may have lost its own.
+    """
+    marks = (SIMULATED_MASTERBOARD, LOCKSTEP_MASTERBOARD)
+    if configuration is not None and configuration.masterboard_version in marks:
+        return True
+    if serial is not None and serial.simulated:
+        return True
+    return None if serial is None or configuration is None or not has_calibration else False
+
+
+def _model_in(configuration: ConfigurationData | None) -> str:
+    try:
+        return UNKNOWN if configuration is None else RobotType(configuration.robot_type).name
+    except ValueError:  # an arm that was built after this was written
+        return UNKNOWN
+
+
+def arm_name(reported: str, version: SoftwareVersion) -> str:
+    """The name of an arm that a robot calls `UR5`, for example: `UR5e` with software of the e-Series."""
+    return f"{reported}e" if version.major >= 5 and reported in _E_SERIES else reported
+
+
+_CONNECT_TIMEOUT = 2.0
+
+_REMOTE, _MODE = "is in remote control", "get operational mode"
+_ANSWERS = {"true": True, "false": False}
+_OPERATIONAL_MODES = ("NONE", "MANUAL", "AUTOMATIC")
+
+
+@dataclass(frozen=True, slots=True)
+class RobotReport:
+    """What a robot reports. None stands for what it does not report.
+
+    Attributes:
+        info: which robot it is.
+        configured: the arm by the configuration data of port 30001, e.g. `UR3` or `UR5e`.
+        frame: its state on port 30003.
+        slider: speed slider, 0 to 1, from port 30001.
+        tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
+        rtde: software, joints, TCP pose and (since 3.11) payload on port 30004; None without RTDE.
+        calibration: name of the arm's calibration in the maker's drivers, from port 30001.
+        remote_control: clients may command the robot, from the dashboard server; e-Series, since 5.6.
+        operational_mode: `NONE`, `MANUAL` or `AUTOMATIC`, from the dashboard server; e-Series, since 5.6.
+    """
+
+    info: RobotInfo
+    configured: str | None
+    frame: RealtimeFrame
+    slider: float | None
+    tcp_offset: tuple[float, ...] | None
+    rtde: RtdeAnswer | None
+    calibration: str | None
+    remote_control: bool | None
+    operational_mode: str | None
+
+    @property
+    def payload(self) -> float | None:
+        """Mass [kg]. Only RTDE reports it on a CB3: frames of port 30003 have it from 5.10 on."""
+        value = None if self.rtde is None else self.rtde.values.get("payload")
+        return value if isinstance(value, float) else None
+
+
+def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
+    """Ask a robot, on connections of its own.
+
+    Raises:
+        DriverError: nothing answers on the primary or the realtime port, or something else than a robot.
+    """
+    primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
+    try:
+        info = read_robot_info(network, host, ports.dashboard, primary)
+        connection = network.connect(host, ports.realtime, _CONNECT_TIMEOUT)
+        frames = RealtimeClient(connection, network, time_waits=info.lockstep)
+        try:
+            frame = frames.receive().latest
+        finally:
+            frames.close()
+        return make_report(network, host, ports, info, frame, primary)
+    finally:
+        primary.close()
+
+
+def make_report(
+    network: Network,
+    host: str,
+    ports: Ports,
+    info: RobotInfo,
+    frame: RealtimeFrame,
+    primary: PackageStream,
+) -> RobotReport:
+    """Put together what open connections have reported, and ask RTDE and dashboard server for the rest.
+
+    Args:
+        network: makes the connections.
+        host: the robot.
+        ports: its ports.
+        info: which robot it is.
+        frame: its state.
+        primary: its primary port; what has come is to be polled by the caller.
+
+    Raises:
+        DriverError: a state on the primary port makes no sense.
+    """
+    configuration = primary.newest(ConfigurationData)
+    cartesian = primary.newest(CartesianInfo)
+    kinematics = primary.newest(KinematicsInfo)
+    asked = (_REMOTE, _MODE) if info.version.major == 5 else ()
+    answers = ask_dashboard(network, host, ports.dashboard, asked) if asked else {}
+    mode = answers.get(_MODE, "").upper()
+    return RobotReport(
+        info=info,
+        configured=None if configuration is None else _configured(configuration, info),
+        frame=frame,
+        slider=reported_slider(primary),
+        tcp_offset=None if cartesian is None else cartesian.tcp_offset,
+        rtde=ask_rtde(network, host, ports.rtde, ("actual_q", "actual_TCP_pose", "payload")),
+        calibration=None if kinematics is None else kinematics.calibration,
+        remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
+        operational_mode=mode if mode in _OPERATIONAL_MODES else None,
+    )
+
+
+def check_arm(info: RobotInfo, primary: PackageStream) -> None:
+    """Refuse a robot that calls itself one arm on the dashboard server and another on port 30001.
+
+    Raises:
+        DriverError: they differ.
+    """
+    configuration = primary.newest(ConfigurationData)
+    if configuration is None or info.model in (UNKNOWN, configured := _configured(configuration, info)):
+        return
+    raise DriverError(
+        f"the robot's arm is {info.model} (dashboard), {configured} (port 30001), must be one of them; "
+        "look which arm it is, and set it so in the installation"
+    )
+
+
+def reported_slider(primary: PackageStream) -> float | None:
+    """The speed slider, 0 to 1, as the port was last polled; None when it was not reported."""
+    mode = primary.newest(RobotModeData)
+    return None if mode is None else mode.target_speed_fraction
+
+
+def _configured(configuration: ConfigurationData, info: RobotInfo) -> str:
+    try:
+        return arm_name(RobotType(configuration.robot_type).name, info.version)
+    except ValueError:  # an arm that was built after this was written
+        return f"type {configuration.robot_type}"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRhythm:
+    """How the realtime frames came in.
+
+    Attributes:
+        frame_size: bytes of a frame.
+        n_new: frames with a new time stamp.
+        n_heartbeats: frames that repeated one: the robot's time stands still between programs.
+        cycle: median step of the time stamps [s]; None when time stood still.
+        lost: cycles whose frame never came.
+        arrival_sd: standard deviation of the time between two arrivals [s].
+        arrival_worst: longest time between two arrivals [s].
+    """
+
+    frame_size: int
+    n_new: int
+    n_heartbeats: int
+    cycle: float | None
+    lost: int
+    arrival_sd: float
+    arrival_worst: float
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What answers at an address.
+
+    Attributes:
+        ports: name, number and state of every port: `open`, `closed`, `no answer`, `no route`.
+        info: which robot; None when its primary port does not answer.
+        rhythm: of the frames; None when none come.
+        report: what `experiment.preflight` judges; None when the robot does not report enough.
+        obstacle: which connection prevents a session, or "".
+    """
+
+    ports: tuple[tuple[str, int, str], ...]
+    info: RobotInfo | None
+    rhythm: FrameRhythm | None
+    report: RobotReport | None
+    obstacle: str
+
+
+def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosis:
+    """Look at everything that a session would need.
+
+    Args:
+        network: makes the connections.
+        host: the robot.
+        ports: its ports.
+        seconds: how long to listen to the frames [s].
+
+    Raises:
+        UnknownHostError: there is no such robot to ask.
+    """
+    states: dict[str, str] = {}
+    for item in fields(ports):
+        try:
+            network.connect(host, getattr(ports, item.name), _CONNECT_TIMEOUT).close()
+            states[item.name] = "open"
+        except UnknownHostError:
+            raise
+        except DriverError as error:
+            states[item.name] = _state(error)
+    info: RobotInfo | None = None
+    rhythm: FrameRhythm | None = None
+    report: RobotReport | None = None
+    obstacle = ""
+    try:
+        primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
+        try:
+            info = read_robot_info(network, host, ports.dashboard, primary)
+            rhythm, frame = _listen(network, host, ports.realtime, seconds, time_waits=info.lockstep)
+            primary.poll()
+            report = make_report(network, host, ports, info, frame, primary)
+        finally:
+            primary.close()
+    except DriverError as error:
+        obstacle = str(error)
+    if report is not None and report.rtde is None and states["rtde"] == "open":
+        states["rtde"] = "open, but it does not answer as RTDE"
+    if not obstacle and states["secondary"] != "open":
+        obstacle = f"the secondary port {ports.secondary} takes no programs"
+    numbered = tuple((name, getattr(ports, name), state) for name, state in states.items())
+    return Diagnosis(numbered, info, rhythm, report, obstacle)
+
+
+def _state(error: DriverError) -> str:
+    """Of a port that accepts no connection."""
+    match error.__cause__:
+        case TimeoutError():
+            return "no answer"
+        case OSError(errno=number) if number in NO_ROUTE:
+            return "no route"
+    return "closed"
+
+
+def _listen(
+    network: Network, host: str, port: int, seconds: float, *, time_waits: bool
+) -> tuple[FrameRhythm, RealtimeFrame]:
+    frames = RealtimeClient(network.connect(host, port, _CONNECT_TIMEOUT), network, time_waits=time_waits)
+    stamps: list[float] = []
+    arrivals: list[float] = []
+    n_heartbeats = 0
+    try:
+        size = frames.layout.size
+        deadline = network.now() + seconds
+        while True:
+            arrival = frames.receive()
+            arrivals.append(network.now())
+            stamps += [frame.timestamp for frame in arrival.new]
+            n_heartbeats += arrival.n_heartbeats
+            if arrivals[-1] > deadline:
+                break
+    finally:
+        frames.close()
+    steps, waits = np.diff(stamps), np.diff(arrivals)
+    cycle = float(np.median(steps)) if len(steps) else None
+    lost = 0 if cycle is None else int(np.sum(np.rint(steps / cycle) - 1))
+    spread = (float(waits.std()), float(waits.max())) if len(waits) else (0.0, 0.0)
+    return FrameRhythm(size, len(stamps), n_heartbeats, cycle, lost, *spread), arrival.latest

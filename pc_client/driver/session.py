@@ -1,0 +1,472 @@
+"""The connections of one session with a robot: state and messages, programs, frames, and the way back.
+
+What ends a motion without the receiver program: a program of our own that stops the arm, and a word.
+
+Bringing the arm to rest, by every available method: the stop word, then a program of our own.
+
+Our program on the robot: start it, watch what the robot reports of it, say why it has ended.
+
+A session with one robot: connect, stream, and always leave the arm stopped.
+
+It uses the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
+when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through
+`stop`: first the stop word to the program, then a program of our own that stops the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.driver.primary import PackageStream, raise_on_error
+from pc_client.driver.realtime import REST_TIMEOUT, RealtimeClient, wait_for_rest, wait_until
+from pc_client.driver.receiver import DIAL_TIMEOUT, STOP_DECELERATION, ReverseServer, receiver_script
+from pc_client.driver.report import (
+    RobotInfo,
+    RobotReport,
+    check_arm,
+    make_report,
+    read_robot_info,
+    reported_slider,
+)
+from pc_client.driver.transport import Network, TcpNetwork, Transport
+from pc_client.driver.velocity_stream import (
+    CommandSource,
+    RowSink,
+    S,
+    StreamReport,
+    VelocityStream,
+    collector_paused,
+)
+from pc_client.driver.watchdog import (
+    ProgramEndedError,
+    check_angles,
+    check_idle,
+    check_safety,
+    check_slider,
+    control,
+    has_ended,
+    is_stopped,
+    software,
+)
+from pc_client.errors import DriverError, RobotStoppedError, full_message
+from protocol.primary.messages import ErrorCodeMessage, TextMessage
+from protocol.realtime.layout import RealtimeFrame
+from protocol.ur_types import Ports
+from protocol.velocity_stream import VelocityMode, encode_velocity
+
+CONNECT_TIMEOUT = 5.0  # s
+
+
+class Connections:
+    """All connections to one robot; `close` must follow, also when making them has failed.
+
+    Args:
+        network: opens them.
+        host: the robot's name or address.
+        ports: its ports.
+
+    Attributes:
+        info: which robot answered.
+        primary: states and messages.
+        scripts: the secondary port; takes programs.
+        frames: the realtime port.
+        server: where its programs dial back.
+    """
+
+    info: RobotInfo
+    primary: PackageStream
+    scripts: PackageStream
+    frames: RealtimeClient
+    server: ReverseServer
+
+    def __init__(self, network: Network, host: str, ports: Ports) -> None:
+        self.network = network
+        self.host = host
+        self.ports = ports
+        self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
+
+    def open(self, reverse_port: int | None) -> None:
+        """Connect to the robot and listen for its programs.
+
+        Args:
+            reverse_port: see ReverseServer.
+
+        Raises:
+            DriverError: a port does not answer, or the robot's software is not one that we drive.
+        """
+        self.primary = self._open_packages(self.ports.primary, "primary")
+        self.scripts = self._open_packages(self.ports.secondary, "secondary")
+        self.info = read_robot_info(self.network, self.host, self.ports.dashboard, self.primary)
+        if not (condition := software(self.info.version)).holds:
+            raise DriverError(condition.complaint)
+        self.frames = self._open_frames()
+        self.server = ReverseServer(
+            self.network, self.frames.local_address, self.frames.robot_address, reverse_port
+        )
+        self._open.append(self.server)
+
+    def renew(self) -> None:
+        """Make new connections for programs and frames: the present ones may be broken.
+
+        Raises:
+            DriverError: a port does not answer.
+        """
+        for connection in (self.scripts, self.frames):
+            connection.close()
+        self.scripts = self._open_packages(self.ports.secondary, "secondary")
+        self.frames = self._open_frames()
+
+    def close(self) -> None:
+        """Close all; harmless if closed already."""
+        for connection in self._open:
+            connection.close()
+        self._open.clear()
+
+    def _open_packages(self, port: int, name: str) -> PackageStream:
+        transport = self.network.connect(self.host, port, CONNECT_TIMEOUT)
+        stream = PackageStream(transport, self.network, name)
+        self._open.append(stream)
+        return stream
+
+    def _open_frames(self) -> RealtimeClient:
+        transport = self.network.connect(self.host, self.ports.realtime, CONNECT_TIMEOUT)
+        frames = RealtimeClient(transport, self.network, time_waits=self.info.lockstep)
+        self._open.append(frames)
+        return frames
+
+
+STOP_WORD = "stop program\n"
+"""A controller's own word, no program: ends what runs or is paused. Source: public client library."""
+
+
+def stop_script() -> str:
+    """A program that replaces whatever runs and brings the arm to rest."""
+    return f"def ur_client_stop():\n  stopj({STOP_DECELERATION})\nend\n"
+
+
+def stop_arm(robot: Connections, reverse: Transport | None) -> None:
+    """Bring the arm to rest, and end the program that moves it.
+
+    Args:
+        robot: the connections; those for programs and frames are made anew if the stop word does not help.
+        reverse: connection to the receiver program, when one runs.
+
+    Raises:
+        DriverError: the arm could not be seen to come to rest.
+    """
+    if reverse is not None and _attempt(
+        robot, lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
+    ):
+        return
+    if not _attempt(robot, lambda: _send_stop_program(robot)):
+        raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
+
+
+def _attempt(robot: Connections, act: Callable[[], object]) -> bool:
+    """Try one method to stop; True when the arm then rests and no program runs."""
+    try:
+        act()
+        wait_until(has_ended, robot.frames, robot.network, REST_TIMEOUT, "the robot's program goes on")
+        if not is_stopped(wait_for_rest(robot.frames, robot.network)):
+            _end_paused_program(robot)
+    except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
+        return False
+    return True
+
+
+def _end_paused_program(robot: Connections) -> None:
+    """End the program that a safety stop has paused, so that it cannot be resumed without this client.
+
+    A robot that does not answer keeps it; nothing moves meanwhile, and the next run reports it.
+    """
+    with suppress(DriverError):
+        robot.scripts.send_program(STOP_WORD)
+        wait_until(is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
+
+
+def _send_stop_program(robot: Connections) -> None:
+    """Replace whatever runs by a program that stops the arm."""
+    robot.renew()
+    robot.scripts.send_program(stop_script())
+
+
+_START_TIMEOUT = 5.0
+"""A program that does not show as running within this [s] was not accepted."""
+_READ_ONLY = 210
+"""Error code for a program that came in local control. Source: test of the maker's client library."""
+
+
+class ProgramWatch:
+    """Watches one program after the other on one robot."""
+
+    def __init__(self, robot: Connections) -> None:
+        self._robot = robot
+        self._program = self._last_text = ""
+        self._is_read_only = False
+
+    def start(self, text: str) -> None:
+        """Send a program and wait until it shows as running; what was reported before is of no interest.
+
+        Raises:
+            RobotStoppedError: the robot is in local control, in a safety stop, or reports an error.
+            DriverError: the program did not start in time.
+        """
+        robot = self._robot
+        robot.frames.drain()
+        robot.primary.poll()
+        robot.scripts.poll()
+        self._program, self._last_text, self._is_read_only = text, "", False
+        robot.scripts.send_program(text)
+        self.wait(
+            self._has_started, _START_TIMEOUT, "the robot did not start the program in time: see its log"
+        )
+
+    def wait(self, condition: Callable[[RealtimeFrame], bool], timeout: float, complaint: str) -> None:
+        """Wait for a frame; raise on safety stops and on errors that the robot reports.
+
+        Raises:
+            DriverError: see `wait_until` and `check`.
+        """
+
+        def check(frame: RealtimeFrame) -> None:
+            check_safety(frame)
+            self.check()
+
+        wait_until(condition, self._robot.frames, self._robot.network, timeout, complaint, check)
+
+    def check(self) -> None:
+        """Read both script ports; raise what the robot reports about our program, or a moved speed slider.
+
+        Raises:
+            RobotStoppedError: the program failed.
+            DriverError: the speed slider was moved, or a connection broke.
+        """
+        self._robot.scripts.poll()
+        messages = self._robot.primary.poll()
+        for message in messages:
+            if isinstance(message, TextMessage):
+                self._last_text = message.text
+            self._is_read_only |= isinstance(message, ErrorCodeMessage) and message.code == _READ_ONLY
+        raise_on_error(messages, self._program)
+        check_slider(reported_slider(self._robot.primary))
+
+    def look_after(self) -> None:
+        """Read everything that has come, while waiting for something else; at least one frame comes.
+
+        Raises:
+            DriverError: see `check`; the robot is in a safety stop.
+        """
+        check_safety(self._robot.frames.receive().latest)
+        self.check()
+
+    def explain(self, error: ProgramEndedError) -> DriverError:
+        """Say why our program has ended, as far as the robot reports it."""
+        try:
+            self.check()
+        except DriverError as reason:
+            return reason
+        said = "the pendant or another client stopped it"
+        if self._last_text:
+            said = f'the robot\'s last message is "{self._last_text}"'
+        return ProgramEndedError(f"{error}; {said}")
+
+    def _has_started(self, frame: RealtimeFrame) -> bool:
+        if self._is_read_only:
+            raise RobotStoppedError(control(remote=False).complaint)
+        return not is_stopped(frame)
+
+
+class UrDriver:
+    """A session with one robot.
+
+    Use as a context manager; leaving it stops the arm if it is still moving and closes all connections.
+
+    Args:
+        host: the robot's name or address.
+        ports: its ports.
+        reverse_port: where its programs dial back; see ReverseServer.
+        network: tests hand in a network in memory.
+
+    Attributes:
+        info: which robot answered.
+        layout: columns of its realtime frames.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        ports: Ports | None = None,
+        *,
+        reverse_port: int | None = None,
+        network: Network | None = None,
+    ) -> None:
+        self._robot = robot = Connections(network or TcpNetwork(), host, ports or Ports.standard())
+        self._watch = ProgramWatch(robot)
+        self._in_motion = False
+        try:
+            robot.open(reverse_port)
+        except BaseException:
+            robot.close()
+            raise
+        self.info = robot.info
+        self.layout = robot.frames.layout
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the arm if we left it in motion, and close all connections."""
+        try:
+            if self._in_motion:
+                self.stop(None)
+        finally:
+            self._robot.close()
+
+    def read_frame(self) -> RealtimeFrame:
+        """The state of the robot now.
+
+        Raises:
+            DriverError: no frames come.
+        """
+        self._robot.frames.drain()
+        return self._robot.frames.receive().latest
+
+    def actual_q(self) -> NDArray[np.float64]:
+        """Joint positions (6,) as reported now [rad].
+
+        Raises:
+            DriverError: no frames come, or one reports what is no angle.
+        """
+        frame = self.read_frame()
+        check_angles(frame)
+        q: NDArray[np.float64] = frame.actual_q
+        return q.copy()
+
+    def report(self) -> RobotReport:
+        """What the robot reports of itself now.
+
+        Raises:
+            DriverError: no frames come, or a connection broke.
+        """
+        self._robot.primary.poll()
+        robot = self._robot
+        return make_report(
+            robot.network, robot.host, robot.ports, self.info, self.read_frame(), robot.primary
+        )
+
+    def check_ready(self) -> RealtimeFrame:
+        """Refuse a robot that may not move now; returns its state.
+
+        Raises:
+            RobotStoppedError: safety mode or robot mode forbids it.
+            DriverError: a program is running, the speed slider was moved, or the ports name different arms.
+        """
+        frame = self.read_frame()
+        check_safety(frame)
+        check_idle(frame)
+        self._robot.primary.poll()
+        check_arm(self.info, self._robot.primary)
+        check_slider(reported_slider(self._robot.primary))
+        return frame
+
+    def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
+        """Stream the commands of one source: start the receiver program, stream, stop, wait for rest.
+
+        Args:
+            source: a fresh one; the arm must stand where its run begins.
+            on_row: takes every new frame with the command sent; what it raises ends the run.
+            acceleration: of the robot's `speedj` [rad/s2].
+
+        Returns:
+            What happened on the wire; the arm rests and no program runs.
+
+        Raises:
+            RobotStoppedError: the robot stopped, or its program failed.
+            DriverError: anything else that ended the run; the arm has been stopped.
+        """
+        self.check_ready()
+        robot, watch = self._robot, self._watch
+        server, frames, period = robot.server, robot.frames, self.info.period
+        server.forget_callers()
+        reverse: Transport | None = None
+        try:
+            with _AlwaysStopped(self) as guard:
+                text = receiver_script(server.address, server.port, acceleration=acceleration, period=period)
+                watch.start(text)
+                reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
+                guard.reverse = reverse
+                stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
+                try:
+                    with collector_paused():
+                        report = stream.run(source, on_row)
+                except ProgramEndedError as error:
+                    raise watch.explain(error) from error
+                watch.wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
+                wait_for_rest(frames, robot.network)
+        except RobotStoppedError:
+            raise
+        except DriverError as error:
+            self._raise_safety_stop(error)
+            raise
+        finally:
+            if reverse is not None:
+                reverse.close()
+        return report
+
+    def _raise_safety_stop(self, error: DriverError) -> None:
+        """Raise a safety stop that the robot reports now: it may be the cause of an error, or its effect."""
+        try:
+            check_safety(self.read_frame())
+        except RobotStoppedError as stop:
+            raise RobotStoppedError(f"{stop}; before that: {full_message(error)}") from error
+        except DriverError:
+            pass  # a robot that is gone reports nothing
+
+    def stop(self, reverse: Transport | None) -> None:
+        """Bring the arm to rest, by every available method.
+
+        Args:
+            reverse: connection to the receiver program, when one runs.
+
+        Raises:
+            DriverError: the arm could not be seen to come to rest.
+        """
+        stop_arm(self._robot, reverse)
+        self._in_motion = False
+
+
+class _AlwaysStopped:
+    """Stops the arm when the block is left by an exception of any kind, Ctrl-C included."""
+
+    def __init__(self, driver: UrDriver) -> None:
+        self._driver = driver
+        self.reverse: Transport | None = None
+
+    def __enter__(self) -> Self:
+        self._driver._in_motion = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self._driver._in_motion = False
+            return
+        try:
+            self._driver.stop(self.reverse)
+        except DriverError as not_stopped:
+            error.add_note(str(not_stopped))
+        finally:
+            # Tried once with everything there is; closing the session would only try the same again.
+            self._driver._in_motion = False
