@@ -104,7 +104,7 @@ def run_case(name: str, fidelity: str, seed: int, pace: str, planned: Experiment
     from pc_client.analysis.table import build_table
     from pc_client.driver.session import UrDriver
     from pc_client.experiment.runner import ExperimentRunner
-    from pc_client.recording.loader import load_recording
+    from pc_client.recording.recording import load_recording
 
     with box(fidelity, seed, pace) as ports, UrDriver(HOST, ports) as driver:
         report = ExperimentRunner(driver, planned, COMPOSITIONS[name][0]).run()

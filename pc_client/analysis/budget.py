@@ -26,7 +26,7 @@ from pc_client.analysis.metrics import rest_noise
 from pc_client.analysis.snr import shifted_pair
 from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.track import ShiftedReference, TcpTrack, speed, velocity
-from pc_client.recording.loader import Recording
+from pc_client.recording.recording import Recording
 
 SPLIT_HZ = 6.0
 PARTS = ("delay", "scale and ramp", "slow rest", "fast rest", "noise")

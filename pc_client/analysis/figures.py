@@ -13,7 +13,7 @@ from pc_client.analysis.metrics import joint_errors, position_errors
 from pc_client.analysis.run import MeasuredRun, budget_column
 from pc_client.analysis.table import Table
 from pc_client.analysis.track import speed
-from pc_client.recording.origin import origin_of
+from pc_client.recording.provenance import origin_of
 from pc_client.results.panels import Box, Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.static import Bars, bars_of_levels, figure
 from pc_client.results.theme import (

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.analysis.track import ShiftedReference, TcpTrack, velocity
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import Recording
+from pc_client.recording.recording import Recording
+from pc_client.recording.rows import Phase
 
 
 @dataclass(frozen=True, slots=True)

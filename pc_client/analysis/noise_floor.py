@@ -31,7 +31,7 @@ from pc_client.analysis.track import speed, velocity
 from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_jacobian
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
-from pc_client.recording.layout import Phase
+from pc_client.recording.rows import Phase
 
 Array = NDArray[np.float64]
 

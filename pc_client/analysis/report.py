@@ -24,7 +24,7 @@ from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.cell_file import parse_cell
 from pc_client.kinematics.robot_model import ROBOTS
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from pc_client.results.pages import picture, render, require_report_libraries, write_files, zoomable
 from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES

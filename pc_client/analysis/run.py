@@ -10,8 +10,8 @@ from pc_client.analysis.metrics import Errors, measure_errors
 from pc_client.analysis.snr import Snr, measure_snr
 from pc_client.analysis.track import TcpTrack, track_of
 from pc_client.errors import RecordingError
-from pc_client.recording.loader import Recording
 from pc_client.recording.provenance import Provenance
+from pc_client.recording.recording import Recording
 
 GIVEN_UP = "given up"
 """Kind of the movement of a run that did not come to its end."""

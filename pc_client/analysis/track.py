@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 
 from pc_client.control.loop_model import SAMPLING_TIME
 from pc_client.errors import RecordingError
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import Recording
+from pc_client.recording.recording import Recording
+from pc_client.recording.rows import Phase
 
 # Fewer samples than this are no movement: 80 ms.
 MIN_MOVEMENT_ROWS = 10

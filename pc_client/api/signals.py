@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.track import TcpTrack, rows_per_sample, track_of
-from pc_client.recording.export import flat_columns, split_columns, table_of
-from pc_client.recording.loader import Recording, load_recording
-from pc_client.recording.origin import Source
+from pc_client.recording.provenance import Source
+from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
 
 if TYPE_CHECKING:
     import polars

@@ -134,7 +134,7 @@ def read_runs(folder: Path) -> list[MeasuredRun]:
     from rich.progress import track
 
     from pc_client.analysis.run import analyse_run
-    from pc_client.recording.loader import load_recording
+    from pc_client.recording.recording import load_recording
 
     files = track(sorted(folder.glob("*.mcap")), description="reading", console=console, transient=True)
     return [analyse_run(load_recording(path)) for path in files]

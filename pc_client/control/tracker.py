@@ -18,7 +18,7 @@ from pc_client.control.tool_guard import ToolGuard
 from pc_client.errors import DriverError
 from pc_client.kinematics.forward import check_flange
 from pc_client.kinematics.robot_model import RobotModel
-from pc_client.recording.layout import Phase
+from pc_client.recording.rows import Phase
 from protocol.realtime.layout import RealtimeFrame
 
 # After a gap in the frames the integral must not jump: no more than this many cycles count.

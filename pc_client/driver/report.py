@@ -19,7 +19,7 @@ from pc_client.driver.questions import RtdeAnswer, ask_dashboard, ask_rtde
 from pc_client.driver.realtime import RealtimeClient
 from pc_client.driver.transport import NO_ROUTE, Network
 from pc_client.errors import DriverError, UnknownHostError
-from pc_client.recording.origin import Source, origin_of
+from pc_client.recording.provenance import Source, origin_of
 from protocol.errors import RemoteProtocolError
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.realtime.layout import RealtimeFrame

@@ -20,7 +20,7 @@ from pc_client.movements.movement import JointTrajectory, Movement
 from pc_client.movements.movement_file import movement_text
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.planning.plan import JointPlan, plan_joints, plan_movement
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 
 Motion = Movement | JointTrajectory
 """What can be planned: a movement of the TCP, or joint angles over time."""

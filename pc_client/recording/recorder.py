@@ -26,8 +26,11 @@ from numpy.typing import NDArray
 
 from pc_client.errors import RecordingError, one_line
 from pc_client.kinematics.arm_tree import ArmTree
-from pc_client.recording.arm_view import ArmView
-from pc_client.recording.layout import (
+from pc_client.recording.arm_view import CDR_LITTLE_ENDIAN, ArmView
+from pc_client.recording.outbox import Opener, Outbox, open_unbuffered
+from pc_client.recording.provenance import Provenance
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import (
     PROVENANCE_RECORD,
     SUMMARY_RECORD,
     UNITS_RECORD,
@@ -36,10 +39,6 @@ from pc_client.recording.layout import (
     row_topics,
     schema_text,
 )
-from pc_client.recording.loader import load_recording
-from pc_client.recording.outbox import Opener, Outbox, open_unbuffered
-from pc_client.recording.provenance import Provenance
-from pc_client.recording.ros_messages import CDR_LITTLE_ENDIAN
 
 ROWS_PER_CHUNK = 64  # half a second at 125 Hz, an eighth of one at 500 Hz
 # Rows that are kept in memory after the disk failed: two minutes at 125 Hz, half of one at 500 Hz, 30 MB.

@@ -8,7 +8,7 @@ from typing import Any
 from pc_client.analysis.budget import PARTS
 from pc_client.analysis.run import budget_column
 from pc_client.control.controller import FIELDS
-from pc_client.recording.origin import Origin, origin_of
+from pc_client.recording.provenance import Origin, origin_of
 from pc_client.results.tables import Column
 
 FACTORS = (

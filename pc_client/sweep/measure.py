@@ -7,7 +7,7 @@ from pathlib import Path
 from pc_client.analysis.run import analyse_run
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.identification import Identification
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from pc_client.results.tables import finite
 from pc_client.sweep.columns import FIGURES
 from pc_client.sweep.outcome import Row

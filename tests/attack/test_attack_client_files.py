@@ -34,8 +34,8 @@ from pc_client.file_names import MOST_BYTES, as_file_name, is_file_name
 from pc_client.input_files import FILE_KINDS
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
-from pc_client.recording.layout import row_topics, schema_text
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import row_topics, schema_text
 from pc_client.sweep.config import read_config
 from ur_hil.input_files import MIB
 

@@ -16,7 +16,7 @@ from pc_client.errors import ClientError
 from pc_client.extraction.pen import contents, parse_pen, pen_sources
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from pc_client.sweep.config import read_config
 
 ROOT = Path(__file__).parents[2]

@@ -20,7 +20,7 @@ from integration_support import (
     send,
 )
 
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from protocol.primary.messages import KeyMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox

@@ -10,7 +10,7 @@ from pc_client.analysis.run import analyse_run
 from pc_client.analysis.track import speed
 from pc_client.api.signals import Run
 from pc_client.movements.files import load_movement
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
 
 PERIOD = 0.002  # s

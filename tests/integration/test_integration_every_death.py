@@ -15,7 +15,7 @@ from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.session import UrDriver
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from protocol.ur_types import ProgramState, SafetyMode
 
 ALLOWED = 0.3  # s

@@ -13,7 +13,7 @@ from integration_support import (
     send,
 )
 
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 

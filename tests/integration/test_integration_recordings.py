@@ -15,7 +15,7 @@ from integration_support import (
     start,
 )
 
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
 
 ROOM = 400_000  # bytes; about a third of the recording of a short movement

@@ -8,7 +8,7 @@ from integration_support import at, free_port_base
 
 from pc_client.driver.report import read_report
 from pc_client.driver.transport import TcpNetwork
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
 
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 import pytest
 from integration_support import Frames, at, finish, send, serving, start
 
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from protocol.ur_types import ProgramState
 
 STOPPED = 2.0  # s

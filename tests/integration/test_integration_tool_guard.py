@@ -15,7 +15,7 @@ from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from protocol.ur_types import SafetyMode
 
 PUSH, PUSH_DURATION = (0.0, 240.0, 0.0), 0.05

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pc_client.recording.layout import Phase
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.rows import Phase
 
 SIGNALS = (
     ("timestamp", 1, "s"),

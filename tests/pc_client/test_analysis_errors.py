@@ -13,7 +13,7 @@ from recording_samples import PERIOD, record_movement
 from pc_client.analysis.budget import PARTS
 from pc_client.analysis.metrics import rest_noise
 from pc_client.analysis.run import MeasuredRun, analyse_run
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 
 
 def analysed(tmp_path: Path, **fault: Any) -> MeasuredRun:

@@ -17,9 +17,9 @@ from pc_client.analysis.table import build_table
 from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_positions
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import Phase
 
 SIGMA = np.array((1.1e-5, 1.1e-5, 1.45e-5, 1.45e-5, 1.75e-5, 1.75e-5))
 Q0 = np.array((0.4, -1.77, -2.1, -0.1, 1.3, 1.86))

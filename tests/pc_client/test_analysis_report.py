@@ -19,8 +19,8 @@ from pc_client.analysis.report import build_report
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.table import PAPER_SNR_DB, Table, build_table
 from pc_client.errors import RecordingError
-from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.recording import load_recording
 
 
 def record(
@@ -319,7 +319,7 @@ def test_missing_library_says_what_to_install(
 
 def test_plotting_is_loaded_only_to_plot() -> None:
     code = (
-        "import sys, pc_client.recording.recorder, pc_client.recording.export, pc_client.analysis.report\n"
+        "import sys, pc_client.recording.recorder, pc_client.recording.recording, pc_client.analysis.report\n"
         "print([m for m in ('matplotlib', 'plotly', 'jinja2') if m in sys.modules])"
     )
     run = subprocess.run(

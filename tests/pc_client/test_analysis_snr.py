@@ -14,9 +14,9 @@ from recording_samples import PERIOD, SIGNALS, append_rows, lognormal, provenanc
 from pc_client.analysis.snr import Snr, measure_snr, snr_db
 from pc_client.analysis.track import speed, track_of
 from pc_client.errors import RecordingError
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import Phase
 
 
 def measured(path: Path) -> Snr:

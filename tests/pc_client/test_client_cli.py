@@ -19,7 +19,7 @@ import pc_client.driver.transport as transport
 from pc_client import cli
 from pc_client.api.confirmation import QUESTION
 from pc_client.errors import DriverError
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.primary.state import encode_state
 from protocol.ur_types import SoftwareVersion

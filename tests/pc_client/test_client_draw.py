@@ -23,7 +23,7 @@ from pc_client.errors import ClientError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.files import load_movement
 from pc_client.movements.geometry import WORKING_BOXES
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 
 LETTER = Path(__file__).parents[2] / "examples" / "drawings" / "letter_i.txt"
 

@@ -14,7 +14,7 @@ from pc_client.control.tracker import Tracker
 from pc_client.errors import DriverError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.lognormal import TwoSidedTiming
-from pc_client.recording.layout import Phase
+from pc_client.recording.rows import Phase
 
 UR3 = robot_model("ur3")
 CONFIG = CONTROLLERS["paper"]

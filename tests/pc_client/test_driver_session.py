@@ -14,7 +14,7 @@ from pc_client.driver.questions import ask_dashboard
 from pc_client.driver.receiver import REVERSE_PORT, ReverseServer, fill_template, receiver_script
 from pc_client.driver.session import UrDriver, stop_script
 from pc_client.errors import DriverError, RobotStoppedError
-from pc_client.recording.origin import origin_of
+from pc_client.recording.provenance import origin_of
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary.messages import TextMessage
 from protocol.primary.state import encode_state

@@ -24,8 +24,8 @@ from pc_client.experiment.prediction import LEAD, SETTLE
 from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
 from pc_client.experiment.runner import ExperimentRunner
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import Phase
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
 BEST = CONTROLLERS["best"]

@@ -28,9 +28,9 @@ from pc_client.experiment.identification import identify
 from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment, scratch_folder
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import Cell, Wall
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import Phase
 from pc_client.sweep.measure import loop_figures
 from protocol.velocity_stream import VelocityMode
 

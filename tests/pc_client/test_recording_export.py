@@ -13,9 +13,8 @@ from recording_samples import SIGNALS, append_rows, provenance
 from scipy.io import loadmat
 
 from pc_client.errors import RecordingError
-from pc_client.recording.export import export
-from pc_client.recording.loader import Recording, load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.recording import Recording, export, load_recording
 
 
 @pytest.fixture

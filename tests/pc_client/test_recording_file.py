@@ -16,9 +16,9 @@ from mcap.records import MessageIndex
 from recording_samples import N_VALUES, SIGNALS, append_rows, provenance
 
 from pc_client.errors import RecordingError
-from pc_client.recording.layout import Phase, parse_schema_text, row_topics, schema_text
-from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import ROWS_PER_CHUNK, Recorder
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import Phase, parse_schema_text, row_topics, schema_text
 
 
 def write(path: Path, n: int) -> Path:

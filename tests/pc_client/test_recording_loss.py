@@ -16,9 +16,9 @@ from recording_samples import SIGNALS, append_rows, provenance
 
 from pc_client.errors import RecordingError
 from pc_client.recording import recorder as recorder_module
-from pc_client.recording.layout import row_topics
-from pc_client.recording.loader import Recording, load_recording
 from pc_client.recording.recorder import ROWS_PER_CHUNK, Recorder
+from pc_client.recording.recording import Recording, load_recording
+from pc_client.recording.rows import row_topics
 
 N_ROWS = 3 * ROWS_PER_CHUNK + 10
 ROW_BYTES = sum(topic.dtype.itemsize + 9 + 22 for topic in row_topics(SIGNALS))  # with the heads of messages

@@ -21,9 +21,9 @@ from scipy.spatial.transform import Rotation
 from pc_client.kinematics.arm_tree import arm_tree
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
-from pc_client.recording.layout import Phase
-from pc_client.recording.loader import load_recording
 from pc_client.recording.recorder import Recorder
+from pc_client.recording.recording import load_recording
+from pc_client.recording.rows import Phase
 from protocol.realtime.layout import COLUMNS
 
 SIGNALS = [(column.name, column.count, column.unit) for column in COLUMNS]

@@ -17,7 +17,7 @@ import pc_client.api.arm as arm_module
 import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli
-from pc_client.recording.loader import load_recording
+from pc_client.recording.recording import load_recording
 from pc_client.sweep.case import all_cases
 from pc_client.sweep.config import read_config
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sweep_samples import case, invented, table_of, table_with
 
 from pc_client.control.controller import CONTROLLERS
-from pc_client.recording.origin import origin_of
+from pc_client.recording.provenance import origin_of
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.outcome import failed
 from pc_client.sweep.page import map_axes
