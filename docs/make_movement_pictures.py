@@ -13,9 +13,8 @@ from pc_client.movements.files import library_names, load_movement
 from pc_client.movements.geometry import UR3_BOX
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.results.panels import Box, Curve, Panel, Range, Sheet, boxes
-from pc_client.results.static import draw, image_bytes
-from pc_client.results.theme import BLUE, PAPER_GREY, RED
+from pc_client.results.matplotlib_figures import draw, image_bytes
+from pc_client.results.sheet import BLUE, PAPER_GREY, RED, Box, Curve, Panel, Range, Sheet, boxes
 
 _IMAGES = Path(__file__).parent / "img"
 _TOP = 0.30

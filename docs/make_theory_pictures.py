@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.robotic import SmoothedSquareWave
-from pc_client.results.static import figure, svg_text
-from pc_client.results.theme import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY
+from pc_client.results.matplotlib_figures import figure, svg_text
+from pc_client.results.sheet import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY
 
 IMG = Path(__file__).parent / "img"
 LOGNORMAL = Lognormal(0.0, -1.6, 0.25)

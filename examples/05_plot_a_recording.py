@@ -6,9 +6,8 @@ from pathlib import Path
 from pc_client.analysis.figures import speed_curve
 from pc_client.analysis.run import analyse_run
 from pc_client.recording.recording import load_recording
-from pc_client.results.panels import Panel, Sheet, boxes
-from pc_client.results.static import draw, image_bytes
-from pc_client.results.theme import BLUE, REFERENCE_GREY, WIDTH
+from pc_client.results.matplotlib_figures import draw, image_bytes
+from pc_client.results.sheet import BLUE, REFERENCE_GREY, WIDTH, Panel, Sheet, boxes
 
 
 def main():

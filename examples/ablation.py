@@ -208,8 +208,8 @@ def markdown(results: list[dict[str, Any]]) -> str:
 
 def draw(results: list[dict[str, Any]], path: Path) -> None:
     """Draw one panel a fidelity: mean SNR of each composition, by kind and run, and the floor."""
-    from pc_client.results.static import figure, image_bytes
-    from pc_client.results.theme import BLUE, ORANGE
+    from pc_client.results.matplotlib_figures import figure, image_bytes
+    from pc_client.results.sheet import BLUE, ORANGE
 
     fidelities = [f for f in FIDELITIES if any(r["fidelity"] == f for r in _of_main(results))]
     with figure(4.4, "SIMULATED") as page:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from docs.generate.page_parts import table
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from protocol.ur_types import Ports
 from ur_emulator.budgets import rows
 from ur_emulator.control_api.http_client import DEFAULT_PORT
@@ -60,7 +60,7 @@ _INTRODUCTION = """\
 # Security
 
 Made from `docs/generate/security_policy.py`, `ur_emulator/budgets.py` and
-`pc_client/input_files.py` by `make docs`. [docs/security.md](docs/security.md) lists the attacks
+`pc_client/files.py` by `make docs`. [docs/security.md](docs/security.md) lists the attacks
 that were tried, with figures.
 
 ## Who may do what

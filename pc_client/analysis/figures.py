@@ -14,9 +14,8 @@ from pc_client.analysis.run import MeasuredRun, budget_column
 from pc_client.analysis.table import Table
 from pc_client.analysis.track import speed
 from pc_client.recording.provenance import origin_of
-from pc_client.results.panels import Box, Curve, Panel, Sheet, boxes, cube_around
-from pc_client.results.static import Bars, bars_of_levels, figure
-from pc_client.results.theme import (
+from pc_client.results.matplotlib_figures import Bars, bars_of_levels, figure
+from pc_client.results.sheet import (
     BLUE,
     GREEN,
     ORANGE,
@@ -25,7 +24,13 @@ from pc_client.results.theme import (
     REFERENCE_GREY,
     SKY,
     WIDTH,
+    Box,
+    Curve,
+    Panel,
+    Sheet,
+    boxes,
     colour_of,
+    cube_around,
 )
 from protocol.ur_types import JOINT_NAMES
 

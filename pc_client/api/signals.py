@@ -84,7 +84,7 @@ class Signals:
     def plot(self) -> Figure:
         """A figure: speed of the TCP, joint angles, joint velocities."""
         from pc_client.analysis.figures import signals_sheet
-        from pc_client.results.static import draw
+        from pc_client.results.matplotlib_figures import draw
 
         return draw(signals_sheet(self.t, self.tcp_speed, self.q, self.qd, self.qd_cmd, self.simulated))
 
@@ -170,6 +170,6 @@ class Run(Signals):
         if self.aborted:
             return super().plot()
         from pc_client.analysis.figures import movement_sheet
-        from pc_client.results.static import draw
+        from pc_client.results.matplotlib_figures import draw
 
         return draw(movement_sheet((self.measured,)))

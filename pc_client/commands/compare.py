@@ -60,8 +60,8 @@ def _write(
 ) -> tuple[Path, ...]:
     """Write table and pictures; returns the files."""
     from pc_client.comparison.figure import comparison_sheet
+    from pc_client.results.matplotlib_figures import draw, svg_text
     from pc_client.results.pages import write_files
-    from pc_client.results.static import draw, svg_text
     from pc_client.results.tables import to_json
 
     texts = {

@@ -15,7 +15,7 @@ from pc_client.commands.experiment import execute, read_runs
 from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
 from pc_client.commands.run_settings import RunSettings, takes_run_settings
 from pc_client.errors import MovementError
-from pc_client.file_names import as_file_name
+from pc_client.files import as_file_name
 
 if TYPE_CHECKING:
     from pc_client.drawing.drawing import Drawing
@@ -211,8 +211,8 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
 
     from pc_client.drawing.figures import Shown, sheets_of
     from pc_client.drawing.table import drawing_rich, drawings_json, drawings_markdown, render_page
+    from pc_client.results.matplotlib_figures import draw, svg_text
     from pc_client.results.pages import write_files
-    from pc_client.results.static import draw, svg_text
     from pc_client.results.tables import to_json
 
     sheets = {

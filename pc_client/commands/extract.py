@@ -18,7 +18,7 @@ from pc_client.commands.options import (
     say,
 )
 from pc_client.errors import RecordingError, one_line
-from pc_client.file_names import as_file_name
+from pc_client.files import as_file_name
 from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:

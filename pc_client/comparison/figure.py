@@ -10,8 +10,7 @@ from pc_client.analysis.run import MeasuredRun
 from pc_client.comparison.movement_set import MovementSet
 from pc_client.comparison.signals import executed_signal, planned_signal
 from pc_client.movements.twins import GENERATORS
-from pc_client.results.panels import Curve, Panel, Sheet, boxes, cube_around
-from pc_client.results.theme import BLUE, REFERENCE_GREY
+from pc_client.results.sheet import BLUE, REFERENCE_GREY, Curve, Panel, Sheet, boxes, cube_around
 
 __all__ = ["comparison_sheet"]
 

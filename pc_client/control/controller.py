@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Annotated
 
 from pc_client.errors import ControllerError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from ur_hil.records import Flag, checked, fields_of, nearest, number, record, word
 
 DEFAULT = "preview"

@@ -15,8 +15,19 @@ from numpy.typing import NDArray
 from pc_client.drawing.drawing import Drawing
 from pc_client.drawing.execution import Execution
 from pc_client.drawing.judgement import Signal, Verdict, signals
-from pc_client.results.panels import Box, Curve, Panel, Sheet, boxes, cube_around
-from pc_client.results.theme import AXIS_GREY, BLUE, GREEN, RED, SKY
+from pc_client.results.sheet import (
+    AXIS_GREY,
+    BLUE,
+    GREEN,
+    RED,
+    SKY,
+    Box,
+    Curve,
+    Panel,
+    Sheet,
+    boxes,
+    cube_around,
+)
 
 __all__ = [
     "COLOURS",

@@ -22,7 +22,7 @@ from pc_client.drawing.figures import COLOURS, FIGURES
 from pc_client.drawing.judgement import Agreement, Verdict
 from pc_client.recording.provenance import Provenance
 from pc_client.results.pages import render, zoomable
-from pc_client.results.panels import Sheet
+from pc_client.results.sheet import Sheet
 from pc_client.results.tables import Column, finite, frame_of, to_html, to_markdown, to_rich
 
 if TYPE_CHECKING:

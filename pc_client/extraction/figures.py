@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from pc_client.errors import printable
 from pc_client.extraction.extract import Extraction, PartExtraction
 from pc_client.movements.sigma_lognormal import Motion
-from pc_client.results.panels import Curve, Panel, Sheet, boxes, cube_around
-from pc_client.results.static import draw, figure, image_bytes
-from pc_client.results.theme import BLUE, RED, REFERENCE_GREY, SKY
+from pc_client.results.matplotlib_figures import draw, figure, image_bytes
+from pc_client.results.sheet import BLUE, RED, REFERENCE_GREY, SKY, Curve, Panel, Sheet, boxes, cube_around
 
 if TYPE_CHECKING:
     import polars as pl

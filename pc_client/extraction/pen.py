@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import RecordingError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.movements.geometry import read_only
 from ur_hil.input_files import MIB
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from pc_client.errors import CellError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.cell import NOUNS, Cell, Solid, Three, Tool, Wall
 from ur_hil.records import Finite, Items, checked, number, record
 from ur_hil.records import text as text_field

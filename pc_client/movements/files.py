@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pc_client.errors import MovementError, UnknownMovementError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.movement import JOINT_COLUMNS, JointTrajectory, Movement
 from pc_client.movements.movement_file import movement_text, parse_movement

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
-from pc_client.file_names import ALLOWED, MOST_BYTES, is_file_name
+from pc_client.files import ALLOWED, MOST_BYTES, is_file_name
 from pc_client.movements.geometry import Similarity, read_only
 from pc_client.movements.minimum_jerk import MinimumJerk
 from pc_client.movements.power_law import PowerLaw
@@ -52,7 +52,7 @@ _KINDS: Mapping[type, Kind] = MappingProxyType(
 
 
 LONGEST_DURATION = 1200.0
-"""No movement lasts longer [s]: its recording could not be read back (`pc_client.input_files`)."""
+"""No movement lasts longer [s]: its recording could not be read back (`pc_client.files`)."""
 
 
 def _check_name(name: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.movements.columns import parse_rows
 from pc_client.movements.durations import Isochrony, leg_lengths
 from pc_client.movements.geometry import read_only

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from scipy.io import savemat
 
 from pc_client.errors import RecordingError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.recording.provenance import Provenance, Source
 from pc_client.recording.rows import (
     COMMAND_SIGNALS,

@@ -18,22 +18,22 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from pc_client.results.panels import Sheet
+    from pc_client.results.sheet import Sheet
 
 __all__ = ["picture", "render", "require_report_libraries", "write_files", "zoomable"]
 
 
 def picture(figure: Figure, alt: str) -> Markup:
     """The element of a figure that does not move, as SVG; `alt` says what it shows."""
-    from pc_client.results.static import svg_text
+    from pc_client.results.matplotlib_figures import svg_text
 
     return _element("svg+xml", svg_text(figure).encode(), alt)
 
 
 def zoomable(sheet: Sheet, alt: str) -> Markup:
     """The element of a figure that can be zoomed, over an image for paper and where scripts do not run."""
-    from pc_client.results.interactive import plotly_figure
-    from pc_client.results.static import draw, image_bytes
+    from pc_client.results.matplotlib_figures import draw, image_bytes
+    from pc_client.results.plotly_figures import plotly_figure
 
     data = json.dumps(plotly_figure(sheet), separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return _element("webp", image_bytes(draw(sheet), "webp"), alt, data)
@@ -67,7 +67,7 @@ def render(template: str, *, scripts: bool = False, **values: Any) -> str:
     """
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    from pc_client.results.interactive import plotly_script
+    from pc_client.results.plotly_figures import plotly_script
 
     environment = Environment(
         loader=FunctionLoader(_text_of),

@@ -16,7 +16,7 @@ import polars as pl
 
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller
 from pc_client.errors import MovementError, SweepError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.robot_model import ROBOTS

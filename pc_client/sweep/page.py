@@ -16,11 +16,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pc_client.control.controller import FIELDS
+from pc_client.results.matplotlib_figures import draw, figure
 from pc_client.results.pages import picture, render
-from pc_client.results.panels import Curve, Panel, Sheet
-from pc_client.results.static import draw, figure
+from pc_client.results.sheet import COLOURS, Curve, Panel, Sheet
 from pc_client.results.tables import to_html
-from pc_client.results.theme import COLOURS
 from pc_client.sweep.columns import origin_of_rows
 from pc_client.sweep.settings import RANKING, edge_of, rank_settings, spans_grid, varying
 

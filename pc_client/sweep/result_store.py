@@ -25,7 +25,7 @@ from typing import Literal
 import polars as pl
 
 from pc_client.errors import SweepError
-from pc_client.input_files import FILE_KINDS
+from pc_client.files import FILE_KINDS
 from pc_client.results.tables import frame_of, to_csv
 from pc_client.sweep.case import Case
 from pc_client.sweep.columns import COLUMNS

@@ -19,7 +19,7 @@ from pc_client.analysis.side_by_side import build_side_by_side, side_by_side
 from pc_client.analysis.table import Table
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.errors import RecordingError
-from pc_client.results.interactive import plotly_figure
+from pc_client.results.plotly_figures import plotly_figure
 
 PAPER, PREVIEW = CONTROLLERS["paper"], CONTROLLERS["preview"]
 QUICK = replace(PAPER, gain_p=10.0, gain_i=5.0)

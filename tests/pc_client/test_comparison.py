@@ -32,7 +32,7 @@ from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, Comparison, bu
 from pc_client.errors import ClientError
 from pc_client.movements import load_movement
 from pc_client.movements.twins import GENERATORS
-from pc_client.results.static import draw, svg_text
+from pc_client.results.matplotlib_figures import draw, svg_text
 
 RATE = 125.0
 

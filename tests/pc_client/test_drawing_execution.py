@@ -22,7 +22,7 @@ from pc_client.drawing.placement import PlacementOptions
 from pc_client.drawing.table import COLUMNS, Entry, drawings_json, drawings_markdown, render_page, table_of
 from pc_client.errors import RecordingError
 from pc_client.kinematics.robot_model import robot_model
-from pc_client.results.static import draw, svg_text
+from pc_client.results.matplotlib_figures import draw, svg_text
 from pc_client.results.tables import cells
 
 CYCLE = 0.008

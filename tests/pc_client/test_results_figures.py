@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pc_client.results.interactive import plotly_figure, thinned
+from pc_client.results.matplotlib_figures import Bars, bars_of_levels, draw, svg_text
 from pc_client.results.pages import zoomable
-from pc_client.results.panels import Curve, Panel, Sheet, boxes, cube_around
-from pc_client.results.static import Bars, bars_of_levels, draw, svg_text
-from pc_client.results.theme import BLUE, RED
+from pc_client.results.plotly_figures import plotly_figure, thinned
+from pc_client.results.sheet import BLUE, RED, Curve, Panel, Sheet, boxes, cube_around
 
 T = np.linspace(0.0, 8.0, 1001)
 SPACE = np.column_stack((np.cos(T), np.sin(T), 0.1 * T))

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.results.panels import Curve, Panel, Sheet
-from pc_client.results.theme import PLOTLY_MARK, plotly_template
+from pc_client.results.sheet import PLOTLY_MARK, Curve, Panel, Sheet, plotly_template
 
 __all__ = ["plotly_figure", "plotly_script", "thinned"]
 

@@ -21,8 +21,18 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from pc_client.results.panels import Curve, Panel, Sheet
-from pc_client.results.theme import LETTERS, MARK_EDGE, MARK_FILL, RED, SHADE, WIDTH, matplotlib_style
+from pc_client.results.sheet import (
+    LETTERS,
+    MARK_EDGE,
+    MARK_FILL,
+    RED,
+    SHADE,
+    WIDTH,
+    Curve,
+    Panel,
+    Sheet,
+    matplotlib_style,
+)
 
 __all__ = ["Bars", "bars_of_levels", "draw", "figure", "image_bytes", "svg_text"]
 
