@@ -99,7 +99,7 @@ def write(results: list[dict[str, Any]], out: Path) -> None:
 
 def run_case(name: str, fidelity: str, seed: int, pace: str, planned: Experiment) -> dict[str, Any]:
     """Run the movements with one composition on one box; returns figures by movement."""
-    from pc_client.analysis.budget import PARTS
+    from pc_client.analysis.measures import PARTS
     from pc_client.analysis.run import analyse_run
     from pc_client.analysis.table import build_table
     from pc_client.driver.session import UrDriver

@@ -1,9 +1,7 @@
 """From recordings to figures of merit, Table I and the report.
 
     track    the TCP path of one recording, reference and actual at the same time stamps
-    snr      the signal-to-noise ratio of the TCP velocity, Eq. 10, and its companions
-    metrics  lag, position errors, joint errors, noise floor
-    budget   where the rest of the signal-to-noise ratio is lost
+    measures the signal-to-noise ratio of the TCP velocity (Eq. 10), errors, and where the rest is lost
     run      all of these for one recording
     table    Table I: ours beside the paper's
     figures  what the pages show (loads matplotlib, so it is imported only when a plot is drawn)

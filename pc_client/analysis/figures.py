@@ -8,8 +8,7 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
-from pc_client.analysis.budget import PARTS
-from pc_client.analysis.metrics import joint_errors, position_errors
+from pc_client.analysis.measures import PARTS, joint_errors, position_errors
 from pc_client.analysis.run import MeasuredRun, budget_column
 from pc_client.analysis.table import Table
 from pc_client.analysis.track import speed

@@ -25,8 +25,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pc_client.analysis.measures import speed_noise
 from pc_client.analysis.run import MeasuredRun
-from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.track import speed, velocity
 from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_jacobian

@@ -16,7 +16,7 @@ import polars.selectors as cs
 from rich.console import Console
 from rich.progress import track as progress
 
-from pc_client.analysis.budget import PARTS, SPLIT_HZ
+from pc_client.analysis.measures import PARTS, SPLIT_HZ
 from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
 from pc_client.analysis.table import FLOOR, LAG, MOVEMENT, Table, build_table

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pc_client.analysis.budget import PARTS, Budget, error_budget
-from pc_client.analysis.metrics import Errors, measure_errors
-from pc_client.analysis.snr import Snr, measure_snr
+from pc_client.analysis.measures import PARTS, Budget, Errors, Snr, error_budget, measure_errors, measure_snr
 from pc_client.analysis.track import TcpTrack, track_of
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance

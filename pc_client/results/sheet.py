@@ -5,7 +5,7 @@ grey line in every figure, so that a figure can be read without its legend.
 
 What a figure shows: curves in panels on a sheet, whatever library draws it.
 
-`static.draw` makes a matplotlib figure of a sheet, `interactive.plotly_figure` one that a browser zooms.
+`matplotlib_figures.draw` makes a matplotlib figure of a sheet, `plotly_figures.plotly_figure` one that a browser zooms.
 """
 
 from __future__ import annotations

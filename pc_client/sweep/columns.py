@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pc_client.analysis.budget import PARTS
+from pc_client.analysis.measures import PARTS
 from pc_client.analysis.run import budget_column
 from pc_client.control.controller import FIELDS
 from pc_client.recording.provenance import Origin, origin_of

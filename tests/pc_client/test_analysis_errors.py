@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from recording_samples import PERIOD, record_movement
 
-from pc_client.analysis.budget import PARTS
-from pc_client.analysis.metrics import rest_noise
+from pc_client.analysis.measures import PARTS, rest_noise
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.recording.recording import load_recording
 

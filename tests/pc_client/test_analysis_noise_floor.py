@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from recording_samples import N_VALUES, PERIOD, SIGNALS, lognormal, provenance, record_movement
 
+from pc_client.analysis.measures import speed_noise
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import MeasuredRun, analyse_run
-from pc_client.analysis.speed_noise import speed_noise
 from pc_client.analysis.table import build_table
 from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_positions

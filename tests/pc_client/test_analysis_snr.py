@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recording_samples import PERIOD, SIGNALS, append_rows, lognormal, provenance, record_movement
 
-from pc_client.analysis.snr import Snr, measure_snr, snr_db
+from pc_client.analysis.measures import Snr, measure_snr, snr_db
 from pc_client.analysis.track import speed, track_of
 from pc_client.errors import RecordingError
 from pc_client.recording.recorder import Recorder

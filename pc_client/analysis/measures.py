@@ -1,0 +1,374 @@
+"""The signal-to-noise ratio of the TCP velocity: the figure by which the paper judges a robot.
+
+    SNR = 10 log10( P(v_pc) / P(v_ur3 - v_pc) )                                             Eq. 10
+
+`speed_db` is this, exactly: v is the scalar TCP speed, the first difference of positions, v_pc of the
+reference and v_ur3 of the position that the robot reports, at the same controller time stamps, over the
+movement phase, neither shifted nor smoothed. P is the mean square. The other figures stand under their own
+names beside it:
+
+    speed_shifted_db     the same after the one time shift that makes it best
+    velocity_db          on the velocity vector, which also sees a wrong direction
+    velocity_shifted_db  the vector after its own best shift
+
+Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial robotic arms: a case study on a
+UR3 robot", Eq. 10 and section IV.B ("velocities are computed as the TCP position derivative").
+
+Errors of one run in the units people think in: millimetres, milliseconds, milliradians.
+
+All of them come from what the robot reports; a calibration error that the robot does not know of is not in
+them. A constant offset between the client's nominal arm and the robot's calibrated one is: it is measured and
+taken out under its own name, never silently.
+
+What noise of a velocity does to its length, the speed that Eq. 10 judges.
+
+Along a fast motion only the noise in its direction counts. Near rest the length of a noisy zero is never
+negative: the speed is too high on average, and all directions count. Both come out of one expectation.
+
+Where the signal-to-noise ratio is lost: the power of the speed error, cut into parts that add up to it.
+
+    delay           what the best time shift takes away
+    scale and ramp  what is left of it, as far as it is a constant times the reference speed (too fast, too
+                    slow) plus a constant times its second derivative (corners rounded off)
+    slow rest       below 6 Hz, less the noise: friction, settling, limits of acceleration, slow gear ripple
+    fast rest       above 6 Hz, less the noise: gear ripple (101 cycles a joint turn pass 6 Hz at 0.4 rad/s),
+                    jitter of the command stream
+    noise           what the differenced position shows at rest, turned into noise of the speed: its variance
+                    is taken from the fast rest, what it adds to the mean of the speed near rest from the slow
+
+Each part is the drop in mean square error from one step to the next, so no part is counted twice. What is
+measured is the correlation with these shapes, not a cause: a cause that looks like a delay is in `delay`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from pc_client.analysis.track import MIN_MOVEMENT_ROWS, ShiftedReference, TcpTrack, speed, velocity
+from pc_client.errors import RecordingError
+from pc_client.recording.recording import Recording
+from pc_client.recording.rows import Phase
+
+# Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
+MIN_LAG_S, MAX_LAG_S = -0.1, 0.4
+
+_VelocityOf = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, slots=True)
+class Snr:
+    """The four signal-to-noise ratios of one run, in dB, and the lags in s that belong to the shifted ones.
+
+    A lag is positive when the arm is behind its reference.
+    """
+
+    speed_db: float
+    speed_shifted_db: float
+    speed_lag_s: float
+    velocity_db: float
+    velocity_shifted_db: float
+    velocity_lag_s: float
+
+
+def snr_db(reference: NDArray[np.float64], actual: NDArray[np.float64]) -> float:
+    """Eq. 10 on two signals of the same shape, (n,) or (n, 3).
+
+    Returns:
+        dB; inf when they are equal, -inf when the reference is all zero and the actual is not.
+    """
+    signal = float(np.sum(np.square(reference)))
+    noise = float(np.sum(np.square(actual - reference)))
+    if noise == 0.0:
+        return math.inf
+    return 10.0 * math.log10(signal / noise) if signal > 0.0 else -math.inf
+
+
+def measure_snr(track: TcpTrack) -> Snr:
+    """Compute all signal-to-noise ratios of one run."""
+    steps = track.movement_steps
+    raw = [
+        snr_db(f(track.t, track.p_ref)[steps], f(track.t, track.p_actual)[steps]) for f in (speed, velocity)
+    ]
+    reference = ShiftedReference(track)
+    speed_lag = _best_lag(track, reference, speed)
+    velocity_lag = _best_lag(track, reference, velocity)
+    return Snr(
+        speed_db=raw[0],
+        speed_shifted_db=snr_db(*shifted_pair(track, reference, speed_lag, speed)),
+        speed_lag_s=speed_lag,
+        velocity_db=raw[1],
+        velocity_shifted_db=snr_db(*shifted_pair(track, reference, velocity_lag, velocity)),
+        velocity_lag_s=velocity_lag,
+    )
+
+
+def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _VelocityOf) -> float:
+    """Return the delay in s of the reference that leaves the least square error.
+
+    A scan in steps of one control cycle finds the valley, a bounded search its bottom, far below one cycle.
+    The error is summed over one window for all lags, the movement and as much after it as the longest lag
+    needs, so that the sum is a smooth function of the lag.
+    """
+    cycle = float(np.median(np.diff(track.t)))
+    start = max(0, track.movement.start + math.floor(MIN_LAG_S / cycle))
+    stop = min(len(track.t), track.movement.stop + math.ceil(MAX_LAG_S / cycle))
+    window = slice(start, stop)
+    t = track.t[window]
+    actual = velocity_of(t, track.p_actual[window])
+
+    def error(lag: float) -> float:
+        return float(np.sum(np.square(actual - velocity_of(t, reference.at(lag, window)))))
+
+    lags = np.arange(MIN_LAG_S, MAX_LAG_S + cycle / 2, cycle)
+    coarse = float(lags[np.argmin([error(lag) for lag in lags])])
+    fine = minimize_scalar(
+        error, bounds=(coarse - cycle, coarse + cycle), method="bounded", options={"xatol": 1e-7}
+    )
+    return float(fine.x)
+
+
+def shifted_pair(
+    track: TcpTrack, reference: ShiftedReference, lag_s: float, velocity_of: _VelocityOf
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return reference and actual over the movement, both taken `lag_s` later at the robot.
+
+    The window moves with the lag, so that the same piece of the reference is judged as without a shift.
+
+    Raises:
+        RecordingError: too little of the movement is left.
+    """
+    half_cycle = 0.5 * float(np.median(np.diff(track.t)))
+    shifted_t = track.t - lag_s
+    inside = np.flatnonzero((shifted_t > track.t_start - half_cycle) & (shifted_t < track.t_end + half_cycle))
+    if len(inside) < MIN_MOVEMENT_ROWS:
+        raise RecordingError(
+            f"{len(inside)} samples of movement are left after the best shift of {lag_s:.3f} s; "
+            f"at least {MIN_MOVEMENT_ROWS} are needed"
+        )
+    window = slice(int(inside[0]), int(inside[-1]) + 1)
+    t = track.t[window]
+    return velocity_of(t, reference.at(lag_s, window)), velocity_of(t, track.p_actual[window])
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Errors over the movement phase.
+
+    Attributes:
+        max_position_error_mm: largest distance between reference and reported TCP position at one time.
+        rms_position_error_mm: its root mean square.
+        max_path_error_mm: the same after the best time shift and without the constant offset: how far the
+            arm leaves the path, whatever the clock says and wherever the calibration puts it.
+        rms_path_error_mm: its root mean square.
+        offset_mm: (3,) the constant offset in the base frame: mean error after the best time shift.
+        max_joint_error_mrad: (6,) largest |reference - actual| of each joint.
+        rms_joint_error_mrad: (6,) its root mean square.
+        peak_speed_mm_s: top TCP speed of the reference.
+        duration_s: length of the movement phase.
+        noise_floor_mm_s: root mean square of the differenced position at rest, one axis; None without rest.
+    """
+
+    max_position_error_mm: float
+    rms_position_error_mm: float
+    max_path_error_mm: float
+    rms_path_error_mm: float
+    offset_mm: tuple[float, float, float]
+    max_joint_error_mrad: tuple[float, ...]
+    rms_joint_error_mrad: tuple[float, ...]
+    peak_speed_mm_s: float
+    duration_s: float
+    noise_floor_mm_s: float | None
+
+
+def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Errors:
+    """Measure position and joint errors over the movement.
+
+    Args:
+        recording: the run.
+        track: its TCP path.
+        lag_s: best time shift of the run, from the velocity.
+    """
+    moving = track.movement
+    error = track.p_actual[moving] - track.p_ref[moving]
+    path_error = track.p_actual[moving] - ShiftedReference(track).at(lag_s, moving)
+    offset = path_error.mean(axis=0)
+    distance = 1e3 * np.linalg.norm(error, axis=1)
+    path_distance = 1e3 * np.linalg.norm(path_error - offset, axis=1)
+    joint_error = 1e3 * joint_errors(recording, track)[moving]
+    ref_speed = np.linalg.norm(velocity(track.t, track.p_ref), axis=1)[track.movement_steps]
+    noise = rest_noise(recording, track)
+    x, y, z = (float(v) for v in 1e3 * offset)
+    return Errors(
+        max_position_error_mm=float(distance.max()),
+        rms_position_error_mm=_rms(distance),
+        max_path_error_mm=float(path_distance.max()),
+        rms_path_error_mm=_rms(path_distance),
+        offset_mm=(x, y, z),
+        max_joint_error_mrad=tuple(float(v) for v in np.abs(joint_error).max(axis=0)),
+        rms_joint_error_mrad=tuple(_rms(column) for column in joint_error.T),
+        peak_speed_mm_s=float(1e3 * ref_speed.max()),
+        duration_s=track.t_end - track.t_start,
+        noise_floor_mm_s=None if noise is None else float(1e3 * np.sqrt(np.trace(noise) / 3.0)),
+    )
+
+
+def joint_errors(recording: Recording, track: TcpTrack) -> NDArray[np.float64]:
+    """Return reference minus actual joint position at the samples of the track, (n, 6) rad."""
+    error: NDArray[np.float64] = (
+        recording.column("ref_q")[track.rows] - recording.column("actual_q")[track.rows]
+    )
+    return error
+
+
+def position_errors(track: TcpTrack) -> NDArray[np.float64]:
+    """Return the distance between reference and reported position over the movement, (n,) m."""
+    moving = track.movement
+    distance: NDArray[np.float64] = np.linalg.norm(track.p_actual[moving] - track.p_ref[moving], axis=1)
+    return distance
+
+
+def rest_noise(recording: Recording, track: TcpTrack) -> NDArray[np.float64] | None:
+    """Return the covariance (3, 3) of the differenced position at rest, (m/s)^2: the noise floor of velocity.
+
+    Only the half of each settling phase farther from the movement counts, and a slow drift (the mean
+    velocity of that half) is taken out. None when no phase of rest is long enough.
+    """
+    phase = recording.column("phase")[track.rows]
+    before = np.flatnonzero(phase == Phase.SETTLE_BEFORE)
+    after = np.flatnonzero(phase == Phase.SETTLE_AFTER)
+    pieces = []
+    for samples in (before[: len(before) // 2], after[len(after) // 2 :]):
+        if len(samples) >= 8:
+            v = velocity(track.t[samples], track.p_actual[samples])
+            pieces.append(v - v.mean(axis=0))
+    if not pieces:
+        return None
+    v = np.concatenate(pieces)
+    return v.T @ v / (len(v) - len(pieces))
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+Array = NDArray[np.float64]
+
+_NODES = 5
+"""Nodes of the Gauss-Hermite rule an axis: exact for polynomials up to the ninth degree."""
+
+
+def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
+    """Mean and variance of |v + n| - |v|, n being normal with mean zero.
+
+    Args:
+        v: (n, 3) velocities [m/s].
+        covariance: (n, 3, 3) or (3, 3), of n [(m/s)2].
+
+    Returns:
+        Mean (n,) [m/s] and variance (n,) [(m/s)2], by Gauss-Hermite quadrature.
+    """
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    share = np.einsum("i,j,k->ijk", weights, weights, weights).ravel()
+    share /= share.sum()
+    # A root of each covariance; a tiny negative eigenvalue is rounding.
+    values, vectors = np.linalg.eigh(np.broadcast_to(covariance, (len(v), 3, 3)))
+    roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    noisy = np.linalg.norm(v[:, None, :] + grid @ roots.transpose(0, 2, 1), axis=2)
+    excess = noisy - np.linalg.norm(v, axis=1)[:, None]
+    mean: Array = excess @ share
+    variance: Array = np.square(excess) @ share - np.square(mean)
+    return mean, np.maximum(variance, 0.0)
+
+
+SPLIT_HZ = 6.0
+PARTS = ("delay", "scale and ramp", "slow rest", "fast rest", "noise")
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """Error power of one run by part.
+
+    Attributes:
+        signal_power: mean square of the reference speed, (m/s)^2.
+        error_power: mean square of the speed error, (m/s)^2; the sum of the parts.
+        parts: (m/s)^2 by name, in the order of `PARTS`.
+    """
+
+    signal_power: float
+    error_power: float
+    parts: Mapping[str, float]
+
+    def share(self, part: str) -> float:
+        """Return the part's share of the error power, 0..1."""
+        return self.parts[part] / self.error_power if self.error_power > 0.0 else 0.0
+
+    def alone_db(self, part: str) -> float:
+        """Return the SNR in dB that would be reached if this part were the only error."""
+        power = self.parts[part]
+        return 10.0 * math.log10(self.signal_power / power) if power > 0.0 < self.signal_power else math.inf
+
+
+def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
+    """Cut the power of the speed error of one run into its parts.
+
+    Args:
+        recording: the run.
+        track: its TCP path.
+        lag_s: best time shift of the scalar speed.
+    """
+    steps = track.movement_steps
+    ref_speed = speed(track.t, track.p_ref)[steps]
+    error_power = _power(speed(track.t, track.p_actual)[steps] - ref_speed)
+
+    reference, actual = shifted_pair(track, ShiftedReference(track), lag_s, speed)
+    cycle = float(np.median(np.diff(track.t)))
+    error = actual - reference
+    after_shift = min(_power(error), error_power)
+    shapes = np.column_stack([reference, np.gradient(np.gradient(reference, cycle), cycle)])
+    scales = np.linalg.norm(shapes, axis=0)
+    scales[scales == 0.0] = 1.0
+    weights = np.linalg.lstsq(shapes / scales, error, rcond=None)[0]
+    rest = error - shapes / scales @ weights
+    after_shape = min(_power(rest), after_shift)
+
+    fast = min(_power_above(rest, SPLIT_HZ * cycle), after_shape)
+    slow = after_shape - fast
+    noise_slow, noise_fast = _noise_of_speed(recording, track)
+    noise_slow, noise_fast = min(noise_slow, slow), min(noise_fast, fast)
+    parts = (
+        error_power - after_shift,
+        after_shift - after_shape,
+        slow - noise_slow,
+        fast - noise_fast,
+        noise_slow + noise_fast,
+    )
+    return Budget(_power(ref_speed), error_power, dict(zip(PARTS, parts, strict=True)))
+
+
+def _power(signal: NDArray[np.float64]) -> float:
+    return float(np.mean(np.square(signal)))
+
+
+def _power_above(signal: NDArray[np.float64], cycles_per_sample: float) -> float:
+    """Return the mean square of the part of a signal above a frequency (Parseval)."""
+    n = len(signal)
+    power = np.square(np.abs(np.fft.rfft(signal))) / n**2
+    power[1 : (n + 1) // 2] *= 2.0  # all but 0 and Nyquist stand for two conjugate lines
+    return float(power[np.fft.rfftfreq(n) > cycles_per_sample].sum())
+
+
+def _noise_of_speed(recording: Recording, track: TcpTrack) -> tuple[float, float]:
+    """Return what noise at rest adds to the power of the speed error: by its mean, slow, and its variance."""
+    covariance = rest_noise(recording, track)
+    if covariance is None:
+        return 0.0, 0.0
+    v = velocity(track.t, track.p_ref)[track.movement_steps]
+    mean, variance = speed_noise(v, covariance)
+    return _power(mean), float(np.mean(variance))
