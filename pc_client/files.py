@@ -1,6 +1,6 @@
-"""How much the client reads of each kind of file, and what it raises for one that is wrong.
+"""The files of the client: how much is read of each kind, what is raised for a wrong one, and file names.
 
-Names from files and archives of others, as names of files in one folder, on any system.
+Names come from files and archives of others; here they become names of files in one folder, on any system.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The signal-to-noise ratio of the TCP velocity: the figure by which the paper judges a robot.
+"""What is measured on one run: signal-to-noise ratios, errors, and where the rest of the ratio is lost.
+
+The signal-to-noise ratio of the TCP velocity is the figure by which the paper judges a robot:
 
     SNR = 10 log10( P(v_pc) / P(v_ur3 - v_pc) )                                             Eq. 10
 
@@ -11,21 +13,12 @@ names beside it:
     velocity_db          on the velocity vector, which also sees a wrong direction
     velocity_shifted_db  the vector after its own best shift
 
-Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial robotic arms: a case study on a
-UR3 robot", Eq. 10 and section IV.B ("velocities are computed as the TCP position derivative").
+Errors are in the units people think in: millimetres, milliseconds, milliradians. All of them come from what
+the robot reports; a calibration error that the robot does not know of is not in them. A constant offset
+between the client's nominal arm and the robot's calibrated one is: it is measured and taken out under its own
+name.
 
-Errors of one run in the units people think in: millimetres, milliseconds, milliradians.
-
-All of them come from what the robot reports; a calibration error that the robot does not know of is not in
-them. A constant offset between the client's nominal arm and the robot's calibrated one is: it is measured and
-taken out under its own name, never silently.
-
-What noise of a velocity does to its length, the speed that Eq. 10 judges.
-
-Along a fast motion only the noise in its direction counts. Near rest the length of a noisy zero is never
-negative: the speed is too high on average, and all directions count. Both come out of one expectation.
-
-Where the signal-to-noise ratio is lost: the power of the speed error, cut into parts that add up to it.
+The budget cuts the power of the speed error into parts that add up to it:
 
     delay           what the best time shift takes away
     scale and ramp  what is left of it, as far as it is a constant times the reference speed (too fast, too
@@ -38,6 +31,9 @@ Where the signal-to-noise ratio is lost: the power of the speed error, cut into 
 
 Each part is the drop in mean square error from one step to the next, so no part is counted twice. What is
 measured is the correlation with these shapes, not a cause: a cause that looks like a delay is in `delay`.
+
+Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial robotic arms: a case study on a
+UR3 robot", Eq. 10 and section IV.B ("velocities are computed as the TCP position derivative").
 """
 
 from __future__ import annotations

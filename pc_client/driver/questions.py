@@ -1,6 +1,6 @@
-"""Questions to the dashboard server: one line out, one line back. An absent server is no error.
+"""Single questions to a robot, each on a connection of its own; an absent server is no error.
 
-What the RTDE port says now: its software, and values of variables. An absent port is no error.
+The dashboard server gets one line and answers one line. RTDE tells its software and values of variables.
 """
 
 from __future__ import annotations

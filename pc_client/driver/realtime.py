@@ -1,10 +1,9 @@
-"""Frames of the realtime port: in order, decoded, each known to be new or a heartbeat.
+"""Frames of the realtime port: in order, decoded, each known to be new or a heartbeat; and waiting for one.
 
 A heartbeat is a frame that repeats the last time stamp: the robot's time stands still while it waits for us.
 Of a robot that does not say that its time waits it is as good as no frame. New frames are never dropped here;
-the caller decides what to do with late ones.
-
-Waiting for something to show in the frames. Looks at every single frame, so that no short state is missed.
+the caller decides what to do with late ones. Waiting looks at every single frame, so that no short state is
+missed.
 
 Time-outs count the running time of this process: with a box faster than real time they are longer. Where the
 robot's time waits for its clients they are longer, since it may wait for another one that is stopped.

@@ -1,9 +1,8 @@
-"""The program that runs on the robot while we stream, filled in with our address and numbers.
+"""The program that runs on the robot while we stream, and the port of this computer where it dials back.
 
-The text is the file `programs/velocity_receiver.script` of the `urscript` package; it is read as a data file,
-without importing that package: the client needs the text, not the language.
-
-Where the robot's programs dial back: one caller at a time, and only the robot.
+The program's text is the file `programs/velocity_receiver.script` of the `urscript` package, filled in with
+our address and numbers. It is read as a data file, without importing that package: the client needs the text,
+not the language.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Which robot answers: firmware, model, serial number, and whether it is simulated, real or unknown.
+"""Which robot answers and what it reports of itself: the record that `experiment.preflight` judges.
 
-What a robot reports of itself: the record that `experiment.preflight` judges. Only reads.
-
-What answers at an address: every port, the rhythm of the frames, and what the robot reports of itself.
-
-It only reads; it sends nothing that could move an arm.
+Everything here only reads. `read_report` asks for it, `probe` looks at every port and at the rhythm of the
+frames, too. Nothing is sent that could move an arm. What a robot does not report stays unknown.
 """
 
 from __future__ import annotations

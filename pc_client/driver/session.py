@@ -1,16 +1,8 @@
-"""The connections of one session with a robot: state and messages, programs, frames, and the way back.
-
-What ends a motion without the receiver program: a program of our own that stops the arm, and a word.
-
-Bringing the arm to rest, by every available method: the stop word, then a program of our own.
-
-Our program on the robot: start it, watch what the robot reports of it, say why it has ended.
-
-A session with one robot: connect, stream, and always leave the arm stopped.
+"""A session with one robot: connect, stream, and always leave the arm stopped.
 
 It uses the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
-when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through
-`stop`: first the stop word to the program, then a program of our own that stops the arm.
+when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through `UrDriver.stop`:
+first the stop word to the program, then a program of our own that stops the arm.
 """
 
 from __future__ import annotations

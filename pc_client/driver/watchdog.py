@@ -1,6 +1,6 @@
-"""One thing that a robot must fulfil before it moves: what it reports, what is needed, what to do. Pure.
+"""What a robot must report for the arm to move and to go on moving, and when the arm rests. Pure checks.
 
-What a robot must report for the arm to go on moving, and when the arm counts as at rest. Pure checks.
+A `Condition` is one thing that a robot must fulfil: what it reports, what is needed, what to do.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""The ROS 2 messages that viewers know: their definitions, and how their values lie in CDR.
-
-Source: ROS 2 common_interfaces, geometry2 (fields only); OMG CDR (XCDR1) alignment rules.
-
-The topics that make a recording a moving arm in Foxglove, Rerun and ROS, beside the measured signals.
+"""The topics that make a recording a moving arm in Foxglove, Rerun and ROS, beside the measured signals.
 
 They are for eyes: 25 times a second, whatever the control cycle, so that a file grows little by them. Every
 cycle is in `/robot_state`. The transforms move the arm also in viewers that read no URDF.
@@ -13,6 +9,8 @@ cycle is in `/robot_state`. The transforms move the arm also in viewers that rea
     /joint_states        actual_q, actual_qd under the names of the URDF
     /tcp_pose            reported TCP pose in `base`
     /desired_tcp_pose    the reference's position, with the orientation of ref_q, in `base`
+
+Source of the messages: ROS 2 common_interfaces, geometry2 (fields only); OMG CDR (XCDR1) alignment rules.
 """
 
 from __future__ import annotations

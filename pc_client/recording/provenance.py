@@ -1,11 +1,8 @@
-"""The words for where data come from: a simulated arm, a real one, or unknown.
-
-Everything that shows data takes them from here. Only data of an arm that is known to be real bear no mark.
-
-What a reader must know to trust a recording and to repeat the run.
+"""What a reader must know to trust a recording and to repeat the run.
 
 Only facts of the experiment belong here. Host names, ports, dates and paths do not: two runs of the same
-experiment must give the same bytes.
+experiment must give the same bytes. Everything that shows data takes the words for simulated, real and not
+known from here. Only data of an arm that is known to be real bear no mark.
 """
 
 from __future__ import annotations

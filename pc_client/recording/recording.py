@@ -1,15 +1,13 @@
-"""Reads a recording back, also one whose end is missing.
+"""Reads a recording back, also one whose end is missing, and writes its rows as CSV, Parquet or MATLAB's MAT.
 
 The reader goes through the file from its beginning and never needs the index at its end, so that a run that
 was killed loads up to its last whole row. It never guesses. Damage inside the file ends the reading
 there, and `Recording.complete` and `Recording.damage` say so.
 
-The rows of a recording as CSV, Parquet or MATLAB's MAT, for tools that do not read MCAP.
-
-Vectors become one column a component, `actual_q_0` .. `actual_q_5`, under the names of RTDE; the last columns
-say in every row whose data these are: robot, software, serial, simulated. In CSV the unit stands behind the
-name, `actual_q_0 [rad]`; in Parquet, as JSON under the key "units", beside the provenance. MAT has matrices,
-one row a cycle, under the names of `_MAT_VARIABLES`, and the provenance as a struct.
+In a table, vectors become one column a component, `actual_q_0` .. `actual_q_5`, under the names of RTDE; the
+last columns say in every row whose data these are: robot, software, serial, simulated. In CSV the unit stands
+behind the name, `actual_q_0 [rad]`; in Parquet, as JSON under the key "units", beside the provenance. MAT has
+matrices, one row a cycle, under the names of `_MAT_VARIABLES`, and the provenance as a struct.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
-"""Colours, letters and sizes that all figures have in common; loads no plotting library.
+"""What a figure shows: curves in panels on a sheet, and the colours and letters that all figures share.
 
-The colours are those of Okabe and Ito, which colour-blind readers can distinguish. The reference is the thick
-grey line in every figure, so that a figure can be read without its legend.
-
-What a figure shows: curves in panels on a sheet, whatever library draws it.
-
-`matplotlib_figures.draw` makes a matplotlib figure of a sheet, `plotly_figures.plotly_figure` one that a browser zooms.
+`matplotlib_figures.draw` makes a matplotlib figure of a sheet, `plotly_figures.plotly_figure` one that a
+browser zooms; this module loads neither library. The colours are those of Okabe and Ito, which colour-blind
+readers can distinguish. The reference is the thick grey line in every figure, so that a figure can be read
+without its legend.
 """
 
 from __future__ import annotations
