@@ -29,7 +29,6 @@ VERSION = SoftwareVersion(3, 15, 8)
 LAYOUT = layout_for_version(VERSION)
 TIMEOUT = 20.0  # s
 PERIOD = 0.008  # s
-REPEATS = 1000  # frames with one stamp: eight seconds in which nothing happened
 QD_MAX = 3.1415927  # rad/s; the slowest joints of a UR3
 SPIN = "def spin():\n  while True:\n    speedj([0.3,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
 STARTED = "PROGRAM_XXX_STARTED"
@@ -81,15 +80,11 @@ class Frames:
         return LAYOUT.decode(self.raw())
 
     def until(self, condition, read=None):
-        """Return the first frame that meets the condition."""
+        """Return the first frame that meets the condition; while time stands still, frames repeat themselves."""
         read = read or self.next
-        repeats = 0
-        while repeats < REPEATS:
-            frame = read()
-            if condition(frame):
-                return frame
-            repeats = repeats + 1 if self.stamps[-2:-1] == self.stamps[-1:] else 0
-        raise AssertionError("time stands still before the frame that was waited for")
+        while not condition(frame := read()):
+            pass
+        return frame
 
     def until_stamp(self, stamp):
         """Read on, cheaply, until a stamp."""
