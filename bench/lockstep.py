@@ -9,7 +9,7 @@ from bench.box_process import box_process
 from bench.limit import measure_limit
 from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.session import UrDriver
-from pc_client.experiment.prepare import load_movements, prepare_experiment
+from pc_client.experiment.experiment import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements import library_names
 

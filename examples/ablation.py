@@ -20,7 +20,7 @@ from typing import Any
 
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.errors import ClientError
-from pc_client.experiment.prepare import Experiment, load_movements, prepare_experiment
+from pc_client.experiment.experiment import Experiment, load_movements, prepare_experiment
 from pc_client.movements.files import library_names
 from protocol.ur_types import Ports
 

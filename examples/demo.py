@@ -20,7 +20,7 @@ from pc_client.analysis.side_by_side import build_side_by_side
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.driver.session import UrDriver
 from pc_client.errors import ClientError
-from pc_client.experiment.prepare import Experiment, load_movements, prepare_experiment
+from pc_client.experiment.experiment import Experiment, load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements.files import library_names
 from pc_client.sweep.box import Box, simulated_box

@@ -21,18 +21,18 @@ from typing import TYPE_CHECKING, Any
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
-    from pc_client.api.arm import Arm as Arm
-    from pc_client.api.arm import connect as connect
-    from pc_client.api.arm import plan as plan
     from pc_client.api.drawing import drawing as drawing
     from pc_client.api.movement import Movement as Movement
     from pc_client.api.signals import Run as Run
     from pc_client.api.signals import Signals as Signals
+    from pc_client.arm import Arm as Arm
+    from pc_client.arm import connect as connect
+    from pc_client.arm import plan as plan
     from pc_client.control.controller import Controller as Controller
     from pc_client.errors import ClientError as ClientError
     from pc_client.errors import PlanningError as PlanningError
     from pc_client.errors import RobotStoppedError as RobotStoppedError
-    from pc_client.experiment.prepare import Plan as Plan
+    from pc_client.experiment.experiment import Plan as Plan
     from pc_client.kinematics.cell import Cell as Cell
     from pc_client.kinematics.cell import Solid as Solid
     from pc_client.kinematics.cell import Tool as Tool
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 check_packages()
 
 _HOMES = {
-    "Arm": "api.arm",
+    "Arm": "arm",
     "Cell": "kinematics.cell",
     "ClientError": "errors",
     "Controller": "control.controller",
@@ -56,9 +56,9 @@ _HOMES = {
     "Solid": "kinematics.cell",
     "Tool": "kinematics.cell",
     "Wall": "kinematics.cell",
-    "connect": "api.arm",
+    "connect": "arm",
     "drawing": "api.drawing",
-    "plan": "api.arm",
+    "plan": "arm",
 }
 __all__ = sorted(_HOMES)
 

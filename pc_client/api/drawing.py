@@ -7,7 +7,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from pc_client.api.arm import Arm
+from pc_client.arm import Arm
 from pc_client.drawing.drawing import Drawing, make_drawing
 from pc_client.drawing.placement import PlacementOptions
 from pc_client.errors import RecordingError

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pc_client.commands.experiment import execute, read_runs
-from pc_client.commands.options import OutOption, console, say
-from pc_client.commands.run_settings import RunSettings, takes_run_settings
+from pc_client.commands.options import OutOption, RunSettings, console, say, takes_run_settings
 
 if TYPE_CHECKING:
     from pc_client.analysis.run import MeasuredRun

@@ -10,10 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pc_client.commands.before_motion import reach
 from pc_client.commands.experiment import execute, read_runs
-from pc_client.commands.options import OutOption, RepeatOption, RobotOption, TimeUnitOption, console, say
-from pc_client.commands.run_settings import RunSettings, takes_run_settings
+from pc_client.commands.options import (
+    OutOption,
+    RepeatOption,
+    RobotOption,
+    RunSettings,
+    TimeUnitOption,
+    console,
+    reach,
+    say,
+    takes_run_settings,
+)
 from pc_client.errors import MovementError
 from pc_client.files import as_file_name
 

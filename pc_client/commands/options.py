@@ -1,20 +1,37 @@
-"""Options that several commands share, and the terminal they write to."""
+"""Options that several commands share, and the terminal they write to.
+
+How a command moves the arm: one record, and the options that all such commands share, declared once.
+
+A command that moves an arm has a keyword parameter `settings: RunSettings` and stands under
+`@takes_run_settings`; the options of `_read_settings` are then its own. A new option is a parameter of
+`_read_settings` and, if it says how to move, a field of the record.
+
+What every command does before an arm moves: connect to it, show what is going to happen, ask.
+"""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
 
-from pc_client.errors import printable
+from pc_client.control.controller import DEFAULT, Controller, load_controller
+from pc_client.errors import ClientError, ControllerError, printable
 from pc_client.kinematics.cell import NO_CELL, Cell
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 
 if TYPE_CHECKING:
     from pc_client.analysis.report import Report
+    from pc_client.arm import Arm
+    from pc_client.kinematics.cell import Cell
+    from protocol.ur_types import Ports
 
 console = Console(highlight=False)
 
@@ -145,3 +162,116 @@ def ports_of(port_base: int) -> Ports:
         return Ports.standard(offset=port_base)
     except ProtocolError as error:
         raise typer.BadParameter(str(error)) from error
+
+
+_OPTIONS = {"gain_p": "--gain-p", "gain_i": "--gain-i", "speedj_acceleration": "--acceleration"}
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How to move an arm, whatever the movements and whichever the robot.
+
+    Attributes:
+        controller: the same for all runs.
+        cell: what stands around the arm and what it carries.
+        ports: where the control box listens.
+        reverse_port: where its programs dial back; see `ReverseServer`.
+        overwrite: replace simulated recordings of the same names.
+        yes: do not ask before a real arm moves.
+        dry_run: end where the arm would begin to move.
+    """
+
+    controller: Controller
+    cell: Cell
+    ports: Ports
+    reverse_port: int | None
+    overwrite: bool
+    yes: bool
+    dry_run: bool
+
+
+def _read_settings(
+    controller: ControllerOption = DEFAULT,
+    gain_p: GainPOption = None,
+    gain_i: GainIOption = None,
+    acceleration: AccelerationOption = None,
+    cell: CellOption = None,
+    port_base: PortBaseOption = 0,
+    reverse_port: ReversePortOption = None,
+    overwrite: OverwriteOption = False,
+    yes: YesOption = False,
+    dry_run: DryRunOption = False,
+) -> RunSettings:
+    """Make the record from what was given on the command line.
+
+    Raises:
+        ControllerError: there is no such controller, or its file makes no sense.
+        CellError: the cell's file makes no sense.
+        typer.BadParameter: an option makes no sense.
+    """
+    given = {"gain_p": gain_p, "gain_i": gain_i, "speedj_acceleration": acceleration}
+    numbers = {name: value for name, value in given.items() if value is not None}
+    base = load_controller(controller)
+    try:
+        config = base.changed(numbers, _OPTIONS.__getitem__)
+    except ControllerError as error:
+        raise typer.BadParameter(str(error)) from error
+    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, overwrite, yes, dry_run)
+
+
+def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `_read_settings` in place of its keyword parameter `settings`.
+
+    Typer reads a command's options from its signature: the two signatures are put together here.
+    """
+    shared = inspect.signature(_read_settings, eval_str=True).parameters
+    own = dict(inspect.signature(command, eval_str=True).parameters)
+    del own["settings"]
+    together = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in (*own.values(), *shared.values())]
+
+    @wraps(command)
+    def with_options(**given: Any) -> None:
+        settings = _read_settings(**{name: given.pop(name) for name in shared})
+        command(**given, settings=settings)
+
+    vars(with_options)["__signature__"] = inspect.Signature(together)
+    with_options.__annotations__ = {p.name: p.annotation for p in together}
+    return with_options
+
+
+def reach(robot: str, ports: Ports, cell: Cell, reverse_port: int | None = None, *, yes: bool = False) -> Arm:
+    """Ask a robot what it is, and refuse it before anything is planned; it stays as it is.
+
+    Args:
+        robot: name or address of the control box.
+        ports: its ports.
+        cell: what stands around it and what it carries.
+        reverse_port: where its programs dial back.
+        yes: do not ask before a real arm moves.
+
+    Raises:
+        ClientError: it does not answer, does not report which arm it is, or is not as it must be.
+    """
+    from pc_client.arm import connect
+
+    confirm = (lambda text: True) if yes else _ask
+    return connect(robot, ports, cell=cell, reverse_port=reverse_port, confirm=confirm)
+
+
+def _ask(text: str) -> bool:
+    """Show what is going to happen, and ask.
+
+    Raises:
+        ClientError: there is no terminal to ask at.
+        typer.Abort: the answer is no.
+    """
+    import sys
+
+    from pc_client.arm import QUESTION
+
+    say(text)
+    if sys.stdin is None or sys.stdin.closed:
+        raise ClientError(
+            "there is no terminal to ask at whether the arm may move: run this at one, or give --yes"
+        )
+    return typer.confirm(QUESTION, abort=True)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pc_client.commands.before_motion import reach
 from pc_client.commands.options import (
     DaskOption,
     WorkersOption,
@@ -19,6 +18,7 @@ from pc_client.commands.options import (
     check_workers,
     console,
     ports_of,
+    reach,
     say,
 )
 from pc_client.errors import InterruptedByUserError, SweepError
@@ -27,7 +27,7 @@ from ur_hil.command_line import ExitCode
 if TYPE_CHECKING:
     import polars as pl
 
-    from pc_client.api.arm import Arm
+    from pc_client.arm import Arm
     from pc_client.sweep.case import Case, GivenRobot, SimulatedArm
     from pc_client.sweep.config import SweepConfig
     from pc_client.sweep.outcome import Outcome
@@ -149,7 +149,7 @@ def _confirm(arm: Arm, waiting: Sequence[Case], n_runs: int) -> None:
     Raises:
         typer.Abort: the answer is no.
     """
-    from pc_client.experiment.prepare import Experiment
+    from pc_client.experiment.experiment import Experiment
     from pc_client.sweep.run_case import plan_case
 
     plans = [plan_case(case) for case in {case.movement: case for case in waiting}.values()]

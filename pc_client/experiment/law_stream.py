@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pc_client.control.tracker import six_velocities
 from pc_client.errors import DriverError
-from pc_client.experiment.command_check import posture_complaint, way_to_rest
+from pc_client.experiment.checks import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.forward import check_flange
 from pc_client.kinematics.robot_model import RobotModel

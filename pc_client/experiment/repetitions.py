@@ -22,7 +22,7 @@ from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import TrackerStep
 from pc_client.driver.velocity_stream import StreamReport
-from pc_client.experiment.command_check import broken_limit
+from pc_client.experiment.checks import broken_limit
 from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.plan import JointPlan
 from protocol.realtime.layout import RealtimeFrame

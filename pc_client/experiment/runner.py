@@ -1,4 +1,8 @@
-"""Runs an experiment on one session: for every movement approach, stream, record, as often as asked.
+"""What the runner reports while it works; the terminal shows it, tests and programs may ignore it.
+
+The approach to a start: streamed like a run, so the arm stops when commands stop; checked at its end.
+
+Runs an experiment on one session: for every movement approach, stream, record, as often as asked.
 
 Whatever ends it early, what is recorded until then stays readable.
 """
@@ -9,28 +13,115 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Protocol
 
-from pc_client.control.controller import Controller
+import numpy as np
+
+from pc_client.control.controller import APPROACH, Controller
 from pc_client.control.gear import GearObserver, MotorReference
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import ControlLaw, Tracker, TrackerStep
+from pc_client.driver.report import RobotInfo
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
-from pc_client.experiment.approach_run import run_approach
+from pc_client.errors import DriverError
+from pc_client.experiment.checks import LEAD, SETTLE, guarded, shortest_loop
+from pc_client.experiment.experiment import Experiment, Plan, clear_folder
 from pc_client.experiment.identification import Identification, check_excitation, identify
-from pc_client.experiment.observer import Observer, Silent
-from pc_client.experiment.prediction import LEAD, SETTLE, guarded, shortest_loop
 from pc_client.experiment.preflight import preflight, require
-from pc_client.experiment.prepare import Experiment, Plan, clear_folder
 from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.kinematics.arm_tree import arm_tree
+from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
 from protocol.realtime.layout import RealtimeFrame
 from ur_hil import tool_version
+
+
+class Observer(Protocol):
+    """Takes notes; raises nothing."""
+
+    def connected(self, info: RobotInfo) -> None:
+        """A session is open."""
+        ...
+
+    def approaching(self, approach: Approach) -> None:
+        """The arm begins to move to the start of a movement."""
+        ...
+
+    def identified(self, found: Identification) -> None:
+        """The loop is known."""
+        ...
+
+    def running(self, name: str, repetition: int) -> None:
+        """A run begins."""
+        ...
+
+    def finished(self, name: str, repetition: int, path: Path, report: StreamReport) -> None:
+        """A run is recorded."""
+        ...
+
+
+class Silent:
+    """Says nothing."""
+
+    def connected(self, info: RobotInfo) -> None:
+        """Say nothing."""
+
+    def approaching(self, approach: Approach) -> None:
+        """Say nothing."""
+
+    def identified(self, found: Identification) -> None:
+        """Say nothing."""
+
+    def running(self, name: str, repetition: int) -> None:
+        """Say nothing."""
+
+    def finished(self, name: str, repetition: int, path: Path, report: StreamReport) -> None:
+        """Say nothing."""
+
+
+_SETTLE = 0.8
+"""Time at the end, position loop closed [s]: four time constants of the feedback."""
+
+_ARRIVAL_TOLERANCE = 5e-3
+"""Largest distance of a joint from the posture after an approach [rad]; a blocked arm is far off."""
+
+_NO_MOVE = 1e-4
+"""An approach shorter than this [rad] is not run."""
+
+
+def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> None:
+    """Move the arm along a checked path and wait until it rests at its end.
+
+    Args:
+        driver: a session; the arm rests where the approach begins.
+        approach: the checked path.
+        model: the nominal arm.
+
+    Raises:
+        RobotStoppedError: the robot stopped.
+        DriverError: the arm did not follow or arrive, or the connection broke; it has been stopped.
+    """
+    goal = approach.waypoints[-1]
+    if np.abs(approach.waypoints - approach.q_from).max() < _NO_MOVE:
+        return
+    table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
+    tracker = Tracker(table, APPROACH, model)
+    driver.stream(tracker, _ignore, acceleration=APPROACH.speedj_acceleration)
+    error = float(np.abs(driver.actual_q() - goal).max())
+    if not error <= _ARRIVAL_TOLERANCE:
+        raise DriverError(
+            f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
+            f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
+        )
+
+
+def _ignore(frame: RealtimeFrame, step: TrackerStep) -> None:
+    """Nothing of an approach is kept."""
 
 
 @dataclass(slots=True)

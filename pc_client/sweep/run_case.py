@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 from pc_client.driver.session import UrDriver
 from pc_client.errors import ClientError, GainMarginError, full_message
-from pc_client.experiment.prepare import Experiment, Plan, prepare_experiment
+from pc_client.experiment.experiment import Experiment, Plan, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.robot_model import robot_model

@@ -28,7 +28,7 @@ from pc_client.analysis.report import build_tables
 from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
 from pc_client.errors import ClientError, MovementError, RecordingError, one_line
-from pc_client.experiment.prepare import _refuse_to_lose
+from pc_client.experiment.experiment import _refuse_to_lose
 from pc_client.extraction.pen import MOST_SAMPLES, contents, parse_pen, pen_sources
 from pc_client.files import FILE_KINDS, MOST_BYTES, as_file_name, is_file_name
 from pc_client.kinematics.cell_file import load_cell

@@ -23,7 +23,7 @@ from wire_story import MODBUS, Story  # noqa: E402
 
 from pc_client.control.controller import CONTROLLERS  # noqa: E402
 from pc_client.driver.session import UrDriver  # noqa: E402
-from pc_client.experiment.prepare import load_movements, prepare_experiment  # noqa: E402
+from pc_client.experiment.experiment import load_movements, prepare_experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
 from protocol.primary.messages import encode_message  # noqa: E402
 from protocol.realtime.layout import layout_for_version  # noqa: E402

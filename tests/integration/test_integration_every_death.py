@@ -13,7 +13,7 @@ from integration_support import PERIOD, Frames
 import ur_emulator.realtime.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.session import UrDriver
-from pc_client.experiment.prepare import load_movements, prepare_experiment
+from pc_client.experiment.experiment import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.recording import load_recording
 from protocol.ur_types import ProgramState, SafetyMode

@@ -8,7 +8,7 @@ from fake_robot import PERIOD, FakeRobot
 
 from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError, RobotStoppedError
-from pc_client.experiment.approach_run import run_approach
+from pc_client.experiment.runner import run_approach
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.planning.approach import Approach
 from protocol.velocity_stream import VelocityMode

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planning_paths import INSIDE_THE_BOX, StraightStrokes
 
 from pc_client.errors import PlanningError
-from pc_client.experiment.prepare import prepare_experiment
+from pc_client.experiment.experiment import prepare_experiment
 from pc_client.kinematics.cell import NO_CELL, Cell, Solid, Tool, Wall
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.robot_model import robot_model

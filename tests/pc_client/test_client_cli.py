@@ -13,11 +13,11 @@ import pytest
 import typer
 from fake_robot import FakeRobot
 
-import pc_client.api.arm as arm_module
+import pc_client.arm as arm_module
 import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli
-from pc_client.api.confirmation import QUESTION
+from pc_client.arm import QUESTION
 from pc_client.errors import DriverError
 from pc_client.recording.recording import load_recording
 from protocol.primary.layout import ConfigurationData, KinematicsInfo

@@ -14,7 +14,7 @@ from drawing_samples import one_part, recording_text, two_parts_and_a_dot
 from fake_robot import FakeRobot
 from page_support import check_needs_nothing
 
-import pc_client.api.arm as arm_module
+import pc_client.arm as arm_module
 import pc_client.commands.draw as draw_module
 import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport

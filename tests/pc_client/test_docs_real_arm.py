@@ -23,9 +23,8 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import CellError
-from pc_client.experiment.experiment_text import experiment_text
+from pc_client.experiment.experiment import experiment_text, load_movements, prepare_experiment
 from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
-from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.kinematics.cell_file import load_cell, parse_cell
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.planning.approach import approach_text, plan_approach

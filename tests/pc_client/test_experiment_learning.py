@@ -18,10 +18,9 @@ from pc_client.control.reference import ReferenceTable
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
-from pc_client.experiment.command_check import broken_limit
+from pc_client.experiment.checks import LEAD, SETTLE, broken_limit
+from pc_client.experiment.experiment import load_movements, prepare_experiment
 from pc_client.experiment.identification import learning_filter
-from pc_client.experiment.prediction import LEAD, SETTLE
-from pc_client.experiment.prepare import load_movements, prepare_experiment
 from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.recording import load_recording

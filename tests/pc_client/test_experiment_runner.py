@@ -23,9 +23,14 @@ from pc_client.errors import (
     RobotStoppedError,
     full_message,
 )
-from pc_client.experiment.experiment_text import experiment_text
+from pc_client.experiment.experiment import (
+    clear_folder,
+    experiment_text,
+    load_movements,
+    prepare_experiment,
+    scratch_folder,
+)
 from pc_client.experiment.identification import identify
-from pc_client.experiment.prepare import clear_folder, load_movements, prepare_experiment, scratch_folder
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import Cell, Wall
 from pc_client.recording.recorder import Recorder

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pc_client.errors import MovementError, PlanningError
-from pc_client.experiment.prepare import make_plan
+from pc_client.experiment.experiment import make_plan
 from pc_client.kinematics.robot_model import ROBOTS, robot_model
 from pc_client.movements import Movement, generate_movement, library_names, load_movement
 from pc_client.movements.description import snr_of_delay, speed_rms_frequency

@@ -13,7 +13,7 @@ import typer
 from fake_robot import FakeRobot
 from sweep_samples import write
 
-import pc_client.api.arm as arm_module
+import pc_client.arm as arm_module
 import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli

@@ -1,4 +1,6 @@
-"""`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
+"""The question before an arm moves that is not known to be simulated.
+
+`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
 
 An emulator and a robot are treated alike; only the address differs. Each motion opens a session, compares
 the robot with its model, streams under the watchdog and leaves the arm at rest; between motions no
@@ -7,6 +9,7 @@ connection is open.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -17,32 +20,79 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pc_client.api.confirmation import Confirm, ask_at_terminal, experiment_description
 from pc_client.api.signals import Run, Signals
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
 from pc_client.control.tracker import ControlLaw
 from pc_client.driver.report import RobotInfo, RobotReport, read_report
 from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
+from pc_client.driver.watchdog import conditions_text
 from pc_client.errors import ClientError, ControllerError, DriverError, PlanningError
-from pc_client.experiment.approach_run import run_approach
+from pc_client.experiment.experiment import (
+    Experiment,
+    Motion,
+    Plan,
+    check_folder,
+    experiment_text,
+    make_plan,
+    scratch_folder,
+)
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
-from pc_client.experiment.observer import Observer
 from pc_client.experiment.preflight import model_of, preflight, require
-from pc_client.experiment.prepare import Experiment, Motion, Plan, check_folder, make_plan, scratch_folder
-from pc_client.experiment.runner import ExperimentReport, ExperimentRunner
+from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, Observer, run_approach
 from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.kinematics.forward import tcp_pose
 from pc_client.kinematics.inverse import nearest_posture
 from pc_client.kinematics.robot_model import RobotModel, robot_model
-from pc_client.planning.approach import plan_approach
+from pc_client.planning.approach import approach_text, plan_approach
 from protocol.pose import T_to_pose, pose_to_T
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from ur_hil.records import checked
 
-__all__ = ["Arm", "connect", "plan"]
+__all__ = ["Arm", "Confirm", "QUESTION", "ask_at_terminal", "connect", "experiment_description", "plan"]
+
+Confirm = Callable[[str], bool]
+"""Gets the text that describes the motion; returns whether the arm may move."""
+
+QUESTION = "The arm is going to move. Is the space around it free, and the emergency stop at hand?"
+_NO_TERMINAL = (
+    "there is no terminal to ask at whether the arm may move: run this at one, or give "
+    "connect(..., confirm=lambda text: True) after a person has checked the arm"
+)
+
+
+def ask_at_terminal(text: str) -> bool:
+    """Show the description of a motion and ask at the terminal.
+
+    Raises:
+        ClientError: there is no terminal to ask at.
+    """
+    if sys.stdin is None or sys.stdin.closed:
+        raise ClientError(_NO_TERMINAL)
+    print(text)
+    try:
+        return input(f"{QUESTION} [y/N]: ").strip().lower() in ("y", "yes")
+    except EOFError:
+        raise ClientError(_NO_TERMINAL) from None
+
+
+def experiment_description(host: str, report: RobotReport, model: RobotModel, wanted: Experiment) -> str:
+    """Describe the motion of an experiment, for the people beside the arm.
+
+    Raises:
+        ClientError: there is no clear path to the start.
+    """
+    approach = plan_approach(wanted.planned[0].joints, report.frame.actual_q, model=model)
+    return "\n".join(
+        (
+            f"robot at {host}: {report.info}",
+            conditions_text(preflight(report, model)),
+            experiment_text(wanted),
+            approach_text(approach),
+        )
+    )
 
 
 def connect(
