@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from pc_client.analysis.figures import speed_curve
-from pc_client.analysis.run import analyse_run
+from pc_client.analysis.run import analyse_run, speed_curve
 from pc_client.recording.recording import load_recording
 from pc_client.results.matplotlib_figures import draw, image_bytes
 from pc_client.results.sheet import BLUE, REFERENCE_GREY, WIDTH, Panel, Sheet, boxes

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
+    from pc_client.analysis.run import Run as Run
+    from pc_client.analysis.run import Signals as Signals
     from pc_client.api.drawing import drawing as drawing
     from pc_client.api.movement import Movement as Movement
-    from pc_client.api.signals import Run as Run
-    from pc_client.api.signals import Signals as Signals
     from pc_client.arm import Arm as Arm
     from pc_client.arm import connect as connect
     from pc_client.arm import plan as plan
@@ -51,8 +51,8 @@ _HOMES = {
     "Plan": "experiment.prepare",
     "PlanningError": "errors",
     "RobotStoppedError": "errors",
-    "Run": "api.signals",
-    "Signals": "api.signals",
+    "Run": "analysis.run",
+    "Signals": "analysis.run",
     "Solid": "kinematics.cell",
     "Tool": "kinematics.cell",
     "Wall": "kinematics.cell",

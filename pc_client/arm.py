@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pc_client.api.signals import Run, Signals
+from pc_client.analysis.run import Run, Signals
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
 from pc_client.control.tracker import ControlLaw
 from pc_client.driver.report import RobotInfo, RobotReport, read_report
@@ -51,7 +51,7 @@ from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from ur_hil.records import checked
 
-__all__ = ["Arm", "Confirm", "QUESTION", "ask_at_terminal", "connect", "experiment_description", "plan"]
+__all__ = ["QUESTION", "Arm", "Confirm", "ask_at_terminal", "connect", "experiment_description", "plan"]
 
 Confirm = Callable[[str], bool]
 """Gets the text that describes the motion; returns whether the arm may move."""

@@ -18,7 +18,7 @@ from rich.progress import track as progress
 
 from pc_client.analysis.measures import PARTS, SPLIT_HZ
 from pc_client.analysis.noise_floor import LEAST_STEPS
-from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
+from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column, movement_sheet
 from pc_client.analysis.table import FLOOR, LAG, MOVEMENT, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.kinematics.cell import NO_CELL
@@ -136,7 +136,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
             "row": row,
             "errors": table.runs[row["name"]][0].errors,
             "figure": zoomable(
-                figures.movement_sheet(table.runs[row["name"]]),
+                movement_sheet(table.runs[row["name"]]),
                 f"Speed, speed error, path, joints and position error of {row['name']}",
             ),
         }

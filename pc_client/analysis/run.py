@@ -1,23 +1,205 @@
-"""Everything that is measured on one recording, in one value."""
+"""What an arm did: signals of a motion, a run with its reference, what is measured on it, their sheets.
+
+`Signals` and `Run` are for programs that import the client: arrays, a table (polars), a figure (matplotlib).
+`MeasuredRun` holds all figures of one recording; tables and pages are made of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from pc_client.analysis.measures import PARTS, Budget, Errors, Snr, error_budget, measure_errors, measure_snr
-from pc_client.analysis.track import TcpTrack, track_of
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.analysis.measures import (
+    PARTS,
+    Budget,
+    Errors,
+    Snr,
+    error_budget,
+    joint_errors,
+    measure_errors,
+    measure_snr,
+    position_errors,
+)
+from pc_client.analysis.track import TcpTrack, rows_per_sample, speed, track_of
 from pc_client.errors import RecordingError
-from pc_client.recording.provenance import Provenance
-from pc_client.recording.recording import Recording
+from pc_client.recording.provenance import Provenance, Source, origin_of
+from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
+from pc_client.results.sheet import (
+    BLUE,
+    REFERENCE_GREY,
+    WIDTH,
+    Box,
+    Curve,
+    Panel,
+    Sheet,
+    boxes,
+    colour_of,
+    cube_around,
+)
+from protocol.ur_types import JOINT_NAMES
+
+if TYPE_CHECKING:
+    import polars
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
 
 GIVEN_UP = "given up"
 """Kind of the movement of a run that did not come to its end."""
 
 
-def budget_column(part: str) -> str:
-    """Name of the column with the share of one part of the error budget."""
-    return f"budget_{part.replace(' ', '_')}"
+@dataclass(frozen=True, eq=False, repr=False)
+class Signals:
+    """Signals of one motion, one row a control cycle.
+
+    Attributes:
+        t: (n,) time since the motion began [s]; of a run, since its movement began: negative before it.
+        q: (n, 6) reported joint positions [rad].
+        qd: (n, 6) reported joint velocities [rad/s].
+        tcp_pose: (n, 6) reported TCP pose: position [m] and rotation vector [rad], base frame.
+        qd_cmd: (n, 6) commanded joint velocities [rad/s].
+        source: robot, software, serial and simulated, by name.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    tcp_pose: Array
+    qd_cmd: Array
+    source: Source
+
+    @property
+    def simulated(self) -> bool | None:
+        """True, False, or None where the robot does not report it."""
+        value = self.source["simulated"]
+        return None if value is None else value is True
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {np.ptp(self.t):.2f} s, {len(self.t)} rows>"
+
+    @cached_property
+    def tcp_speed(self) -> Array:
+        """(n,) speed of the TCP [m/s]: reported positions differenced over the last 8 ms, as in Eq. 10.
+
+        The rows of the first 8 ms are 0.
+        """
+        t, p, each = self.t, self.tcp_pose[:, :3], rows_per_sample(self.t)
+        moved = np.linalg.norm(p[each:] - p[:-each], axis=1) / (t[each:] - t[:-each])
+        return np.concatenate((np.zeros(min(each, len(t))), moved))
+
+    def columns(self) -> Mapping[str, Array]:
+        """Every number as a column (n,) of its own, by name; RTDE names where RTDE has the signal."""
+        return split_columns(
+            {
+                "t": self.t,
+                "actual_q": self.q,
+                "actual_qd": self.qd,
+                "actual_TCP_pose": self.tcp_pose,
+                "tcp_speed": self.tcp_speed,
+                "cmd_qd": self.qd_cmd,
+            }
+        )
+
+    def to_frame(self) -> polars.DataFrame:
+        """A table with the rows of the attributes, in their units, and the columns of `source`."""
+        return table_of(self.columns(), self.source)
+
+    def plot(self) -> Figure:
+        """A figure: speed of the TCP, joint angles, joint velocities."""
+        from pc_client.results.matplotlib_figures import draw
+
+        return draw(signals_sheet(self))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Signals):
+    """A run of a plan: reference, signals of the arm, and the figures of the paper.
+
+    Attributes:
+        recording: all that was recorded.
+    """
+
+    recording: Recording
+    _track: TcpTrack
+
+    @classmethod
+    def from_file(cls, path: Path | str) -> Run:
+        """The run of a recording; rows that repeat a time stamp are left out.
+
+        Raises:
+            RecordingError: it cannot be read, or holds too little.
+        """
+        recording = load_recording(path)
+        track = track_of(recording)
+        t, q, qd, pose, command = (
+            recording.column(name)[track.new_rows]
+            for name in ("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
+        )
+        return cls(t - track.t_begin, q, qd, pose, command, recording.provenance.source, recording, track)
+
+    def __repr__(self) -> str:
+        whose = self.recording.provenance
+        level = self.aborted or f"{self.snr:.1f} dB"
+        return (
+            f"<Run {whose.repetition} of {whose.movement!r} with {whose.controller}: {level}, "
+            f"{len(self.t)} rows, {whose.origin.name}>"
+        )
+
+    @property
+    def aborted(self) -> str:
+        """Why the run did not come to its end; empty for a whole one."""
+        return self.recording.aborted
+
+    @cached_property
+    def measured(self) -> MeasuredRun:
+        """All figures measured on the recording.
+
+        Raises:
+            RecordingError: the run was given up.
+        """
+        return analyse_run(self.recording)
+
+    @property
+    def snr(self) -> float:
+        """Eq. 10 on the scalar speed of the TCP over the movement [dB]: neither shifted nor smoothed.
+
+        A run that was given up has none: `RecordingError`.
+        `measured.snr` has the ratios of other definitions, `measured.errors` the errors in mm and rad.
+        """
+        return self.measured.snr.speed_db
+
+    @property
+    def ref_q(self) -> Array:
+        """(n, 6) joint positions of the reference [rad]."""
+        return self.recording.column("ref_q")[self._track.new_rows]
+
+    @property
+    def ref_tcp_position(self) -> Array:
+        """(n, 3) TCP position of the reference [m]."""
+        return self.recording.column("ref_tcp_position")[self._track.new_rows]
+
+    def columns(self) -> Mapping[str, Array]:
+        """Every number of the recording as a column (n,) of its own, with `t` and `tcp_speed`."""
+        rows = self._track.new_rows
+        recorded = {name: values[rows] for name, values in flat_columns(self.recording).items()}
+        return {"t": self.t, "tcp_speed": self.tcp_speed, **recorded}
+
+    def plot(self) -> Figure:
+        """The figure of the report: desired and actual TCP speed, error, path, joints and their errors.
+
+        Of a run that was given up that of `Signals`.
+        """
+        if self.aborted:
+            return super().plot()
+        from pc_client.results.matplotlib_figures import draw
+
+        return draw(movement_sheet((self.measured,)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,3 +267,173 @@ def analyse_run(recording: Recording, *, include_aborted: bool = False) -> Measu
         errors=measure_errors(recording, track, snr.velocity_lag_s),
         budget=error_budget(recording, track, snr.speed_lag_s),
     )
+
+
+def budget_column(part: str) -> str:
+    """Name of the column with the share of one part of the error budget."""
+    return f"budget_{part.replace(' ', '_')}"
+
+
+def signals_sheet(signals: Signals) -> Sheet:
+    """A motion without a reference: speed of the TCP, joint angles, joint velocities."""
+    t, free = signals.t, (None, None)
+    size = (WIDTH, 7.2)
+    (upper,), (middle,), (lower,) = boxes(
+        size, (1,), (1, 1, 1), margins=(0.7, 0.15, 0.4, 0.5), gaps=(0.0, 0.5)
+    )
+    span = (float(t[0]), float(t[-1]))
+    commanded = [Curve(np.c_[t, v], REFERENCE_GREY, width=2.0, stepped=True) for v in signals.qd_cmd.T]
+    panels = (
+        Panel(
+            upper,
+            [Curve(np.c_[t, 1e3 * signals.tcp_speed], BLUE)],
+            "",
+            ("", "TCP speed [mm/s]"),
+            (span, (0.0, None)),
+        ),
+        Panel(middle, _joint_curves(t, signals.q), "", ("", "joint angle [rad]"), (span, free), "above"),
+        Panel(
+            lower,
+            [*commanded, *_joint_curves(t, signals.qd)],
+            "Commanded (grey) and reported",
+            ("time [s]", "joint velocity [rad/s]"),
+            (span, free),
+        ),
+    )
+    return Sheet(size[1], panels, origin_of(signals.simulated).mark)
+
+
+def movement_sheet(runs: Sequence[MeasuredRun]) -> Sheet:
+    """Everything about the runs of one movement: the paper's figures 4 and 5 and what explains them."""
+    first, coloured = runs[0], {colour_of(i): run for i, run in enumerate(runs)}
+    t, track = _step_times(first), first.track
+    span = (max(t[0], -0.15), min(t[-1], track.t_end - track.t_start + 0.35))
+    size = (WIDTH, 8.4)
+    ((upper, _), (lower, right)) = boxes(
+        size, (6.3, 3.7), (2.6, 1.4), margins=(0.72, 0.4, 0.45, 3.4), gaps=(0.2, 0.45)
+    )
+    below = boxes(size, (1, 1, 1), (1,), margins=(0.72, 0.15, 5.75, 0.5), gaps=(0.8, 0.0))[0]
+    desired = speed_curve(first, REFERENCE_GREY, "desired", desired=True, width=4.0)
+    actual = [
+        speed_curve(run, colour, f"actual r{run.provenance.repetition}, {run.snr.speed_db:.1f} dB")
+        for colour, run in coloured.items()
+    ]
+    errors = [
+        Curve(
+            np.c_[_step_times(run), 1e3 * (_speed(run) - _speed(run, desired=True))],
+            colour,
+            f"r{run.provenance.repetition}",
+            0.8,
+        )
+        for colour, run in coloured.items()
+    ]
+    panels = (
+        Panel(
+            upper,
+            (desired, *actual),
+            "TCP speed",
+            ("", "TCP speed [mm/s]"),
+            (span, (0.0, None)),
+            "above",
+        ),
+        Panel(
+            lower,
+            errors,
+            "Speed error, actual − desired",
+            ("time since the movement began [s]", "error [mm/s]"),
+            (span, (None, None)),
+        ),
+        _path_panel((right[0], right[1] - 0.01, right[2], 0.53), coloured),
+        *_joint_panels(below, first),
+        _spread_panel(below[2], coloured),
+    )
+    return Sheet(size[1], panels, first.provenance.origin.mark)
+
+
+def speed_curve(
+    run: MeasuredRun, colour: str, label: str = "", *, desired: bool = False, width: float = 0.9
+) -> Curve:
+    """TCP speed [mm/s] over the time since the movement began [s]; not smoothed."""
+    return Curve(np.c_[_step_times(run), 1e3 * _speed(run, desired=desired)], colour, label, width)
+
+
+def _path_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
+    first = next(iter(coloured.values()))
+    targets = 1e3 * np.array(first.provenance.target_points, dtype=np.float64).reshape(-1, 3)
+    desired = Curve(1e3 * first.track.p_ref[first.track.movement], REFERENCE_GREY, width=3.0, opacity=0.6)
+    actual = [
+        Curve(1e3 * run.track.p_actual[run.track.movement], colour, width=0.9)
+        for colour, run in coloured.items()
+    ]
+    circles = Curve(targets, "#000000", width=0.0, marker="o", hollow=True)
+    return Panel(
+        box,
+        (desired, *actual, circles),
+        "TCP path and target points, base frame",
+        ("x [mm]", "y [mm]", "z [mm]"),
+        cube_around(np.vstack([desired.points, targets])),
+        texts=[(target, str(i)) for i, target in enumerate(targets, start=1)],
+    )
+
+
+def _joint_panels(places: Sequence[Box], run: MeasuredRun) -> tuple[Panel, Panel]:
+    rows, moving, number = run.track.rows, run.track.movement, f"r{run.provenance.repetition}"
+    t = run.track.t[moving] - run.track.t_start
+    ref, actual = (run.recording.column(name)[rows][moving] for name in ("ref_q", "actual_q"))
+    wanted = [Curve(np.c_[t, q], REFERENCE_GREY, width=2.6) for q in (ref - ref[0]).T]
+    errors = 1e3 * joint_errors(run.recording, run.track)[moving]
+    return (
+        Panel(
+            places[0],
+            [*wanted, *_joint_curves(t, actual - ref[0])],
+            f"Joints, reference (grey) and actual, {number}",
+            ("time [s]", "angle since start [rad]"),
+            ((float(t[0]), float(t[-1])), (None, None)),
+        ),
+        Panel(
+            places[1],
+            _joint_curves(t, errors),
+            f"Joint tracking error, {number}",
+            ("time [s]", "reference − actual [mrad]"),
+            ((float(t[0]), float(t[-1])), (None, None)),
+            "inside",
+            columns=3,
+        ),
+    )
+
+
+def _spread_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
+    errors = [1e3 * position_errors(run.track) for run in coloured.values()]
+    edges = np.linspace(0.0, max(1e-3, *(float(e.max()) for e in errors)), 31)
+    curves = []
+    for (colour, run), error in zip(coloured.items(), errors, strict=True):
+        shares = 100.0 * np.histogram(error, edges)[0] / len(error)
+        label = f"r{run.provenance.repetition}: rms {run.errors.rms_position_error_mm:.2f} mm"
+        curves.append(Curve(np.c_[edges, np.append(shares, 0.0)], colour, label, 1.2, stepped=True))
+    return Panel(
+        box,
+        curves,
+        "Position error over the movement",
+        ("TCP position error [mm]", "share of time [%]"),
+        ((0.0, float(edges[-1])), (0.0, None)),
+        "inside",
+        columns=1,
+    )
+
+
+def _joint_curves(t: Array, values: Array) -> list[Curve]:
+    return [
+        Curve(np.c_[t, v], colour_of(i), name)
+        for i, (v, name) in enumerate(zip(values.T, JOINT_NAMES, strict=True))
+    ]
+
+
+def _speed(run: MeasuredRun, *, desired: bool = False) -> Array:
+    """TCP speed at each first difference [m/s]."""
+    return speed(run.track.t, run.track.p_ref if desired else run.track.p_actual)
+
+
+def _step_times(run: MeasuredRun) -> Array:
+    """The middle of each first difference, s since the movement began."""
+    t = run.track.t
+    return 0.5 * (t[1:] + t[:-1]) - run.track.t_start

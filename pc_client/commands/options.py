@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from pc_client.analysis.report import Report
     from pc_client.arm import Arm
     from pc_client.kinematics.cell import Cell
-    from protocol.ur_types import Ports
 
 console = Console(highlight=False)
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from integration_support import at, free_port_base
 
-from pc_client.analysis.run import analyse_run
+from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.track import speed
-from pc_client.api.signals import Run
 from pc_client.movements.files import load_movement
 from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox

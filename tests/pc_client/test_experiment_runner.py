@@ -9,7 +9,7 @@ from fake_robot import PERIOD, FakeRobot
 from mcap.reader import make_reader
 from recording_samples import SIGNALS, provenance
 
-from pc_client.api.signals import Run
+from pc_client.analysis.run import Run
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop_model import LoopModel
 from pc_client.control.stability import loop_margins
