@@ -1,10 +1,8 @@
-"""The question before an arm moves that is not known to be simulated.
-
-`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
+"""`connect` and `Arm`: a robot, real or emulated, that runs plans and velocity laws.
 
 An emulator and a robot are treated alike; only the address differs. Each motion opens a session, compares
 the robot with its model, streams under the watchdog and leaves the arm at rest; between motions no
-connection is open.
+connection is open. Before an arm moves that is not known to be simulated, a person is asked.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""`ur-client experiment` and `ur-client run`: movements on a robot, recordings and tables in a folder.
-
-Shows on the terminal how far an experiment is.
-"""
+"""`ur-client experiment` and `ur-client run`: movements on a robot, recordings and tables in a folder."""
 
 from __future__ import annotations
 

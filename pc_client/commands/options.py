@@ -1,13 +1,4 @@
-"""Options that several commands share, and the terminal they write to.
-
-How a command moves the arm: one record, and the options that all such commands share, declared once.
-
-A command that moves an arm has a keyword parameter `settings: RunSettings` and stands under
-`@takes_run_settings`; the options of `_read_settings` are then its own. A new option is a parameter of
-`_read_settings` and, if it says how to move, a field of the record.
-
-What every command does before an arm moves: connect to it, show what is going to happen, ask.
-"""
+"""What several commands share: options, the terminal, how a command moves an arm, what it does before."""
 
 from __future__ import annotations
 

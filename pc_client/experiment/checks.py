@@ -1,11 +1,9 @@
-"""The checks of motions that no plan contains: what was learned, the excitation, a velocity law.
+"""The checks of motions beside those of a plan, before anything is sent.
 
-The limits are those that plans are held against, and the controller's own.
-
-What the loop makes of a plan: the tool's largest deviation from its path, before anything moves.
-
-The guard of a run allows this deviation and a margin. A plan that the controller would leave further than its
-tolerances allow is refused.
+What was learned, the excitation and a velocity law are in no plan: they are held against the limits of plans
+and the controller's own. What the loop makes of a plan is predicted: the tool's largest deviation from its
+path. The guard of a run allows this deviation and a margin. A plan that the controller would leave further
+than its tolerances allow is refused.
 """
 
 from __future__ import annotations
@@ -35,9 +33,6 @@ Array = NDArray[np.float64]
 
 _LEARNED_DISPLACEMENT = 0.05
 """What was learned may lead a joint this far [rad]."""
-
-_CLEARANCE_STEP = 4
-"""Every so many cycles the arm's clearance is measured: 32 ms, in which it moves by less than a margin."""
 
 _REACTION = 0.1
 """From a frame to the start of the robot's ramp [s]: the loop's delay, and the robot's patience with us."""

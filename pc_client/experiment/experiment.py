@@ -1,6 +1,6 @@
-"""Everything that can be refused before the arm moves: movements that cannot be planned, a folder in use.
+"""What is to be done: plans, runs of each, the folder; in words for the people beside the arm.
 
-What a bystander must know and agree to before a real arm moves, in words.
+All that can be refused is refused here, before the arm moves: plans for another arm or cell, a folder in use.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""What the runner reports while it works; the terminal shows it, tests and programs may ignore it.
+"""Runs an experiment on one session: for every movement approach, stream, record, as often as asked.
 
-The approach to a start: streamed like a run, so the arm stops when commands stop; checked at its end.
-
-Runs an experiment on one session: for every movement approach, stream, record, as often as asked.
-
-Whatever ends it early, what is recorded until then stays readable.
+The approach is streamed like a run, so the arm stops when commands stop. Whatever ends an experiment early,
+what is recorded until then stays readable.
 """
 
 from __future__ import annotations
