@@ -91,7 +91,6 @@ PROTOCOL_ORDER = (
     {
         "errors",
         "frame_buffer",
-        "patience",
         "pose",
         "serial_numbers",
         "ur_types",
@@ -102,7 +101,7 @@ PROTOCOL_ORDER = (
     {"dashboard"},
     {"primary"},
     {"rtde"},
-    {"capture"},
+    {"as_text"},
     {"__main__"},
 )
 ORDERS = {

@@ -10,12 +10,12 @@ Decisions without a constant, and where they are made:
 |---|---|---|
 | hexadecimal literals, a line end in a string | refused | grammar.lark |
 | a label after a statement, `return` without a value | accepted | grammar.lark |
-| list * matrix, matrix / matrix; matrix + matrix | errors; of equal shape by element | ops |
+| list * matrix, matrix / matrix; matrix + matrix | errors; of equal shape by element | runtime |
 | the text of a struct | `{a: 1, b: "x"}` | values |
-| `insert` behind the last element, `remove` | appends, returns nothing | methods |
-| capacity of a slice; of a variable whose first value is a list | its length; that of the list | methods |
+| `insert` behind the last element, `remove` | appends, returns nothing | variables |
+| capacity of a slice; of a variable whose first value is a list | its length; that of the list | variables |
 | storing by index into a struct | as by the name of the member | variables |
-| a sign before a list or matrix | by element | ops |
+| a sign before a list or matrix | by element | runtime |
 | reading a variable before it has a value | run-time error | variables |
 | two definitions of one name | the later one counts | resolver |
 | `sleep` of a fraction of a cycle, of less than 0 | a whole cycle, none | runtime |

@@ -9,8 +9,8 @@
 | list with room | `CapacityList` | | struct | `Struct` |
 
 URScript passes everything by value. Therefore lists, poses, matrices and structs are never changed in place:
-assigning to an element makes a new value (`elements.store_item`), and no copies are needed. Host functions
-must not change lists either. Operators are in `run.ops`.
+assigning to an element makes a new value (`run.variables.store_item`), and no copies are needed. Host
+functions must not change lists either. Operators are in `run.runtime`.
 """
 
 from __future__ import annotations

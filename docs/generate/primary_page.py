@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from docs.generate.page_parts import MARKS, example, table
-from protocol.__main__ import type_name
-from protocol.capture import StreamDecoder
+from protocol.as_text import StreamDecoder, type_name
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
-from protocol.primary.packages import SECONDARY_MESSAGES, SafetyTolerances, encode_message_package
-from protocol.primary.state import state_size
+from protocol.primary.packages import SECONDARY_MESSAGES, SafetyTolerances, encode_message_package, state_size
 from protocol.primary.values import value_codes
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ALWAYS, WireField, wire_fields

@@ -8,7 +8,7 @@ from itertools import groupby
 from types import SimpleNamespace
 
 from docs.generate.page_parts import MARKS, example, table
-from protocol.capture import RtdeDecoder
+from protocol.as_text import RtdeDecoder
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import (
     MAX_NAMES_SIZE,

@@ -14,7 +14,6 @@ from pc_client.driver.watchdog import software
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.patience import LONGEST_STEP, Patience
 from protocol.primary.framing import SubPackage
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary.messages import (
@@ -25,9 +24,10 @@ from protocol.primary.messages import (
     VersionMessage,
     decode_message,
 )
-from protocol.primary.state import decode_sub_package, split_state
+from protocol.primary.packages import decode_sub_package, split_state
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import OLDEST
+from ur_hil.patience import LONGEST_STEP, Patience
 
 S = TypeVar("S", bound=SubPackage)
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
-from protocol.patience import LONGEST_STEP, Patience
 from protocol.rtde.client_connection import ClientEvent, DataReceived, RtdeClientConnection
 from protocol.rtde.codec import (
     GetControllerVersion,
@@ -27,6 +26,7 @@ from protocol.rtde.codec import (
 )
 from protocol.rtde.types import REFUSALS, RtdeValue
 from protocol.ur_types import SoftwareVersion
+from ur_hil.patience import LONGEST_STEP, Patience
 
 _CONNECT_TIMEOUT = 2.0
 DASHBOARD_TIMEOUT = 60.0

@@ -19,8 +19,8 @@ from pc_client.driver.watchdog import is_at_rest
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
-from protocol.patience import LONGEST_STEP, Patience
 from protocol.realtime.layout import MAX_FRAME_SIZE, RealtimeFrame, RealtimeLayout, layout_for_size
+from ur_hil.patience import LONGEST_STEP, Patience
 
 FRAME_TIMEOUT = 1.0
 """Without a new frame for this long [s] the robot counts as gone."""

@@ -16,8 +16,8 @@ from pathlib import Path
 from pc_client.driver.transport import Listener, Network, PortTakenError, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
-from protocol.patience import Patience
 from protocol.velocity_stream import HELLO_SIZE, check_hello
+from ur_hil.patience import Patience
 
 STOP_DECELERATION = 20.0
 """Of the program's ramp to rest [rad/s2]: what a UR3 does in UR's stopping figures (manual UR3/CB3 3.10, stop

@@ -19,9 +19,9 @@ from pc_client.driver.receiver import READ_TIMEOUT
 from pc_client.driver.transport import Network, Transport
 from pc_client.driver.watchdog import check_angles, check_streaming, is_at_full_speed
 from pc_client.errors import DriverError
-from protocol.patience import Patience
 from protocol.realtime.layout import RealtimeFrame
 from protocol.velocity_stream import VelocityMode, encode_velocity
+from ur_hil.patience import Patience
 
 
 class Step(Protocol):

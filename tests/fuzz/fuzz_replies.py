@@ -10,8 +10,7 @@ from protocol.dashboard.connection import MAX_LINE
 from protocol.frame_buffer import FrameBuffer
 from protocol.modbus import take_frame
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, PackageType
-from protocol.primary.packages import decode_package
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.codec import Role, decode_message
 from protocol.rtde.codec import RtdePackageType as RtdeType

@@ -8,7 +8,7 @@ from integration_support import HELLO_PROGRAM, STARTED, Frames, Messages, connec
 
 from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState
 from protocol.script_channel import MAX_LINE
 from protocol.ur_types import ProgramState
 

@@ -9,7 +9,7 @@ from integration_support import PERIOD, Frames, Messages, connect, in_background
 import ur_emulator.realtime.pacing as pacing
 from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, TextMessage
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState
 
 MINUTE = 'def minute():\n  sleep(60)\n  textmsg("done")\nend\n'
 PATIENCE = 0.2  # s; instead of the seconds that a box waits for a reader in lockstep

@@ -24,7 +24,7 @@ from protocol.primary.messages import (
     encode_message,
     version_message,
 )
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_state
 from protocol.realtime.layout import SNAPSHOT_FIELDS, layout_for_version
 from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.server_connection import RtdeServerConnection

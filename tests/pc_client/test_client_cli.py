@@ -21,7 +21,7 @@ from pc_client.arm import QUESTION
 from pc_client.errors import DriverError
 from pc_client.recording.recording import load_recording
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_state
 from protocol.ur_types import SoftwareVersion
 
 COMMANDS = (["experiment"], ["run"], ["movements"], ["movements", "list"], ["report"], ["doctor"], ["export"])

@@ -17,7 +17,7 @@ from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.recording.provenance import origin_of
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary.messages import TextMessage
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_state
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotType, SoftwareVersion
 
 

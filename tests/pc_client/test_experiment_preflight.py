@@ -20,7 +20,7 @@ from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.robot_model import robot_model
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.primary.messages import encode_message, version_message
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_state
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]

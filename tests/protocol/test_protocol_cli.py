@@ -12,8 +12,7 @@ from protocol.__main__ import main
 from protocol.primary.framing import encode_package
 from protocol.primary.layout import SUB_PACKAGES
 from protocol.primary.messages import version_message
-from protocol.primary.packages import encode_message_package
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_message_package, encode_state
 from protocol.realtime.layout import COLUMNS, SNAPSHOT_FIELDS, layout_for_size
 from protocol.ur_types import SoftwareVersion
 

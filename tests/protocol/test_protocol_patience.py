@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.patience import LONGEST_STEP, Patience
+from ur_hil.patience import LONGEST_STEP, Patience
 
 
 @given(st.lists(st.floats(0.0, LONGEST_STEP), max_size=50))

@@ -14,7 +14,6 @@ from protocol.primary import framing as F
 from protocol.primary import layout as L
 from protocol.primary import messages as M
 from protocol.primary import packages as P
-from protocol.primary import state as S
 from protocol.primary.messages import encode_message, version_message
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import codec_for, wire_fields
@@ -206,18 +205,18 @@ def as_sent(record, version):
 def test_state_totals_are_the_documented_ones(version, first, later):
     version = SoftwareVersion.parse(version)
     records = [record() for record in L.SUB_PACKAGES]
-    data = S.encode_state(records, version)
-    assert len(data) == first == S.state_size(version, first=True)
-    data = S.encode_state([record for record in records if not record.FIRST_STATE_ONLY], version)
-    assert len(data) == later == S.state_size(version, first=False)
+    data = P.encode_state(records, version)
+    assert len(data) == first == P.state_size(version, first=True)
+    data = P.encode_state([record for record in records if not record.FIRST_STATE_ONLY], version)
+    assert len(data) == later == P.state_size(version, first=False)
 
 
 @pytest.mark.parametrize("version", [version for version, _, _ in TOTALS])
 def test_states_by_four_methods(version):
     version = SoftwareVersion.parse(version)
-    records = [distinct(record) for record in S.state_types(version, first=True)]
-    data = S.encode_state(reversed(records), version)
-    state = S.RobotState(tuple(as_sent(record, version) for record in records))
+    records = [distinct(record) for record in P.state_types(version, first=True)]
+    data = P.encode_state(reversed(records), version)
+    state = P.RobotState(tuple(as_sent(record, version) for record in records))
     assert read(data, version) == [state]
     assert read(data, version, step=1) == [state]
     assert read(data + data[:100], version) == [state]
@@ -225,7 +224,7 @@ def test_states_by_four_methods(version):
 
 
 def test_order_and_sizes_on_the_wire_in_3_15():
-    data = S.encode_state([record() for record in L.SUB_PACKAGES], V3_15)
+    data = P.encode_state([record() for record in L.SUB_PACKAGES], V3_15)
     seen, position = [], 5
     while position < len(data):
         size, sub_type = struct.unpack_from(">iB", data, position)
@@ -242,8 +241,8 @@ def test_order_and_sizes_on_the_wire_in_3_15():
 )
 def test_order_and_sizes_on_the_wire_of_an_e_series(version, more):
     version = SoftwareVersion.parse(version)
-    data = S.encode_state([record() for record in L.SUB_PACKAGES], version)
-    seen = [(sub_type, len(body) + 5) for sub_type, body in S.split_state(data[5:])]
+    data = P.encode_state([record() for record in L.SUB_PACKAGES], version)
+    seen = [(sub_type, len(body) + 5) for sub_type, body in P.split_state(data[5:])]
     board, info = (75, 9) if version >= SoftwareVersion(5, 4) else (74, 8)
     assert seen == [
         (0, 47), (1, 251), (4, 101), (5, 225), (9, 53), (3, board), (2, 37), (6, 445), (7, 61), (8, info), (10, 43),
@@ -254,9 +253,9 @@ def test_order_and_sizes_on_the_wire_of_an_e_series(version, more):
 def test_configuration_grows_with_5_25_1():
     record = L.ConfigurationData(box_series=7, tool_flange_type=2)
     for version, end in (("5.25", ""), ("5.25.1", "0007 0002")):
-        data = S.encode_sub_package(L.ConfigurationData, record, SoftwareVersion.parse(version))
+        data = P.encode_sub_package(L.ConfigurationData, record, SoftwareVersion.parse(version))
         assert data[445:] == bytes.fromhex(end)
-    assert S.decode_sub_package(6, data[5:]) == record
+    assert P.decode_sub_package(6, data[5:]) == record
 
 
 def test_robot_mode_data_byte_by_byte():
@@ -264,14 +263,14 @@ def test_robot_mode_data_byte_by_byte():
         timestamp=6_242_520_000, is_real_robot_enabled=True, is_robot_power_on=True, is_program_running=True,
         robot_mode=7, control_mode=0, target_speed_fraction=1.0, speed_scaling=0.5,
     )  # fmt: skip
-    data = S.encode_sub_package(L.RobotModeData, record, V3_15)
+    data = P.encode_sub_package(L.RobotModeData, record, V3_15)
     assert data.hex(" ") == bytes.fromhex(
         "0000002f 00 0000000174154bc0 01 01 01 00 00 01 00 07 00"
         "3ff0000000000000 3fe0000000000000 3ff0000000000000 00"
     ).hex(" ")
-    assert S.encode_sub_package(L.RobotModeData, replace(record, robot_mode=-1), V3_15)[20] == 0xFF
+    assert P.encode_sub_package(L.RobotModeData, replace(record, robot_mode=-1), V3_15)[20] == 0xFF
     for minor, size in ((1, 38), (2, 46), (4, 46), (5, 47)):
-        assert len(S.encode_sub_package(L.RobotModeData, record, SoftwareVersion(3, minor))) == size
+        assert len(P.encode_sub_package(L.RobotModeData, record, SoftwareVersion(3, minor))) == size
 
 
 # Sub-packages of a 5.8 simulator's first state.
@@ -298,18 +297,18 @@ CAPTURED = [
 @pytest.mark.parametrize(("record", "data"), CAPTURED, ids=[type(record).__name__ for record, _ in CAPTURED])
 def test_captured_sub_packages(record, data):
     data = bytes.fromhex(data)
-    assert S.encode_sub_package(type(record), record, SoftwareVersion(5, 8)) == data
-    assert S.decode_sub_package(data[4], data[5:]) == record
+    assert P.encode_sub_package(type(record), record, SoftwareVersion(5, 8)) == data
+    assert P.decode_sub_package(data[4], data[5:]) == record
 
 
 def test_joints_stand_together_and_pairs_alternate():
     joints = distinct(L.JointData)
-    data = S.encode_sub_package(L.JointData, joints, V3_15)
+    data = P.encode_sub_package(L.JointData, joints, V3_15)
     for k in range(6):
         block = struct.unpack_from(">3d4fB", data, 5 + 41 * k)
         assert block == tuple(getattr(joints, field.name)[k] for field in fields(joints))
     configuration = distinct(L.ConfigurationData)
-    data = S.encode_sub_package(L.ConfigurationData, configuration, V3_15)
+    data = P.encode_sub_package(L.ConfigurationData, configuration, V3_15)
     assert struct.unpack_from(">2d", data, 5 + 16 * 4) == (
         configuration.joint_min_limit[4],
         configuration.joint_max_limit[4],
@@ -330,33 +329,33 @@ def test_joints_stand_together_and_pairs_alternate():
 def test_euromap_fields_are_there_only_with_the_board(version, size):
     version = SoftwareVersion.parse(version)
     record = replace(distinct(L.MasterboardData), euromap67_installed=True)
-    data = S.encode_sub_package(L.MasterboardData, record, version)
+    data = P.encode_sub_package(L.MasterboardData, record, version)
     assert len(data) == size
     assert data[67] == 1
     assert struct.unpack_from(">II", data, 68) == (record.euromap67_input_bits, record.euromap67_output_bits)
-    assert S.decode_sub_package(3, data[5:]) == as_sent(record, version)
+    assert P.decode_sub_package(3, data[5:]) == as_sent(record, version)
 
 
 def test_records_may_be_mappings_or_any_object():
     record = distinct(L.CartesianInfo)
-    expected = S.encode_sub_package(L.CartesianInfo, record, V3_15)
-    assert S.encode_sub_package(L.CartesianInfo, asdict(record), V3_15) == expected
-    assert S.encode_sub_package(L.CartesianInfo, SimpleNamespace(**asdict(record)), V3_15) == expected
+    expected = P.encode_sub_package(L.CartesianInfo, record, V3_15)
+    assert P.encode_sub_package(L.CartesianInfo, asdict(record), V3_15) == expected
+    assert P.encode_sub_package(L.CartesianInfo, SimpleNamespace(**asdict(record)), V3_15) == expected
     board = asdict(distinct(L.MasterboardData))
-    assert len(S.encode_sub_package(L.MasterboardData, board, V3_15)) == 75
+    assert len(P.encode_sub_package(L.MasterboardData, board, V3_15)) == 75
     with pytest.raises(LocalProtocolError, match=r"CartesianInfo needs the field .*tcp_offset"):
-        S.encode_sub_package(L.CartesianInfo, {"tcp_pose": (0.0,) * 6}, V3_15)
+        P.encode_sub_package(L.CartesianInfo, {"tcp_pose": (0.0,) * 6}, V3_15)
     with pytest.raises(LocalProtocolError, match="tcp_pose has 5 values instead of 6"):
-        S.encode_sub_package(L.CartesianInfo, replace(record, tcp_pose=(0.0,) * 5), V3_15)
+        P.encode_sub_package(L.CartesianInfo, replace(record, tcp_pose=(0.0,) * 5), V3_15)
 
 
 def test_a_reader_skips_what_newer_software_appends():
     record = distinct(L.ConfigurationData)
-    data = S.encode_sub_package(L.ConfigurationData, record, SoftwareVersion(5, 25, 1))
-    assert S.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
-    body = F.encode_package(14, b"\x01\x02") + S.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
+    data = P.encode_sub_package(L.ConfigurationData, record, SoftwareVersion(5, 25, 1))
+    assert P.decode_sub_package(6, data[5:] + b"\x00\x01\x00\x02") == record
+    body = F.encode_package(14, b"\x01\x02") + P.encode_sub_package(L.ForceModeData, L.ForceModeData(), V3_15)
     (state,) = read(F.encode_package(16, body))
-    assert state.sub_packages == (S.UnknownSubPackage(14, b"\x01\x02"), L.ForceModeData())
+    assert state.sub_packages == (P.UnknownSubPackage(14, b"\x01\x02"), L.ForceModeData())
     assert state.find(L.ForceModeData) == L.ForceModeData()
     assert state.find(L.JointData) is None
 
@@ -378,16 +377,16 @@ def test_states_that_do_not_add_up_are_refused(body, problem):
 
 def test_a_state_takes_each_sub_package_once():
     with pytest.raises(LocalProtocolError, match="ToolData is unknown or repeated"):
-        S.encode_state([L.ToolData(), L.ToolData()], V3_15)
+        P.encode_state([L.ToolData(), L.ToolData()], V3_15)
     with pytest.raises(LocalProtocolError, match="SubPackage is unknown"):
-        S.encode_state([F.SubPackage()], V3_15)
+        P.encode_state([F.SubPackage()], V3_15)
 
 
 def test_software_before_3_0_has_no_table():
     old = SoftwareVersion(1, 8)
-    assert S.state_types(old, first=True) == ()
+    assert P.state_types(old, first=True) == ()
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0: use 3\.0\.0 or later"):
-        S.encode_state([L.ToolData()], old)
+        P.encode_state([L.ToolData()], old)
     with pytest.raises(LocalProtocolError, match=r"1\.8\.0 had other layouts"):
         encode_message(M.TextMessage(text="x"), old)
     data = P.encode_message_package(M.TextMessage(text="x"), V3_15)

@@ -5,12 +5,11 @@ import struct
 import pytest
 
 from protocol.__main__ import main
-from protocol.capture import RtdeDecoder, StreamDecoder
+from protocol.as_text import RtdeDecoder, StreamDecoder
 from protocol.errors import RemoteProtocolError
 from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import version_message
-from protocol.primary.packages import encode_message_package
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_message_package, encode_state
 from protocol.rtde import codec as R
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import data_header, encode_message

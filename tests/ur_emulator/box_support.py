@@ -9,8 +9,7 @@ from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
-from protocol.primary.packages import decode_package
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram

@@ -5,8 +5,7 @@ from functools import cache
 from box_support import VERSION, Bench
 
 from protocol.primary.layout import JointData, MasterboardData, RobotModeData
-from protocol.primary.packages import decode_package
-from protocol.primary.state import encode_state
+from protocol.primary.packages import decode_package, encode_state
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import RobotMode, SafetyMode

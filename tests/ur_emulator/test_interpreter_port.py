@@ -16,7 +16,7 @@ from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import RefusedError
 from ur_emulator.program_files.compiling import compile_line
 from urscript.catalogue import catalogue_for
-from urscript.compile.statements import NO_NAMES
+from urscript.compile.interpreter_mode import NO_NAMES
 from urscript.names.living_scope import LivingScope
 
 WAITING = 'def waiting():\n  interpreter_mode()\n  textmsg("mode ended")\n  sleep(1000)\nend\n'

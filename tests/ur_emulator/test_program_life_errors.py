@@ -13,8 +13,7 @@ from protocol.primary.messages import (
     TextMessage,
     VersionMessage,
 )
-from protocol.primary.packages import decode_package
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState, decode_package
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed

@@ -14,8 +14,7 @@ from protocol.primary.messages import (
     TextMessage,
     ThreadLabel,
 )
-from protocol.primary.packages import decode_package
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState, decode_package
 from protocol.primary.values import (
     GlobalVariablesSetup,
     GlobalVariablesUpdate,

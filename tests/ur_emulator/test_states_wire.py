@@ -7,7 +7,7 @@ from states_support import BRAKING, COMMANDS, ENTRY, check_wires, moving
 
 from protocol.primary.layout import MasterboardData, RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, SafetyModeMessage
-from protocol.primary.state import RobotState
+from protocol.primary.packages import RobotState
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator import ControlBox
 from ur_emulator.commands.power import ReleaseBrakes

@@ -4,8 +4,7 @@ import pytest
 from wire_story import ESeriesStory, Story
 
 from protocol.primary.layout import SUB_PACKAGES
-from protocol.primary.packages import decode_package
-from protocol.primary.state import state_types
+from protocol.primary.packages import decode_package, state_types
 from protocol.realtime.layout import COLUMNS, layout_for_version
 from protocol.rtde.fields import OUTPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder

@@ -10,8 +10,7 @@ from protocol.frame_buffer import FrameBuffer
 from protocol.primary import layout as L
 from protocol.primary import messages as M
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
-from protocol.primary.packages import SafetyTolerances, decode_package
-from protocol.primary.state import RobotState, state_size
+from protocol.primary.packages import RobotState, SafetyTolerances, decode_package, state_size
 from protocol.primary.values import ProgramStateMessage
 from protocol.script_channel import CONTROLLER_WORDS
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion

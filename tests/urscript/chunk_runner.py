@@ -38,7 +38,7 @@ from tree_printer import print_program
 from urscript.catalogue import Catalogue, catalogue_for
 from urscript.check.checking import check_program
 from urscript.compile.inference import StaticTypes, Type
-from urscript.compile.statements import NO_NAMES, CompiledStatements, compile_statements
+from urscript.compile.interpreter_mode import NO_NAMES, CompiledStatements, compile_statements
 from urscript.errors import ScriptCompileError, ScriptError
 from urscript.program import ProgramStatus, compile_program
 from urscript.recording_host import FakeSocket, RecordingHost

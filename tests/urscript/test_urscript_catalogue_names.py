@@ -23,7 +23,7 @@ from urscript.catalogue import (
     catalogue_for,
 )
 from urscript.catalogue.calls import compile_check, fits
-from urscript.catalogue.tables import read_rows
+from urscript.catalogue.catalogue import read_rows
 
 # Script manual CB3 3.15.4, chapter by chapter.
 CB3_MANUAL = {

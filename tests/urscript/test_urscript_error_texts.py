@@ -27,8 +27,8 @@ ERROR_CLASSES = {
 OUT_OF_REACH = {
     "compile/compiler.py _FunctionCompiler._assign_inside": "every builtin array has a setter",
     "compile/compiler.py compile_resolved": "the limits before it are lower than Python's",
-    "compile/statements.py compile_statements": "as program.py resolve_source; tests/ur_emulator/test_interpreter",
-    "run/ops.py equal": "dialect.MIXED_TYPES_COMPARE",
+    "compile/interpreter_mode.py compile_statements": "as program.py resolve_source; tests/ur_emulator/test_interpreter",
+    "run/runtime.py equal": "dialect.MIXED_TYPES_COMPARE",
     "names/resolver.py resolve": "201 functions; test_urscript_lang_running",
     "program.py resolve_source": "the resolver is deeper than the compiler in no program short enough for a chunk",
     "program.py RunningProgram._finish": "a fault of a host; test_urscript_lang_running",
@@ -160,7 +160,7 @@ def test_the_search_finds_the_places():
     assert len(sites) > 80
     assert {"type_error", "explain", "_syntax_error", "_out_of_range"} <= makers()
     assert {file for file, *_ in sites} >= {
-        "run/ops.py",
+        "run/runtime.py",
         "run/variables.py",
         "builtins/urmath.py",
         "names/resolver.py",

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urscript import Matrix, Pose, RecordingHost, ScriptRuntimeError, compile_program
-from urscript.run import ops
+from urscript.run import runtime
 from urscript.values import log_form, str_form, type_name, wrap_int
 
 numbers = st.one_of(
@@ -75,9 +75,9 @@ def test_wrapping_is_congruent_and_in_range(value):
 def test_remainder_and_quotient_belong_together(a, b):
     if b == 0:
         with pytest.raises(ScriptRuntimeError, match="modulo by zero"):
-            ops.mod(a, b)
+            runtime.mod(a, b)
         return
-    rest = ops.mod(a, b)
+    rest = runtime.mod(a, b)
     assert rest == math.fmod(a, b)
     assert type(rest) is (int if type(a) is type(b) is int else float)
 

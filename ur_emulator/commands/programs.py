@@ -25,7 +25,7 @@ from ur_emulator.errors import RefusedError
 if TYPE_CHECKING:
     from ur_emulator.controller.state import ControllerState
     from urscript import CompiledProgram
-    from urscript.compile.statements import CompiledStatements
+    from urscript.compile.interpreter_mode import CompiledStatements
 
 PROGRAM_RUNS = "a program runs, stop it first"
 

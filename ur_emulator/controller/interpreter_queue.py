@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Final
 from protocol.interpreter import MAX_ID, TOO_MANY
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import RefusedError
-from urscript.compile.statements import NO_NAMES
+from urscript.compile.interpreter_mode import NO_NAMES
 
 if TYPE_CHECKING:
-    from urscript.compile.statements import CompiledStatements
+    from urscript.compile.interpreter_mode import CompiledStatements
 
 
 # --- the log of interpreter mode, as the files of a controller hold it

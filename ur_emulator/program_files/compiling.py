@@ -19,7 +19,7 @@ from ur_emulator.program_files.loading import LoadedProgram, load_program
 from ur_emulator.program_files.script_writer import setup_script
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
-from urscript.compile.statements import CompiledStatements, compile_statements
+from urscript.compile.interpreter_mode import CompiledStatements, compile_statements
 from urscript.errors import ScriptError, ScriptTypeError
 
 # A program that can be started, or why it cannot.

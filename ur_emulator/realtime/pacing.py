@@ -12,7 +12,7 @@ import math
 from enum import Enum
 from typing import Protocol
 
-from protocol.patience import Patience
+from ur_hil.patience import Patience
 
 # A box that could not tick for this long (a suspended laptop, a debugger) starts a new time base instead of
 # racing after the old one.

@@ -1,7 +1,7 @@
 """The catalogue of all URScript builtins: which version has what, how it is called, how well it is modelled.
 
-`chapters/` has one table for each chapter of the script manual, `tables` reads them, `calls` binds and checks
-arguments; `catalogue_for(version)` is the view of one release.
+`chapters/` has a table for each chapter of the script manual, `catalogue` reads them, `calls` binds and
+checks arguments; `catalogue_for(version)` is the view of one release.
 """
 
 from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, Catalogue, catalogue_for

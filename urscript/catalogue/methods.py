@@ -1,7 +1,7 @@
 """The methods that values have in later software: `list.append(x)` and its like.
 
-Behaviour in `urscript.run.methods`. Source: e-Series script directory, chapter Lists and Structs; the maker's
-forum, "Request for comments: variable length lists". Names of parameters are ours.
+What they do is in `urscript.run.variables`. Source: e-Series script directory, chapter Lists and Structs; the
+maker's forum, "Request for comments: variable length lists". Names of parameters are ours.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The records of the catalogue: a builtin, its parameters, its time, its support.
 
-`tables` reads the rows, one text a chapter of the script manual; `calls` interprets them.
+`catalogue` reads the rows, one text a chapter of the script manual; `calls` interprets them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Expressions -> Python expressions.
 
-Where the static types are known, the Python operator is emitted, elsewhere a call of `ops`. A call that may
-take time becomes `yield from`. Names: `v_x` local, `g_x` global, `b_f` builtin; the rest of the names a
-compiled program uses is listed in `runtime`.
+Where the static types are known, the Python operator is emitted, elsewhere a call of the run-time library. A
+call that may take time becomes `yield from`. Names: `v_x` local, `g_x` global, `b_f` builtin; the rest of the
+names a compiled program uses is listed in `runtime`.
 """
 
 from __future__ import annotations
@@ -299,7 +299,7 @@ class ExpressionCompiler:
     # --- places ------------------------------------------------------------------------------------------
 
     def steps(self, target: Expression, scope: FunctionScope) -> tuple[str | None, ast.expr]:
-        """The variable that `target` is, or is inside of, and the steps to it (`elements.Step`).
+        """The variable that `target` is, or is inside of, and the steps to it (`variables.Step`).
 
         Without a variable (a call, a builtin array) it is None.
         """

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from urscript.compile.statements import CompiledStatements
+from urscript.compile.interpreter_mode import CompiledStatements
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import Wait
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Container, Generator, Iterable, Mapping
 from typing import Any, Final
 
 from urscript.compile.compiler import CompiledCode
-from urscript.compile.statements import CompiledStatements
+from urscript.compile.interpreter_mode import CompiledStatements
 from urscript.errors import ScriptRuntimeError
 from urscript.run.host import EnterMode
 from urscript.run.metering import Meter

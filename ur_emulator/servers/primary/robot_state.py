@@ -24,7 +24,7 @@ from protocol.primary.layout import (
     ToolData,
     ToolModeInfo,
 )
-from protocol.primary.state import encode_state
+from protocol.primary.packages import encode_state
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import (
     SIMULATED_MASTERBOARD,
