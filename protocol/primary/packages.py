@@ -57,7 +57,7 @@ __all__ = [
     "state_types",
 ]
 
-_S = TypeVar("S", bound=SubPackage)
+_S = TypeVar("_S", bound=SubPackage)
 
 
 @dataclass(frozen=True, slots=True)
