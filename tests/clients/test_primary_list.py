@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from clients_support import BOTH_GENERATIONS, TIMEOUT, connect
+from clients_support import BOTH_GENERATIONS, TIMEOUT
 from primary_wire import (
     CONFIGURATION,
     ERROR,
@@ -194,16 +194,6 @@ def test_a_tool_that_is_set_is_the_tool(box, primary):
         rtde.until(lambda v: v["payload"] == 0.5)
         primary.write("sec setup():\n\tset_tcp(p[0,0,0,0,0,0])\nend\nsec setup():\n\tset_payload(0)\nend\n")
         rtde.until(lambda v: not any(v["tcp_offset"]) and v["payload"] == 0.0)
-
-
-@BOTH_GENERATIONS
-@pytest.mark.parametrize("port", ["primary", "secondary", "realtime"])
-def test_packages_never_come_half_a_second_apart(box, port):
-    """urx and ur_modern_driver take longer silence for death; counted in robot time by what the stamps say."""
-    with connect(box, port) as sock:
-        sock.settimeout(0.5)  # theirs
-        for _ in range(15):
-            assert sock.recv(1 << 16)
 
 
 def test_state_packages_of_the_secondary_port_suit_urx(old_box):

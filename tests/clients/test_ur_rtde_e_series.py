@@ -1,7 +1,5 @@
 """ur_rtde as it is on a UR5e: 500 Hz, what only e-Series software has, remote control."""
 
-import time
-
 import numpy as np
 import pytest
 from clients_support import served_box
@@ -49,8 +47,7 @@ def still(receive):
 
 def test_a_package_comes_every_two_milliseconds(receive):
     stamps = []
-    end = time.monotonic() + 20.0
-    while len(stamps) < 200 and time.monotonic() < end:
+    while len(stamps) < 200:
         stamp = receive.getTimestamp()
         if not stamps or stamp != stamps[-1]:
             stamps.append(stamp)

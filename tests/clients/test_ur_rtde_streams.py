@@ -131,8 +131,8 @@ def test_hand_guiding(arm):
 
 
 def test_a_watchdog_that_is_kicked_lets_the_script_live(arm):
-    """Then it is not kicked any more and the script ends."""
-    assert arm.control.setWatchdog(5.0)
+    """Then it is not kicked any more and the script ends, 2 s later: a busy machine may kick late."""
+    assert arm.control.setWatchdog(0.5)
     start = arm.receive.getTimestamp()
     while arm.receive.getTimestamp() < start + 0.6:
         assert arm.control.kickWatchdog()

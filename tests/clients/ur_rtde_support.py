@@ -2,7 +2,7 @@
 
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +25,7 @@ SPEED, ACCELERATION = 3.0, 12.0  # rad/s, rad/s^2; no test is about slowness
 CLOSE_Q = 5e-4  # rad; backlash and sag of the arm at rest
 CLOSE_X = 1e-3  # m, and rad for a rotation vector
 PATIENCE = 20.0  # s; a limit for hangs
+TRIES = 3  # before the last
 
 
 def wait_until(condition, what="what was waited for"):
@@ -37,8 +38,16 @@ def wait_until(condition, what="what was waited for"):
 
 @contextmanager
 def connected(interface, *arguments):
-    """Connect one of ur_rtde's interfaces and disconnect it: one that outlives its box ends the whole process."""
-    client = interface(*arguments)
+    """Connect one of ur_rtde's interfaces and disconnect it: one that outlives its box ends the whole process.
+
+    The client gives its script five seconds to start, by the wall clock. A busy machine gets more tries.
+    """
+    for _ in range(TRIES):
+        with suppress(RuntimeError):
+            client = interface(*arguments)
+            break
+    else:
+        client = interface(*arguments)
     try:
         yield client
     finally:

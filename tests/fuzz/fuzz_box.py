@@ -516,10 +516,7 @@ def run(rng, folder, n_cases, **options):
     fuzz = FuzzBox(rng, folder, **options)
     try:
         while fuzz.cases.total() < n_cases:
-            started = time.perf_counter()
             fuzz.step()
-            if (took := time.perf_counter() - started) > 20:
-                raise AssertionError(f"a step took {took:.0f} s")
         fuzz.settle()
     except BaseException as error:
         lines = [repr(step)[:2000] for step in tuple(fuzz.trail)[-40:]]
