@@ -55,7 +55,7 @@ BOX_ORDER = (
     {"rack"},
     {"box_process"},
     {"emulator"},
-    {"__main__", "cli", "descriptor_limit", "pytest_plugin", "script_robots", "script_run"},
+    {"__main__", "cli", "pytest_plugin", "script_robots", "script_run"},
 )
 CONTROLLER_ORDER = (
     {"events"},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -131,7 +130,7 @@ class Box:
             "seed": seed,
             "fidelity": options.fidelity,
         }
-        context = Context(self._access, player, time.monotonic, self._identity_now, make)
+        context = Context(self._access, player, self._identity_now, make)
         self.operations = OperationRunner(self._loop, context)
         self._wanted_control_port = options.control_port
         if options.control_port is not None:
@@ -159,7 +158,7 @@ class Box:
         """Ask for something as a client of the box would, from any thread; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.commands`, such as `operator.ClosePopup()` or `power.PowerOff()`.
+            command: one of `ur_emulator.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
             done: called in that cycle, in the thread of the box: with its result and None, or with
                 None and the error, a `RefusedError` if it was refused.
         """

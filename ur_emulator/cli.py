@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from ur_emulator.realtime.line_writer import LineWriter
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Enough for hundreds of boxes with hundreds of clients, and a number that every system grants.
+WANTED_DESCRIPTORS = 65_536
 
 # Ports of the line that says that a box is ready.
 _SHOWN_PORTS = ("robot_api", "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter", "modbus")
@@ -125,7 +127,6 @@ def serve(
     except ImportError as error:
         _complain(str(error))
         raise typer.Exit(ExitCode.FAILED) from None
-    from ur_emulator.descriptor_limit import raise_descriptor_limit
     from ur_emulator.realtime.processes import Role, prepare_children
 
     raise_descriptor_limit()
@@ -221,6 +222,25 @@ def ctl(
     from ur_emulator.control_api.command_line import main as control
 
     raise typer.Exit(control(words or ()))
+
+
+def raise_descriptor_limit() -> int:
+    """Raise this process's limit of descriptors as far as the system allows; return it, 0 without one.
+
+    Each client takes a descriptor, and some systems start with 256.
+    """
+    try:
+        import resource
+    except ImportError:
+        return 0
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = WANTED_DESCRIPTORS if hard == resource.RLIM_INFINITY else min(WANTED_DESCRIPTORS, hard)
+    if soft == resource.RLIM_INFINITY or soft >= wanted:
+        return soft
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+        return wanted
+    return soft
 
 
 def _ports_line(at: ServedAt) -> str:

@@ -145,7 +145,7 @@ class BoxControl(BoxOperations):
         """Ask for something as a client of the box would; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.commands`, such as `operator.ClosePopup()` or `power.PowerOff()`.
+            command: one of `ur_emulator.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
             done: called when it was applied, in another thread: with its result and None, or with None and
                 the error, a `RefusedError` if it was refused.
 

@@ -8,7 +8,7 @@ import sys
 import pytest
 from integration_support import finish, free_port_base
 
-from ur_emulator.descriptor_limit import WANTED
+from ur_emulator.cli import WANTED_DESCRIPTORS
 
 # Each costs time or memory that no box needs before somebody asks for it.
 LATE = {
@@ -34,7 +34,7 @@ START = (
 
 RAISE = (
     "import json, resource\n"
-    "from ur_emulator.descriptor_limit import raise_descriptor_limit\n"
+    "from ur_emulator.cli import raise_descriptor_limit\n"
     "print(json.dumps([raise_descriptor_limit(), *resource.getrlimit(resource.RLIMIT_NOFILE)]))\n"
 )
 
@@ -58,7 +58,7 @@ def test_a_box_that_serves_has_loaded_nothing_that_can_wait():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such limit")
-@pytest.mark.parametrize(("hard", "given"), [(300, 300), (None, WANTED)])
+@pytest.mark.parametrize(("hard", "given"), [(300, 300), (None, WANTED_DESCRIPTORS)])
 def test_the_limit_of_descriptors_is_raised_as_far_as_the_system_allows(hard, given):
     import resource
 

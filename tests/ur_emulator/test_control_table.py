@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from ur_emulator.commands.operation import Kind
 from ur_emulator.commands.surroundings import SIZES
-from ur_emulator.control_api.operations import OPERATIONS, BoxOperations, Reading, describe, make
+from ur_emulator.control_api.operations import OPERATIONS, BoxOperations, ReadProperty, describe, make
 from ur_emulator.control_api.step_operations import CONDITIONS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
@@ -39,7 +39,7 @@ def test_an_operation_that_acts_is_a_method_with_its_parameters_and_its_sentence
     operation, method = OPERATIONS[name], getattr(ControlBox, name)
     assert inspect.getdoc(method).splitlines()[0] == operation.meaning
     if operation.only_reads:
-        assert isinstance(method, Reading)
+        assert isinstance(method, ReadProperty)
         return
     assert method.__name__ == name
     parameters = list(inspect.signature(method).parameters.values())[1:]

@@ -1,1 +1,1 @@
-"""Commands of clients, people and tests: one frozen record each, with its effect."""
+"""Commands of clients, people and tests, one frozen record each: they act as a cycle begins."""

@@ -1,11 +1,11 @@
-"""What clients write: input variables of RTDE, and the robot's Modbus map."""
+"""Commands of clients that write: input variables of RTDE, the robot's Modbus map."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from protocol.rtde.types import RtdeValue
-from ur_emulator.controller.command import Box
+from ur_emulator.controller.command import BoxParts
 from ur_emulator.controller.modbus_map import write_range
 
 
@@ -19,7 +19,7 @@ class WriteInputs:
 
     values: tuple[tuple[str, RtdeValue], ...]
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.client_inputs.write(self.values)
 
 
@@ -37,5 +37,5 @@ class WriteModbus:
     first: int
     values: tuple[int, ...]
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         write_range(box.state, self.is_coils, self.first, self.values)

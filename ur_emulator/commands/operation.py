@@ -29,7 +29,7 @@ from typing import (
     get_type_hints,
 )
 
-from ur_emulator.controller.command import Box, Result
+from ur_emulator.controller.command import BoxParts, Result
 from ur_emulator.errors import ArgumentError
 
 # --- What an operation may be given: types, ranges, units, and one line for what does not fit
@@ -318,7 +318,7 @@ class CommandOperation(Operation[int]):
     """An operation that is done at the beginning of a cycle; its method returns the number of that cycle."""
 
     @abstractmethod
-    def apply(self, box: Box) -> Result:
+    def apply(self, box: BoxParts) -> Result:
         """Apply the operation.
 
         Returns:

@@ -1,4 +1,4 @@
-"""Power, brakes and freedrive: the buttons of the initialisation screen, and their text commands."""
+"""Commands for power, brakes, freedrive, the operational mode and remote control."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import Box, inform
+from ur_emulator.controller.command import BoxParts, inform
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.robot_mode import ModeCommand
 from ur_emulator.controller.safety.inputs import EnablingAct, ModeSource, OperationalMode
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 class PowerOn(CommandOperation):
     """Power the joints; the brakes stay closed."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         _give_power(box, ModeCommand.POWER_ON)
 
 
 class PowerOff(CommandOperation):
     """Close the brakes and cut the power."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.cut_power()
 
 
 class ReleaseBrakes(CommandOperation):
     """Go to RUNNING, powering on first if need be."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.compliance.end_freedrive_by_client()
         _give_power(box, ModeCommand.BRAKE_RELEASE)
 
@@ -43,14 +43,14 @@ class ReleaseBrakes(CommandOperation):
 class StartFreedrive:
     """Go into freedrive, as `set robotmode freedrive` asks; `set robotmode run` ends it."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         if box.state.operational.allows.allows_freedrive:
             box.state.compliance.start_freedrive(by_client=True)
         else:
             inform(box.state, "freedrive refused: the operational mode is AUTOMATIC: choose manual mode")
 
 
-def _give_power(box: Box, command: ModeCommand) -> None:
+def _give_power(box: BoxParts, command: ModeCommand) -> None:
     """Power the joints or open their brakes, if the safety mode allows it; clients get a message if not."""
     mode = box.state.safety.mode
     if ROW[mode].may_have_power:
@@ -59,7 +59,7 @@ def _give_power(box: Box, command: ModeCommand) -> None:
         inform(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].remedy}")
 
 
-# --- Operational mode, enabling device and remote control of an e-Series box
+# --- An e-Series box: operational mode, enabling device, remote control
 
 
 class SetOperationalMode(CommandOperation):
@@ -67,7 +67,7 @@ class SetOperationalMode(CommandOperation):
 
     mode: Literal["none", "manual", "automatic"] = parameter("the mode; none: no password is set")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         _choose(box, ModeSource.PENDANT, None if self.mode == "none" else OperationalMode(self.mode))
 
 
@@ -77,7 +77,7 @@ class ChooseModeByDashboard:
 
     mode: OperationalMode | None
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         _choose(box, ModeSource.DASHBOARD, self.mode)
 
 
@@ -88,7 +88,7 @@ class MoveEnablingDevice(CommandOperation):
         "pressed is its middle position; none: no device is connected"
     )
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         needs_operational_modes(box.state)
         box.safety.inputs.act_on_device(EnablingAct(self.position))
 
@@ -102,7 +102,7 @@ class SwitchRemoteControl(CommandOperation):
 
     on: bool = parameter("remote control, or local", default=True)
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         generation = box.state.robot.generation
         if not generation.has_remote_control:
             raise RefusedError(f"a box of the {generation.name} has no remote control")
@@ -129,7 +129,7 @@ def needs_operational_modes(state: ControllerState) -> None:
         raise RefusedError(f"a box of the {generation.name} has no operational modes")
 
 
-def _choose(box: Box, source: ModeSource, mode: OperationalMode | None) -> None:
+def _choose(box: BoxParts, source: ModeSource, mode: OperationalMode | None) -> None:
     needs_operational_modes(box.state)
     decides = box.state.operational.source
     if mode is not None and decides < source:

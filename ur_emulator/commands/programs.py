@@ -1,9 +1,4 @@
-"""The running program: start, stop, pause and resume it, and the speed slider.
-
-Interpreter mode: what clients of its port do with the running program.
-
-What the operator does at the screen: answer questions, close popups; and popups that clients show.
-"""
+"""Commands for programs: the running one, the speed slider, its questions and popups, interpreter mode."""
 
 from __future__ import annotations
 
@@ -14,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from protocol.primary.messages import RequestedType
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import Box, Result, inform
+from ur_emulator.controller.command import BoxParts, Result, inform
 from ur_emulator.controller.events import PopupShown, ScriptFailed
 from ur_emulator.controller.pendant import Answer
 from ur_emulator.controller.safety.inputs import SafetyInput
@@ -44,7 +39,7 @@ class StartProgram:
     pauses: bool = False
     loaded: bool = False
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         obstacle = _why_not_running(box.state)
         if obstacle:
             text = f"program {self.program.name} not started: {obstacle}"
@@ -69,7 +64,7 @@ class SetUp:
     limits: ConfiguredLimits
     inputs: Mapping[int, SafetyInput]
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         if box.programs.is_running:
             raise RefusedError(PROGRAM_RUNS)
         box.safety.set_limits(self.limits)
@@ -81,14 +76,14 @@ class SetUp:
 class StopProgram(CommandOperation):
     """End the program, if one runs."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.programs.stop()
 
 
 class PauseProgram(CommandOperation):
     """Let the program stand still, and the arm come to rest on its path."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         if not box.programs.is_running or box.programs.is_paused:
             raise RefusedError(f"there is no program to pause: the program state is {_program_state(box)}")
         box.programs.pause()
@@ -97,7 +92,7 @@ class PauseProgram(CommandOperation):
 class ResumeProgram(CommandOperation):
     """Let a paused program go on."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         if not box.programs.is_paused:
             raise RefusedError(f"there is no program to resume: the program state is {_program_state(box)}")
         obstacle = _why_not_running(box.state)
@@ -113,7 +108,7 @@ class SetSpeedSlider(CommandOperation):
 
     fraction: float = parameter("of full speed", low=0.0, high=1.0)
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.speed.set_slider(self.fraction)
 
 
@@ -126,8 +121,11 @@ def _why_not_running(state: ControllerState) -> str:
     return "" if mode is RobotMode.RUNNING else f"the robot is in {mode.name}, it must be RUNNING"
 
 
-def _program_state(box: Box) -> str:
+def _program_state(box: BoxParts) -> str:
     return ProgramState(box.state.past.snapshot.runtime_state).name
+
+
+# --- Interpreter mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +140,7 @@ class AppendStatements:
     statements: CompiledStatements
     epoch: int
 
-    def apply(self, box: Box) -> dict[str, int]:
+    def apply(self, box: BoxParts) -> dict[str, int]:
         """Return its id; 0 if its names do not hold any more."""
         return {"id": box.state.interpreter.append(self.statements, self.epoch)}
 
@@ -151,7 +149,7 @@ class AppendStatements:
 class SkipStatements:
     """Drop the lines that have not begun."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.interpreter.skip()
 
 
@@ -159,8 +157,11 @@ class SkipStatements:
 class AbortMove:
     """End a movej or movel of any program; the instruction returns."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.motion.abort()
+
+
+# --- The operator: questions and popups
 
 
 class AnswerRequest(CommandOperation):
@@ -172,10 +173,10 @@ class AnswerRequest(CommandOperation):
     )
     result: ClassVar[str] = "`id`: number of the question, and `tick`"
 
-    def apply(self, box: Box) -> Result:
-        operator = box.state.pendant
-        asked = [r for r in operator.requests if r.kind is not RequestedType.NONE]
-        answered = operator.answer(self.value, self.id)
+    def apply(self, box: BoxParts) -> Result:
+        pendant = box.state.pendant
+        asked = [r for r in pendant.requests if r.kind is not RequestedType.NONE]
+        answered = pendant.answer(self.value, self.id)
         if answered is None:
             questions = ", ".join(f"{r.request_id} ({r.kind.name.lower()}): {r.text}" for r in asked)
             raise RefusedError(
@@ -187,7 +188,7 @@ class AnswerRequest(CommandOperation):
 class ClosePopup(CommandOperation):
     """Press the button of all popups."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.pendant.close_popups()
 
 
@@ -197,6 +198,6 @@ class ShowPopup:
 
     text: str
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.pendant.show(self.text)
         box.state.events.append(PopupShown("Popup", self.text, False, False, False))

@@ -1,4 +1,4 @@
-"""Effects of people and of wiring on the safety system and the pendant.
+"""Commands for the safety system: its buttons, inputs, settings and planes; the buttons of the pendant.
 
 Clients of a real box cannot send most of these; they are for tests and for people at the emulator.
 """
@@ -15,7 +15,7 @@ from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
 from ur_emulator.commands.operation import CommandOperation, parameter
 from ur_emulator.commands.power import needs_operational_modes
-from ur_emulator.controller.command import Box
+from ur_emulator.controller.command import BoxParts
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.robot_mode import ModeCommand
 from ur_emulator.controller.safety.boundaries import (
@@ -38,21 +38,21 @@ class PressEmergencyStop(CommandOperation):
         "the pendant's button, or that of the surroundings", default="robot"
     )
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.inputs.press(self.kind)
 
 
 class ReleaseEmergencyStop(CommandOperation):
     """Release all emergency stop buttons; the power stays off."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.inputs.release()
 
 
 GuardName = Literal["permanent", "automatic mode"]
 
 
-def _guard_of(box: Box, name: GuardName) -> Guard:
+def _guard_of(box: BoxParts, name: GuardName) -> Guard:
     """Return a safeguard, if the box has it.
 
     Raises:
@@ -69,7 +69,7 @@ class SafeguardStop(CommandOperation):
     active: bool = parameter("begin, or end it", default=True)
     safeguard: GuardName = parameter("which; that of automatic mode acts in no other", default="permanent")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.inputs.guard(_guard_of(box, self.safeguard), self.active)
 
 
@@ -78,21 +78,21 @@ class ReducedMode(CommandOperation):
 
     active: bool = parameter("begin, or end it", default=True)
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.inputs.reduce(self.active)
 
 
 class TriggerProtectiveStop(CommandOperation):
     """Stop the arm as a safety function would."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.requests.protective_stop()
 
 
 class UnlockProtectiveStop(CommandOperation):
     """End a protective stop at once, without the dashboard's 5 s."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         safety = box.state.safety
         if not safety.has(SafetyMode.PROTECTIVE_STOP):
             raise RefusedError(
@@ -106,7 +106,7 @@ class TriggerViolation(CommandOperation):
 
     text: str = parameter("for log and clients", default="Safety violation requested")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.events.append(ErrorReported(0, 0, ReportLevel.VIOLATION, self.text))
         box.safety.handle(SafetyEvent.VIOLATION)
 
@@ -116,7 +116,7 @@ class TriggerFault(CommandOperation):
 
     text: str = parameter("for log and clients", default="Safety fault requested")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.events.append(ErrorReported(0, 0, ReportLevel.FAULT, self.text))
         box.safety.handle(SafetyEvent.FAULT)
 
@@ -124,7 +124,7 @@ class TriggerFault(CommandOperation):
 class RestartSafety(CommandOperation):
     """Restart the safety system; the power is off then."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.handle(SafetyEvent.RESTART)
 
 
@@ -134,7 +134,7 @@ class RequireSafeguardReset(CommandOperation):
     required: bool = parameter("a reset is needed")
     safeguard: GuardName = parameter("which", default="permanent")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.inputs.require_reset(_guard_of(box, self.safeguard), self.required)
 
 
@@ -143,7 +143,7 @@ class ResetSafeguard(CommandOperation):
 
     safeguard: GuardName = parameter("which", default="permanent")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.inputs.reset(_guard_of(box, self.safeguard))
 
 
@@ -156,7 +156,7 @@ class AssignSafetyInput(CommandOperation):
     pair: int = parameter("inputs 2 * pair and 2 * pair + 1", low=0, high=N_INPUT_PAIRS - 1)
     function: str = parameter("of the pair", choices=("none", *(it.value for it in SafetyInput)))
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         function = None if self.function == "none" else SafetyInput(self.function)
         if function is not None and function.needs_operational_modes:
             needs_operational_modes(box.state)
@@ -166,7 +166,7 @@ class AssignSafetyInput(CommandOperation):
 class ChangeSafetySettings(CommandOperation):
     """Change the safety settings: the power goes off and the robot mode becomes CONFIRM_SAFETY."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.safety.cut_power()
         box.state.mode.command(ModeCommand.ASK_TO_CONFIRM)
 
@@ -174,7 +174,7 @@ class ChangeSafetySettings(CommandOperation):
 class ConfirmSafety(CommandOperation):
     """Confirm the safety settings, as `confirm user safety parameters` does."""
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.mode.command(ModeCommand.CONFIRM)
 
 
@@ -192,7 +192,7 @@ class PressButton(CommandOperation):
     button: Button = parameter("which button")
     pressed: bool = parameter("pressed, or released")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.pendant.press(BUTTON_BITS[self.button], self.pressed)
         if self.button == "teach":
             box.state.compliance.press_teach_button(self.pressed)
@@ -220,7 +220,7 @@ class SetSafetyPlane(CommandOperation):
             raise ArgumentError("safety plane without a name given: it needs one, to be replaced by")
         _unit(self.normal)
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         x, y, z = self.position
         plane = SafetyPlane(
             self.name, (x, y, z), _unit(self.normal), BoundaryMode(self.mode), self.restrict_elbow
@@ -247,12 +247,12 @@ class LimitToolDirection(CommandOperation):
     def check_together(self) -> None:
         _unit(self.axis)
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         cone = ToolDirection(_unit(self.axis), self.deviation, BoundaryMode(self.mode))
         _set(box, replace(box.state.safety.limits.boundaries, tool_direction=cone))
 
 
-def _set(box: Box, boundaries: Boundaries) -> None:
+def _set(box: BoxParts, boundaries: Boundaries) -> None:
     box.safety.set_limits(replace(box.state.safety.limits, boundaries=boundaries))
 
 

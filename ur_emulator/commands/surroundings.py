@@ -1,4 +1,4 @@
-"""What is wired to the inputs of the box and the tool: levels and values from outside.
+"""Commands for what surrounds the arm: levels at inputs, forces and loads on the flange, obstacles.
 
 No client of a real box can send these; they are for tests and for people at the emulator.
 """
@@ -10,14 +10,12 @@ from math import hypot
 from typing import Literal
 
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import Box, inform
+from ur_emulator.controller.command import BoxParts, inform
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.models.robot_model import Vector3, six
 
-# --- What is wired to the inputs of the box and the tool: levels and values from outside
-#
-# No client of a real box can send these; they are for tests and for people at the emulator.
+# --- What is wired to the inputs of the box and the tool
 
 
 class SetDigitalInput(CommandOperation):
@@ -32,7 +30,7 @@ class SetDigitalInput(CommandOperation):
         if self.n >= count:
             raise ArgumentError(f"{self.group} digital input {self.n} given: allowed are 0 to {count - 1}")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.state.io.write_digital_in(DIGITAL_GROUPS[self.group].bits[self.n], self.level)
 
 
@@ -43,7 +41,7 @@ class SetAnalogInput(CommandOperation):
     n: int = parameter("number of the input", low=0, high=1)
     value: float = parameter("in V, or in A where the input measures current", low=0.0, high=10.0)
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         io = box.state.io
         line = (io.analog_in if self.group == "standard" else io.tool_analog_in)[self.n]
         low, high = ANALOG_RANGE[line.domain]
@@ -55,9 +53,7 @@ class SetAnalogInput(CommandOperation):
         line.value = self.value
 
 
-# --- External forces on the flange, and a payload that no program has declared
-#
-# No client of a real box can send these; they are for tests and for people at the emulator.
+# --- Forces on the flange, and a payload that no program has declared
 
 
 # The largest force limit of the safety settings [N]; about the length of a tool [m].
@@ -75,7 +71,7 @@ class Push(CommandOperation):
         "for so long in robot time; until the next push if left out", "s", 0.0, 600.0, default=None
     )
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.push.begin(self.force, self.point, self.duration)
 
 
@@ -87,11 +83,11 @@ class AttachPayload(CommandOperation):
         "centre of gravity in the flange frame", "m", high=MAX_LEVER, default=(0.0, 0.0, 0.0)
     )
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         box.plant.attach_load(self.mass, self.cog)
 
 
-# --- Obstacles around the arm: sizes and poses are checked before they reach the physics
+# --- Obstacles: sizes and poses are checked before they reach the physics
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
@@ -133,7 +129,7 @@ class AddObstacle(CommandOperation):
                 f"are needed, at most {FARTHEST:g} m away"
             )
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         try:
             box.plant.obstacles.put(self.name, self.shape, self.size, six(self.pose))
         except RefusedError as refusal:
@@ -146,7 +142,7 @@ class RemoveObstacle(CommandOperation):
 
     name: str = parameter("of the obstacle")
 
-    def apply(self, box: Box) -> None:
+    def apply(self, box: BoxParts) -> None:
         known = box.plant.obstacles.names
         if self.name not in known:
             there = f"are {', '.join(known)}" if known else "is none"

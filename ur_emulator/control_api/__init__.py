@@ -1,1 +1,1 @@
-"""What people and tests do to a box: a table of operations, how they are done, and how they are called."""
+"""The control API: a table of named operations on a box, how they are done, and how they are called."""

@@ -109,8 +109,8 @@ def is_steady(controller: Controller) -> bool:
 
 def take_state(controller: Controller) -> BoxState:
     """Return the state of a box; in the thread of its loop, or when it does not run."""
-    now, operator = controller.snapshot, controller.state.pendant
-    popups = tuple(r.text for r in operator.requests if r.kind is RequestedType.NONE)
+    now, pendant = controller.snapshot, controller.state.pendant
+    popups = tuple(r.text for r in pendant.requests if r.kind is RequestedType.NONE)
     return BoxState(
         tick=now.tick,
         time=now.timestamp,
@@ -118,7 +118,7 @@ def take_state(controller: Controller) -> BoxState:
         safety_mode=SafetyMode(now.safety_mode).name,
         safety_status=SafetyStatus(now.safety_status).name,
         operational_mode=controller.state.operational.mode.name,
-        remote_control=bool(operator.remote_period),
+        remote_control=bool(pendant.remote_period),
         program_state=ProgramState(now.runtime_state).name,
         program=now.program_name,
         joint_modes=tuple(JointMode(mode).name for mode in now.joint_mode),
@@ -139,10 +139,10 @@ def take_state(controller: Controller) -> BoxState:
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
         obstacles=controller.plant.obstacles.names,
-        popups=(*operator.shown, *popups),
+        popups=(*pendant.shown, *popups),
         questions=tuple(
             Question(r.request_id, r.kind.name, r.text)
-            for r in operator.requests
+            for r in pendant.requests
             if r.kind is not RequestedType.NONE
         ),
     )

@@ -106,7 +106,7 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
     return call
 
 
-class Reading(Generic[R]):
+class ReadProperty(Generic[R]):
     """The property for an operation that only reads.
 
     Args:
@@ -148,9 +148,9 @@ class BoxOperations:
         raise NotImplementedError
 
     # --- what is going on
-    state = Reading(ReadState)
-    log = Reading(ReadLog, lambda box: box._log_entries())
-    identity = Reading(ReadIdentity)
+    state = ReadProperty(ReadState)
+    log = ReadProperty(ReadLog, lambda box: box._log_entries())
+    identity = ReadProperty(ReadIdentity)
     wait_until = method(WaitUntil)
     at = method(At)
     # --- inputs

@@ -25,7 +25,7 @@ Result = Mapping[str, Any] | None
 Done = Callable[[Result, Exception | None], None]
 
 
-class Box(Protocol):
+class BoxParts(Protocol):
     """The parts of a box that commands act on.
 
     Attributes:
@@ -47,7 +47,7 @@ class Box(Protocol):
 class Command(Protocol):
     """Something that is done to a box at the beginning of a cycle."""
 
-    def apply(self, box: Box) -> Result:
+    def apply(self, box: BoxParts) -> Result:
         """Apply the command.
 
         Raises:
@@ -63,7 +63,7 @@ class Submitted:
     command: Command
     done: Done
 
-    def apply(self, box: Box) -> Result:
+    def apply(self, box: BoxParts) -> Result:
         """Apply the command and call `done` with its result or its error, which ends only the command."""
         try:
             result = self.command.apply(box)

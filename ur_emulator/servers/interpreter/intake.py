@@ -24,7 +24,7 @@ from protocol.interpreter import (
 )
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import AbortMove, AppendStatements, SkipStatements
-from ur_emulator.controller.command import Box, Command, Result
+from ur_emulator.controller.command import BoxParts, Command, Result
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.errors import NotRunningError, RefusedError, WorkerError
 from ur_emulator.program_files.compiling import compile_line
@@ -70,7 +70,7 @@ class _Noted:
     command: Command
     begun: Callable[[], object]
 
-    def apply(self, box: Box) -> Result:
+    def apply(self, box: BoxParts) -> Result:
         """Apply it."""
         self.begun()
         return self.command.apply(box)
