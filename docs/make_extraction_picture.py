@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pc_client.extraction.extract import extract
-from pc_client.extraction.figures import draw_extraction
-from pc_client.extraction.pen import PenRecording, on_one_axis, ordered_part
 from pc_client.movements.files import load_movement
+from pc_client.studies.extraction.extract import extract
+from pc_client.studies.extraction.figures import draw_extraction
+from pc_client.studies.extraction.pen import PenRecording, on_one_axis, ordered_part
 
 
 def bad_recording(name: str, seed: int) -> PenRecording:

@@ -23,8 +23,8 @@ from pc_client.errors import ClientError
 from pc_client.experiment.experiment import Experiment, load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements.files import library_names
-from pc_client.sweep.box import Box, simulated_box
-from pc_client.sweep.case import SimulatedArm
+from pc_client.studies.sweep.box import Box, simulated_box
+from pc_client.studies.sweep.case import SimulatedArm
 
 PAPER, PREVIEW = CONTROLLERS["paper"], CONTROLLERS["preview"]
 # The paper gives neither gains nor acceleration: the page shows what other ordinary numbers would have given.

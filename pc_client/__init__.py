@@ -23,7 +23,6 @@ from ur_hil import check_packages
 if TYPE_CHECKING:
     from pc_client.analysis.run import Run as Run
     from pc_client.analysis.run import Signals as Signals
-    from pc_client.api.drawing import drawing as drawing
     from pc_client.api.movement import Movement as Movement
     from pc_client.arm import Arm as Arm
     from pc_client.arm import connect as connect
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from pc_client.kinematics.cell import Tool as Tool
     from pc_client.kinematics.cell import Wall as Wall
     from pc_client.movements.movement import JointTrajectory as JointTrajectory
+    from pc_client.studies.drawing.drawing import drawing as drawing
 
 check_packages()
 
@@ -57,7 +57,7 @@ _HOMES = {
     "Tool": "kinematics.cell",
     "Wall": "kinematics.cell",
     "connect": "arm",
-    "drawing": "api.drawing",
+    "drawing": "studies.drawing.drawing",
     "plan": "arm",
 }
 __all__ = sorted(_HOMES)

@@ -1,1 +1,1 @@
-"""`Movement` and `drawing`, as programs that import `pc_client` use them."""
+"""`Movement`, as programs that import `pc_client` use them."""

@@ -13,8 +13,7 @@ from pc_client.commands.options import OutOption, RunSettings, console, say, tak
 
 if TYPE_CHECKING:
     from pc_client.analysis.run import MeasuredRun
-    from pc_client.comparison.movement_set import MovementSet
-    from pc_client.comparison.table import Comparison
+    from pc_client.studies.comparison import Comparison, MovementSet
 
 
 @takes_run_settings
@@ -36,8 +35,7 @@ def compare(
     settings: RunSettings,
 ) -> None:
     """Compare all generators of movements: smoothness, power law, peaks; planned and executed."""
-    from pc_client.comparison.movement_set import make_sets, save_sets
-    from pc_client.comparison.table import build_comparison
+    from pc_client.studies.comparison import build_comparison, make_sets, save_sets
 
     with console.status("making movements"):
         made = make_sets(targets, seed, sets)
@@ -58,10 +56,10 @@ def _write(
     table: Comparison, one: MovementSet, runs: Mapping[str, MeasuredRun] | None, out: Path
 ) -> tuple[Path, ...]:
     """Write table and pictures; returns the files."""
-    from pc_client.comparison.figure import comparison_sheet
     from pc_client.results.matplotlib_figures import draw, svg_text
     from pc_client.results.pages import write_files
     from pc_client.results.tables import to_json
+    from pc_client.studies.comparison import comparison_sheet
 
     texts = {
         "compare.json": to_json(table.to_json()),

@@ -26,10 +26,10 @@ from pc_client.errors import MovementError
 from pc_client.files import as_file_name
 
 if TYPE_CHECKING:
-    from pc_client.drawing.drawing import Drawing
-    from pc_client.drawing.placement import PlacementOptions
-    from pc_client.drawing.table import Entry
-    from pc_client.extraction.pen import PenRecording
+    from pc_client.studies.drawing.drawing import Drawing
+    from pc_client.studies.drawing.placement import PlacementOptions
+    from pc_client.studies.drawing.table import Entry
+    from pc_client.studies.extraction.pen import PenRecording
 
 
 @takes_run_settings
@@ -94,7 +94,7 @@ def draw(
     settings: RunSettings,
 ) -> None:
     """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
-    from pc_client.extraction.pen import read_recording
+    from pc_client.studies.extraction.pen import read_recording
 
     if save is not None and len(files) > 1:
         raise typer.BadParameter("--save is for one drawing: give one FILE")
@@ -116,7 +116,7 @@ def draw(
 
 
 def _options(plane: str, size: str, rotate: str, lift: float, y: str) -> PlacementOptions:
-    from pc_client.drawing.placement import PlacementOptions
+    from pc_client.studies.drawing.placement import PlacementOptions
 
     try:
         return PlacementOptions(
@@ -147,9 +147,9 @@ def _make(
     """Extract the strokes of recordings and make them ready for the arm that answers."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from pc_client.drawing.drawing import make_drawing
-    from pc_client.extraction.extract import extract
     from pc_client.movements.geometry import WORKING_BOXES
+    from pc_client.studies.drawing.drawing import make_drawing
+    from pc_client.studies.extraction.extract import extract
 
     model = reach(robot, settings.ports, settings.cell).model
     options = replace(options, box=WORKING_BOXES[model.name])
@@ -200,9 +200,8 @@ def _summary(drawing: Drawing) -> str:
 
 def _judge(drawings: Sequence[Drawing], out: Path) -> list[Entry]:
     """Read the recordings of the runs and compute all figures."""
-    from pc_client.drawing.execution import executed
-    from pc_client.drawing.judgement import judge
-    from pc_client.drawing.table import Entry
+    from pc_client.studies.drawing.judgement import executed, judge
+    from pc_client.studies.drawing.table import Entry
 
     runs = sorted(read_runs(out), key=lambda run: run.provenance.repetition)
     entries = []
@@ -217,11 +216,11 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
     """Write page, tables and pictures, and show the tables."""
     from rich.progress import track
 
-    from pc_client.drawing.figures import Shown, sheets_of
-    from pc_client.drawing.table import drawing_rich, drawings_json, drawings_markdown, render_page
     from pc_client.results.matplotlib_figures import draw, svg_text
     from pc_client.results.pages import write_files
     from pc_client.results.tables import to_json
+    from pc_client.studies.drawing.figures import Shown, sheets_of
+    from pc_client.studies.drawing.table import drawing_rich, drawings_json, drawings_markdown, render_page
 
     sheets = {
         entry.name: sheets_of(Shown.of(entry.drawing, entry.executions[-1], entry.verdict))

@@ -22,9 +22,9 @@ from pc_client.files import as_file_name
 from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
-    from pc_client.extraction.batch import Outcome, Row
-    from pc_client.extraction.extract import ExtractOptions
-    from pc_client.extraction.pen import PenSource
+    from pc_client.studies.extraction.batch import Outcome, Row
+    from pc_client.studies.extraction.extract import ExtractOptions
+    from pc_client.studies.extraction.pen import PenSource
 
 _FEW_FIGURES = 6
 _MOST_ROWS = 30
@@ -61,10 +61,10 @@ def extract(
     dask: DaskOption = None,
 ) -> None:
     """Find the strokes of recorded movements, and say how well they reconstruct them."""
-    from pc_client.extraction.batch import STROKE_COLUMNS, table_of, to_json
-    from pc_client.extraction.extract import ExtractOptions
     from pc_client.results.pages import write_files
     from pc_client.results.tables import frame_of, to_csv
+    from pc_client.studies.extraction.batch import STROKE_COLUMNS, table_of, to_json
+    from pc_client.studies.extraction.extract import ExtractOptions
 
     check_workers(workers, dask)
     if figures != "none":
@@ -81,7 +81,7 @@ def extract(
         "strokes.csv": to_csv(frame_of(strokes, STROKE_COLUMNS)),
     }
     if figures != "none" and rows:
-        from pc_client.extraction.figures import draw_overview
+        from pc_client.studies.extraction.figures import draw_overview
 
         contents |= _pictures(outcomes)
         contents["overview.png"] = draw_overview(table_of(rows))
@@ -97,7 +97,7 @@ def extract(
 
 def _look_up(files: Sequence[str]) -> tuple[list[PenSource], list[str]]:
     """The recordings that are meant, and what is wrong with folders and archives that cannot be opened."""
-    from pc_client.extraction.pen import pen_sources
+    from pc_client.studies.extraction.pen import pen_sources
 
     sources, unusable = [], []
     for file in files:
@@ -118,8 +118,8 @@ def _run(
 ) -> list[Outcome]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from pc_client.executors import open_executor, usable_cores
-    from pc_client.extraction.batch import extract_many
+    from pc_client.studies.executors import open_executor, usable_cores
+    from pc_client.studies.extraction.batch import extract_many
 
     if not sources:
         return []
@@ -156,8 +156,8 @@ def _show(outcomes: Sequence[Outcome], rows: Sequence[Row]) -> None:
         return
     import polars as pl
 
-    from pc_client.extraction.batch import COLUMNS, table_of
     from pc_client.results.tables import to_rich
+    from pc_client.studies.extraction.batch import COLUMNS, table_of
 
     frame = table_of(rows)
     if len(frame) <= _MOST_ROWS:

@@ -28,10 +28,9 @@ if TYPE_CHECKING:
     import polars as pl
 
     from pc_client.arm import Arm
-    from pc_client.sweep.case import Case, GivenRobot, SimulatedArm
-    from pc_client.sweep.config import SweepConfig
-    from pc_client.sweep.outcome import Outcome
-    from pc_client.sweep.result_store import ResultStore
+    from pc_client.studies.sweep.case import Case, GivenRobot, Outcome, SimulatedArm
+    from pc_client.studies.sweep.config import SweepConfig
+    from pc_client.studies.sweep.store import ResultStore
 
 _MOST_SHOWN = 5
 """Settings and errors on the terminal; table and page have all."""
@@ -51,11 +50,10 @@ def sweep(
     yes: YesOption = False,
 ) -> None:
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
-    from pc_client.sweep.case import GivenRobot
-    from pc_client.sweep.config import read_config
-    from pc_client.sweep.result_store import ResultStore
-    from pc_client.sweep.run_case import run_case
-    from pc_client.sweep.schedule import Sweep, in_turn, side_by_side
+    from pc_client.studies.sweep.case import GivenRobot
+    from pc_client.studies.sweep.config import read_config
+    from pc_client.studies.sweep.schedule import Sweep, in_turn, run_case, side_by_side
+    from pc_client.studies.sweep.store import ResultStore
 
     check_workers(workers, dask)
     plan = read_config(config)
@@ -150,7 +148,7 @@ def _confirm(arm: Arm, waiting: Sequence[Case], n_runs: int) -> None:
         typer.Abort: the answer is no.
     """
     from pc_client.experiment.experiment import Experiment
-    from pc_client.sweep.run_case import plan_case
+    from pc_client.studies.sweep.schedule import plan_case
 
     plans = [plan_case(case) for case in {case.movement: case for case in waiting}.values()]
     planned = tuple(planned for plan in plans for planned in plan.planned)
@@ -160,7 +158,7 @@ def _confirm(arm: Arm, waiting: Sequence[Case], n_runs: int) -> None:
 def _draw(store: ResultStore, name: str, table: pl.DataFrame) -> None:
     """Write the page with the plots; without matplotlib the table has to do."""
     try:
-        from pc_client.sweep.page import render_page
+        from pc_client.studies.sweep.page import render_page
 
         with console.status("drawing"):
             page = render_page(name, table)
@@ -175,7 +173,7 @@ def _draw(store: ResultStore, name: str, table: pl.DataFrame) -> None:
 def _show(table: pl.DataFrame) -> None:
     """Say on the terminal what is best and what went wrong."""
     from pc_client.results.tables import to_rich
-    from pc_client.sweep.settings import RANKING, edge_of, rank_settings
+    from pc_client.studies.sweep.settings import RANKING, edge_of, rank_settings
 
     settings = rank_settings(table)
     console.print(to_rich(settings.head(_MOST_SHOWN), RANKING))

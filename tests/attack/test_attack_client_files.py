@@ -29,13 +29,13 @@ from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
 from pc_client.errors import ClientError, MovementError, RecordingError, one_line
 from pc_client.experiment.experiment import _refuse_to_lose
-from pc_client.extraction.pen import MOST_SAMPLES, contents, parse_pen, pen_sources
 from pc_client.files import FILE_KINDS, MOST_BYTES, as_file_name, is_file_name
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import row_topics, schema_text
-from pc_client.sweep.config import read_config
+from pc_client.studies.extraction.pen import MOST_SAMPLES, contents, parse_pen, pen_sources
+from pc_client.studies.sweep.config import read_config
 from ur_hil.input_files import MIB
 
 QUIET = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -261,7 +261,7 @@ def test_packing_methods_that_cannot_be_unpacked_piece_by_piece_are_refused(tmp_
 
 def test_an_archive_of_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = zipped(tmp_path / "a.zip", {f"{k}.csv": b"0,0,0" for k in range(4)})
-    monkeypatch.setattr("pc_client.extraction.pen.MOST_MEMBERS", 3)
+    monkeypatch.setattr("pc_client.studies.extraction.pen.MOST_MEMBERS", 3)
     with pytest.raises(RecordingError, match=r"4 files of 0 MiB in all; allowed are 3"):
         pen_sources([path])
 

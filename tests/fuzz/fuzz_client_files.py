@@ -13,11 +13,11 @@ from recording_samples import record_movement
 from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
 from pc_client.errors import ClientError
-from pc_client.extraction.pen import contents, parse_pen, pen_sources
 from pc_client.kinematics.cell_file import load_cell
 from pc_client.movements.files import LIBRARY_FOLDER, load_movement
 from pc_client.recording.recording import load_recording
-from pc_client.sweep.config import read_config
+from pc_client.studies.extraction.pen import contents, parse_pen, pen_sources
+from pc_client.studies.sweep.config import read_config
 
 ROOT = Path(__file__).parents[2]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pc_client.extraction.extract import Extraction, PartExtraction
-from pc_client.extraction.pen import PenPart
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
+from pc_client.studies.extraction.extract import Extraction, PartExtraction
+from pc_client.studies.extraction.pen import PenPart
 
 
 def flat_trajectory(targets, onsets, end, sigma=0.2, mu=-1.6, arc_angle=0.6):

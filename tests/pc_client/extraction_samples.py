@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pc_client.extraction.pen import PenPart, PenRecording
 from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
+from pc_client.studies.extraction.pen import PenPart, PenRecording
 
 DRAWINGS = Path(__file__).parents[2] / "examples" / "drawings"
 DRAWINGS_OF_PEOPLE = os.environ.get("OMNIGLOT")

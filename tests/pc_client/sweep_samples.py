@@ -10,9 +10,8 @@ from tempfile import TemporaryDirectory
 from pc_client.control.controller import CONTROLLERS
 from pc_client.errors import GainMarginError
 from pc_client.movements.files import library_path
-from pc_client.sweep.case import Case, MovementFile, SimulatedArm
-from pc_client.sweep.outcome import Outcome, failed
-from pc_client.sweep.result_store import ResultStore
+from pc_client.studies.sweep.case import Case, MovementFile, Outcome, SimulatedArm, failed
+from pc_client.studies.sweep.store import ResultStore
 
 PREVIEW = CONTROLLERS["preview"]
 

@@ -11,7 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pc_client.analysis.human_likeness import (
+from pc_client.errors import ClientError
+from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
+from pc_client.movements.minimum_jerk import stroke_shape
+from pc_client.movements.robotic import SmoothedSquareWave
+from pc_client.studies.likeness import (
     between_peaks,
     curvature_of,
     fit_power_law,
@@ -21,10 +25,6 @@ from pc_client.analysis.human_likeness import (
     sparc,
     speed_peaks,
 )
-from pc_client.errors import ClientError
-from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
-from pc_client.movements.minimum_jerk import stroke_shape
-from pc_client.movements.robotic import SmoothedSquareWave
 
 RATE = 1000.0
 T = np.arange(1001) / RATE

@@ -11,7 +11,7 @@ import pytest
 from extraction_samples import own_strokes
 from test_extraction_batch import write
 
-import pc_client.executors as executors
+import pc_client.studies.executors as executors
 from pc_client import cli
 
 

@@ -17,22 +17,26 @@ import pc_client.arm as arm_module
 import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli
-from pc_client.comparison.figure import comparison_sheet
-from pc_client.comparison.movement_set import make_sets, save_sets
-from pc_client.comparison.signals import (
-    CUTOFF_HZ,
-    Likeness,
-    executed_signal,
-    filtered_motion,
-    filtered_signal,
-    measure_likeness,
-    planned_signal,
-)
-from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, Comparison, build_comparison
 from pc_client.errors import ClientError
 from pc_client.movements import load_movement
 from pc_client.movements.twins import GENERATORS
 from pc_client.results.matplotlib_figures import draw, svg_text
+from pc_client.studies.comparison import (
+    COLUMNS,
+    CUTOFF_HZ,
+    EXECUTED_COLUMNS,
+    Comparison,
+    Likeness,
+    build_comparison,
+    comparison_sheet,
+    executed_signal,
+    filtered_motion,
+    filtered_signal,
+    make_sets,
+    measure_likeness,
+    planned_signal,
+    save_sets,
+)
 
 RATE = 125.0
 

@@ -12,8 +12,6 @@ from scipy.integrate import quad
 from scipy.special import erf, ndtr
 from test_analysis_human_likeness import REFERENCE
 
-from pc_client.comparison.movement_set import make_sets
-from pc_client.comparison.table import COLUMNS, EXECUTED_COLUMNS, build_comparison
 from pc_client.movements.durations import Fitts, Isochrony
 from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
@@ -23,6 +21,7 @@ from pc_client.movements.robotic import SmoothedSquareWave
 from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke
 from pc_client.movements.twins import GENERATORS
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED
+from pc_client.studies.comparison import COLUMNS, EXECUTED_COLUMNS, build_comparison, make_sets
 
 PAGE = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
 SENTENCES = " ".join(PAGE.split())

@@ -14,16 +14,22 @@ from drawing_samples import two_parts_and_a_dot
 from page_support import check_needs_nothing
 from recording_samples import provenance
 
-from pc_client.drawing.drawing import make_drawing
-from pc_client.drawing.execution import executed
-from pc_client.drawing.figures import FIGURES, Shown, sheets_of
-from pc_client.drawing.judgement import judge, signals
-from pc_client.drawing.placement import PlacementOptions
-from pc_client.drawing.table import COLUMNS, Entry, drawings_json, drawings_markdown, render_page, table_of
 from pc_client.errors import RecordingError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.results.matplotlib_figures import draw, svg_text
 from pc_client.results.tables import cells
+from pc_client.studies.drawing.drawing import make_drawing
+from pc_client.studies.drawing.figures import FIGURES, Shown, sheets_of
+from pc_client.studies.drawing.judgement import executed, judge, signals
+from pc_client.studies.drawing.placement import PlacementOptions
+from pc_client.studies.drawing.table import (
+    COLUMNS,
+    Entry,
+    drawings_json,
+    drawings_markdown,
+    render_page,
+    table_of,
+)
 
 CYCLE = 0.008
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from drawing_samples import one_part, two_parts_and_a_dot
 
-from pc_client.drawing.joining import TAIL, join, least_gaps
-from pc_client.drawing.placement import marks_of
 from pc_client.errors import MovementError
-from pc_client.extraction.extract import Extraction
-from pc_client.extraction.pen import PenPart
+from pc_client.studies.drawing.joining import TAIL, join, least_gaps
+from pc_client.studies.drawing.placement import marks_of
+from pc_client.studies.extraction.extract import Extraction
+from pc_client.studies.extraction.pen import PenPart
 
 LIFT = np.array([0.0, 0.0, -12.0])
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from drawing_samples import one_part, two_parts_and_a_dot
 
-from pc_client.drawing.drawing import make_drawing
-from pc_client.drawing.joining import ACCURACY, factor_needed, join, least_factor, least_gaps, paced
-from pc_client.drawing.placement import PlacementOptions
 from pc_client.errors import PlanningError
 from pc_client.kinematics.robot_model import robot_model
 from pc_client.movements.files import load_movement, save_movement
 from pc_client.movements.geometry import Box
 from pc_client.planning.plan import plan_movement
+from pc_client.studies.drawing.drawing import make_drawing
+from pc_client.studies.drawing.joining import ACCURACY, factor_needed, join, least_factor, least_gaps, paced
+from pc_client.studies.drawing.placement import PlacementOptions
 
 ARM = robot_model("ur3")
 

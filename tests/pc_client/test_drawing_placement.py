@@ -10,10 +10,17 @@ from drawing_samples import one_part, two_parts_and_a_dot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pc_client.drawing.drawing import spatial
-from pc_client.drawing.placement import PLANES, PlacementOptions, inverse, marks_of, place, sheet_frame
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import UR3_BOX
+from pc_client.studies.drawing.drawing import spatial
+from pc_client.studies.drawing.placement import (
+    PLANES,
+    PlacementOptions,
+    inverse,
+    marks_of,
+    place,
+    sheet_frame,
+)
 
 
 def drawn(extraction):

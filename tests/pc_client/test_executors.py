@@ -16,7 +16,7 @@ import pytest
 
 from pc_client import cli
 from pc_client.errors import ClientError
-from pc_client.executors import open_executor, usable_cores
+from pc_client.studies.executors import open_executor, usable_cores
 
 
 def square(x):
@@ -104,7 +104,7 @@ def test_an_exception_ends_running_jobs_and_drops_waiting_ones(listener):
 
 def test_workers_end_with_a_caller_that_is_killed(listener):
     code = (
-        "from test_executors import work_without_end; from pc_client.executors import open_executor\n"
+        "from test_executors import work_without_end; from pc_client.studies.executors import open_executor\n"
         f"with open_executor(1) as e: e.submit(work_without_end, {listener.getsockname()[1]}).result()"
     )
     caller = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parent)
@@ -131,7 +131,7 @@ def test_the_default_fills_the_cores_that_may_be_used():
 )
 def test_what_makes_no_sense_is_one_line(workers, dask, words, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("pc_client.executors._DASK_TIMEOUT", "300ms")
+    monkeypatch.setattr("pc_client.studies.executors._DASK_TIMEOUT", "300ms")
     with pytest.raises(ClientError, match=words), open_executor(workers, dask):
         pass
 

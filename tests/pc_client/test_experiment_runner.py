@@ -36,7 +36,7 @@ from pc_client.kinematics.cell import Cell, Wall
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase
-from pc_client.sweep.measure import loop_figures
+from pc_client.studies.sweep.schedule import loop_figures
 from protocol.velocity_stream import VelocityMode
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]

@@ -11,15 +11,22 @@ import numpy as np
 import pytest
 from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot, own_strokes, recorded
 
-import pc_client.extraction.batch as batch
+import pc_client.studies.extraction.batch as batch
 from pc_client.errors import ClientError, RecordingError
-from pc_client.executors import open_executor
-from pc_client.extraction.batch import STROKE_COLUMNS, extract_many, figures_of, strokes_of, table_of, to_json
-from pc_client.extraction.extract import extract
-from pc_client.extraction.pen import pen_sources
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.results.tables import frame_of, to_csv
+from pc_client.studies.executors import open_executor
+from pc_client.studies.extraction.batch import (
+    STROKE_COLUMNS,
+    extract_many,
+    figures_of,
+    strokes_of,
+    table_of,
+    to_json,
+)
+from pc_client.studies.extraction.extract import extract
+from pc_client.studies.extraction.pen import pen_sources
 
 
 class AtOnce(Executor):

@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pc_client.errors import MovementError
-from pc_client.extraction.initial import (
+from pc_client.movements.lognormal import Lognormal
+from pc_client.studies.extraction.initial import (
     CharacteristicPoints,
     lognormal_from_points,
     sigma_from_peak_ratio,
     sigma_from_slope_ratio,
     turn_rate,
 )
-from pc_client.movements.lognormal import Lognormal
 
 
 def points_of(lognormal, length):

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from pc_client.extraction.chain import Bounds
-from pc_client.extraction.extract import ExtractOptions, extract
-from pc_client.extraction.fitting import FitOptions
-from pc_client.extraction.pen import PenPart, PenRecording, on_one_axis, ordered_part
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import arc_frame
+from pc_client.studies.extraction.chain import Bounds
+from pc_client.studies.extraction.extract import ExtractOptions, extract
+from pc_client.studies.extraction.fitting import FitOptions
+from pc_client.studies.extraction.pen import PenPart, PenRecording, on_one_axis, ordered_part
 
 
 def numbers(trajectory):

@@ -9,10 +9,10 @@ import pytest
 from extraction_samples import own_strokes, recorded
 from matplotlib.image import imread
 
-from pc_client.extraction.batch import table_of
-from pc_client.extraction.extract import extract
-from pc_client.extraction.figures import draw_extraction, draw_overview
-from pc_client.extraction.pen import PenPart, PenRecording
+from pc_client.studies.extraction.batch import table_of
+from pc_client.studies.extraction.extract import extract
+from pc_client.studies.extraction.figures import draw_extraction, draw_overview
+from pc_client.studies.extraction.pen import PenPart, PenRecording
 
 
 def ink(png):

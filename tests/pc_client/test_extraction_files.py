@@ -10,7 +10,7 @@ import pytest
 from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot
 
 from pc_client.errors import RecordingError
-from pc_client.extraction.pen import (
+from pc_client.studies.extraction.pen import (
     PenPart,
     PenRecording,
     contents,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pc_client.extraction.chain import (
+from pc_client.studies.extraction.chain import (
     Bounds,
     Chain,
     in_order,
@@ -14,7 +14,7 @@ from pc_client.extraction.chain import (
     sigma_lognormal,
     without,
 )
-from pc_client.extraction.refine import linearise, moved, variables_per_stroke
+from pc_client.studies.extraction.refine import linearise, moved, variables_per_stroke
 
 
 def chain_of(dim, arc_angles=(0.8, -1.5, 0.0, 1e-5), seed=0):

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from pc_client.extraction.fitting import best_candidates
-from pc_client.extraction.initial import characteristic_points, initial_chain, salient_points
-from pc_client.extraction.pen import PenPart
-from pc_client.extraction.smoothing import CUTOFF_HZ, moves, smooth_part, speed_peaks
 from pc_client.movements.lognormal import Lognormal
+from pc_client.studies.extraction.fitting import best_candidates
+from pc_client.studies.extraction.initial import characteristic_points, initial_chain, salient_points
+from pc_client.studies.extraction.pen import PenPart
+from pc_client.studies.extraction.smoothing import CUTOFF_HZ, moves, smooth_part, speed_peaks
 
 
 def wave(frequency, rate=200.0, duration=4.0):

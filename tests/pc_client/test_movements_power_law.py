@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.integrate import cumulative_simpson
 from scipy.spatial.transform import Rotation
 
-from pc_client.analysis.human_likeness import fit_power_law
 from pc_client.errors import MovementError
 from pc_client.movements.geometry import Similarity
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS, PowerLaw, SmoothPath
+from pc_client.studies.likeness import fit_power_law
 
 POINTS = np.array(
     [[0.30, 0.0, 0.2], [0.40, 0.1, 0.3], [0.30, 0.15, 0.2], [0.35, -0.05, 0.25], [0.3, 0.0, 0.3]]

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 from sweep_samples import case
 
-import pc_client.sweep.box as box_module
-import pc_client.sweep.run_case as run_case_module
+import pc_client.studies.sweep.box as box_module
+import pc_client.studies.sweep.schedule as run_case_module
 from pc_client.errors import SweepError
-from pc_client.executors import open_executor
-from pc_client.sweep.box import HOST, simulated_box
-from pc_client.sweep.case import SimulatedArm
-from pc_client.sweep.run_case import run_case
+from pc_client.studies.executors import open_executor
+from pc_client.studies.sweep.box import HOST, simulated_box
+from pc_client.studies.sweep.case import SimulatedArm
+from pc_client.studies.sweep.schedule import run_case
 from protocol.ur_types import Ports
 
 ARM = SimulatedArm("ur3", "typical", 7)
@@ -108,7 +108,7 @@ def test_a_box_that_dies_in_the_middle_is_named(monkeypatch):
 
 def test_a_box_ends_with_a_user_that_is_killed():
     code = (
-        "from pc_client.sweep.box import simulated_box; from pc_client.sweep.case import SimulatedArm\n"
+        "from pc_client.studies.sweep.box import simulated_box; from pc_client.studies.sweep.case import SimulatedArm\n"
         "with simulated_box(SimulatedArm('ur3', 'typical', 7)) as box:\n"
         "    print(box.ports.dashboard, box.folder, flush=True)\n"
         "    input()"

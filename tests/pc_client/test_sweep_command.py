@@ -18,8 +18,8 @@ import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli
 from pc_client.recording.recording import load_recording
-from pc_client.sweep.case import all_cases
-from pc_client.sweep.config import read_config
+from pc_client.studies.sweep.case import all_cases
+from pc_client.studies.sweep.config import read_config
 
 GRID = """
 movements = ["uniform_4_1", "lognorm_4_1"]
@@ -46,7 +46,7 @@ def job(monkeypatch):
 
             return nullcontext(run)
 
-        monkeypatch.setattr("pc_client.sweep.schedule.side_by_side", side_by_side)
+        monkeypatch.setattr("pc_client.studies.sweep.schedule.side_by_side", side_by_side)
         return ran
 
     return use
@@ -55,7 +55,7 @@ def job(monkeypatch):
 @pytest.fixture
 def quick_job(job, monkeypatch):
     """The same without plots, which take seconds."""
-    monkeypatch.setattr("pc_client.sweep.page.render_page", lambda name, table: name)
+    monkeypatch.setattr("pc_client.studies.sweep.page.render_page", lambda name, table: name)
     return job
 
 
@@ -212,7 +212,7 @@ def test_without_matplotlib_there_is_a_table(job, tmp_path, capsys, monkeypatch)
 
 
 def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, capsys, monkeypatch):
-    from pc_client.sweep.result_store import ResultStore
+    from pc_client.studies.sweep.store import ResultStore
 
     stored = []
     real = ResultStore.settle
@@ -246,7 +246,7 @@ def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, ca
 )
 def test_what_does_not_work_is_one_line(text, options, code, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pc_client.executors._DASK_TIMEOUT", "300ms")
+    monkeypatch.setattr("pc_client.studies.executors._DASK_TIMEOUT", "300ms")
     path = write(tmp_path, text)
     assert (
         cli.run(["sweep", str(path), *(["--out", "out"] if "--out" not in options else []), *options]) == code

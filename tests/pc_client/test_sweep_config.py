@@ -11,9 +11,9 @@ from sweep_samples import PREVIEW, case, write
 
 from pc_client.errors import ClientError
 from pc_client.movements.files import library_path
-from pc_client.sweep.case import Case, GivenRobot, SimulatedArm, all_cases
-from pc_client.sweep.config import FIDELITIES, SweepFile, read_config
-from pc_client.sweep.run_case import plan_case
+from pc_client.studies.sweep.case import Case, GivenRobot, SimulatedArm, all_cases
+from pc_client.studies.sweep.config import FIDELITIES, SweepFile, read_config
+from pc_client.studies.sweep.schedule import plan_case
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "sweeps").glob("*.toml"))

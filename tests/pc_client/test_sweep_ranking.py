@@ -11,10 +11,9 @@ from sweep_samples import case, invented, table_of, table_with
 
 from pc_client.control.controller import CONTROLLERS
 from pc_client.recording.provenance import origin_of
-from pc_client.sweep.columns import origin_of_rows
-from pc_client.sweep.outcome import failed
-from pc_client.sweep.page import map_axes
-from pc_client.sweep.settings import edge_of, rank_settings, spans_grid, varying
+from pc_client.studies.sweep.case import failed, origin_of_rows
+from pc_client.studies.sweep.page import map_axes
+from pc_client.studies.sweep.settings import edge_of, rank_settings, spans_grid, varying
 
 
 def test_the_best_setting_has_the_largest_mean_over_all_its_runs():

@@ -16,10 +16,8 @@ import pytest
 from sweep_samples import case, figures, invented, table_with
 
 from pc_client.errors import SweepError
-from pc_client.sweep.case import Case, GivenRobot
-from pc_client.sweep.columns import COLUMNS
-from pc_client.sweep.outcome import Outcome, failed
-from pc_client.sweep.result_store import ResultStore
+from pc_client.studies.sweep.case import COLUMNS, Case, GivenRobot, Outcome, failed
+from pc_client.studies.sweep.store import ResultStore
 
 DONE = Outcome("done", rows=({"repetition": 1, "snr_db": 0.1 + 0.2, "kind": "uniform"},))
 

@@ -8,9 +8,8 @@ from functools import partial
 import pytest
 from sweep_samples import case, deadly, faulty, interrupted, invented, process_id
 
-from pc_client.sweep.outcome import Outcome, failed
-from pc_client.sweep.run_case import run_case
-from pc_client.sweep.schedule import in_turn, side_by_side
+from pc_client.studies.sweep.case import Outcome, failed
+from pc_client.studies.sweep.schedule import in_turn, run_case, side_by_side
 
 CASES = [case(seed=seed) for seed in (1, 2, 13, 3, 4, 5)]
 
@@ -63,7 +62,7 @@ def test_a_mistake_in_the_job_is_a_row_too():
 
 
 def test_nothing_to_do_starts_nothing(monkeypatch):
-    monkeypatch.setattr("pc_client.sweep.schedule.open_executor", None)
+    monkeypatch.setattr("pc_client.studies.sweep.schedule.open_executor", None)
     assert done_by(invented, [], workers=2) == []
 
 
@@ -76,7 +75,7 @@ def test_ctrl_c_goes_through():
 
 def test_without_the_box_every_case_fails_in_one_line(monkeypatch):
     monkeypatch.setattr(
-        "pc_client.sweep.box._command", lambda *a: [sys.executable, "-m", "ur_emulator_not_here"]
+        "pc_client.studies.sweep.box._command", lambda *a: [sys.executable, "-m", "ur_emulator_not_here"]
     )
     outcome = run_case(case(), False)
     assert outcome.status == "failed"
@@ -88,5 +87,5 @@ def test_a_folder_without_room_is_a_failed_case(monkeypatch):
     def full(*args, **options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pc_client.sweep.box.tempfile.mkdtemp", full)
+    monkeypatch.setattr("pc_client.studies.sweep.box.tempfile.mkdtemp", full)
     assert run_case(case(), False) == Outcome("failed", "[Errno 28] No space left on device")

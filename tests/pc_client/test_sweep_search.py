@@ -12,8 +12,8 @@ from sweep_samples import PREVIEW, case, invented, table_with
 
 from pc_client import cli
 from pc_client.control.controller import CONTROLLERS
-from pc_client.sweep.outcome import failed
-from pc_client.sweep.settings import Range, Search, searched
+from pc_client.studies.sweep.case import failed
+from pc_client.studies.sweep.settings import Range, Search, searched
 
 AXES = {
     "gain_p": Range(low=1.0, high=30.0, log=True),
@@ -102,6 +102,6 @@ def test_missing_optuna_names_the_extra(monkeypatch, tmp_path, capsys):
 def test_a_sweep_without_a_search_loads_no_optuna(tmp_path):
     import subprocess
 
-    code = "import sys; import pc_client.sweep.schedule, pc_client.commands.sweep; print('optuna' in sys.modules)"
+    code = "import sys; import pc_client.studies.sweep.schedule, pc_client.commands.sweep; print('optuna' in sys.modules)"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "False"

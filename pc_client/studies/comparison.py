@@ -1,0 +1,495 @@
+"""Which movements are compared: every generator in the same time, for one or more seeds.
+
+All but the duplicate, which moves its target points as people do, have the same target points.
+
+The signals of one movement: as planned, as planned but sampled and filtered, as executed; their figures.
+
+The last two go through the same steps (sampled at the control cycle with some rest at both ends, filtered,
+differentiated), so that they differ by what the robot did and by nothing else.
+
+One filter serves what was planned and what was measured, so that both can be differentiated and compared.
+The second derivative of the speed is the third of the position: the encoders' noise, some micrometres at
+the TCP, would drown it. A Butterworth filter of second order is run forwards and backwards over the
+positions, which shifts nothing in time and halves the amplitude at 5 Hz. Of noise of 5 micrometres it
+leaves less than .05 m/s^3, where executed movements have .3 to 6; what is lost are the corners of
+trapezoids, and they are lost from the plan, too. 5 Hz is far above the movements themselves: the speed
+profiles of a robot's strokes last a second or more.
+
+One table of all generators: how human-like each is as planned, as sampled and filtered, and as executed.
+
+One frame, a row for each signal of each movement, in three forms: `compare.json`, `compare.md` and a table
+for the terminal.
+
+What a comparison shows: the speed of every generator beside the others, and its path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+from pc_client.analysis.run import MeasuredRun
+from pc_client.control.loop_model import SAMPLING_TIME
+from pc_client.errors import ClientError
+from pc_client.movements.files import save_movement
+from pc_client.movements.generate import generate_movement
+from pc_client.movements.movement import Movement
+from pc_client.movements.sigma_lognormal import Motion
+from pc_client.movements.twins import GENERATORS
+from pc_client.results.sheet import BLUE, REFERENCE_GREY, Curve, Panel, Sheet, boxes, cube_around
+from pc_client.results.tables import Column, finite, to_markdown, to_rich
+from pc_client.studies.likeness import (
+    between_peaks,
+    fit_power_law,
+    log_dimensionless_jerk,
+    sparc,
+    speed_peaks,
+)
+
+if TYPE_CHECKING:
+    from rich.table import Table as RichTable
+
+__all__ = [
+    "COLUMNS",
+    "CUTOFF_HZ",
+    "EXECUTED_COLUMNS",
+    "Comparison",
+    "Likeness",
+    "MovementSet",
+    "Signal",
+    "build_comparison",
+    "comparison_sheet",
+    "executed_signal",
+    "filtered_motion",
+    "filtered_signal",
+    "make_sets",
+    "measure_likeness",
+    "planned_signal",
+    "save_sets",
+]
+
+MovementSet = Mapping[str, Movement]
+"""The movements of one seed by the generator's name, in the order of `GENERATORS`."""
+
+
+def make_sets(n_targets: int, seed: int, n_sets: int) -> list[MovementSet]:
+    """Make the movements of the seeds seed, seed + 1 ...
+
+    Args:
+        n_targets: number of target points, at least 2.
+        seed: the first, 0 or more.
+        n_sets: how many, at least 1.
+    """
+    if n_sets < 1:
+        raise ClientError(f"{n_sets} sets of movements is nothing to compare; give at least one")
+    return [
+        {kind: _make(kind, n_targets, number) for kind in GENERATORS} for number in range(seed, seed + n_sets)
+    ]
+
+
+def _make(kind: str, n_targets: int, seed: int) -> Movement:
+    made = generate_movement(kind, n_targets, seed, name=f"{kind}_{n_targets}_seed{seed}")
+    return replace(made, may_be_moved=True)
+
+
+def save_sets(sets: Sequence[MovementSet], folder: Path) -> None:
+    """Write all movements as files into a folder, so that each can be run or looked at by itself.
+
+    Raises:
+        ClientError: the folder cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ClientError(f"cannot use the folder {folder}: {error.strerror or error}") from error
+    for movements in sets:
+        for movement in movements.values():
+            save_movement(movement, folder / f"{movement.name}.toml")
+
+
+#: Frequency (Hz) at which the filter halves an amplitude. One number for all movements and robots.
+CUTOFF_HZ = 5.0
+_ORDER = 2
+#: What the filter is, for tables.
+_FILTER_TEXT = f"Butterworth order {_ORDER}, forwards and backwards, half amplitude at {CUTOFF_HZ:g} Hz"
+
+
+def filtered_motion(p: NDArray[np.float64], rate: float) -> Motion:
+    """Smoothed positions and their first two central differences.
+
+    Args:
+        p: positions, (n, 3), m, at equal steps, at rest for the first and the last few tenths of a second.
+        rate: samples a second, Hz, more than twice the cutoff.
+
+    Returns:
+        Position, velocity and acceleration, each (n, 3).
+    """
+    if not (math.isfinite(rate) and rate > 2.0 * CUTOFF_HZ):
+        raise ClientError(
+            f"rate of {rate} Hz: a filter at {CUTOFF_HZ:g} Hz needs more than "
+            f"{2.0 * CUTOFF_HZ:g} samples a second"
+        )
+    sections = butter(_ORDER, CUTOFF_HZ, fs=rate, output="sos")
+    # The rests at both ends are long enough to be continued as they are.
+    smooth = sosfiltfilt(sections, p, axis=0, padtype="constant", padlen=min(len(p) - 1, round(rate)))
+    v = np.gradient(smooth, 1.0 / rate, axis=0)
+    return Motion(smooth, v, np.gradient(v, 1.0 / rate, axis=0))
+
+
+#: Samples a second (Hz) of the plan: the rate of the reference figures.
+_PLAN_RATE = 1000.0
+#: Rest (s) before and after a movement that is filtered with it.
+_REST = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """A movement as samples, from start to end.
+
+    Attributes:
+        t: (n,), s since its start.
+        motion: each (n, 3).
+        rate: samples a second, Hz.
+    """
+
+    t: NDArray[np.float64]
+    motion: Motion
+    rate: float
+
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """(n,), m/s."""
+        speed: NDArray[np.float64] = np.linalg.norm(self.motion.v, axis=1)
+        return speed
+
+
+def planned_signal(movement: Movement) -> Signal:
+    """The movement's own closed form, at 1 kHz, unfiltered."""
+    t = np.arange(math.floor(movement.duration * _PLAN_RATE + 1e-6) + 1) / _PLAN_RATE
+    return Signal(t, movement.motion(t), _PLAN_RATE)
+
+
+def filtered_signal(movement: Movement, rate: float) -> Signal:
+    """The plan as a perfect robot would report it, through the filter.
+
+    Args:
+        movement: what was planned.
+        rate: of the control cycle, Hz.
+    """
+    t = _grid(movement.duration, rate)
+    return _inner(t, filtered_motion(movement.sample(t).p, rate), movement.duration, rate)
+
+
+def _sampling_rate(run: MeasuredRun) -> float:
+    """Samples a second of the track of a run, Hz."""
+    return 1.0 / max(run.provenance.cycle_time_s, SAMPLING_TIME)
+
+
+def executed_signal(run: MeasuredRun, duration: float) -> Signal:
+    """What the robot did, through the filter.
+
+    The window is that of the plan, later by the robot's lag, so that a late robot is not cut off.
+
+    Args:
+        run: a recording and what was measured on it.
+        duration: of the movement, s.
+    """
+    rate = _sampling_rate(run)
+    t = _grid(duration, rate)
+    at = t + run.track.t_begin + run.snr.speed_lag_s
+    # Frames come on the same grid but for the lag, which is no whole number of cycles.
+    p = CubicSpline(run.track.t, run.track.p_actual)(np.clip(at, run.track.t[0], run.track.t[-1]))
+    return _inner(t, filtered_motion(p, rate), duration, rate)
+
+
+def _grid(duration: float, rate: float) -> NDArray[np.float64]:
+    before, after = round(_REST * rate), round((duration + _REST) * rate)
+    return np.arange(-before, after + 1) / rate
+
+
+def _inner(t: NDArray[np.float64], motion: Motion, duration: float, rate: float) -> Signal:
+    moving = (t >= -1e-9) & (t <= duration + 1e-9)
+    return Signal(t[moving], Motion(*(values[moving] for values in motion)), rate)
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How human-like a signal is.
+
+    Attributes:
+        sparc: spectral arc length.
+        log_jerk: log dimensionless jerk.
+        peaks: peaks of the speed, a mean over movements where there are several.
+        exponent: beta of speed = k curvature^-beta between the first and the last peak of the speed; nan for
+            a path of straight lines.
+        r_squared: how well that law holds, 0 to 1; nan likewise.
+        peak_speed: m/s.
+        peak_acceleration: m/s^2.
+    """
+
+    sparc: float
+    log_jerk: float
+    peaks: float
+    exponent: float
+    r_squared: float
+    peak_speed: float
+    peak_acceleration: float
+
+
+def measure_likeness(motion: Motion, rate: float) -> Likeness:
+    """Measure a movement from start to end.
+
+    Args:
+        motion: at equal steps, each (n, 3); filtered if it was measured.
+        rate: samples a second, Hz.
+    """
+    speed = np.linalg.norm(motion.v, axis=1)
+    inner = between_peaks(speed)
+    law = fit_power_law(motion.v[inner], motion.a[inner])
+    return Likeness(
+        sparc=sparc(speed, rate),
+        log_jerk=log_dimensionless_jerk(speed, rate),
+        peaks=float(speed_peaks(speed)),
+        exponent=law.exponent,
+        r_squared=law.r_squared,
+        peak_speed=float(speed.max()),
+        peak_acceleration=float(np.linalg.norm(motion.a, axis=1).max()),
+    )
+
+
+COLUMNS = (
+    Column("generator", align="left"),
+    Column("signal", align="left"),
+    Column("sparc", "SPARC", format=".2f"),
+    Column("log_jerk", "LDJ", format=".2f"),
+    Column("peaks", format=".3g"),
+    Column("exponent", "beta", format=".3f"),
+    Column("r_squared", "R²", format=".2f"),
+    Column("peak_speed", "speed", "m/s", ".3f"),
+    Column("peak_acceleration", "acc.", "m/s²", ".2f"),
+)
+EXECUTED_COLUMNS = (Column("snr_db", "SNR", "dB", ".1f"), Column("shifted_snr_db", "best", "dB", ".1f"))
+"""The two more where the movements were executed."""
+
+_SIGNALS = ("planned", "filtered", "executed")
+_LIKENESS = [field.name for field in fields(Likeness)]
+_LEVELS = [column.name for column in EXECUTED_COLUMNS]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All figures, and what they have in common.
+
+    Attributes:
+        frame: a row for each signal of each movement ("planned", "filtered" and, where it was, "executed"):
+            generator, movement, duration [s], signal, the figures of `Likeness` (nan where there is nothing
+            to fit) and of executed ones the SNR of Eq. 10, raw and after the best time shift.
+        n_strokes: of each movement.
+        rate: of the control cycle, Hz.
+        robot: e.g. "SIMULATED UR3 3.15.8, seed 7, controller preview"; None where nothing was executed.
+    """
+
+    frame: pl.DataFrame
+    n_strokes: int
+    rate: float
+    robot: str | None
+
+    @property
+    def generators(self) -> list[str]:
+        """Their names, in order."""
+        return self.frame["generator"].unique(maintain_order=True).to_list()
+
+    @property
+    def title(self) -> str:
+        """One line that says what was compared."""
+        n = len(self.generators)
+        n_sets = self.frame["movement"].n_unique() // n
+        sets = f", means over {n_sets} sets of target points" if n_sets > 1 else ""
+        executed = self.robot or "planned only"
+        return f"Human-likeness of {n} generators, {self.n_strokes} strokes each{sets}: {executed}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the columns."""
+        return (
+            f"planned: closed form at {_PLAN_RATE:g} Hz. filtered, executed: positions at {self.rate:g} Hz, "
+            f"{_FILTER_TEXT}, then differentiated.",
+            "SPARC and LDJ: nearer to 0 is smoother; compare LDJ only within one of the three signals. "
+            "beta: the exponent of speed = k curvature^-beta, from the first to the last peak of the speed; "
+            "1/3 for drawing hands, where R² is high. A dash: straight lines, or one peak only.",
+            *(("SNR: Eq. 10 on the raw TCP speed; best: after the best time shift.",) if self.robot else ()),
+        )
+
+    @property
+    def means(self) -> pl.DataFrame:
+        """A row for each generator and signal: means over the movements that have the figure."""
+        likeness = pl.col(_LIKENESS)
+        grouped = self.frame.group_by("generator", "signal", maintain_order=True)
+        return grouped.agg(
+            likeness.filter(likeness.is_finite()).mean().fill_null(math.nan), pl.col(_LEVELS).mean()
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of `compare.json`; figures that are not finite become null."""
+        rows = self.frame.partition_by("generator", "movement", maintain_order=True)
+        means = self.means.partition_by("generator", maintain_order=True)
+        return {
+            "robot": self.robot,
+            "rate_hz": self.rate,
+            "n_strokes": self.n_strokes,
+            "filter": _FILTER_TEXT,
+            "rows": finite(
+                [
+                    {"kind": row["generator"][0], "movement": row["movement"][0]}
+                    | {"duration": row["duration"][0]}
+                    | dict.fromkeys(_SIGNALS)
+                    | _by_signal(row)
+                    for row in rows
+                ],
+                6,
+            ),
+            "means": finite({mean["generator"][0]: _by_signal(mean) for mean in means}, 6),
+        }
+
+    def to_markdown(self) -> str:
+        """Return the content of `compare.md`."""
+        lines = [f"# {self.title}", "", to_markdown(*self._shown()), ""]
+        for note in self.notes:
+            lines += [note, ""]
+        lines += [f"* `{name}`: {GENERATORS[name].says}" for name in self.generators]
+        return "\n".join(lines) + "\n"
+
+    def to_rich(self) -> RichTable:
+        """Return the table for the terminal."""
+        caption = "\n".join(self.notes)
+        return to_rich(*self._shown(), section="section", padding=0, title=self.title, caption=caption)
+
+    def _shown(self) -> tuple[pl.DataFrame, tuple[Column, ...]]:
+        """The means as people read them: a generator's name stands in the first of its lines."""
+        name = pl.col("generator")
+        frame = self.means.with_columns(section=name, generator=pl.when(name.is_first_distinct()).then(name))
+        return frame, (*COLUMNS, *(EXECUTED_COLUMNS if self.robot else ()))
+
+
+def build_comparison(
+    sets: Sequence[MovementSet], runs: Mapping[str, MeasuredRun] | None = None, *, rate: float = 125.0
+) -> Comparison:
+    """Measure all movements.
+
+    Args:
+        sets: what was planned.
+        runs: the recordings by the movement's name; None where nothing was executed.
+        rate: of the samples, Hz, where nothing was executed.
+
+    Raises:
+        ClientError: a movement has no recording although others have.
+    """
+    if runs:
+        run = next(iter(runs.values()))
+        rate = _sampling_rate(run)
+        robot: str | None = f"{run.provenance.arm}, controller {run.provenance.controller}"
+    else:
+        robot = None
+    rows = [
+        row
+        for one in sets
+        for generator, movement in one.items()
+        for row in _rows(generator, movement, runs, rate)
+    ]
+    n_strokes = len(next(iter(sets[0].values())).target_points) - 1
+    return Comparison(pl.DataFrame(rows, infer_schema_length=None), n_strokes, rate, robot)
+
+
+def _rows(
+    generator: str, movement: Movement, runs: Mapping[str, MeasuredRun] | None, rate: float
+) -> Iterator[dict[str, Any]]:
+    """One row for each signal of a movement."""
+    signals = {"planned": planned_signal(movement), "filtered": filtered_signal(movement, rate)}
+    run = None
+    if runs:
+        run = runs.get(movement.name)
+        if run is None:
+            raise ClientError(f"there is no recording of {movement.name}; run the comparison again")
+        signals["executed"] = executed_signal(run, movement.duration)
+    for name, signal in signals.items():
+        levels = (run.snr.speed_db, run.snr.speed_shifted_db) if run and name == "executed" else (None, None)
+        yield {
+            "generator": generator,
+            "movement": movement.name,
+            "duration": movement.duration,
+            "signal": name,
+            **asdict(measure_likeness(signal.motion, signal.rate)),
+            **dict(zip(_LEVELS, levels, strict=True)),
+        }
+
+
+def _by_signal(rows: pl.DataFrame) -> dict[str, Any]:
+    """The figures of one movement or generator, by signal; the levels are those of the last, if executed."""
+    figures = {row["signal"]: {name: row[name] for name in _LIKENESS} for row in rows.to_dicts()}
+    return figures | {name: rows[name][-1] for name in _LEVELS}
+
+
+_COLUMNS = 2
+_PANEL_HEIGHT = 1.75
+_WIDTH = 12.0
+
+
+def comparison_sheet(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = None) -> Sheet:
+    """The movements of one seed.
+
+    Args:
+        one: the movements.
+        runs: their recordings by name, or None.
+    """
+    n_rows = -(-len(one) // _COLUMNS)
+    height = _PANEL_HEIGHT * n_rows + 0.75
+    grid = boxes(
+        (_WIDTH, height),
+        (2.5, 1.0) * _COLUMNS,
+        (1.0,) * n_rows,
+        margins=(0.6, 0.15, 0.65, 0.5),
+        gaps=(0.25, 0.4),
+    )
+    plans = {movement.name: planned_signal(movement) for movement in one.values()}
+    top = 1.08e3 * max(float(plan.speed.max()) for plan in plans.values())
+    cube = cube_around(np.vstack([1e3 * plan.motion.p for plan in plans.values()]))
+    panels = []
+    for index, (kind, movement) in enumerate(one.items()):
+        row, column = divmod(index, _COLUMNS)
+        plan, run = plans[movement.name], (runs or {}).get(movement.name)
+        speeds = [Curve(np.c_[plan.t, 1e3 * plan.speed], REFERENCE_GREY, width=2.6)]
+        paths = [Curve(1e3 * plan.motion.p, REFERENCE_GREY, width=2.4, opacity=0.7)]
+        if run is not None:
+            done = executed_signal(run, movement.duration)
+            speeds.append(Curve(np.c_[done.t, 1e3 * done.speed], BLUE))
+            paths.append(Curve(1e3 * run.track.p_actual[run.track.movement], BLUE, width=0.9))
+        paths.append(
+            Curve(1e3 * movement.target_points, "#000000", width=0.0, marker="o", size=3.5, hollow=True)
+        )
+        panels += [
+            Panel(
+                grid[row][2 * column],
+                speeds,
+                f"{kind}: {GENERATORS[kind].says}",
+                ("time [s]" if index + _COLUMNS >= len(plans) else "", "" if column else "mm/s"),
+                ((0.0, movement.duration), (0.0, top)),
+            ),
+            Panel(grid[row][2 * column + 1], paths, ranges=cube, view=(24.0, -40.0), zoom=1.3),
+        ]
+    executed = "; blue: as executed, filtered" if runs else ""
+    return Sheet(
+        height,
+        panels,
+        next(iter(runs.values())).provenance.origin.mark if runs else "",
+        f"TCP speed and path, grey: as planned{executed}. Same time, same target points (all but duplicate)",
+        _WIDTH,
+    )

@@ -1,0 +1,411 @@
+"""What a drawing shows: its paths, its movement in space, its speed profiles.
+
+All pictures are made of `Shown`: one frame and one time, millimetres on the sheet, x to the right and y up as
+the person saw it, and seconds of the hand. Each of the four signals has its colour on the whole page. Letters
+are larger than elsewhere: these figures are shown to audiences.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pc_client.results.sheet import (
+    AXIS_GREY,
+    BLUE,
+    GREEN,
+    RED,
+    SKY,
+    Box,
+    Curve,
+    Panel,
+    Sheet,
+    boxes,
+    cube_around,
+)
+from pc_client.studies.drawing.drawing import Drawing
+from pc_client.studies.drawing.judgement import Execution, Signal, Verdict, signals
+
+__all__ = [
+    "COLOURS",
+    "FIGURES",
+    "Shown",
+    "sheets_of",
+]
+
+Array = NDArray[np.float64]
+
+#: Colour of each signal; names as of `judgement.signals`.
+COLOURS = {"human": "#3A3A3A", "reconstructed": BLUE, "planned": GREEN, "executed": RED}
+#: Colour of what the pen does in the air.
+_AIR = "#A8A8A8"
+#: The figures are shown to audiences: letters [points] for a width [inches].
+_LETTERS, _SHEET_WIDTH = 11.0, 12.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What the pictures of a drawing are made of.
+
+    Attributes:
+        drawing: the drawing.
+        execution: the run that is shown.
+        verdict: its figures.
+        parts: the four signals, each with the parts that move.
+    """
+
+    drawing: Drawing
+    execution: Execution
+    verdict: Verdict
+    parts: dict[str, tuple[Signal, ...]]
+
+    @classmethod
+    def of(cls, drawing: Drawing, execution: Execution, verdict: Verdict) -> Shown:
+        """Take the signals of a drawing and a run."""
+        return cls(drawing, execution, verdict, signals(drawing, execution))
+
+    @property
+    def unit(self) -> float:
+        """Millimetres on the sheet per unit of the recording."""
+        return 1e3 * self.drawing.placement.similarity.scale
+
+    @property
+    def moving(self) -> list[int]:
+        """Indices of the marks that move."""
+        return [index for index, mark in enumerate(self.drawing.marks) if mark.trajectory is not None]
+
+    @property
+    def mark(self) -> str:
+        """What the data are, as it stands on every figure."""
+        return self.execution.run.provenance.origin.mark
+
+    @property
+    def dots(self) -> list[Array]:
+        """The marks that do not move, (1, 3) each, in the recording's frame."""
+        return [mark.first[None] for mark in self.drawing.marks if mark.trajectory is None]
+
+    @property
+    def start(self) -> float:
+        """When the pen first comes down, s of the hand since the movement began."""
+        return float(self.drawing.joined.pen_down[0, 0])
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Start and end of the movement, s of the hand since the pen first came down."""
+        return -self.start, self.drawing.joined.trajectory.duration - self.start
+
+    @property
+    def pen_down(self) -> Array:
+        """(n_marks, 2): when the pen comes down and goes up, s of the hand since it first came down."""
+        times = self.drawing.joined.pen_down - self.start
+        return np.column_stack((times[:, 0], np.maximum(times[:, 1], times[:, 0] + 0.012)))
+
+    def whole(self, *, executed: bool) -> tuple[Array, Array, Array]:
+        """Times (n,), positions, velocities (n, 3) of all, lifts too: base frame, s of the hand."""
+        if executed:
+            return self.execution.t, self.execution.p, self.execution.v
+        t = np.linspace(0.0, self.drawing.joined.trajectory.duration, 1500)
+        motion = self.drawing.joined.trajectory.evaluate(t)
+        return t, motion.p, motion.v
+
+    def on_page(self, p: Array) -> Array:
+        """Points (n, 3) in the recording's frame, on the page: (n, 2), mm, from the middle of the drawing."""
+        drawn = self.drawing.drawn
+        middle = 0.5 * (drawn.min(axis=0) + drawn.max(axis=0))
+        if self.drawing.flat:
+            axes = np.array([[1.0, 0.0, 0.0], [0.0, 1.0 if self.drawing.placement.y_up else -1.0, 0.0]])
+        else:
+            axes = np.linalg.svd(drawn - drawn.mean(axis=0), full_matrices=False)[2][:2]
+        page: Array = self.unit * (p - middle) @ axes.T
+        return page
+
+    def since_pen_down(self, t: Array, mark: int) -> Array:
+        """Times of the recording that belong to a mark, as s of the hand since the pen first came down."""
+        joined = self.drawing.joined
+        since: Array = t + joined.shifts[mark] - joined.pen_down[0, 0]
+        return since
+
+
+def _pen_is_down(t: Array, pen_down: Array) -> NDArray[np.bool_]:
+    """Whether the pen is down at times (n,), by the times (n_marks, 2) when it comes down and goes up."""
+    down: NDArray[np.bool_] = np.any((t[:, None] >= pen_down[:, 0]) & (t[:, None] <= pen_down[:, 1]), axis=1)
+    return down
+
+
+#: What a drawing has pictures of, and what a reader sees.
+FIGURES = {
+    "paths": "Paths: human, reconstructed with virtual targets, planned, executed",
+    "speeds": "Speed profiles one under the other, overlaid, and differences",
+    "space": "The movement in space, and the height of the pen",
+}
+
+#: Virtual targets farther outside than this share of the drawing's size are left out of the picture.
+_FAR = 0.45
+#: From where a plane is seen: elevation and azimuth [degrees].
+_VIEWS = {"vertical": (18.0, -152.0), "horizontal": (32.0, -152.0), "inclined": (24.0, -152.0)}
+_FAINT, _PAPER_EDGE = "#D9D9D9", "#C9B37E"
+
+
+def sheets_of(shown: Shown) -> dict[str, Sheet]:
+    """The figures of a drawing by name, as `FIGURES` names them."""
+    return {"paths": _paths_sheet(shown), "speeds": _speeds_sheet(shown), "space": _space_sheet(shown)}
+
+
+def _paths_sheet(shown: Shown) -> Sheet:
+    """The four paths side by side: human, reconstructed, planned, executed."""
+    half = _half_width(shown)
+    # A path in space is shown from where it is widest.
+    across, up = ("x [mm]", "y [mm]") if shown.drawing.flat else ("widest [mm]", "second widest [mm]")
+    targets = np.abs(shown.on_page(_targets(shown))).max(axis=1)
+    outside = f"; targets outside: {n}" if (n := int(np.count_nonzero(targets > half))) else ""
+    titles = {
+        "human": ("human", across),
+        "reconstructed": (
+            f"reconstructed, {shown.drawing.extraction.n_strokes} strokes",
+            f"{across}{outside}",
+        ),
+        "planned": ("planned, with lifts", across),
+        "executed": ("executed", across),
+    }
+    height = 3.75
+    places = boxes((_SHEET_WIDTH, height), [1] * 4, [1], margins=(0.7, 0.2, 0.6, 0.6), gaps=(0.3, 0.0))[0]
+    page = ((-half, half), (-half, half))
+    panels = [
+        Panel(
+            box,
+            _paths(shown, name, half),
+            title,
+            (label, "" if index else up),
+            page,
+            equal=True,
+            texts=_numbers(shown, half) if name == "human" else (),
+        )
+        for index, (box, (name, (title, label))) in enumerate(zip(places, titles.items(), strict=True))
+    ]
+    return Sheet(height, panels, shown.mark, "", _SHEET_WIDTH, _LETTERS)
+
+
+def _paths(shown: Shown, name: str, half: float) -> list[Curve]:
+    """One of the four paths, over that of the person."""
+    curves, colour = [], COLOURS[name]
+    if name in ("planned", "executed"):
+        curves.append(Curve(_air(shown, executed=name == "executed"), _AIR, style="--"))
+    if name != "human":
+        curves += [Curve(shown.on_page(part.p), _FAINT, width=5.0) for part in shown.parts["human"]]
+    for part in shown.parts[name]:
+        p = shown.on_page(part.p)
+        curves.append(Curve(p, colour, width=2.0))
+        if name == "human":
+            curves += [Curve(p[:1], colour, width=0.0, marker="o"), Curve(_arrow(p, half), colour, width=2.0)]
+    if name == "reconstructed":
+        for extracted in shown.drawing.extraction.parts:
+            targets = shown.on_page(extracted.trajectory.target_points)
+            curves += [
+                Curve(targets, SKY, width=0.7),
+                Curve(targets, colour, width=0.0, marker="o", size=3.6, hollow=True),
+            ]
+    curves += [Curve(shown.on_page(dot), colour, width=0.0, marker="o") for dot in shown.dots]
+    return curves
+
+
+def _arrow(p: Array, half: float) -> Array:
+    """The head (3, 2) of an arrow in the middle of a path (n, 2)."""
+    middle = len(p) // 2
+    ahead = p[min(middle + max(1, len(p) // 20), len(p) - 1)]
+    along = ahead - p[middle]
+    along = 0.07 * half * along / max(1e-9, float(np.linalg.norm(along)))
+    aside = 0.5 * np.array([-along[1], along[0]])
+    return np.array([ahead - along + aside, ahead, ahead - along - aside])
+
+
+def _numbers(shown: Shown, half: float) -> list[tuple[Array, str]]:
+    """The order of the marks, where there are several, beside their starts."""
+    marks = shown.drawing.marks
+    begins = dict(
+        zip(shown.moving, (part.p[: 1 + len(part.p) // 8] for part in shown.parts["human"]), strict=True)
+    )
+    numbers = []
+    for index, mark in enumerate(marks if len(marks) > 1 else ()):
+        path = shown.on_page(begins.get(index, mark.first[None]))
+        away = path[0] - path[-1]
+        length = float(np.linalg.norm(away))
+        numbers.append((path[0] + (0.11 * half * away / length if length else 0.0), str(index + 1)))
+    return numbers
+
+
+def _half_width(shown: Shown) -> float:
+    """Half the width (mm) of a square page that holds the drawing and the near virtual targets."""
+    paths = [shown.on_page(part.p) for parts in shown.parts.values() for part in parts]
+    reach = float(np.abs(np.vstack([*paths, shown.on_page(shown.drawing.drawn)])).max())
+    targets = np.abs(shown.on_page(_targets(shown))).max(axis=1)
+    near = targets[targets <= (1.0 + _FAR) * reach]
+    return 1.1 * max(reach, float(near.max(initial=0.0)))
+
+
+def _targets(shown: Shown) -> Array:
+    return np.vstack([part.trajectory.target_points for part in shown.drawing.extraction.parts])
+
+
+def _air(shown: Shown, *, executed: bool) -> Array:
+    """The whole path on the page, with gaps (nan) where the pen is down; (n, 2), mm."""
+    t, p, _ = shown.whole(executed=executed)
+    page = shown.on_page(shown.drawing.points_back(p))
+    page[_pen_is_down(t, shown.drawing.joined.pen_down)] = np.nan
+    return page
+
+
+def _space_sheet(shown: Shown) -> Sheet:
+    """The movement in the base frame, with its lifts; and the height of the pen over the sheet."""
+    height = 4.7
+    left, right = boxes(
+        (_SHEET_WIDTH, height), (1.0, 0.85), (1,), margins=(0.3, 0.2, 0.55, 0.65), gaps=(1.1, 0.0)
+    )[0]
+    return Sheet(height, (_space(left, shown), _height(right, shown)), shown.mark, "", _SHEET_WIDTH, _LETTERS)
+
+
+def _space(box: Box, shown: Shown) -> Panel:
+    t, p, _ = shown.whole(executed=False)
+    p, done = 1e3 * p, 1e3 * shown.execution.p
+    down = _pen_is_down(t, shown.drawing.joined.pen_down)[:, None]
+    similarity = shown.drawing.placement.similarity
+    curves = [
+        Curve(np.where(down, np.nan, p), _AIR, "pen lifted", 1.4, "--"),
+        Curve(np.where(down, p, np.nan), COLOURS["planned"], "planned", 3.6, opacity=0.5),
+        Curve(done, COLOURS["executed"], "executed", 1.1),
+        *(
+            Curve(1e3 * similarity.points(dot), COLOURS["planned"], width=0.0, marker="o")
+            for dot in shown.dots
+        ),
+        Curve(p[:1], "#000000", width=0.0, marker="o", hollow=True),
+    ]
+    if shown.drawing.flat:
+        curves.append(Curve(_sheet(shown), _PAPER_EDGE))
+    return Panel(
+        box,
+        curves,
+        "",
+        ("x [mm]", "y [mm]", "z [mm]"),
+        cube_around(np.vstack([curve.points for curve in curves]), least=0.35, margin=0.1),
+        "above",
+        texts=((p[0], "begin"),),
+        zoom=1.3,
+        view=_VIEWS.get(shown.drawing.placement.plane, (24.0, -60.0)),
+    )
+
+
+def _sheet(shown: Shown) -> Array:
+    """Outline of the sheet, (5, 3), mm, base frame: around what is drawn, with a margin."""
+    drawn = shown.drawing.drawn
+    margin = 0.12 * float(np.ptp(drawn, axis=0).max())
+    (x0, y0), (x1, y1) = drawn.min(axis=0)[:2] - margin, drawn.max(axis=0)[:2] + margin
+    flat = np.array([(x, y, 0.0) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0))])
+    return 1e3 * shown.drawing.placement.similarity.points(flat)
+
+
+def _height(box: Box, shown: Shown) -> Panel:
+    placement = shown.drawing.placement
+    if shown.drawing.flat:
+        out = placement.lift / float(np.linalg.norm(placement.lift))
+        zero, title = float(placement.similarity.shift @ out), "height of the pen over the sheet"
+    else:
+        out, zero, title = np.array([0.0, 0.0, 1.0]), 0.0, "height of the pen, z of the base frame"
+    curves = []
+    for name, width, opacity in (("planned", 4.0, 0.5), ("executed", 1.4, 1.0)):
+        t, p, _ = shown.whole(executed=name == "executed")
+        curves.append(
+            Curve(np.c_[t - shown.start, 1e3 * (p @ out - zero)], COLOURS[name], name, width, opacity=opacity)
+        )
+    return Panel(
+        box,
+        curves,
+        title,
+        ("time of the hand [s]; shaded: pen down", "mm"),
+        (shown.span, (None, None)),
+        "inside",
+        shaded=shown.pen_down,
+    )
+
+
+#: Lognormals that are this many times as high as the speed itself, since they cancel, are cut off.
+_TALL = 1.5
+_FAINT = "#BDBDBD"
+
+
+def _speeds_sheet(shown: Shown) -> Sheet:
+    """The four speed profiles one under the other, then overlaid, then differences from the person's."""
+    parts, factor = shown.drawing.extraction.parts, shown.drawing.factor
+    top = shown.unit * max(float(part.speed.max()) for own in shown.parts.values() for part in own)
+    highest = shown.unit * max(float(part.trajectory.stroke_speeds(part.t).max()) for part in parts)
+    overlaid = [
+        curve
+        for name, width in zip(COLOURS, (4.5, 2.0, 1.4, 1.2), strict=True)
+        for curve in _speeds(shown, name, width, _FAINT if name == "human" else COLOURS[name])
+    ]
+    rows: list[tuple[str, list[Curve], float | None]] = [
+        (name, _profile(shown, name), 1.1 * max(top, min(highest, _TALL * top))) for name in COLOURS
+    ]
+    rows += [("overlaid", overlaid, 1.22 * top), ("difference", _differences(shown), None)]
+    heights = (1.0, 1.0, 1.0, 1.0, 1.55, 0.75)
+    height = 9.6
+    margins = (0.85, 0.75, 0.5, 0.6)
+    places = boxes((_SHEET_WIDTH, height), (1,), heights, margins=margins, gaps=(0.0, 0.2))
+    panels = [
+        Panel(
+            box,
+            curves,
+            "",
+            ("time of the hand since the pen came down [s]; shaded: pen down" if upper is None else "", name),
+            (shown.span, (None if upper is None else 0.0, upper)),
+            "inside" if name == "overlaid" else "",
+            columns=4,
+            shaded=shown.pen_down,
+            slower=factor if factor > 1.0 and upper is not None else 1.0,
+        )
+        for (box,), (name, curves, upper) in zip(places, rows, strict=True)
+    ]
+    title = "speed on the sheet [mm per s of the hand]" + (
+        "; right: of the arm [mm/s]" if factor > 1.0 else ""
+    )
+    return Sheet(height, panels, shown.mark, title, _SHEET_WIDTH, _LETTERS)
+
+
+def _profile(shown: Shown, name: str) -> list[Curve]:
+    """One signal, with its strokes or with the movement of the arm while the pen is up."""
+    curves = []
+    if name == "reconstructed":
+        for index, part in zip(shown.moving, shown.drawing.extraction.parts, strict=True):
+            mark, nearly = shown.drawing.marks[index], 1e-3 * float(np.ptp(part.p, axis=0).max())
+            t = np.arange(mark.begin - mark.lead(nearly), mark.end + mark.lag(nearly), 0.002)
+            at = shown.since_pen_down(t, index)
+            for stroke in shown.unit * part.trajectory.stroke_speeds(t).T:
+                visible = stroke > 1e-3 * stroke.max()
+                curves.append(Curve(np.c_[at, stroke][visible], SKY, width=0.8, filled=True))
+    if name in ("planned", "executed"):
+        t, _, v = shown.whole(executed=name == "executed")
+        curves.append(Curve(np.c_[t - shown.start, 1e3 * np.linalg.norm(v, axis=1)], _AIR, width=1.1))
+    return curves + _speeds(shown, name, 1.8, COLOURS[name])
+
+
+def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
+    parts = zip(shown.moving, shown.parts[name], strict=True)
+    return [
+        Curve(
+            np.c_[shown.since_pen_down(part.t, index), shown.unit * part.speed],
+            colour,
+            "" if count else name,
+            width,
+            "--" if name == "planned" and width < 1.8 else "-",
+        )
+        for count, (index, part) in enumerate(parts)
+    ]
+
+
+def _differences(shown: Shown) -> list[Curve]:
+    curves = [Curve(np.array([[at, 0.0] for at in shown.span]), AXIS_GREY, width=0.7)]
+    for name in ("reconstructed", "executed"):
+        for index, own, human in zip(shown.moving, shown.parts[name], shown.parts["human"], strict=True):
+            t = shown.since_pen_down(human.t, index)
+            curves.append(Curve(np.c_[t, shown.unit * (own.speed - human.speed)], COLOURS[name], "", 1.3))
+    return curves

@@ -1,0 +1,286 @@
+"""One recording as the figures of one row.
+
+One case, from its content to its figures. This is the job that workers do.
+
+Whatever goes wrong is part of the answer: a sweep is not ended by one case.
+
+All cases of a sweep, one after the other or side by side; outcomes come as they get ready.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from contextlib import ExitStack, contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pc_client.analysis.run import analyse_run
+from pc_client.driver.session import UrDriver
+from pc_client.driver.velocity_stream import StreamReport
+from pc_client.errors import ClientError, GainMarginError, full_message
+from pc_client.experiment.experiment import Experiment, Plan, prepare_experiment
+from pc_client.experiment.identification import Identification
+from pc_client.experiment.runner import ExperimentRunner
+from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.movements.files import library_name_of, load_movement
+from pc_client.recording.recording import load_recording
+from pc_client.results.tables import finite
+from pc_client.studies.executors import open_executor, usable_cores
+from pc_client.studies.sweep.box import simulated_box
+from pc_client.studies.sweep.case import (
+    FIGURES,
+    Case,
+    GivenRobot,
+    MovementFile,
+    Outcome,
+    Row,
+    SimulatedArm,
+    all_cases,
+    failed,
+)
+from pc_client.studies.sweep.config import SweepConfig
+from pc_client.studies.sweep.store import ResultStore
+from protocol.errors import ProtocolError
+from protocol.ur_types import Ports
+
+
+def _measure_run(path: Path, stream: StreamReport) -> Row:
+    """Measure one finished run.
+
+    Args:
+        path: its recording.
+        stream: what happened on the wire.
+
+    Returns:
+        The figures by the names of `columns.FIGURES`, but for those of the loop.
+
+    Raises:
+        RecordingError: the recording cannot be judged.
+    """
+    run = analyse_run(load_recording(path))
+    figures = run.figures | {"late_frames": stream.late_frames, "lost_frames": stream.lost_frames}
+    return _finite({column.name: figures[column.name] for column in FIGURES if column.name in figures})
+
+
+def loop_figures(found: Identification) -> Row:
+    """Delay and gain margin of an identified loop."""
+    return _finite({"delay_ms": 1e3 * found.delay, "gain_margin": found.margins.gain})
+
+
+def _finite(figures: Row) -> Row:
+    """None for infinity (no error at all, no feedback): tables do not agree on how to write it."""
+    row: Row = finite(figures)
+    return row
+
+
+def run_case(case: Case, keep_recordings: bool) -> Outcome:
+    """Do one case.
+
+    Args:
+        case: what to do.
+        keep_recordings: True: the recordings are part of the answer.
+
+    Returns:
+        What came of it; errors of robot, plan or disk are in it, and the recordings of a case that failed.
+    """
+    incident: list[tuple[str, bytes]] = []
+    try:
+        if isinstance(case.arm, SimulatedArm):
+            with simulated_box(case.arm) as box:
+                return _run(case, box.host, box.ports, 0, box.folder, keep_recordings, incident)
+        with TemporaryDirectory(prefix="ur-sweep-") as folder:
+            arm, ports = case.arm, Ports.standard(case.arm.port_base)
+            return _run(case, arm.host, ports, arm.reverse_port, Path(folder), keep_recordings, incident)
+    except GainMarginError as error:
+        return Outcome(
+            "refused", full_message(error), ({"delay_ms": 1e3 * error.delay, "gain_margin": error.margin},)
+        )
+    except (ClientError, ProtocolError, OSError) as error:
+        return failed(full_message(error), tuple(incident))
+
+
+def plan_case(case: Case) -> Experiment:
+    """The experiment of a case, checked and planned; its folder is to be set.
+
+    Raises:
+        PlanningError: the arm cannot do the movement.
+        MovementError: the movement makes no sense.
+    """
+    cell = NO_CELL if isinstance(case.arm, SimulatedArm) else case.arm.cell
+    planned = _planned(case.movement, case.arm.robot, cell)
+    # A model of its own: it carries scratch data, and workers of a cluster may be threads.
+    return Experiment(robot_model(case.arm.robot, cell), (planned,), case.repeat, Path())
+
+
+def _run(
+    case: Case,
+    host: str,
+    ports: Ports,
+    reverse_port: int | None,
+    folder: Path,
+    keep_recordings: bool,
+    incident: list[tuple[str, bytes]],
+) -> Outcome:
+    planned = plan_case(case)
+    experiment = Experiment(planned.model, planned.planned, planned.repeat, folder / "recordings")
+    try:
+        with UrDriver(host, ports, reverse_port=reverse_port) as driver:
+            if isinstance(case.arm, GivenRobot):
+                driver.info.check_same(experiment.model.title, case.arm.serial)
+            report = ExperimentRunner(driver, experiment, case.controller).run()
+    except (ClientError, ProtocolError, OSError) as error:
+        incident += _contents(experiment.out.glob("*.mcap"))
+        notes = getattr(error, "__notes__", ())  # of a folder that will be gone
+        error.__notes__ = [note.replace(str(experiment.out), case.incidents) for note in notes]
+        raise
+    loop = loop_figures(report.delay)
+    rows = tuple(
+        {**_measure_run(path, stream), **loop}
+        for path, stream in zip(report.paths, report.streams, strict=True)
+    )
+    return Outcome("done", rows=rows, recordings=_contents(report.paths) if keep_recordings else ())
+
+
+def _contents(paths: Iterable[Path]) -> tuple[tuple[str, bytes], ...]:
+    return tuple((path.name, path.read_bytes()) for path in paths)
+
+
+@lru_cache(maxsize=64)
+def _planned(movement: MovementFile, robot: str, cell: Cell) -> Plan:
+    """Plan a movement, once for all cases of this worker; a plan is never changed."""
+    with TemporaryDirectory(prefix="ur-sweep-") as folder:
+        path = Path(folder) / movement.file_name
+        path.write_text(movement.text, encoding="utf-8")
+        loaded = load_movement(library_name_of(movement.text) or path)
+    return prepare_experiment([loaded], repeat=1, out=Path(), robot=robot, cell=cell).planned[0]
+
+
+Job = Callable[[Case], Outcome]
+_Outcomes = Iterator[tuple[Case, Outcome]]
+_Runner = Callable[[Sequence[Case]], _Outcomes]
+
+
+class Sweep:
+    """All cases of a sweep, batch by batch.
+
+    Args:
+        config: the file.
+        arms: simulated ones, or the robot that is there.
+        store: knows what is settled, and takes the outcomes.
+
+    Attributes:
+        waiting: cases of the first batch that is not settled; empty: nothing is left to run.
+    """
+
+    def __init__(
+        self, config: SweepConfig, arms: Sequence[SimulatedArm] | Sequence[GivenRobot], store: ResultStore
+    ) -> None:
+        self._store = store
+        self._cases: list[Case] = []
+        self._batches = (
+            all_cases(config.movements, arms, controllers, config.file.repeat)
+            for controllers in config.batches(lambda: store.table(self._cases))
+        )
+        self._advance()
+
+    def run(self, run: _Runner) -> Generator[Outcome, None, None]:
+        """Run and settle what is not settled.
+
+        The first failure of a robot that is there ends the sweep: somebody has to look at the arm before it
+        moves again.
+
+        Args:
+            run: runs cases.
+
+        Yields:
+            Each outcome, when it is on disk.
+
+        Raises:
+            SweepError: the folder cannot be written.
+        """
+        while self.waiting:
+            for case, outcome in run(self.waiting):
+                self._store.settle(case, outcome)
+                yield outcome
+                if outcome.status == "failed" and isinstance(case.arm, GivenRobot):
+                    return
+            self._advance()
+
+    def _advance(self) -> None:
+        """Go on to the next batch that has cases to run."""
+        for cases in self._batches:
+            self._cases = cases
+            self.waiting = self._store.waiting(cases)
+            if self.waiting:
+                return
+        self.waiting = []
+
+
+def in_turn(job: Job) -> _Runner:
+    """One case after the other in this process, as one robot must."""
+    return lambda cases: ((case, job(case)) for case in cases)
+
+
+@contextmanager
+def side_by_side(job: Job, *, workers: int | None, dask: str | None) -> Iterator[_Runner]:
+    """Cases over processes of this machine or a Dask cluster, which are started with the first case.
+
+    When a worker process dies (out of memory, killed), the others are lost with it. Those cases that may have
+    been its are then run alone: one that kills its worker again has failed, the others go on.
+
+    Args:
+        job: does one case; must be picklable and raise nothing for errors of the case.
+        workers: as `open_executor`.
+        dask: as `open_executor`.
+    """
+    # The pool hands a job more than it has workers to its queue.
+    n_begun = 1 + (usable_cores() if workers is None else workers)
+    executors: list[Executor] = []
+
+    def run(cases: Sequence[Case]) -> _Outcomes:
+        waiting = list(cases)
+        while waiting:
+            if not executors:
+                executors.append(opened.enter_context(open_executor(workers, dask)))
+            lost = yield from _round(executors[0], waiting, job)
+            if lost:
+                opened.close()
+                executors.clear()
+            suspects, waiting = lost[:n_begun], lost[n_begun:]
+            for case in suspects:
+                with open_executor(1) as alone:
+                    dies_again = yield from _round(alone, [case], job)
+                if dies_again:
+                    yield (
+                        case,
+                        failed("the worker process died, also when the case ran alone: is memory short?"),
+                    )
+
+    with ExitStack() as opened:
+        yield run
+
+
+def _round(
+    executor: Executor, cases: Sequence[Case], job: Job
+) -> Generator[tuple[Case, Outcome], None, list[Case]]:
+    """Run cases; returns those that were lost with a worker process, in order."""
+    lost: set[str] = set()
+    futures: dict[Future[Outcome], Case] = {}
+    with suppress(BrokenExecutor):  # died while we were still handing out: the rest counts as lost
+        for case in cases:
+            futures[executor.submit(job, case)] = case
+    lost.update(case.identity for case in cases[len(futures) :])
+    for future in as_completed(list(futures)):
+        case = futures.pop(future)  # with its recordings, which may be large
+        try:
+            outcome = future.result()
+        except BrokenExecutor:
+            lost.add(case.identity)
+            continue
+        except Exception as error:
+            outcome = failed(f"{type(error).__name__}: {error}")
+        yield case, outcome
+    return [case for case in cases if case.identity in lost]
