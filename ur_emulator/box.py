@@ -64,7 +64,7 @@ class Box:
         Raises:
             EmulatorError: an argument is not among the allowed ones.
         """
-        model = robot_by_name(options.robot, options.version)
+        model = robot_by_name(str(options.robot), options.version)
         if options.generation is not None:
             model = dataclasses.replace(model, generation=options.generation)
         generation = model.generation

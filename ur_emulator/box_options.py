@@ -33,7 +33,7 @@ class BoxOptions:
     """Arguments of a box.
 
     Attributes:
-        robot: type of the arm, such as "ur3" or "ur5e".
+        robot: type of the arm, such as "ur3" or "ur5e", or a file that ends in .toml (docs/fidelity.md).
         version: software that the box pretends to run; decides layouts and builtins. None: the usual one.
         host: address to listen on; other machines can reach the box only through an address of theirs.
         pace: "realtime" or "lockstep".
@@ -53,7 +53,7 @@ class BoxOptions:
         generation: in place of that of the arm.
     """
 
-    robot: str = "ur3"
+    robot: str | PathLike[str] = "ur3"
     version: str | None = None
     host: str = "127.0.0.1"
     pace: str | Pace = Pace.REALTIME

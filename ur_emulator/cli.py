@@ -41,12 +41,13 @@ app = new_app("An emulated Universal Robots control box.")
     epilog=examples(
         "ur-emulator serve",
         "ur-emulator serve --robot ur5 --software 3.4.0 --pace lockstep --seed 7",
+        "ur-emulator serve --robot my_arm.toml",
         "ur-emulator serve --boxes 20 --host 127.0.0.2",
         "ur-emulator serve --programs my_programs --control-port 29900 --log",
     )
 )
 def serve(
-    robot: Annotated[str, typer.Option(help="Type of the arm.")] = "ur3",
+    robot: Annotated[str, typer.Option(help="Type of the arm, or FILE.toml: an arm of your own.")] = "ur3",
     software: Annotated[
         str | None,
         typer.Option(

@@ -208,7 +208,7 @@ class ControlBox(_Running, BoxControl):
     """A control box for one `with`.
 
     Args:
-        robot: type of the arm, such as "ur3" or "ur5e".
+        robot: type of the arm, such as "ur3" or "ur5e", or a file of one (docs/fidelity.md).
         version: software, such as "3.4.0"; None is the usual one of the arm's generation.
         host: address to listen on.
         pace: "realtime", or "lockstep": as fast as the processor allows, and repeatable.
@@ -231,7 +231,7 @@ class ControlBox(_Running, BoxControl):
 
     def __init__(
         self,
-        robot: str = "ur3",
+        robot: str | PathLike[str] = "ur3",
         version: str | None = None,
         host: str = "127.0.0.1",
         pace: str | Pace = "realtime",

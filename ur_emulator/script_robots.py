@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
+from ur_emulator.errors import ModelError
 from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import ROBOTS
+from ur_emulator.models.robots import ROBOTS, robot_by_name
 
 if TYPE_CHECKING:
     from ur_emulator.script_run import ScriptBox
@@ -17,6 +18,13 @@ class BoxMaker:
 
     robots: Mapping[str, str] = {name: robot.default_software for name, robot in ROBOTS.items()}
     fidelities: Sequence[str] = ("typical", *(it.name for it in CB3.fidelities if it.name != "typical"))
+
+    def software_of(self, file: str) -> str:
+        """See urscript.robot.RobotMaker."""
+        try:
+            return robot_by_name(file).default_software
+        except ModelError as error:
+            raise ValueError(str(error)) from None
 
     def make(
         self, name: str, *, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]

@@ -107,13 +107,21 @@ class RobotMaker(Protocol):
     fidelities: Sequence[str]
     """Names of the levels of fidelity, the default first."""
 
+    def software_of(self, file: str) -> str:
+        """The software that the robot of a file runs if none is named; a file ends in .toml.
+
+        Raises:
+            ValueError: The file is wrong; one line says how.
+        """
+        ...
+
     def make(
         self, name: str, *, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]
     ) -> ScriptRobot:
         """A robot at rest, ready to move.
 
         Args:
-            name: One of `robots`.
+            name: One of `robots`, or a file that `software_of` has read.
             fidelity: One of `fidelities`.
             seed: Of all random numbers.
             software: Software version of the generation of that robot, e.g. (3, 15).

@@ -286,6 +286,12 @@ def test_every_arm_can_be_chosen(run, name):
     assert document["robot"].startswith(ROBOTS[name].title)
 
 
+def test_a_file_of_an_arm_can_be_chosen(run):
+    file = Path(__file__).parents[2] / "examples" / "arms" / "long_ur5e.toml"
+    document = json.loads(run("textmsg(get_steptime())", "--robot", str(file), "--json").stdout)
+    assert document["robot"].startswith("UR5e, long forearm")
+
+
 @pytest.mark.parametrize("software", ["5.12", "10.11"])
 def test_software_chooses_an_arm_that_runs_it(run, software):
     document = json.loads(run("textmsg(get_steptime())", "--software", software, "--json").stdout)
@@ -296,6 +302,7 @@ def test_software_chooses_an_arm_that_runs_it(run, software):
     ("words", "allowed"),
     [
         (("--robot", "kuka"), "there are ur3, "),
+        (("--robot", "nowhere.toml"), "nowhere.toml: cannot be read"),
         (("--robot", "ur3", "--software", "5.12"), "give software such as 3.15.8, or another robot"),
         (("--fidelity", "perfect"), "there are typical, "),
         (("--seed", "-1"), "greater than or equal to 0"),

@@ -34,11 +34,11 @@ from ur_emulator.controller.safety.safety_state import UNLOCK_DELAY
 from ur_emulator.controller.safety_system import SafetySystem
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.controller.state import ControllerState, make_state
-from ur_emulator.errors import RefusedError
+from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
-from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.motion.tool import UnreachableError
@@ -157,7 +157,9 @@ class Controller:
         self.period_s = generation.period_s
         make_plant = Plant if fidelity.has_physics else ExactPlant
         self.plant = make_plant(robot, fidelity, seed)
-        q = six(robot.home_q)
+        q = robot.home_q
+        if self.plant.touches(q):
+            raise ModelError(f"{robot.name}: at home_q the arm would touch itself or the table; give another")
         self.plant.reset(q)
         self._setpoints = SetpointCheck(robot.stop_deceleration, self.period_s)
         self._mode = mode

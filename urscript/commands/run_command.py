@@ -47,7 +47,7 @@ def run(
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Arm to run it on, e.g. ur3; none only records the calls.",
+            help="Arm to run it on, e.g. ur3, or FILE.toml; none only records the calls.",
             show_default="the first that runs the software",
         ),
     ] = None,
@@ -72,10 +72,10 @@ def run(
     """Run a program on an emulated robot, as fast as it goes; exit 1 if it is wrong or fails."""
     if trace and as_json:
         raise typer.BadParameter("--trace shows lines, --json one document: choose one")
-    maker, name = _find_robot(robot, software)
-    catalogue = catalogue_of(software or (maker.robots[name] if maker else DEFAULT_SOFTWARE))
+    maker, name, usual = _find_robot(robot, software)
+    catalogue = catalogue_of(software or usual)
     if maker:
-        _check_options(maker, name, fidelity, catalogue)
+        _check_options(maker, name, usual, fidelity, catalogue)
     source = Source(read_program(file), shown_name(file))
     output: RunOutput = JsonOutput(source, str(file)) if as_json else TextOutput(source, quiet=quiet)
     try:
@@ -99,14 +99,19 @@ def run(
         raise SystemExit(EXIT_CODES[status])  # all that is to be said stands in the output
 
 
-def _find_robot(name: str | None, software: str | None) -> tuple[RobotMaker | None, str]:
-    """The maker of the robot of that name, and the name; None for no robot.
+def _find_robot(name: str | None, software: str | None) -> tuple[RobotMaker | None, str, str]:
+    """The maker of the robot of that name or file, the name, and its usual software; None for no robot.
 
     Without a name it is the first robot whose generation runs the software.
     """
     makers = find_makers()
     if name == NO_ROBOT or (name is None and not makers):
-        return None, NO_ROBOT
+        return None, NO_ROBOT, DEFAULT_SOFTWARE
+    if name is not None and name.endswith(".toml") and makers:
+        try:
+            return makers[0], name, makers[0].software_of(name)
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="--robot") from None
     robots = {robot: maker for maker in reversed(makers) for robot in maker.robots}
     if name is not None:
         maker = robots.get(name.lower())
@@ -115,12 +120,12 @@ def _find_robot(name: str | None, software: str | None) -> tuple[RobotMaker | No
             raise typer.BadParameter(
                 f"no robot {name!r} is installed; there are {known}", param_hint="--robot"
             )
-        return maker, name.lower()
+        return maker, name.lower(), maker.robots[name.lower()]
     for maker in makers:
         for robot, usual in maker.robots.items():
             if software is None or _runs(usual, catalogue_of(software)):
-                return maker, robot
-    return makers[0], next(iter(makers[0].robots))
+                return maker, robot, usual
+    return makers[0], *next(iter(makers[0].robots.items()))
 
 
 def _runs(usual: str, catalogue: Catalogue) -> bool:
@@ -130,11 +135,13 @@ def _runs(usual: str, catalogue: Catalogue) -> bool:
     return len(generations) == 1 or generations == of_e_series
 
 
-def _check_options(maker: RobotMaker, name: str, fidelity: str | None, catalogue: Catalogue) -> None:
+def _check_options(
+    maker: RobotMaker, name: str, usual: str, fidelity: str | None, catalogue: Catalogue
+) -> None:
     if fidelity is not None and fidelity not in maker.fidelities:
         known = ", ".join(maker.fidelities)
         raise typer.BadParameter(f"no fidelity {fidelity!r}; there are {known}", param_hint="--fidelity")
-    usual, given = maker.robots[name], catalogue.version
+    given = catalogue.version
     if not _runs(usual, catalogue):
         raise typer.BadParameter(
             f"software {given} is of {given.generation.value}, which {name} does not run; "
