@@ -12,7 +12,7 @@ from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import CompiledProgram, compile_program
 from urscript.syntax.parser import prepare
 
@@ -53,8 +53,8 @@ def measure_script_in_box() -> dict[str, float]:
 
 
 def _box() -> Controller:
-    programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    return Controller(robot_by_name("ur3"), CB3.fidelity("typical"), 7, programs)
+    hosts = partial(robot_hosts, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
+    return Controller(robot_by_name("ur3"), CB3.fidelity("typical"), 7, hosts)
 
 
 def _box_running(n_threads: int) -> Controller:

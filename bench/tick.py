@@ -10,7 +10,7 @@ from bench.limit import best_of
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.syntax.parser import prepare
@@ -39,8 +39,8 @@ def measure_tick(robot: str = "ur3") -> dict[str, float]:
     arm = robot_by_name(robot)
     n_steps = arm.generation.n_substeps
     catalogue = catalogue_for(arm.default_software)
-    programs = partial(ProgramSlot, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    controller = Controller(arm, arm.generation.fidelity("typical"), 7, programs)
+    hosts = partial(robot_hosts, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
+    controller = Controller(arm, arm.generation.fidelity("typical"), 7, hosts)
     controller.tick([StartProgram(compile_program(_SPEEDJ, catalogue=catalogue))])
     for _ in range(WARM_UP):
         controller.tick(())

@@ -28,7 +28,7 @@ from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import TYPICAL
 from ur_emulator.models.mjcf import LINKS, arm_spec, to_body
 from ur_emulator.plant.arm_physics import TABLE_HEIGHT
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
 mpl.use("agg")
@@ -54,7 +54,7 @@ class Run:
     """A program on a box, and what it left behind, cycle by cycle."""
 
     def __init__(self, start_z, program):
-        self.controller = Controller(UR3, TYPICAL, SEED, partial(ProgramSlot, network=NoNetwork()))
+        self.controller = Controller(UR3, TYPICAL, SEED, partial(robot_hosts, network=NoNetwork()))
         self._play(f"movej({DOWN.format(z=start_z)}, a=3, v=2)")
         self.rows = []
         self.errors = []

@@ -61,7 +61,7 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"arm_in_space", "clock", "interpreter_queue", "pendant", "programs", "robot_mode"},
+    {"arm_in_space", "clock", "interpreter_queue", "pendant", "robot_mode"},
     {"io"},
     {"safety"},
     {"settings"},
@@ -70,7 +70,8 @@ CONTROLLER_ORDER = (
     {"past_cycles"},
     {"compliance", "force_sense"},
     {"state"},
-    {"modbus_map", "safety_system"},
+    {"modbus_map", "program_runner"},
+    {"safety_system"},
     {"command"},
     {"controller"},
 )

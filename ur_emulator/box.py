@@ -26,7 +26,7 @@ from ur_emulator.realtime.memory import MemoryWatch
 from ur_emulator.realtime.pacing import Pace, make_pacer
 from ur_emulator.realtime.processes import Role, prepare_children
 from ur_emulator.realtime.served_box import ServedBox
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from ur_emulator.servers.box_ports import SendingPorts, answering_ports
 from ur_emulator.servers.port_set import CONTROL, PortSet
@@ -88,7 +88,7 @@ class Box:
             model,
             imperfections,
             seed,
-            partial(ProgramSlot, network=self._network),
+            partial(robot_hosts, network=self._network),
             mode=RobotMode.RUNNING,
             version=(asked.major, asked.minor),
         )

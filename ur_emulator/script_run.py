@@ -22,7 +22,7 @@ from ur_emulator.errors import ArgumentError
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.move import Move
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from ur_emulator.servers.scripts.loop_network import LoopNetwork
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
@@ -75,7 +75,7 @@ class ScriptBox:
             model,
             model.generation.fidelity(fidelity),
             seed,
-            partial(ProgramSlot, network=LoopNetwork(self._loop, model.generation.period_s, _raise)),
+            partial(robot_hosts, network=LoopNetwork(self._loop, model.generation.period_s, _raise)),
             version=(version.major, version.minor),
         )
         self._answers = deque(answers)

@@ -48,7 +48,7 @@ class ProgramTransition(NamedTuple):
 
 
 _P = ProgramState
-# What `scripting.program_slot` does; a test takes every transition.
+# What `controller.program_runner` does; a test takes every transition.
 PROGRAM_TRANSITIONS: tuple[ProgramTransition, ...] = (
     ProgramTransition(_P.STOPPED, "a program is started", _P.PLAYING),
     ProgramTransition(_P.PLAYING, "pause, safeguard stop; protective stop, if it was loaded", _P.PAUSING),

@@ -17,7 +17,7 @@ from ur_emulator.controller.command import Submitted
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from urscript import compile_program
 
@@ -120,7 +120,7 @@ class Bench:
             replace(robot_by_name(robot), generation=generation),
             generation.fidelity(fidelity),
             seed,
-            partial(ProgramSlot, network=self.network),
+            partial(robot_hosts, network=self.network),
             **kwargs,
         )
         self.events = []

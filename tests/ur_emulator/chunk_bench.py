@@ -12,7 +12,7 @@ from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram
 from ur_emulator.controller.controller import Controller
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.check.checking import check_program
@@ -30,7 +30,7 @@ class ChunkBench(Bench):
             robot,
             robot.generation.fidelity(chunk.fidelity),
             chunk.seed,
-            partial(ProgramSlot, network=self.network),
+            partial(robot_hosts, network=self.network),
         )
         self.events = []
         self.snapshots = []

@@ -14,7 +14,7 @@ from ur_emulator.controller.controller import Controller
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.network import RemoteCallError
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError
@@ -115,7 +115,7 @@ class Box(Bench):
     def __init__(self, *, peers=None, servers=None, software="3.15", robot="ur3", fidelity="ideal", seed=7):
         self.network = PeerNetwork(peers or {}, servers or {})
         self.controller = Controller(
-            robot_by_name(robot), CB3.fidelity(fidelity), seed, partial(ProgramSlot, network=self.network)
+            robot_by_name(robot), CB3.fidelity(fidelity), seed, partial(robot_hosts, network=self.network)
         )
         self.events = []
         self.snapshots = []

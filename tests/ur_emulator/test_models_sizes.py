@@ -21,7 +21,7 @@ from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import arm_spec
 from ur_emulator.models.robots import ROBOTS
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
 ARMS = [pytest.param(robot, id=name) for name, robot in ROBOTS.items()]
@@ -88,7 +88,7 @@ def test_drives_can_carry_the_stretched_arm_with_its_payload(robot):
 @pytest.mark.parametrize("robot", ARMS)
 def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(robot, fidelity):
     controller = Controller(
-        robot, robot.generation.fidelity(fidelity), 7, partial(ProgramSlot, network=FakeNetwork())
+        robot, robot.generation.fidelity(fidelity), 7, partial(robot_hosts, network=FakeNetwork())
     )
     program = compile_program(f"""def prog():
       set_payload({robot.payload_max}, [0, 0, 0.03])

@@ -20,7 +20,7 @@ from ur_emulator.realtime.pacing import (
     make_pacer,
 )
 from ur_emulator.realtime.served_box import ServedBox
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 
 PERIOD = 0.008
 
@@ -94,7 +94,7 @@ def test_the_lead_is_at_most_a_quarter_of_a_short_period():
 
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():
     controller = Controller(
-        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(ProgramSlot, network=None)
+        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(robot_hosts, network=None)
     )
     box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
     seen = []
@@ -114,7 +114,7 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
 
 def test_messages_of_a_cycle_that_was_computed_early_are_sent_before_anybody_can_see_its_state():
     controller = Controller(
-        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(ProgramSlot, network=None)
+        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(robot_hosts, network=None)
     )
     box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
     seen = []

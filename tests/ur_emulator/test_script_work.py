@@ -276,7 +276,7 @@ def test_on_cb3_no_execution_time_is_reported():
 
 def test_secondary_programs_share_units_of_their_own_and_come_in_turn(monkeypatch):
     monkeypatch.setattr(
-        "ur_emulator.scripting.program_slot.BUDGETS",
+        "ur_emulator.controller.program_runner.BUDGETS",
         replace(BUDGETS, secondary_units=5_000, secondary_units_saved=5_000),
     )
     bench = Bench(fidelity="ideal")
@@ -296,7 +296,7 @@ def test_secondary_programs_share_units_of_their_own_and_come_in_turn(monkeypatc
 
 def test_a_secondary_program_that_fails_later_is_reported_and_gone(monkeypatch):
     monkeypatch.setattr(
-        "ur_emulator.scripting.program_slot.BUDGETS",
+        "ur_emulator.controller.program_runner.BUDGETS",
         replace(BUDGETS, secondary_units=5_000, secondary_units_saved=5_000),
     )
     bench = Bench(fidelity="ideal")

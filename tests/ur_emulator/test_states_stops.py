@@ -38,7 +38,7 @@ from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.safety_limits import UNLIMITED
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
-from ur_emulator.scripting.program_slot import ProgramSlot
+from ur_emulator.scripting.robot_host import robot_hosts
 
 PRESS, RELEASE = PressEmergencyStop("robot"), ReleaseEmergencyStop()
 OPEN, CLOSE = SafeguardStop(True), SafeguardStop(False)
@@ -284,7 +284,7 @@ def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it():
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
 def test_every_arm_brakes_with_its_own_deceleration(name):
     robot = robot_by_name(name)
-    controller = Controller(robot, CB3.fidelity("ideal"), 1, partial(ProgramSlot, network=FakeNetwork()))
+    controller = Controller(robot, CB3.fidelity("ideal"), 1, partial(robot_hosts, network=FakeNetwork()))
     bench = Bench(fidelity="ideal")
     bench.controller = controller
     bench.start(LONG_MOVE)

@@ -14,7 +14,7 @@ from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.programs import Programs
+    from ur_emulator.controller.program_runner import ProgramRunner
     from ur_emulator.controller.safety_system import SafetySystem
     from ur_emulator.controller.state import ControllerState
     from ur_emulator.plant.plant import FlangePush, Plant
@@ -39,7 +39,7 @@ class BoxParts(Protocol):
     state: ControllerState
     plant: Plant
     push: FlangePush
-    programs: Programs
+    programs: ProgramRunner
     safety: SafetySystem
 
 

@@ -19,7 +19,7 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, RobotModeChanged
 from ur_emulator.controller.force_sense import VARIABLE
 from ur_emulator.controller.io.watchdogs import WatchdogAction
-from ur_emulator.controller.programs import Programs
+from ur_emulator.controller.program_runner import ProgramRunner
 from ur_emulator.controller.robot_mode import JOINT_VECTORS, ModeCommand, RobotModeMachine
 from ur_emulator.controller.safety.inputs import ACTIVE
 from ur_emulator.controller.safety.limit_checks import (
@@ -44,6 +44,7 @@ from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import FlangePush, Plant, PlantState
+from urscript.run.host import Host
 
 # --- The snapshot of a cycle: the records of target, sensors and box one after the other
 
@@ -53,7 +54,7 @@ _UNIT_TIME = 50e-6
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
-def make_snapshot(state: ControllerState, programs: Programs, sensed: PlantState) -> Snapshot:
+def make_snapshot(state: ControllerState, programs: ProgramRunner, sensed: PlantState) -> Snapshot:
     """Return everything that any port may publish of this cycle.
 
     The target is the one with which the cycle began: target and measurements are of the same moment.
@@ -138,7 +139,7 @@ class Controller:
         robot: RobotModel,
         fidelity: Fidelity,
         seed: int,
-        make_programs: Callable[[ControllerState], Programs],
+        make_robot: Callable[[ControllerState], Callable[[], Host]],
         *,
         mode: RobotMode = RobotMode.RUNNING,
         version: tuple[int, int] | None = None,
@@ -149,7 +150,8 @@ class Controller:
             robot: the arm; its generation has the control cycle.
             fidelity: how far it is from a perfect one.
             seed: of everything random in it: calibration, phases, noise.
-            make_programs: makes what runs the programs, which act on the parts of the controller.
+            make_robot: called once with the parts of the controller; what it returns makes the robot as one
+                program sees it.
             mode: robot mode to start in.
             version: of the software, major and minor; None: the usual one of the generation.
         """
@@ -186,7 +188,7 @@ class Controller:
             motion.braking = self.state.dynamics.greatest_deceleration
         self._payload = self.state.tool.payload
         self.state.past.place(motion.target, self.plant.sense())
-        self.programs = make_programs(self.state)
+        self.programs = ProgramRunner(self.state, make_robot(self.state))
         self.safety = SafetySystem(self.state, self.programs, self.plant)
         self.push = FlangePush(self.plant)
         self.state.mode.command(ModeCommand.BOOT)

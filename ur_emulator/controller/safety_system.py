@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller.events import LogAdded, SafetyModeChanged
-from ur_emulator.controller.programs import Programs
+from ur_emulator.controller.program_runner import ProgramRunner
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.controller.safety.boundaries import TRIGGER_BAND
 from ur_emulator.controller.safety.inputs import Guard, OperationalMode, SafetyInput, SafetyInputs
@@ -39,7 +39,7 @@ class SafetySystem:
         is_busy: `step` and `find_violation` must be called in every cycle.
     """
 
-    def __init__(self, state: ControllerState, programs: Programs, plant: Plant) -> None:
+    def __init__(self, state: ControllerState, programs: ProgramRunner, plant: Plant) -> None:
         self._state = state
         self._plant = plant
         self._programs = programs

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Protocol
 from ur_emulator.budgets import BUDGETS, MIB
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.programs import Programs
+    from ur_emulator.controller.program_runner import ProgramRunner
 
 # In a process of the user: collect rarely, a full collection over a large heap costs more than a cycle has to
 # spare; and let threads take short turns, one with long work shares the interpreter with the loop.
@@ -128,10 +128,10 @@ class MemoryWatch:
         # What it holds when nothing can be given back.
         self._floor = 0
         # How much each box has made it grow since it held half of what is allowed.
-        self._grown: dict[Programs, int] = {}
+        self._grown: dict[ProgramRunner, int] = {}
         self._next_look = 0.0
 
-    def look(self, programs: Programs, now: float) -> None:
+    def look(self, programs: ProgramRunner, now: float) -> None:
         """Measure, after a cycle of the box whose programs are given; let pay who must."""
         if gc.get_count()[0] > _NEW:
             gc.collect(1)
@@ -160,7 +160,7 @@ class MemoryWatch:
         programs.end_for_memory(text)
         self._give_back(programs)
 
-    def _give_back(self, programs: Programs) -> None:
+    def _give_back(self, programs: ProgramRunner) -> None:
         """Give back what programs held that have ended."""
         programs.forget()
         gc.collect(_ALL)

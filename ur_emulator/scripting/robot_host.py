@@ -34,6 +34,11 @@ from ur_emulator.scripting.state_functions import clock_functions, dynamics_func
 from urscript.builtins import pure_builtins
 
 
+def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotHost]:
+    """Return what makes the host of one program on a box; arguments are those of `RobotHost`."""
+    return lambda: RobotHost(state, network)
+
+
 class RobotHost:
     """The host of one running program (see urscript.run.host.Host)."""
 

@@ -17,7 +17,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import PROGRAM_RUNS, PauseProgram, ResumeProgram, SetUp, StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.io.configuration import IoConfiguration
-from ur_emulator.controller.programs import Programs
+from ur_emulator.controller.program_runner import ProgramRunner
 from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.controller.snapshot import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
@@ -142,7 +142,7 @@ def follow_inputs(
 # --- The variables of an installation, which keep the values that programs leave in them
 
 
-def values_at_end(programs: Programs, variables: Mapping[str, str]) -> Steps[dict[str, str]]:
+def values_at_end(programs: ProgramRunner, variables: Mapping[str, str]) -> Steps[dict[str, str]]:
     """Wait for the end of the program that runs; return the values that the variables have then.
 
     Args:

@@ -1,8 +1,12 @@
-"""The one primary program of the box and the secondary programs beside it, stepped once a cycle."""
+"""ProgramRunner: the one primary program of the box and the secondary programs beside it.
+
+It knows the robot that they run on only as `urscript.run.host.Host`; `scripting` has the builtins.
+"""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 from protocol.ur_types import ProgramState
 from ur_emulator.budgets import BUDGETS, of_cycle
@@ -14,9 +18,8 @@ from ur_emulator.controller.events import (
     ScriptFailed,
 )
 from ur_emulator.controller.state import ControllerState
-from ur_emulator.scripting.network import Network
-from ur_emulator.scripting.robot_host import RobotHost
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
+from urscript.run.host import Host
 from urscript.run.metering import WorkBudget
 
 # Looked up once: a cycle asks for them several times.
@@ -25,7 +28,7 @@ _PLAYING, _PAUSED = ProgramState.PLAYING, ProgramState.PAUSED
 _STANDS_STILL = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
 
 
-class ProgramSlot:
+class ProgramRunner:
     """Runs programs on a controller.
 
     A primary program plays, or it comes to a pause (PAUSING, until the arm rests), in it (PAUSED), or
@@ -36,12 +39,18 @@ class ProgramSlot:
         name: of the primary program, or of the last one.
         latest: the primary program or the last one, whose variables can still be read; None before the first.
         reports_line: a client reads the line that the program executes.
-        work: units that all programs have used in this cycle.
+        work: units that all programs have used in this cycle (`urscript.run.metering`).
     """
 
-    def __init__(self, state: ControllerState, network: Network) -> None:
+    def __init__(self, state: ControllerState, make_host: Callable[[], Host]) -> None:
+        """Prepare.
+
+        Args:
+            state: changed with a program: motion, outputs, watchdogs, events.
+            make_host: makes the robot as one program sees it.
+        """
         self._state = state
-        self._network = network
+        self._make_host = make_host
         self._primary: RunningProgram | None = None
         self._secondaries: deque[RunningProgram] = deque()
         limits = BUDGETS.program_units, BUDGETS.program_units_saved
@@ -119,12 +128,11 @@ class ProgramSlot:
                 text = f"{len(self._secondaries)} secondary programs wait already: this one is not started"
                 self._state.events.append(ScriptFailed(1, 1, text, True))
                 return
-            host = RobotHost(self._state, self._network)
-            self._secondaries.append(program.start(host, self._secondary_work))
+            self._secondaries.append(program.start(self._make_host(), self._secondary_work))
             return
         self.stop()
         self.name = program.name
-        self.latest = self._primary = program.start(RobotHost(self._state, self._network), self._work)
+        self.latest = self._primary = program.start(self._make_host(), self._work)
         self._phase = ProgramState.PLAYING
         self._is_loaded = loaded
         if loaded:
@@ -135,7 +143,11 @@ class ProgramSlot:
         self._state.events.append(ProgramStarted(program.name, self._primary))
 
     def stop(self, *, unscheduled: bool = False) -> None:
-        """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint."""
+        """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint.
+
+        Args:
+            unscheduled: nobody wanted it, which the outputs that follow the program show.
+        """
         if self._primary is not None:
             self._primary.kill()
             self._end(unscheduled=unscheduled)
