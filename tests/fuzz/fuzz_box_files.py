@@ -17,7 +17,7 @@ from ur_emulator.program_files.compiling import load_and_compile
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
 from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.scripting.remote_procedures import ProgramRemotes
+from ur_emulator.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.servers.scripts.loop_network import LoopNetwork
 from urscript.errors import ScriptRuntimeError
 
@@ -62,7 +62,7 @@ class _Answers:
         self._defects.append((what, error))
 
     def read(self, data, folder):
-        remotes = ProgramRemotes(self._network, self._clock)
+        remotes = RpcBuiltins(self._network, self._clock)
         factory = remotes.functions()["rpc_factory"]
         handle = factory(None, "xmlrpc", f"127.0.0.1:{self._server.getsockname()[1]}")
         steps, answering = handle.call_method(None, "value", [1], {}), self._answer(data)

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.scripting import socket_functions
-from ur_emulator.scripting.socket_functions import SocketReader, TextSearch
+from ur_emulator.scripting import socket_builtins
+from ur_emulator.scripting.socket_builtins import SocketReader, TextSearch
 from ur_emulator.servers.scripts import buffers, look_ups, loop_network, sockets
 from ur_emulator.servers.scripts.look_ups import LookUp, LookUps
 
-USERS = (buffers, look_ups, loop_network, sockets, socket_functions)
+USERS = (buffers, look_ups, loop_network, sockets, socket_builtins)
 
 
 def lower(monkeypatch, **budgets):

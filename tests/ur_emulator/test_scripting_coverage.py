@@ -5,7 +5,7 @@ import inspect
 import pytest
 from box_support import Bench
 
-from ur_emulator.scripting.robot_host import RobotHost
+from ur_emulator.scripting.robot_host import robot_hosts
 from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15, catalogue_for
 from urscript.catalogue.types import Support
@@ -17,7 +17,7 @@ STATEMENTS = {"pause"}
 
 def offered():
     bench = Bench()
-    host = RobotHost(bench.controller.state, bench.network)
+    host = robot_hosts(bench.controller.state, bench.network)()
     return (set(host.builtins()) | set(PURE) | FLOW) - STATEMENTS
 
 
@@ -27,7 +27,7 @@ VERSIONS = ("3.15", "5.0", "5.4", "5.9", "5.12", "5.15", "5.17", "5.18", "5.22",
 @pytest.mark.parametrize("version", VERSIONS)
 def test_every_function_takes_the_parameters_of_its_row(version):
     bench = Bench()
-    effects = RobotHost(bench.controller.state, bench.network).builtins()
+    effects = robot_hosts(bench.controller.state, bench.network)().builtins()
     for row in catalogue_for(version):
         values = [None] * len(row.params)
         if row.name in effects:

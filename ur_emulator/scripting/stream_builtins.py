@@ -1,8 +1,8 @@
-"""Builtins that stream: velocities and positions that a script renews every cycle, and the stops."""
+"""Builtins that stream: velocities, positions and torques that a script renews every cycle, and the stops."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from ur_emulator.controller.compliance import Compliance
@@ -21,24 +21,69 @@ from ur_emulator.motion.generators import (
     Streamed,
     TorqueCommand,
 )
-from ur_emulator.scripting.script_arm import MIN_LIMIT, Cycles, ScriptArm, floats, require_positive
+from ur_emulator.scripting.builtin_group import (
+    MIN_LIMIT,
+    BuiltinGroup,
+    Cycles,
+    ScriptArm,
+    builtin,
+    floats,
+    require_positive,
+)
 from urscript.errors import ScriptRuntimeError
 from urscript.run.waits import NEXT_CYCLE
 from urscript.values import log_form
 
 
-def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[..., Any]]:
-    """Return the streaming builtins and the stops.
+class StreamBuiltins(BuiltinGroup):
+    """Streams of velocities and positions, and the stops."""
 
-    Args:
-        arm: that they move.
-        step_time: duration of a cycle [s].
-    """
-    motion = arm.motion
+    def __init__(self, arm: ScriptArm, step_time: float) -> None:
+        """Bind the builtins.
 
-    def stream(thread: object, generator: Streamed, t: float | None) -> Cycles:
+        Args:
+            arm: that they move.
+            step_time: duration of a cycle [s].
+        """
+        self._arm = arm
+        self._motion = arm.motion
+        self._step_time = step_time
+
+    @builtin("speedj")
+    def _speedj(self, thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
+        if not a >= MIN_LIMIT:
+            a = _limit("speedj", t, a=a)
+        return self._stream(thread, SpeedJ(floats(qd), a), t)
+
+    @builtin("speedl")
+    def _speedl(self, thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
+        a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
+        a = _limit("speedl", t, a=a)
+        twist = floats(tuple(xd))
+        return self._stream(thread, SpeedL(twist, a, a_rot, self._arm.tool), t)
+
+    @builtin("servoj")
+    def _servoj(
+        self, thread: object, q: list[float], a: float, v: float, t: float, lookahead_time: float, gain: float
+    ) -> Cycles:
+        require_positive("servoj", t=t, lookahead_time=lookahead_time, gain=gain)
+        return self._stream(thread, ServoJ(floats(q), lookahead_time, gain, self._arm.robot.qd_max), t)
+
+    @builtin("stopj")
+    def _stopj(self, thread: object, a: float) -> Cycles:
+        require_positive("stopj", a=a)
+        return self._stop(thread, StopJ(a))
+
+    @builtin("stopl")
+    def _stopl(self, thread: object, a: float, aRot: float | None) -> Cycles:
+        a_rot = a if aRot is None else aRot
+        require_positive("stopl", a=a, aRot=a_rot)
+        return self._stop(thread, StopL(a, a_rot, self._arm.tool))
+
+    def _stream(self, thread: object, generator: Streamed, t: float | None) -> Cycles:
         """Renew a motion for the time t [s] of the speed slider, or until it is done."""
-        arm.take(thread, generator)
+        motion, step_time = self._motion, self._step_time
+        self._arm.take(thread, generator)
         if t is not None and t > 0.0:
             left = t - generator.surplus
             motion.renew()
@@ -54,38 +99,10 @@ def speed_functions(arm: ScriptArm, step_time: float) -> Mapping[str, Callable[.
                 motion.renew()
                 yield NEXT_CYCLE
 
-    def stop(thread: object, generator: StopJ | StopL) -> Cycles:
-        arm.take(thread, generator)
+    def _stop(self, thread: object, generator: StopJ | StopL) -> Cycles:
+        self._arm.take(thread, generator)
         while not generator.done:
             yield NEXT_CYCLE
-
-    def speedj(thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
-        if not a >= MIN_LIMIT:
-            a = _limit("speedj", t, a=a)
-        return stream(thread, SpeedJ(floats(qd), a), t)
-
-    def speedl(thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
-        a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
-        a = _limit("speedl", t, a=a)
-        twist = floats(tuple(xd))
-        return stream(thread, SpeedL(twist, a, a_rot, arm.tool), t)
-
-    def servoj(
-        thread: object, q: list[float], a: float, v: float, t: float, lookahead_time: float, gain: float
-    ) -> Cycles:
-        require_positive("servoj", t=t, lookahead_time=lookahead_time, gain=gain)
-        return stream(thread, ServoJ(floats(q), lookahead_time, gain, arm.robot.qd_max), t)
-
-    def stopj(thread: object, a: float) -> Cycles:
-        require_positive("stopj", a=a)
-        return stop(thread, StopJ(a))
-
-    def stopl(thread: object, a: float, aRot: float | None) -> Cycles:
-        a_rot = a if aRot is None else aRot
-        require_positive("stopl", a=a, aRot=a_rot)
-        return stop(thread, StopL(a, a_rot, arm.tool))
-
-    return {"speedj": speedj, "speedl": speedl, "servoj": servoj, "stopj": stopj, "stopl": stopl}
 
 
 def _limit(function: str, t: float | None, **limit: float) -> float:
@@ -112,7 +129,7 @@ _VISCOUS_SCALE = (0.9, 0.9, 0.8, 0.9, 0.9, 0.9)
 _COULOMB_SCALE = (0.8, 0.8, 0.7, 0.8, 0.8, 0.8)
 
 
-class ProgramTorque:
+class TorqueBuiltins(BuiltinGroup):
     """The torque control of one program."""
 
     def __init__(
@@ -124,10 +141,7 @@ class ProgramTorque:
         self._events = events
         self._has_logged = False
 
-    def functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Return the builtin."""
-        return {"direct_torque": self._direct_torque}
-
+    @builtin("direct_torque")
     def _direct_torque(
         self,
         thread: object,

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from typing import Any
 
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.events import EventQueue, LogAdded
+from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network, ScriptSocket
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
@@ -97,10 +98,8 @@ OPEN_TIMEOUT = 2.0
 # Longest text that a string read returns [bytes]. Source: later edition of the manual, socket_read_string.
 MAX_STRING = 1024
 
-Function = Callable[..., Any]
 
-
-class ProgramSockets:
+class SocketBuiltins(BuiltinGroup):
     """The named sockets of one program."""
 
     def __init__(self, clock: Clock, events: EventQueue, network: Network) -> None:
@@ -111,32 +110,15 @@ class ProgramSockets:
         self._searched = 0
         self._searched_in = -1
 
-    def close_all(self) -> None:
+    def end(self) -> None:
         """Close every socket; the program has ended."""
         for reader in self._sockets.values():
             reader.socket.close()
         self._sockets.clear()
 
-    def functions(self) -> Mapping[str, Function]:
-        """Return the socket builtins by URScript name."""
-        return {
-            "socket_open": self._open,
-            "socket_close": self._close,
-            "socket_read_binary_integer": self._read_binary_integer,
-            "socket_read_byte_list": self._read_byte_list,
-            "socket_read_ascii_float": self._read_ascii_float,
-            "socket_read_line": self._read_line,
-            "socket_read_string": self._read_string,
-            "socket_send_byte": self._send_byte,
-            "socket_send_int": self._send_int,
-            "socket_send_string": self._send_string,
-            "socket_send_line": self._send_line,
-            "socket_set_var": self._set_var,
-            "socket_get_var": self._get_var,
-        }
-
     # --- opening, closing, sending
 
+    @builtin("socket_open")
     def _open(self, thread: object, address: str, port: int, name: str) -> Generator[Wait, None, bool]:
         if len(name) > LONGEST_NAME:
             raise ScriptRuntimeError(
@@ -165,6 +147,7 @@ class ProgramSockets:
             return False
         return True
 
+    @builtin("socket_close")
     def _close(self, thread: object, name: str) -> None:
         reader = self._sockets.pop(name, None)
         if reader is not None:
@@ -174,20 +157,25 @@ class ProgramSockets:
         reader = self._sockets.get(name)
         return reader is not None and reader.socket.send(data)
 
+    @builtin("socket_send_byte")
     def _send_byte(self, thread: object, value: int, name: str) -> bool:
         return self._send(name, bytes([int(value) & 0xFF]))
 
+    @builtin("socket_send_int")
     def _send_int(self, thread: object, value: float, name: str) -> bool:
         if not (math.isfinite(value) and -(2**31) <= value < 2**31):
             raise ScriptRuntimeError(f"socket_send_int: {value:g} does not fit into 32 bits")
         return self._send(name, struct.pack(">i", int(value)))
 
+    @builtin("socket_send_string")
     def _send_string(self, thread: object, text: Any, name: str) -> bool:
         return self._send(name, log_form(text).encode("latin-1", "replace"))
 
+    @builtin("socket_send_line")
     def _send_line(self, thread: object, text: Any, name: str) -> bool:
         return self._send(name, log_form(text).encode("latin-1", "replace") + b"\n")
 
+    @builtin("socket_set_var")
     def _set_var(self, thread: object, variable: str, value: int, name: str) -> None:
         self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
 
@@ -279,16 +267,19 @@ class ProgramSockets:
             return failed
         return [number, *struct.unpack(f">{number}{code}", reader.take(size))]
 
+    @builtin("socket_read_binary_integer")
     def _read_binary_integer(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
         return self._read_numbers(name, timeout, int(number), "i", 4)
 
+    @builtin("socket_read_byte_list")
     def _read_byte_list(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
         return self._read_numbers(name, timeout, int(number), "B", 1)
 
+    @builtin("socket_read_ascii_float")
     def _read_ascii_float(
         self, thread: object, number: float, name: str, timeout: float
     ) -> Generator[Wait, None, list[float]]:
@@ -304,11 +295,13 @@ class ProgramSockets:
             return failed
         return [number, *values] if len(values) == number else failed
 
+    @builtin("socket_read_line")
     def _read_line(self, thread: object, name: str, timeout: float) -> Generator[Wait, None, str]:
         data = yield from self._take(name, timeout, TextSearch(b"", b"\n"))
         line = b"" if data is None else data.removesuffix(b"\n").removesuffix(b"\r")
         return line[:LONGEST_STRING].decode("latin-1")
 
+    @builtin("socket_read_string")
     def _read_string(
         self, thread: object, name: str, prefix: str, suffix: str, interpret_escape: bool, timeout: float
     ) -> Generator[Wait, None, str]:
@@ -319,6 +312,7 @@ class ProgramSockets:
         text = data[data.find(start) + len(start) :] if start else data
         return (text.removesuffix(end) if end else text)[:MAX_STRING].decode("latin-1")
 
+    @builtin("socket_get_var")
     def _get_var(self, thread: object, variable: str, name: str) -> Generator[Wait, None, int]:
         self._send(name, f"GET {variable}\n".encode("latin-1", "replace"))
         data = yield from self._take(name, OPEN_TIMEOUT, TextSearch(b"", b"\n"))

@@ -1,26 +1,60 @@
-"""ScriptArm: the parts of the controller that move an arm, for builtins; and checks of their arguments."""
+"""What all groups of builtins share: the decorator, the parts that move an arm, and checks of arguments.
+
+A group is a class whose marked methods are builtins. It gets only the parts of the controller that it acts
+on. Signatures, versions and costs of builtins are in `urscript.catalogue`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 from protocol.pose import Pose
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyState
 from ur_emulator.controller.settings import ToolSettings
 from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.robot_model import RobotModel, Vector6, six
+from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
 from ur_emulator.motion.tool import Tool
 from urscript.errors import ScriptRuntimeError
+from urscript.run.host import HostFunction
+
+_Method = TypeVar("_Method", bound=Callable[..., Any])
 
 # A motion builtin is a generator that yields once for each cycle that it lasts.
 Cycles = Generator[Any, None, None]
 
 # Smallest limit [SI units]: squares of smaller ones underflow.
 MIN_LIMIT = 1e-9
+
+
+def builtin(*names: str) -> Callable[[_Method], _Method]:
+    """Mark a method of a `BuiltinGroup` as the builtin of these names."""
+
+    def mark(method: _Method) -> _Method:
+        method.builtin_names = names  # type: ignore[attr-defined]  # functions take any attribute
+        return method
+
+    return mark
+
+
+class BuiltinGroup:
+    """Builtins of one subject."""
+
+    _methods: ClassVar[Mapping[str, str]]  # builtin -> its method
+
+    def __init_subclass__(cls) -> None:
+        cls._methods = {
+            name: attribute
+            for attribute, method in vars(cls).items()
+            for name in getattr(method, "builtin_names", ())
+        }
+
+    def functions(self) -> dict[str, HostFunction]:
+        """Return the builtins by URScript name; a group adds those of its tables."""
+        return {name: getattr(self, attribute) for name, attribute in self._methods.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,3 +117,9 @@ def require_range(function: str, q: Vector6, limits: ConfiguredLimits) -> None:
 def floats(values: Sequence[float]) -> Vector6:
     """Return six values as floats; a script may write whole numbers."""
     return six(list(map(float, values)))
+
+
+def vector(values: Sequence[float]) -> Vector3:
+    """Return three values as floats."""
+    x, y, z = map(float, values)
+    return (x, y, z)

@@ -9,12 +9,13 @@ Source: URScript manual CB3 3.15, rpc_factory, and UR's XML-RPC article; e-Serie
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from typing import Any, Final
 from weakref import WeakSet
 
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.clock import Clock
+from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
@@ -31,7 +32,7 @@ LONGEST_MESSAGE = 500
 _CLOSE = "closeXMLRPCClientConnection"
 
 
-class ProgramRemotes:
+class RpcBuiltins(BuiltinGroup):
     """The remote-procedure handles of one program.
 
     Attributes:
@@ -47,11 +48,7 @@ class ProgramRemotes:
         # Values sent, since which cycle, and the cycle that counts anew.
         self._sent = self._since = self._renewed_at = 0
 
-    def functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Return the builtins by URScript name."""
-        return {"rpc_factory": self._rpc_factory}
-
-    def close_all(self) -> None:
+    def end(self) -> None:
         """Close every connection; the program has ended."""
         for server in tuple(self._servers):
             server.close()
@@ -71,7 +68,8 @@ class ProgramRemotes:
         self._renewed_at = self._since + max(1, math.ceil(self._sent / room))
         return True
 
-    def _rpc_factory(self, thread: object, kind: str, url: str) -> RemoteHandle:
+    @builtin("rpc_factory")
+    def _make_handle(self, thread: object, kind: str, url: str) -> RemoteHandle:
         server = self._network.remote_server(url if "://" in url else f"http://{url}")
         self._servers.add(server)
         return RemoteHandle(self, server)
@@ -82,7 +80,7 @@ class RemoteHandle:
 
     script_type: Final = "remote procedure handle"
 
-    def __init__(self, program: ProgramRemotes, server: RemoteServer) -> None:
+    def __init__(self, program: RpcBuiltins, server: RemoteServer) -> None:
         self._program = program
         self._server = server
 
