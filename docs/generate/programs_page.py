@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from docs.generate.page_parts import table
-from ur_emulator.program_files.urp_kinds import KINDS, NOT_KNOWN, TOP_KINDS
+from ur_emulator.program_files.urp_program import KINDS, NOT_KNOWN, TOP_KINDS
 
-_BEGIN = "<!-- made from ur_emulator/program_files/urp_kinds.py by `make docs` -->\n"
+_BEGIN = "<!-- made from ur_emulator/program_files/urp_program.py by `make docs` -->\n"
 _END = "<!-- end of what is made -->\n"
 _PAGE = Path(__file__).parents[1] / "programs.md"
 

@@ -13,7 +13,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.program_files import reading
+from ur_emulator.program_files import reader
 from ur_emulator.program_files.compiling import compile_loaded
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.loading import load_program
@@ -108,7 +108,7 @@ def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path):
 
 
 def test_levels_of_a_file_are_counted_exactly(tmp_path, monkeypatch):
-    monkeypatch.setattr(reading, "BUDGETS", replace(BUDGETS, program_depth=9))
+    monkeypatch.setattr(reader, "BUDGETS", replace(BUDGETS, program_depth=9))
     load(tmp_path, urp(nested(2, "<Halt/>")))
     assert "nested more than 9 deep" in refused(tmp_path, urp(nested(3, "<Halt/>")))
 

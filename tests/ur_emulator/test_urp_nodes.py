@@ -5,7 +5,7 @@ from dashboard_support import urp
 from urp_samples import SAMPLES
 from urp_support import script_of
 
-from ur_emulator.program_files.urp_kinds import KINDS
+from ur_emulator.program_files.urp_program import KINDS
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

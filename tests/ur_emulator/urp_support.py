@@ -4,7 +4,7 @@ from dashboard_support import urp
 
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation_reader import NEW_BOX
-from ur_emulator.program_files.reading import ProgramReader
+from ur_emulator.program_files.reader import ProgramReader
 from ur_emulator.program_files.script_writer import Gap
 from ur_emulator.program_files.urp_program import make_script
 

@@ -21,6 +21,8 @@ from ur_emulator.errors import FileMissingError, ProgramFileError
 # Names of the folder on the wire; the box itself uses the first.
 # Source: replies of real boxes and of the maker's simulator.
 WIRE_ROOTS = (PurePosixPath("/programs"), PurePosixPath("/ursim/programs"))
+# A program is one of these files: nodes of PolyScope, a text, a program of PolyScope X.
+PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX = ".urp", ".script", ".urpx"
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ from ur_emulator.program_files.installation import (
     OutputRule,
     StartUp,
 )
-from ur_emulator.program_files.reading import ProgramReader, XmlTree, number
+from ur_emulator.program_files.reader import ProgramReader, XmlTree, number
 from ur_emulator.program_files.safety_text import safety_settings
 from ur_emulator.program_files.variables_file import SUFFIX as VARIABLES_SUFFIX
 from ur_emulator.program_files.variables_file import read_variables

@@ -9,17 +9,21 @@ from pathlib import PurePosixPath
 
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
-from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import (
+    PROGRAM_SUFFIX,
+    SCRIPT_SUFFIX,
+    URPX_SUFFIX,
+    FoundFile,
+    ProgramFolder,
+)
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import NEW_BOX, installation_of
-from ur_emulator.program_files.reading import ProgramReader, XmlTree
+from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.script_writer import Gap, Header, Part, header_lines, identifier
 from ur_emulator.program_files.urp_program import ROOT, make_script, uses_external_control
-from ur_emulator.program_files.urpx_program import URPX_SUFFIX
+from ur_emulator.program_files.urpx import read_urpx
 from urscript.values import to_script_text
 
-SCRIPT_SUFFIX = ".script"
-PROGRAM_SUFFIX = ".urp"
 # So many things that are left out are named one by one.
 _MOST_NOTES = 20
 # Marks of the part of a PC's program that is written once, before the rest. Source: External Control URCap.
@@ -148,7 +152,8 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
     reader = ProgramReader(folder)
     suffix = file.inside.suffix
     if suffix in (SCRIPT_SUFFIX, URPX_SUFFIX):
-        text = reader.script(file) if suffix == SCRIPT_SUFFIX else reader.urpx(file).script
+        is_script = suffix == SCRIPT_SUFFIX
+        text = reader.script(file) if is_script else read_urpx(file.name, reader.unpacked(file)).script
         return LoadedProgram(file.wire_path, None, (as_one_program(text, identifier(file.inside.stem)),))
     if suffix != PROGRAM_SUFFIX:
         raise ProgramFileError(

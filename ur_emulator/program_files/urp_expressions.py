@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, T_to_pose, pose_trans
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.program_files.installation import Installation
-from ur_emulator.program_files.reading import XmlTree, number_texts
+from ur_emulator.program_files.reader import XmlTree, number_texts
 from ur_emulator.program_files.script_writer import identifier, is_identifier
 from ur_emulator.program_files.urp_maker import UrpMaker
 from ur_emulator.program_files.urp_nodes import CB3, Node

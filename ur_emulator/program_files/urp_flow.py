@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.program_files.reading import number_text
+from ur_emulator.program_files.reader import number_text
 from ur_emulator.program_files.urp_expressions import expression_of, variable_name
 from ur_emulator.program_files.urp_maker import Around, UrpMaker
 from ur_emulator.program_files.urp_nodes import Node

@@ -8,7 +8,7 @@ from functools import partial
 
 from ur_emulator.errors import UnknownNodeError
 from ur_emulator.program_files.installation import Installation
-from ur_emulator.program_files.reading import ProgramReader
+from ur_emulator.program_files.reader import ProgramReader
 from ur_emulator.program_files.script_writer import ScriptWriter
 from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 

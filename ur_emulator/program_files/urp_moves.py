@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from protocol.pose import pose_inv
-from ur_emulator.program_files.reading import number_text, number_texts
+from ur_emulator.program_files.reader import number_text, number_texts
 from ur_emulator.program_files.script_writer import identifier
 from ur_emulator.program_files.urp_expressions import (
     ZERO_POSE,

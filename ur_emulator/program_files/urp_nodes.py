@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError, UnknownNodeError
 from ur_emulator.program_files.folder import FoundFile
-from ur_emulator.program_files.reading import ProgramReader, XmlTree
+from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.script_writer import Names
 
 if TYPE_CHECKING:

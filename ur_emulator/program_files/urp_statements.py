@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ur_emulator.errors import FileMissingError
 from ur_emulator.program_files.installation_reader import pc_from
-from ur_emulator.program_files.reading import number_text
+from ur_emulator.program_files.reader import number_text
 from ur_emulator.program_files.script_writer import one_line
 from ur_emulator.program_files.urp_expressions import Line, expression_of, line_of, variable_name
 from ur_emulator.program_files.urp_maker import Around, UrpMaker

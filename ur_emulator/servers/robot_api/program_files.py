@@ -13,10 +13,15 @@ from pathlib import PurePosixPath
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.program_files.folder import FoundFile, ProgramFolder
-from ur_emulator.program_files.loading import PROGRAM_SUFFIX, SCRIPT_SUFFIX
-from ur_emulator.program_files.reading import ProgramReader
-from ur_emulator.program_files.urpx_program import URPX_SUFFIX, Information, information_of, read_urpx
+from ur_emulator.program_files.folder import (
+    PROGRAM_SUFFIX,
+    SCRIPT_SUFFIX,
+    URPX_SUFFIX,
+    FoundFile,
+    ProgramFolder,
+)
+from ur_emulator.program_files.reader import ProgramReader
+from ur_emulator.program_files.urpx import Information, information_of, read_urpx
 
 
 class Outcome(Enum):
@@ -58,7 +63,7 @@ def _information(folder: ProgramFolder, name: str) -> Information:
     file = find_program(folder, name)
     if file.inside.suffix == URPX_SUFFIX:
         with suppress(ProgramFileError):
-            return ProgramReader(folder).urpx(file).information | {"name": name}
+            return read_urpx(file.name, ProgramReader(folder).unpacked(file)).information | {"name": name}
     return information_of(name)
 
 

@@ -16,7 +16,6 @@ from typing import Any
 
 from ur_emulator.errors import ProgramFileError
 
-URPX_SUFFIX = ".urpx"
 # What a list of programs says of one, by field. All but the name may be null.
 Information = dict[str, Any]
 _FIELDS: dict[str, type] = {

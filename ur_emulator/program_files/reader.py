@@ -11,7 +11,6 @@ from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.program_files.folder import FoundFile, ProgramFolder
-from ur_emulator.program_files.urpx_program import UrpxProgram, read_urpx
 from urscript.source import as_utf8, program_text
 
 if TYPE_CHECKING:
@@ -60,14 +59,6 @@ class ProgramReader:
                 f"{name}: the program has more than {BUDGETS.program_marks} tags and attributes"
             )
         return parse_xml(name, data)
-
-    def urpx(self, file: FoundFile) -> UrpxProgram:
-        """Read a program of PolyScope X.
-
-        Raises:
-            ProgramFileError: it cannot be read, or has another form.
-        """
-        return read_urpx(file.name, self.unpacked(file))
 
     def script(self, file: FoundFile) -> str:
         """Read a text file, UTF-8 or else Latin-1.
