@@ -106,7 +106,7 @@ class Budgets:
         256 * KIB,
         "bytes",
         "script of clients that have gone",
-        "the longest aside, the newest of who has left most is dropped",
+        "the newest of the client with the most text is dropped; the longest of all is kept",
     )
     # More than any client sends; each costs the cycle up to 0.5 ms.
     programs_per_cycle: int = _cycle_budget(4, "programs", "started or refused", "the others wait")

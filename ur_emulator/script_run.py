@@ -249,7 +249,7 @@ class _Run:
             self._report(ReportKind.QUESTION, f"{question} {text}", *self._place())
             self._commands.append(answer)
             return
-        given = "and there is no answer" if text is None else f"'{text}' is none"
+        given = "and there is no answer" if text is None else f"but the answer is '{text}'"
         self.status = RunStatus.FAILED
         message = f"the program asks for {_KINDS[kind]}: '{question}', {given} (--answer)"
         self._report(ReportKind.FAILURE, message, *self._place())
@@ -274,7 +274,7 @@ def _raise(what: str, error: Exception) -> None:
 
 
 def _parsed(text: str, kind: RequestedType, request_id: int) -> AnswerRequest | None:
-    """Return an answer as the type asked for; None if it is none."""
+    """Return an answer as the type asked for; None if it does not fit."""
     try:
         if kind is RequestedType.INTEGER:
             return AnswerRequest(int(text), request_id)

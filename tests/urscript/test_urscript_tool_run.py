@@ -129,7 +129,7 @@ def test_a_question_that_nobody_answers_ends_the_run_with_its_place(run):
     result = run(body('n = request_integer_from_primary_client("how many")'), "--answer", "no idea")
     assert result.exit_code == 1
     assert (
-        "a.script:2:7: Runtime error: the program asks for an integer: 'how many', 'no idea' is none (--answer)\n"
+        "a.script:2:7: Runtime error: the program asks for an integer: 'how many', but the answer is 'no idea' (--answer)\n"
         '      n = request_integer_from_primary_client("how many")\n          ^\n'
     ) in result.stderr
 

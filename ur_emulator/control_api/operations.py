@@ -14,60 +14,9 @@ from pathlib import Path
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
 
 from ur_emulator.box_log import LogEntry
+from ur_emulator.commands import power, programs, safety, surroundings
 from ur_emulator.commands.operation import Operation
-from ur_emulator.commands.power import (
-    MoveEnablingDevice,
-    PowerOff,
-    PowerOn,
-    ReleaseBrakes,
-    SetOperationalMode,
-    SwitchRemoteControl,
-)
-from ur_emulator.commands.programs import (
-    AnswerRequest,
-    ClosePopup,
-    PauseProgram,
-    ResumeProgram,
-    SetSpeedSlider,
-    StopProgram,
-)
-from ur_emulator.commands.safety import (
-    AssignSafetyInput,
-    ChangeSafetySettings,
-    ConfirmSafety,
-    LimitToolDirection,
-    PressButton,
-    PressEmergencyStop,
-    ReducedMode,
-    ReleaseEmergencyStop,
-    RequireSafeguardReset,
-    ResetSafeguard,
-    RestartSafety,
-    SafeguardStop,
-    SetSafetyPlane,
-    TriggerFault,
-    TriggerProtectiveStop,
-    TriggerViolation,
-    UnlockProtectiveStop,
-)
-from ur_emulator.commands.surroundings import (
-    AddObstacle,
-    AttachPayload,
-    Push,
-    RemoveObstacle,
-    SetAnalogInput,
-    SetDigitalInput,
-)
-from ur_emulator.control_api.step_operations import (
-    AddToLog,
-    At,
-    ReadIdentity,
-    ReadLog,
-    ReadState,
-    RunProgram,
-    WaitUntil,
-    read_script,
-)
+from ur_emulator.control_api import step_operations as steps
 from ur_emulator.errors import ArgumentError
 
 P = ParamSpec("P")
@@ -88,7 +37,7 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
         bound.apply_defaults()
         # Read here: the box must not wait for a disk.
         given = {
-            name: read_script(value) if isinstance(value, Path) else value
+            name: steps.read_script(value) if isinstance(value, Path) else value
             for name, value in bound.arguments.items()
         }
         result: Any = box._perform(call.__name__, given)
@@ -148,55 +97,55 @@ class BoxOperations:
         raise NotImplementedError
 
     # --- what is going on
-    state = ReadProperty(ReadState)
-    log = ReadProperty(ReadLog, lambda box: box._log_entries())
-    identity = ReadProperty(ReadIdentity)
-    wait_until = method(WaitUntil)
-    at = method(At)
+    state = ReadProperty(steps.ReadState)
+    log = ReadProperty(steps.ReadLog, lambda box: box._log_entries())
+    identity = ReadProperty(steps.ReadIdentity)
+    wait_until = method(steps.WaitUntil)
+    at = method(steps.At)
     # --- inputs
-    set_digital_input = method(SetDigitalInput)
-    set_analog_input = method(SetAnalogInput)
+    set_digital_input = method(surroundings.SetDigitalInput)
+    set_analog_input = method(surroundings.SetAnalogInput)
     # --- what acts on the arm
-    push = method(Push)
-    attach_payload = method(AttachPayload)
-    add_obstacle = method(AddObstacle)
-    remove_obstacle = method(RemoveObstacle)
+    push = method(surroundings.Push)
+    attach_payload = method(surroundings.AttachPayload)
+    add_obstacle = method(surroundings.AddObstacle)
+    remove_obstacle = method(surroundings.RemoveObstacle)
     # --- safety
-    emergency_stop = method(PressEmergencyStop)
-    release_emergency_stop = method(ReleaseEmergencyStop)
-    safeguard_stop = method(SafeguardStop)
-    reduced_mode = method(ReducedMode)
-    set_safety_plane = method(SetSafetyPlane)
-    limit_tool_direction = method(LimitToolDirection)
-    protective_stop = method(TriggerProtectiveStop)
-    unlock_protective_stop = method(UnlockProtectiveStop)
-    trigger_violation = method(TriggerViolation)
-    trigger_fault = method(TriggerFault)
-    restart_safety = method(RestartSafety)
-    require_safeguard_reset = method(RequireSafeguardReset)
-    reset_safeguard = method(ResetSafeguard)
-    assign_safety_input = method(AssignSafetyInput)
-    change_safety_settings = method(ChangeSafetySettings)
-    confirm_safety = method(ConfirmSafety)
+    emergency_stop = method(safety.PressEmergencyStop)
+    release_emergency_stop = method(safety.ReleaseEmergencyStop)
+    safeguard_stop = method(safety.SafeguardStop)
+    reduced_mode = method(safety.ReducedMode)
+    set_safety_plane = method(safety.SetSafetyPlane)
+    limit_tool_direction = method(safety.LimitToolDirection)
+    protective_stop = method(safety.TriggerProtectiveStop)
+    unlock_protective_stop = method(safety.UnlockProtectiveStop)
+    trigger_violation = method(safety.TriggerViolation)
+    trigger_fault = method(safety.TriggerFault)
+    restart_safety = method(safety.RestartSafety)
+    require_safeguard_reset = method(safety.RequireSafeguardReset)
+    reset_safeguard = method(safety.ResetSafeguard)
+    assign_safety_input = method(safety.AssignSafetyInput)
+    change_safety_settings = method(safety.ChangeSafetySettings)
+    confirm_safety = method(safety.ConfirmSafety)
     # --- operational mode, remote control
-    set_operational_mode = method(SetOperationalMode)
-    enabling_device = method(MoveEnablingDevice)
-    remote_control = method(SwitchRemoteControl)
+    set_operational_mode = method(power.SetOperationalMode)
+    enabling_device = method(power.MoveEnablingDevice)
+    remote_control = method(power.SwitchRemoteControl)
     # --- power
-    power_on = method(PowerOn)
-    power_off = method(PowerOff)
-    release_brakes = method(ReleaseBrakes)
+    power_on = method(power.PowerOn)
+    power_off = method(power.PowerOff)
+    release_brakes = method(power.ReleaseBrakes)
     # --- programs
-    run_program = method(RunProgram)
-    stop_program = method(StopProgram)
-    pause_program = method(PauseProgram)
-    resume_program = method(ResumeProgram)
-    set_speed = method(SetSpeedSlider)
+    run_program = method(steps.RunProgram)
+    stop_program = method(programs.StopProgram)
+    pause_program = method(programs.PauseProgram)
+    resume_program = method(programs.ResumeProgram)
+    set_speed = method(programs.SetSpeedSlider)
     # --- the operator
-    press_button = method(PressButton)
-    answer = method(AnswerRequest)
-    close_popups = method(ClosePopup)
-    add_to_log = method(AddToLog)
+    press_button = method(safety.PressButton)
+    answer = method(programs.AnswerRequest)
+    close_popups = method(programs.ClosePopup)
+    add_to_log = method(steps.AddToLog)
 
 
 OPERATIONS: dict[str, type[Operation[Any]]] = {}

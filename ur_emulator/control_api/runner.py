@@ -48,10 +48,8 @@ class OperationRunner:
         future: Future[Any] = Future()
         with self._lock:
             if self._is_closed or not self._loop.is_running:
-                raise (
-                    NotRunningError()
-                    if self._is_closed
-                    else NotRunningError("the box does not run: start it first")
+                raise NotRunningError(
+                    NotRunningError.ENDED if self._is_closed else "the box does not run: start it first"
                 )
             self._awaited.add(future)
 
