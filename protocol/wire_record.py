@@ -119,13 +119,15 @@ class WireField:
 
 
 _METADATA_KEY = "wire"
+_ZEROS = {"?": False, "f": 0.0, "d": 0.0, "p": "", "t": "", "s": "", "*": ()}
+"""Defaults of the types that are no whole numbers."""
 
 
 def wire(
     code: str,
     note: str = "",
     *,
-    default: Any = 0,
+    default: Any = None,
     count: int = 1,
     unit: str = "",
     interleaved: str = "",
@@ -134,8 +136,13 @@ def wire(
     record: type[Any] | None = None,
     origin: ValueOrigin | None = None,
 ) -> Any:
-    """Declare a field of a record; see `WireField`. The default of a vector is `count` times `default`."""
+    """Declare a field of a record; see `WireField`.
+
+    The default of a vector is `count` times `default`, which is the zero of the type if none is given.
+    """
     row = WireField("", code, count, interleaved, only_if, since, unit, note, record, origin)
+    if default is None:
+        default = _ZEROS.get(code, 0)
     value = (default,) * count if count > 1 else default
     return dataclasses.field(default=value, metadata={_METADATA_KEY: row})
 

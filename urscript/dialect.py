@@ -20,8 +20,8 @@ Decisions without a constant, and where they are made:
 | two definitions of one name | the later one counts | resolver |
 | `sleep` of a fraction of a cycle, of less than 0 | a whole cycle, none | runtime |
 | order of threads | the body, then by age | threads |
-| log(b, 0), asin(NaN), floor(1e10) | infinite, NaN, an error | builtins.urmath |
-| str_find from beyond the ends, to_num("12 "), to_num("5e-4") | -1, an error, a float | builtins.strings |
+| log(b, 0), asin(NaN), floor(1e10) | infinite, NaN, an error | builtins |
+| str_find from beyond the ends, to_num("12 "), to_num("5e-4") | -1, an error, a float | builtins |
 """
 
 from __future__ import annotations

@@ -46,6 +46,14 @@ __all__ = [
 ]
 
 
+_MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = ValueOrigin
+
+_SINCE_3_1 = since((3, 1))
+_SINCE_3_2 = since((3, 2))
+_SINCE_3_5 = since((3, 5))
+_SINCE_3_10 = since((3, 10), (5, 4))
+_SINCE_5_25_1 = Since(None, SoftwareVersion(5, 25, 1))
+
 _SEED = 0xC70F6907
 _MULTIPLIER = 0xC6A4A7935BD1E995
 _MASK = 2**64 - 1
@@ -84,10 +92,6 @@ def _mixed(value: int) -> int:
 # after the brakes have opened
 
 
-_SINCE_5_25_1 = Since(None, SoftwareVersion(5, 25, 1))
-_PROPERTY, _CONSTANT, _ZERO = ValueOrigin.PROPERTY, ValueOrigin.CONSTANT, ValueOrigin.INTERNAL_ZERO
-
-
 @dataclass(frozen=True, slots=True)
 class KinematicsInfo(SubPackage):
     """Denavit-Hartenberg parameters of this very arm; clients make their calibration check from it."""
@@ -98,10 +102,10 @@ class KinematicsInfo(SubPackage):
     checksum: tuple[int, ...] = wire(
         "I", "all ones on the maker's simulator", count=6, default=SIMULATOR_CHECKSUM, origin=_PROPERTY
     )
-    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
-    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
-    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
-    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", origin=_PROPERTY)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", origin=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", origin=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", origin=_PROPERTY)
     calibration_status: int = wire("I", origin=_CONSTANT)
 
     @property
@@ -118,13 +122,13 @@ class ConfigurationData(SubPackage):
     FIRST_STATE_ONLY: ClassVar[bool] = True
 
     joint_min_limit: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="limits", default=0.0, origin=_PROPERTY
+        "d", count=6, unit="rad", interleaved="limits", origin=_PROPERTY
     )
     joint_max_limit: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="limits", default=0.0, origin=_PROPERTY
+        "d", count=6, unit="rad", interleaved="limits", origin=_PROPERTY
     )
     joint_max_speed: tuple[float, ...] = wire(
-        "d", count=6, unit="rad/s", interleaved="rates", default=0.0, origin=_PROPERTY
+        "d", count=6, unit="rad/s", interleaved="rates", origin=_PROPERTY
     )
     joint_max_acceleration: tuple[float, ...] = wire(
         "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, origin=_CONSTANT
@@ -134,10 +138,10 @@ class ConfigurationData(SubPackage):
     v_tool_default: float = wire("d", unit="m/s", default=0.25, origin=_CONSTANT)
     a_tool_default: float = wire("d", unit="m/s2", default=1.2, origin=_CONSTANT)
     eq_radius: float = wire("d", unit="m", default=0.25, origin=_CONSTANT)
-    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
-    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", default=0.0, origin=_PROPERTY)
-    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
-    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", default=0.0, origin=_PROPERTY)
+    dh_a: tuple[float, ...] = wire("d", count=6, unit="m", origin=_PROPERTY)
+    dh_d: tuple[float, ...] = wire("d", count=6, unit="m", origin=_PROPERTY)
+    dh_alpha: tuple[float, ...] = wire("d", count=6, unit="rad", origin=_PROPERTY)
+    dh_theta: tuple[float, ...] = wire("d", count=6, unit="rad", origin=_PROPERTY)
     masterboard_version: int = wire(
         "i",
         f"{SIMULATED_MASTERBOARD} of this box, {LOCKSTEP_MASTERBOARD} in lockstep, by which clients know it; "
@@ -166,7 +170,7 @@ class CalibrationData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 9
 
-    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", default=0.0, origin=_ZERO)
+    wrench: tuple[float, ...] = wire("d", count=6, unit="N, Nm", origin=_ZERO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,9 +187,6 @@ class SingularityInfo(SubPackage):
 # --- the tool connector
 
 
-_MEASURED, _MODELLED = ValueOrigin.MEASURED, ValueOrigin.MODELLED
-
-
 @dataclass(frozen=True, slots=True)
 class ToolData(SubPackage):
     """Tool connector: analogue inputs, supply, temperature."""
@@ -194,11 +195,11 @@ class ToolData(SubPackage):
 
     analog_input_range2: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
     analog_input_range3: int = wire("B", "0 current, 1 voltage", origin=_MODELLED)
-    analog_input2: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
-    analog_input3: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    analog_input2: float = wire("d", unit="A or V", origin=_MODELLED)
+    analog_input3: float = wire("d", unit="A or V", origin=_MODELLED)
     tool_voltage_48v: float = wire("f", unit="V", default=48.0, origin=_MEASURED)
     tool_output_voltage: int = wire("B", "0, 12 or 24", unit="V", origin=_MODELLED)
-    tool_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
+    tool_current: float = wire("f", unit="A", origin=_MODELLED)
     tool_temperature: float = wire("f", unit="degC", default=25.0, origin=_MEASURED)
     tool_mode: int = wire("B", "JointMode, the tool's subset", default=239, origin=_MODELLED)
 
@@ -210,7 +211,7 @@ class ToolCommunicationInfo(SubPackage):
     SUB_TYPE: ClassVar[int] = 11
     SINCE: ClassVar[Since] = since(None, (5, 0))
 
-    is_enabled: bool = wire("?", default=False, origin=_MODELLED)
+    is_enabled: bool = wire("?", origin=_MODELLED)
     baud_rate: int = wire("i", default=115200, origin=_MODELLED)
     parity: int = wire("i", "0 none, 1 odd, 2 even", origin=_MODELLED)
     stop_bits: int = wire("i", default=1, origin=_MODELLED)
@@ -230,14 +231,6 @@ class ToolModeInfo(SubPackage):
     digital_output_mode1: int = wire("B", "1 sinking, 2 sourcing, 3 push-pull", default=1, origin=_MODELLED)
 
 
-_MEASURED, _MODELLED, _PROPERTY, _CONSTANT, _ZERO = ValueOrigin
-
-_SINCE_3_1 = since((3, 1))
-_SINCE_3_2 = since((3, 2))
-_SINCE_3_5 = since((3, 5))
-_SINCE_3_10 = since((3, 10), (5, 4))
-
-
 @dataclass(frozen=True, slots=True)
 class RobotModeData(SubPackage):
     """Modes, flags and speed scaling; clients pick their whole parser by its size."""
@@ -246,16 +239,12 @@ class RobotModeData(SubPackage):
 
     timestamp: int = wire("Q", "since controller start, a multiple of the cycle", unit="us", origin=_MODELLED)
     is_real_robot_connected: bool = wire("?", "control box and arm talk", default=True, origin=_MODELLED)
-    is_real_robot_enabled: bool = wire(
-        "?", "true from POWER_ON to RUNNING (inferred)", default=False, origin=_MODELLED
-    )
-    is_robot_power_on: bool = wire(
-        "?", "true from POWER_ON to RUNNING (inferred)", default=False, origin=_MODELLED
-    )
-    is_emergency_stopped: bool = wire("?", default=False, origin=_MODELLED)
-    is_protective_stopped: bool = wire("?", default=False, origin=_MODELLED)
-    is_program_running: bool = wire("?", default=False, origin=_MODELLED)
-    is_program_paused: bool = wire("?", default=False, origin=_MODELLED)
+    is_real_robot_enabled: bool = wire("?", "true from POWER_ON to RUNNING (inferred)", origin=_MODELLED)
+    is_robot_power_on: bool = wire("?", "true from POWER_ON to RUNNING (inferred)", origin=_MODELLED)
+    is_emergency_stopped: bool = wire("?", origin=_MODELLED)
+    is_protective_stopped: bool = wire("?", origin=_MODELLED)
+    is_program_running: bool = wire("?", origin=_MODELLED)
+    is_program_paused: bool = wire("?", origin=_MODELLED)
     robot_mode: int = wire(
         "b", "RobotMode; signed, so that NO_CONTROLLER fits", default=RobotMode.POWER_OFF, origin=_MODELLED
     )
@@ -272,26 +261,18 @@ class JointData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 1
 
-    q_actual: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="joint", default=0.0, origin=_MEASURED
-    )
-    q_target: tuple[float, ...] = wire(
-        "d", count=6, unit="rad", interleaved="joint", default=0.0, origin=_MODELLED
-    )
-    qd_actual: tuple[float, ...] = wire(
-        "d", count=6, unit="rad/s", interleaved="joint", default=0.0, origin=_MEASURED
-    )
-    current_actual: tuple[float, ...] = wire(
-        "f", count=6, unit="A", interleaved="joint", default=0.0, origin=_MEASURED
-    )
+    q_actual: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="joint", origin=_MEASURED)
+    q_target: tuple[float, ...] = wire("d", count=6, unit="rad", interleaved="joint", origin=_MODELLED)
+    qd_actual: tuple[float, ...] = wire("d", count=6, unit="rad/s", interleaved="joint", origin=_MEASURED)
+    current_actual: tuple[float, ...] = wire("f", count=6, unit="A", interleaved="joint", origin=_MEASURED)
     voltage_actual: tuple[float, ...] = wire(
-        "f", "0 on simulators", count=6, unit="V", interleaved="joint", default=0.0, origin=_MEASURED
+        "f", "0 on simulators", count=6, unit="V", interleaved="joint", origin=_MEASURED
     )
     temperature_motor: tuple[float, ...] = wire(
         "f", count=6, unit="degC", interleaved="joint", default=25.0, origin=_MEASURED
     )
     temperature_micro: tuple[float, ...] = wire(
-        "f", "obsolete", count=6, unit="degC", interleaved="joint", default=0.0, origin=_ZERO
+        "f", "obsolete", count=6, unit="degC", interleaved="joint", origin=_ZERO
     )
     joint_mode: tuple[int, ...] = wire(
         "B", "JointMode", count=6, interleaved="joint", default=239, origin=_MODELLED
@@ -308,29 +289,23 @@ class MasterboardData(SubPackage):
     digital_output_bits: int = wire("i", "as the inputs", origin=_MODELLED)
     analog_input_range0: int = wire("B", "0 current, 1 voltage", default=1, origin=_MODELLED)
     analog_input_range1: int = wire("B", "0 current, 1 voltage", default=1, origin=_MODELLED)
-    analog_input0: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
-    analog_input1: float = wire("d", unit="A or V", default=0.0, origin=_MODELLED)
+    analog_input0: float = wire("d", unit="A or V", origin=_MODELLED)
+    analog_input1: float = wire("d", unit="A or V", origin=_MODELLED)
     analog_output_domain0: int = wire("b", "0 current, 1 voltage", origin=_MODELLED)
     analog_output_domain1: int = wire("b", "0 current, 1 voltage", origin=_MODELLED)
     analog_output0: float = wire("d", unit="A or V", default=0.004, origin=_MODELLED)
     analog_output1: float = wire("d", unit="A or V", default=0.004, origin=_MODELLED)
     masterboard_temperature: float = wire("f", unit="degC", default=24.0, origin=_MODELLED)
     robot_voltage_48v: float = wire("f", unit="V", default=48.0, origin=_MODELLED)
-    robot_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
-    master_io_current: float = wire("f", unit="A", default=0.0, origin=_MODELLED)
+    robot_current: float = wire("f", unit="A", origin=_MODELLED)
+    master_io_current: float = wire("f", unit="A", origin=_MODELLED)
     safety_mode: int = wire("B", "SafetyMode", default=SafetyMode.NORMAL, origin=_MODELLED)
-    in_reduced_mode: bool = wire("?", default=False, origin=_MODELLED)
-    euromap67_installed: bool = wire(
-        "?", "true: the next four fields are there", default=False, origin=_CONSTANT
-    )
+    in_reduced_mode: bool = wire("?", origin=_MODELLED)
+    euromap67_installed: bool = wire("?", "true: the next four fields are there", origin=_CONSTANT)
     euromap67_input_bits: int = wire("I", only_if="euromap67_installed", origin=_CONSTANT)
     euromap67_output_bits: int = wire("I", only_if="euromap67_installed", origin=_CONSTANT)
-    euromap67_voltage_24v: float = wire(
-        "f", unit="V", default=0.0, only_if="euromap67_installed", origin=_CONSTANT
-    )
-    euromap67_current: float = wire(
-        "f", unit="A", default=0.0, only_if="euromap67_installed", origin=_CONSTANT
-    )
+    euromap67_voltage_24v: float = wire("f", unit="V", only_if="euromap67_installed", origin=_CONSTANT)
+    euromap67_current: float = wire("f", unit="A", only_if="euromap67_installed", origin=_CONSTANT)
     safety_checksum: int = wire("I", "internal; repeats in SafetyData", origin=_PROPERTY)
     operational_mode_selector_input: int = wire("B", default=1, since=_SINCE_3_2, origin=_CONSTANT)
     three_position_enabling_device_input: int = wire("B", default=1, since=_SINCE_3_2, origin=_CONSTANT)
@@ -343,9 +318,9 @@ class CartesianInfo(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 4
 
-    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", default=0.0, origin=_MODELLED)
+    tcp_pose: tuple[float, ...] = wire("d", "in base", count=6, unit="m, rad", origin=_MODELLED)
     tcp_offset: tuple[float, ...] = wire(
-        "d", "in flange", count=6, unit="m, rad", default=0.0, since=_SINCE_3_1, origin=_MODELLED
+        "d", "in flange", count=6, unit="m, rad", since=_SINCE_3_1, origin=_MODELLED
     )
 
 
@@ -355,10 +330,8 @@ class ForceModeData(SubPackage):
 
     SUB_TYPE: ClassVar[int] = 7
 
-    wrench: tuple[float, ...] = wire(
-        "d", "in base axes", count=6, unit="N, Nm", default=0.0, origin=_MODELLED
-    )
-    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", default=0.0, origin=_MODELLED)
+    wrench: tuple[float, ...] = wire("d", "in base axes", count=6, unit="N, Nm", origin=_MODELLED)
+    robot_dexterity: float = wire("d", "squared determinant of the Jacobian", origin=_MODELLED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,7 +342,7 @@ class AdditionalInfo(SubPackage):
 
     teach_button_state: int = wire("B", origin=_MODELLED)
     freedrive_button_enabled: bool = wire("?", default=True, origin=_MODELLED)
-    io_enabled_freedrive: bool = wire("?", default=False, since=since((3, 3)), origin=_MODELLED)
+    io_enabled_freedrive: bool = wire("?", since=since((3, 3)), origin=_MODELLED)
     reserved: int = wire("B", default=1, since=_SINCE_3_10, origin=_CONSTANT)
 
 
@@ -383,9 +356,7 @@ class SafetyData(SubPackage):
     safety_checksum: int = wire("I", "repeats in MasterboardData", origin=_PROPERTY)
     flag0: int = wire("B", default=1, origin=_CONSTANT)
     flag1: int = wire("B", default=1, origin=_CONSTANT)
-    elbow_sphere: tuple[float, ...] = wire(
-        "d", "x y z in base, radius", count=4, unit="m", default=0.0, origin=_MODELLED
-    )
+    elbow_sphere: tuple[float, ...] = wire("d", "x y z in base, radius", count=4, unit="m", origin=_MODELLED)
 
 
 SUB_PACKAGES: tuple[type[SubPackage], ...] = (

@@ -111,7 +111,7 @@ class TextMessage(RobotMessage):
 
     MESSAGE_TYPE: ClassVar[int] = 0
 
-    text: str = wire("s", default="")
+    text: str = wire("s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +121,7 @@ class ProgramLabelMessage(RobotMessage):
     MESSAGE_TYPE: ClassVar[int] = 1
 
     label_id: int = wire("i", "number after the $")
-    text: str = wire("s", default="")
+    text: str = wire("s")
 
 
 # Characters of a title: its length is one byte on the wire.
@@ -136,11 +136,11 @@ class PopupMessage(RobotMessage):
 
     request_id: int = wire("I", since=_SINCE_3_3)
     requested_type: int = wire("I", "RequestedType", default=RequestedType.NONE, since=_SINCE_3_3)
-    is_warning: bool = wire("?", default=False)
-    is_error: bool = wire("?", default=False)
-    is_blocking: bool = wire("?", default=False, since=_SINCE_3_3)
-    title: str = wire("p", default="")
-    text: str = wire("s", default="")
+    is_warning: bool = wire("?")
+    is_error: bool = wire("?")
+    is_blocking: bool = wire("?", since=_SINCE_3_3)
+    title: str = wire("p")
+    text: str = wire("s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +158,7 @@ class VersionMessage(RobotMessage):
     minor: int = wire("B")
     bugfix: int = wire("i", "up to 3.2 the source revision stands here")
     build: int = wire("i", "0 in newer software", since=_SINCE_3_3)
-    build_date: str = wire("s", "dd-mm-yyyy, hh:mm:ss; old clients hold 20 characters", default="")
+    build_date: str = wire("s", "dd-mm-yyyy, hh:mm:ss; old clients hold 20 characters")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,7 +185,7 @@ class ErrorCodeMessage(RobotMessage):
     report_level: int = wire("i", "ReportLevel", default=ReportLevel.INFO, since=_SINCE_3_3)
     data_type: int = wire("I", "2 signed, 3 float, 4 hexadecimal, else unsigned", since=_SINCE_3_3)
     data: int = wire("I", "bits of the datum", since=_SINCE_3_3)
-    text: str = wire("s", default="")
+    text: str = wire("s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,8 +196,8 @@ class KeyMessage(RobotMessage):
 
     code: int = wire("i")
     argument: int = wire("i")
-    title: str = wire("p", default="")
-    text: str = wire("s", default="")
+    title: str = wire("p")
+    text: str = wire("s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,7 +208,7 @@ class RequestValueMessage(RobotMessage):
 
     request_id: int = wire("I")
     requested_type: int = wire("I", "RequestedType", default=RequestedType.BOOLEAN)
-    text: str = wire("s", default="")
+    text: str = wire("s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,7 +219,7 @@ class RuntimeExceptionMessage(RobotMessage):
 
     line: int = wire("i", since=_SINCE_3_3)
     column: int = wire("i", since=_SINCE_3_3)
-    text: str = wire("s", default="")
+    text: str = wire("s")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -242,8 +242,8 @@ class ThreadLabel:
     """Position of one thread in PolyScope's program tree."""
 
     label_id: int = wire("i", "number after the $")
-    text: str = wire("t", default="")
-    thread_name: str = wire("t", default="")
+    text: str = wire("t")
+    thread_name: str = wire("t")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -257,7 +257,7 @@ class ProgramThreadsMessage(RobotMessage):
     MESSAGE_TYPE: ClassVar[int] = 14
     SINCE: ClassVar[Since] = _SINCE_3_3
 
-    threads: tuple[ThreadLabel, ...] = wire("*", default=(), record=ThreadLabel)
+    threads: tuple[ThreadLabel, ...] = wire("*", record=ThreadLabel)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

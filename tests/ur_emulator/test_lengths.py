@@ -20,8 +20,8 @@ from ur_emulator.box_log import MAX_TEXT
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.servers.http.messages import MAX_HEADER
-from urscript.builtins.strings import TEXT_LIMIT
 from urscript.dialect import LONGEST_LABEL, LONGEST_NAME, LONGEST_STRING
+from urscript.values import TEXT_LIMIT
 
 NAME, LABEL, STRING = "n" * (LONGEST_NAME + 1), "l" * (LONGEST_LABEL + 1), "s" * (LONGEST_STRING // 2 + 1)
 HOST = "h" * (BUDGETS.host_length + 1)

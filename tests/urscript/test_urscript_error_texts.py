@@ -162,6 +162,6 @@ def test_the_search_finds_the_places():
     assert {file for file, *_ in sites} >= {
         "run/runtime.py",
         "run/variables.py",
-        "builtins/urmath.py",
+        "builtins.py",
         "names/resolver.py",
     }

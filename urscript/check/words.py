@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import Final, NamedTuple
+from collections.abc import Mapping
+from typing import Final, NamedTuple, TypeVar
 
 from urscript.errors import ScriptCompileError, ScriptNameError, ScriptTypeError
+
+T = TypeVar("T")
 
 
 class ForeignWord(NamedTuple):
@@ -23,43 +26,36 @@ class ForeignWord(NamedTuple):
     exact: bool = False
 
 
-_COUNT: Final = "write i = 0, then while i < n: ... i = i + 1 end"
-_IMPORT: Final = "all functions are available; remove the line"
+def _by_word(rows: Mapping[str, T]) -> dict[str, T]:
+    """A table with a row for each word, from one with a row for several, which blanks separate."""
+    return {word: row for words, row in rows.items() for word in words.split(" ")}
 
-STATEMENTS: Final[dict[str, ForeignWord]] = {
-    "elseif": ForeignWord("write elif", "elif", True),
-    "elsif": ForeignWord("write elif", "elif", True),
-    "elsf": ForeignWord("write elif", "elif", True),
-    "function": ForeignWord("write def", "def", True),
-    "func": ForeignWord("write def", "def", True),
-    "fn": ForeignWord("write def", "def", True),
-    "sub": ForeignWord("write def", "def", True),
-    "procedure": ForeignWord("write def", "def", True),
-    "void": ForeignWord("write def", "def", True),
-    "for": ForeignWord(_COUNT, "while True:"),
-    "foreach": ForeignWord(_COUNT, "while True:"),
-    "loop": ForeignWord("write while True:", "while True:", True),
-    "repeat": ForeignWord("write while True: ... if done: break end ... end", "while True:"),
-    "until": ForeignWord("write while not done:", "while True:"),
-    "do": ForeignWord("write while True: ... if done: break end ... end", "while True:"),
-    "unless": ForeignWord("write if not ...:", "if True:"),
-    "switch": ForeignWord("write if, elif and else", "if True:"),
-    "match": ForeignWord("write if, elif and else", "if True:"),
-    "case": ForeignWord("write if, elif and else"),
-    "default": ForeignWord("write else"),
-    "try": ForeignWord("an error ends the program; check conditions before", "if True:"),
-    "except": ForeignWord("an error ends the program; check conditions before", "else:"),
-    "catch": ForeignWord("an error ends the program; check conditions before", "else:"),
-    "finally": ForeignWord("an error ends the program; check conditions before"),
-    "with": ForeignWord("call the open and close functions", "if True:"),
-    "class": ForeignWord("write functions", "if True:"),
-    "import": ForeignWord(_IMPORT),
-    "from": ForeignWord(_IMPORT),
-    "include": ForeignWord(_IMPORT),
-    "var": ForeignWord("write x = 1, global x = 1 or local x = 1"),
-    "let": ForeignWord("write x = 1, global x = 1 or local x = 1"),
-    "const": ForeignWord("write x = 1, global x = 1 or local x = 1"),
-}
+
+_IMPORT: Final = "all functions are available; remove the line"
+_UNTIL: Final = "write while True: ... if done: break end ... end"
+_NO_EXCEPTIONS: Final = "an error ends the program; check conditions before"
+
+STATEMENTS: Final[dict[str, ForeignWord]] = _by_word(
+    {
+        "elseif elsif elsf": ForeignWord("write elif", "elif", True),
+        "function func fn sub procedure void": ForeignWord("write def", "def", True),
+        "for foreach": ForeignWord("write i = 0, then while i < n: ... i = i + 1 end", "while True:"),
+        "loop": ForeignWord("write while True:", "while True:", True),
+        "repeat do": ForeignWord(_UNTIL, "while True:"),
+        "until": ForeignWord("write while not done:", "while True:"),
+        "unless": ForeignWord("write if not ...:", "if True:"),
+        "switch match": ForeignWord("write if, elif and else", "if True:"),
+        "case": ForeignWord("write if, elif and else"),
+        "default": ForeignWord("write else"),
+        "try": ForeignWord(_NO_EXCEPTIONS, "if True:"),
+        "except catch": ForeignWord(_NO_EXCEPTIONS, "else:"),
+        "finally": ForeignWord(_NO_EXCEPTIONS),
+        "with": ForeignWord("call the open and close functions", "if True:"),
+        "class": ForeignWord("write functions", "if True:"),
+        "import from include": ForeignWord(_IMPORT),
+        "var let const": ForeignWord("write x = 1, global x = 1 or local x = 1"),
+    }
+)
 
 BLOCK_ENDS: Final = frozenset(
     {"endif", "endwhile", "endfor", "enddef", "endfunction", "endthread", "endloop", "fi", "done", "wend"}
@@ -93,66 +89,44 @@ RESERVED: Final = frozenset(
 )
 """Reserved words."""
 
-NAMES: Final[dict[str, str]] = {
-    "print": "write textmsg(...)",
-    "printf": "write textmsg(...)",
-    "println": "write textmsg(...)",
-    "echo": "write textmsg(...)",
-    "log_message": "write textmsg(...)",
-    "len": "write length(...)",
-    "count": "write length(...)",
-    "str": "write to_str(...)",
-    "string": "write to_str(...)",
-    "int": "write floor(...), ceil(...), or to_num(...) for a string",
-    "float": "write to_num(...) for a string; numbers need no conversion",
-    "abs": "write norm(...)",
-    "fabs": "write norm(...)",
-    "max": "write an if",
-    "min": "write an if",
-    "round": "write floor(x + 0.5)",
-    "fmod": "write a % b",
-    "range": "count in a while loop",
-    "append": "a list has a fixed length; write one that is long enough",
-    "input": "write request_string_from_primary_client(...)",
-    "time": "count with get_steptime()",
-    "null": "write None",
-    "nil": "write None",
-    "none": "write None",
-    "NULL": "write None",
-    "TRUE": "write True",
-    "FALSE": "write False",
-    "on": "write True",
-    "off": "write False",
-    "pi": "write 3.141592653589793",
-    "PI": "write 3.141592653589793",
-    "M_PI": "write 3.141592653589793",
-    "math": "mathematical functions have no prefix: sqrt(x), sin(x)",
-    "np": "mathematical functions have no prefix: sqrt(x), sin(x)",
-    "self": "URScript has no objects",
-    "this": "URScript has no objects",
-    "pass": "a block may be empty; remove it",
-    "wait": "write sleep(...)",
-    "delay": "write sleep(...)",
-    "usleep": "write sleep(...), in seconds",
-    "pause": "write sleep(...) to wait, halt to end",
-    "stop": "write stopj(2) for the arm, halt for the program",
-    "exit": "write halt",
-    "quit": "write halt",
-    "goto": "write a while loop",
-    "degrees": "write r2d(...)",
-    "radians": "write d2r(...)",
-    "deg2rad": "write d2r(...)",
-    "rad2deg": "write r2d(...)",
-    "random_float": "write random()",
-    "rand": "write random()",
-    "moveJ": "write movej(...)",
-    "MoveJ": "write movej(...)",
-    "moveL": "write movel(...)",
-    "MoveL": "write movel(...)",
-    "move": "write movej(...) or movel(...)",
-    **dict.fromkeys(("double", "bool", "char", "auto"), "remove it: x = 1 is enough"),
-    **dict.fromkeys(("import", "from", "include"), _IMPORT),
-}
+NAMES: Final[dict[str, str]] = _by_word(
+    {
+        "print printf println echo log_message": "write textmsg(...)",
+        "len count": "write length(...)",
+        "str string": "write to_str(...)",
+        "int": "write floor(...), ceil(...), or to_num(...) for a string",
+        "float": "write to_num(...) for a string; numbers need no conversion",
+        "abs fabs": "write norm(...)",
+        "max min": "write an if",
+        "round": "write floor(x + 0.5)",
+        "fmod": "write a % b",
+        "range": "count in a while loop",
+        "append": "a list has a fixed length; write one that is long enough",
+        "input": "write request_string_from_primary_client(...)",
+        "time": "count with get_steptime()",
+        "null nil none NULL": "write None",
+        "TRUE on": "write True",
+        "FALSE off": "write False",
+        "pi PI M_PI": "write 3.141592653589793",
+        "math np": "mathematical functions have no prefix: sqrt(x), sin(x)",
+        "self this": "URScript has no objects",
+        "pass": "a block may be empty; remove it",
+        "wait delay": "write sleep(...)",
+        "usleep": "write sleep(...), in seconds",
+        "pause": "write sleep(...) to wait, halt to end",
+        "stop": "write stopj(2) for the arm, halt for the program",
+        "exit quit": "write halt",
+        "goto": "write a while loop",
+        "degrees rad2deg": "write r2d(...)",
+        "radians deg2rad": "write d2r(...)",
+        "random_float rand": "write random()",
+        "moveJ MoveJ": "write movej(...)",
+        "moveL MoveL": "write movel(...)",
+        "move": "write movej(...) or movel(...)",
+        "double bool char auto": "remove it: x = 1 is enough",
+        "import from include": _IMPORT,
+    }
+)
 """Names of other languages: hint."""
 
 TYPES: Final = frozenset(
@@ -160,50 +134,39 @@ TYPES: Final = frozenset(
 )
 """Words before the name in a declaration of another language."""
 
-KEYWORDS: Final[dict[str, str]] = {
-    **dict.fromkeys(("acc", "accel", "acceleration"), "a"),
-    **dict.fromkeys(("vel", "speed", "velocity"), "v"),
-    **dict.fromkeys(("time", "duration"), "t"),
-    **dict.fromkeys(("radius", "blend", "blend_radius"), "r"),
-}
+KEYWORDS: Final[dict[str, str]] = _by_word(
+    {
+        "acc accel acceleration": "a",
+        "vel speed velocity": "v",
+        "time duration": "t",
+        "radius blend blend_radius": "r",
+    }
+)
 """Guessed names of arguments: the name in URScript."""
 
-SYMBOLS: Final[dict[str, tuple[str, str]]] = {
-    "&&": ("and", "write and"),
-    "||": ("or", "write or"),
-    "&": ("and", "write and; bits are in integer_to_binary_list(...)"),
-    "|": ("or", "write or; bits are in integer_to_binary_list(...)"),
-    ";": (" ", "remove it; statements need no separator"),
-    "{": (":", "a block begins with ':' and ends with 'end'"),
-    "}": ("end", "a block begins with ':' and ends with 'end'"),
-    "^": ("*", "write pow(a, b)"),
-    "?": (" ", "write if ...: x = a else: x = b end"),
-    "\u201c": ('"', 'write "'),
-    "\u201d": ('"', 'write "'),
-    "\u201e": ('"', 'write "'),
-    "\u00ab": ('"', 'write "'),
-    "\u00bb": ('"', 'write "'),
-    "\u2018": ('"', 'write "'),
-    "\u2019": ('"', 'write "'),
-    "\u00b4": ('"', 'write "'),
-    "`": ('"', 'write "'),
-    "'": ('"', 'write "'),
-    "\u2013": ("-", "write -"),
-    "\u2014": ("-", "write -"),
-    "\u2212": ("-", "write -"),
-    "\u00d7": ("*", "write *"),
-    "\u00b7": ("*", "write *"),
-    "\u00f7": ("/", "write /"),
-    "\u2264": ("<=", "write <="),
-    "\u2265": (">=", "write >="),
-    "\u2260": ("!=", "write !="),
-    "\u00a0": (" ", "write a space"),
-    "\u202f": (" ", "write a space"),
-    "\u2009": (" ", "write a space"),
-    "\u200b": (" ", "remove it"),
-    "\ufeff": (" ", "remove it"),
-    "\\": (" ", "remove it; a statement may continue on the next line"),
-}
+SYMBOLS: Final[dict[str, tuple[str, str]]] = _by_word(
+    {
+        "&&": ("and", "write and"),
+        "||": ("or", "write or"),
+        "&": ("and", "write and; bits are in integer_to_binary_list(...)"),
+        "|": ("or", "write or; bits are in integer_to_binary_list(...)"),
+        ";": (" ", "remove it; statements need no separator"),
+        "{": (":", "a block begins with ':' and ends with 'end'"),
+        "}": ("end", "a block begins with ':' and ends with 'end'"),
+        "^": ("*", "write pow(a, b)"),
+        "?": (" ", "write if ...: x = a else: x = b end"),
+        "\u201c \u201d \u201e \u00ab \u00bb \u2018 \u2019 \u00b4 ` '": ('"', 'write "'),
+        "\u2013 \u2014 \u2212": ("-", "write -"),
+        "\u00d7 \u00b7": ("*", "write *"),
+        "\u00f7": ("/", "write /"),
+        "\u2264": ("<=", "write <="),
+        "\u2265": (">=", "write >="),
+        "\u2260": ("!=", "write !="),
+        "\u00a0 \u202f \u2009": (" ", "write a space"),
+        "\u200b \ufeff": (" ", "remove it"),
+        "\\": (" ", "remove it; a statement may continue on the next line"),
+    }
+)
 """Characters without meaning in URScript: replacement and hint."""
 
 INVISIBLE: Final = {
