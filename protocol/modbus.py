@@ -110,11 +110,7 @@ class ExceptionCode(IntEnum):
 
 
 class ModbusRequestError(Exception):
-    """A request that is answered with an exception.
-
-    Attributes:
-        code: of the exception.
-    """
+    """A request that is answered with an exception."""
 
     def __init__(self, code: ExceptionCode) -> None:
         super().__init__(f"Modbus exception {code.value}: {code.name}")
@@ -203,12 +199,7 @@ def encode_read_write(address: int, count: int, write_address: int, values: Sequ
 
 
 def decode_values(request: bytes, answer: bytes) -> tuple[int, ...] | None:
-    """Return the values that an answer reads or confirms; None if it does not answer the request.
-
-    Args:
-        request: made by `encode_read`, `encode_write` or `encode_read_write`.
-        answer: PDU of the frame with the same transaction.
-    """
+    """Return the values that the PDU of an answer reads or confirms; None if it answers another request."""
     function = ModbusFunction(request[0])
     _, _, word = _SHORT.unpack_from(request)
     if function.is_single_write:
@@ -283,12 +274,7 @@ def _unpacked(function: ModbusFunction, count: int, data: bytes) -> tuple[int, .
 
 
 def encode_answer(request: ModbusRequest, values: Sequence[int] = ()) -> bytes:
-    """Return the answer to a request that was done.
-
-    Args:
-        request: what was asked.
-        values: what was read, one for each address; unused for a write.
-    """
+    """Return the answer to a request that was done, with what was read, one value for each address."""
     function = request.function
     if function.is_single_write:
         return encode_write(function, request.address, request.values)

@@ -193,10 +193,7 @@ def pose_sub(p_to: Sequence[float], p_from: Sequence[float]) -> Pose:
 def interpolate_pose(p_from: Sequence[float], p_to: Sequence[float], alpha: float) -> Pose:
     """Straight line in position and shortest turn at constant rate in rotation.
 
-    Args:
-        p_from: pose at `alpha` = 0.
-        p_to: pose at `alpha` = 1.
-        alpha: may leave [0, 1]; the movement then continues beyond its ends.
+    `alpha` is 0 at `p_from` and 1 at `p_to`; outside of [0, 1] the movement continues beyond its ends.
 
     Source: URScript manual CB3, `interpolate_pose`.
     """

@@ -6,7 +6,7 @@ The numbers are those of the vendor's client interface documents, the same on ev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -242,19 +242,7 @@ class Ports:
         low, high = 1 - cls().dashboard, 65535 - cls().interpreter
         if not low <= offset <= high:
             raise LocalProtocolError(f"port offset {offset} leaves the TCP ports: use {low} to {high}")
-        return cls(
-            robot_api=max(0, cls().robot_api + offset),
-            modbus=max(0, cls().modbus + offset),
-            dashboard=29999 + offset,
-            primary=30001 + offset,
-            secondary=30002 + offset,
-            realtime=30003 + offset,
-            rtde=30004 + offset,
-            primary_ro=30011 + offset,
-            secondary_ro=30012 + offset,
-            realtime_ro=30013 + offset,
-            interpreter=30020 + offset,
-        )
+        return cls(**{name: max(0, port + offset) for name, port in asdict(cls()).items()})
 
 
 SIMULATED_MASTERBOARD = 2099

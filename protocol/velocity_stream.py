@@ -49,11 +49,7 @@ _AT_REST = (0.0,) * 6
 
 
 def encode_velocity(mode: VelocityMode, qd: Sequence[float] | NDArray[np.float64] = _AT_REST) -> bytes:
-    """One message to the robot.
-
-    Args:
-        mode: the mode word.
-        qd: six joint velocities [rad/s]; rounded to 1e-6 rad/s.
+    """One message to the robot: the mode word and six joint velocities [rad/s], rounded to 1e-6 rad/s.
 
     Raises:
         LocalProtocolError: not six values, or one is NaN, infinite or too large for the integer.

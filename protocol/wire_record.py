@@ -348,10 +348,7 @@ _codecs: dict[Any, Codec[Any]] = {}
 def codec_for(record: type[R], version: SoftwareVersion, present: tuple[str, ...] = ()) -> Codec[R]:
     """The codec of a record class as software `version` sends it; made once.
 
-    Args:
-        record: a dataclass with `wire` fields.
-        version: software of the controller.
-        present: names of the `only_if` conditions that hold.
+    `present` names the conditions (`only_if`) that hold.
 
     Raises:
         LocalProtocolError: the software is older than `OLDEST`.

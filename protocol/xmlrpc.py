@@ -13,7 +13,9 @@
 | struct                 | dict                         |
 | nil                    | None, in answers only        |
 
-dateTime.iso8601 and base64 are refused: no value of a robot's program is one.
+dateTime.iso8601 and base64 are refused: no value of a robot's program is one. The standard library's
+`xmlrpc.client` takes these and document types, bounds neither the depth nor the number of values, and imports
+HTTP and sockets; tests have it at the other end.
 Source: xmlrpc.com, XML-RPC specification; i8 and nil: extensions of Apache's library.
 """
 
@@ -40,11 +42,7 @@ class RemoteFaultError(Exception):
 
 
 def encode_call(method: str, arguments: Sequence[Any]) -> bytes:
-    """Return the body of a call.
-
-    Args:
-        method: name of the procedure.
-        arguments: int, float, bool, str, lists and dicts of them.
+    """Return the body of a call; arguments are int, float, bool, str, lists and dicts of them.
 
     Raises:
         LocalProtocolError: a text has a character that XML has not.
@@ -135,14 +133,9 @@ class _Name(str):
 
 
 class AnswerReader:
-    """Reads an answer as it comes."""
+    """Reads an answer as it comes; it may have `most_values` values, arrays and structs included."""
 
     def __init__(self, most_values: int) -> None:
-        """Prepare.
-
-        Args:
-            most_values: how many values an answer may have, arrays and structs included.
-        """
         self._values_left = most_values
         self._open = [_Element("")]
         self._parser = ParserCreate()

@@ -73,13 +73,9 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 def run_app(
     app: typer.Typer, program: str, words: Sequence[str] | None, complain: Callable[[str], None]
 ) -> int:
-    """Run a command line; return the exit code.
+    """Run a command line of an app made by `new_app`; return the exit code.
 
-    Args:
-        app: made by `new_app`.
-        program: name of the command.
-        words: its arguments; None: those of the process.
-        complain: shows one line on stderr.
+    Without `words` they are those of the process; `complain` shows one line on stderr.
     """
     given = list(sys.argv[1:] if words is None else words)
     try:

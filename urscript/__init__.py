@@ -32,26 +32,19 @@ if TYPE_CHECKING:
 
 check_packages()
 
-_HOME: Final = {
-    "ScriptCompileError": "errors",
-    "ScriptError": "errors",
-    "ScriptNameError": "errors",
-    "ScriptRuntimeError": "errors",
-    "ScriptSyntaxError": "errors",
-    "Host": "run.host",
-    "HostFunction": "run.host",
-    "CompiledProgram": "program",
-    "ProgramStatus": "program",
-    "RunningProgram": "program",
-    "check_program": "check.checking",
-    "compile_program": "program",
-    "RecordingHost": "recording_host",
-    "ScriptThread": "run.threads",
-    "Matrix": "values",
-    "Pose": "values",
-    "NEXT_CYCLE": "run.waits",
-    "Blocked": "run.waits",
-}
+_NAMES: Final = {
+    "check.checking": ("check_program",),
+    "errors": (
+        "ScriptCompileError", "ScriptError", "ScriptNameError", "ScriptRuntimeError", "ScriptSyntaxError"
+    ),
+    "program": ("CompiledProgram", "ProgramStatus", "RunningProgram", "compile_program"),
+    "recording_host": ("RecordingHost",),
+    "run.host": ("Host", "HostFunction"),
+    "run.threads": ("ScriptThread",),
+    "run.waits": ("NEXT_CYCLE", "Blocked"),
+    "values": ("Matrix", "Pose"),
+}  # fmt: skip
+_HOME: Final = {name: module for module, names in _NAMES.items() for name in names}
 """Which module each public name lives in."""
 
 __all__ = [

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
-from urscript.check import check_with_advice, with_advice
+from urscript.check.checking import check_with_advice, with_advice
 from urscript.check.warnings import RULES, ScriptWarning
 from urscript.commands.run_command import run
 from urscript.commands.support import (

@@ -135,11 +135,7 @@ class ScriptLexerError(ScriptSyntaxError):
 
 
 class ScriptNameError(ScriptCompileError):
-    """A name that is neither defined in the program nor built in.
-
-    Attributes:
-        name: The unknown name.
-    """
+    """A name that is neither defined in the program nor built in."""
 
     def __init__(self, name: str, *, line: int = 0, column: int = 0, hint: str | None = None) -> None:
         super().__init__(

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from urscript.errors import ScriptSyntaxError
 from urscript.source import BLANKS, Source
 from urscript.syntax.nodes import same_tree
-from urscript.syntax.parser import parse
+from urscript.syntax.parser import make_parser, parse
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -308,13 +308,7 @@ def read_comments(text: str, start: int, end: int) -> list[Comment]:
 
 @cache
 def _concrete_parser() -> Lark:
-    """The parser of the language without its tree builder: it keeps every bracket and comma."""
-    from importlib.resources import files
-
-    from lark import Lark
-
-    grammar = files("urscript.syntax").joinpath("grammar.lark").read_text(encoding="utf-8")
-    return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True)
+    return make_parser(None)
 
 
 _COMPOUND: Final = frozenset({"function", "thread", "if_", "elif_", "while_"})

@@ -298,10 +298,6 @@ def _script_error(error: Exception, texts: _Texts) -> ScriptRuntimeError:
     """The run-time error of the program for `error`, with its place and call stack.
 
     Where static types are known, compiled code uses Python's operators; their exceptions are translated here.
-
-    Args:
-        error: Exception of a thread.
-        texts: That the thread runs.
     """
     stack, innermost, source = _stack(error.__traceback__, texts)
     if isinstance(error, ScriptRuntimeError):

@@ -39,10 +39,6 @@ def as_bytes(text: str) -> str:
 def program_text(content: bytes, name: str) -> str:
     """Text of a program file as a controller receives it, without a byte order mark.
 
-    Args:
-        content: Of the file.
-        name: Of the file, for the message.
-
     Raises:
         ValueError: The file is UTF-16, as some editors of Windows save it; a controller cannot read that.
     """

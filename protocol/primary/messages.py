@@ -323,10 +323,6 @@ def version_message(
 
     Up to 3.2 the build number is in the place of the third number; from 3.10 on it is 0. The date has two
     forms. Source: captures of 3.3 and 3.10; that both changes came with 3.10 is assumed.
-
-    Args:
-        version: four numbers.
-        built: date and time of the build.
     """
     is_new = version >= _NEW_FORM
     return VersionMessage(

@@ -85,10 +85,7 @@ class RobotState:
 def encode_sub_package(record: type[SubPackage], source: Any, version: SoftwareVersion) -> bytes:
     """One sub-package, header included, as software `version` sends it.
 
-    Args:
-        record: the sub-package's class, which is its table.
-        source: an instance of it, or any object or mapping with fields of these names.
-        version: software of the controller.
+    `source` is an instance of `record`, or any object or mapping with fields of these names.
 
     Raises:
         LocalProtocolError: a field is missing or its value does not fit its type.
@@ -108,13 +105,9 @@ def encode_state(
 ) -> bytes:
     """A whole robot state package.
 
-    Records may come in any order; those that software `version` does not have are left out. For the
-    sub-packages that belong into a state see `state_types`.
-
-    Args:
-        records: one of each sub-package.
-        version: software of the controller.
-        sub_packages: of its generation, in the order of the wire.
+    Records may come in any order; those that software `version` does not have are left out, and those that
+    its generation does not have: `sub_packages` are in the order of the wire. For the sub-packages that
+    belong into a state see `state_types`.
 
     Raises:
         LocalProtocolError: two records of one type, a record without table, a value that does not fit, or
@@ -284,10 +277,8 @@ def encode_safety_tolerances() -> bytes:
 def decode_package(frame: bytes, version: SoftwareVersion) -> Package:
     """Read one whole package, as `FrameBuffer` cuts it.
 
-    Args:
-        frame: header and body.
-        version: software of the controller, from its version message (which itself may be read with any);
-            only messages and values of variables depend on it.
+    The version is that of the controller's version message, which itself may be read with any; only messages
+    and values of variables depend on it.
 
     Raises:
         RemoteProtocolError: the body ends before its fields do, or sub-package sizes do not add up.

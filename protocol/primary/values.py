@@ -398,10 +398,6 @@ def _package(timestamp: int, sub_type: int, body: bytes) -> bytes:
 def decode_program_state(body: bytes, version: SoftwareVersion) -> ProgramStateMessage:
     """Read the body of a package of type 25, from the timestamp on.
 
-    Args:
-        body: what follows the package header.
-        version: software of the controller: its codes of value types are not those of another.
-
     Raises:
         RemoteProtocolError: the body ends before its fields do, or a value has no known type.
     """

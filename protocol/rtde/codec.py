@@ -223,12 +223,7 @@ MAX_NAMES_SIZE = 2048
 
 
 def encode_message(message: Message, sender: Role, version: int) -> bytes:
-    """Bytes of a package.
-
-    Args:
-        message: what to send.
-        sender: who sends it; only text messages differ.
-        version: protocol version spoken.
+    """Bytes of a package in a version of the protocol; only text messages depend on who sends them.
 
     Raises:
         LocalProtocolError: a name, text or number has no place on the wire.
@@ -340,16 +335,9 @@ def take_package(buffer: bytearray, max_size: int) -> tuple[int, bytes] | None:
 
 
 def decode_message(kind: int, payload: bytes, sender: Role, version: int) -> Message | None:
-    """Package from bytes; surplus bytes after a fixed payload are skipped.
+    """Package from its type byte and what follows, or None if the type is unknown.
 
-    Args:
-        kind: type byte.
-        payload: what follows it.
-        sender: who has sent it.
-        version: protocol version spoken.
-
-    Returns:
-        The package, or None if its type is unknown.
+    Surplus bytes after a fixed payload are skipped.
 
     Raises:
         RemoteProtocolError: the payload is too short for its type.

@@ -10,8 +10,7 @@ from random_trees import WORDS, programs
 from tree_printer import print_program
 from typer.testing import CliRunner
 
-from urscript.check import check_with_advice
-from urscript.check.checking import RULES, advise, check_program, first_syntax_error
+from urscript.check.checking import RULES, advise, check_program, check_with_advice, first_syntax_error
 from urscript.cli import app
 from urscript.errors import ScriptSyntaxError
 from urscript.program import compile_program

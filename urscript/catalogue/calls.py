@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import hypot, isfinite
 from typing import Any, Literal
 
-from urscript.catalogue.types import Builtin, Param, ParamType
+from urscript.catalogue.types import FIXED_SIZE, Builtin, Param, ParamType
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, is_number, type_name
 
@@ -29,7 +29,6 @@ class CallSignature:
     """The signature of a function, builtin or of a program.
 
     Attributes:
-        function: name of the function.
         names: of its parameters, in order.
         optional: those that have a default.
         hint: added to the error.
@@ -41,12 +40,7 @@ class CallSignature:
     hint: str | None = None
 
     def check(self, n_positional: int, keywords: Sequence[str]) -> None:
-        """Raise ScriptTypeError, without a place, if these arguments do not fit.
-
-        Args:
-            n_positional: number of positional arguments.
-            keywords: names of the keyword arguments, in the order of the call.
-        """
+        """Raise ScriptTypeError, without a place, if these arguments do not fit."""
         self.check_keywords(n_positional, keywords)
         given = n_positional + len(keywords)
         if n_positional > len(self.names) or given < len(self.names) - len(self.optional):
@@ -80,11 +74,6 @@ class CallSignature:
 
 def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str] = ()) -> list[Slot]:
     """Decide for each parameter, in order, where its value comes from.
-
-    Args:
-        builtin: the function called.
-        n_positional: number of positional arguments.
-        keyword_names: names of the keyword arguments, in the order of the call.
 
     Returns:
         One slot for each parameter: `("arg", i)`, `("kw", name)` or `("default", value)`.
@@ -168,17 +157,7 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.NORMED: lambda value: type(value) is Pose or is_number(value) or _is_numbers(value),
 }
 
-_NUMERIC = frozenset(
-    {
-        ParamType.NUMBER,
-        ParamType.POSE,
-        ParamType.JOINTS,
-        ParamType.POSE_OR_JOINTS,
-        ParamType.VECTOR3,
-        ParamType.VECTOR6,
-        ParamType.NUMBERS,
-    }
-)
+_NUMERIC = FIXED_SIZE - {ParamType.BOOL, ParamType.INT} | {ParamType.NUMBERS}
 
 
 def fits(kind: ParamType, value: Any) -> bool:

@@ -11,7 +11,3 @@
 
 A rule must not raise; programs without errors never reach one.
 """
-
-from urscript.check.checking import check_with_advice, with_advice
-
-__all__ = ["check_with_advice", "with_advice"]

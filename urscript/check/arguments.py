@@ -177,13 +177,7 @@ _TOOL_SPEED: Final = 10.0
 
 
 class _Excess(NamedTuple):
-    """A value that is too large for its unit.
-
-    Attributes:
-        rule: The warning.
-        text: What is too large.
-        hint: What to write instead.
-    """
+    """A value that is too large for its unit: the warning, what is too large, what to write instead."""
 
     rule: Rule
     text: str
@@ -191,11 +185,9 @@ class _Excess(NamedTuple):
 
 
 def _wrong_unit(param: Param, value: Any) -> _Excess | None:
-    """What is too large in a constant argument, or None.
+    """What is too large in a constant argument, or None; numbers that are not known are 0.
 
-    Args:
-        param: The parameter; the first words of its unit say what it measures.
-        value: Its value; numbers that are not known are 0.
+    The first words of the parameter's unit say what it measures.
     """
     unit = param.unit
     if isinstance(value, Pose):

@@ -46,12 +46,7 @@ class Token(NamedTuple):
 
 
 class TokenizedText:
-    """A text and its tokens.
-
-    Attributes:
-        text: The text.
-        tokens: Its tokens in order, the last one of kind "end".
-    """
+    """A text and its tokens in order, the last one of kind "end"."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -150,13 +145,7 @@ def replacement(token: Token, new: str, last: Token | None = None) -> Edit:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """The first syntax error of a text.
-
-    Attributes:
-        tokenized: The text.
-        error: The parser's error.
-        index: Index of the token at the error.
-    """
+    """The first syntax error of a text; `index` is that of the token at the error."""
 
     tokenized: TokenizedText
     error: ScriptSyntaxError

@@ -100,12 +100,7 @@ ABOUT_VALUES: Final = frozenset({REFUSED_ARGUMENT, DEGREES, MILLIMETRES, SHORT_T
 
 
 class ScriptWarning(ScriptError):
-    """Allowed but probably a mistake.
-
-    Attributes:
-        rule: The row of the table.
-        span: The text that it concerns.
-    """
+    """Allowed but probably a mistake: the row of the table, and the span of the text that it concerns."""
 
     kind = "Warning"
 

@@ -14,7 +14,7 @@ import typer
 from ur_hil.command_line import ExitCode
 from urscript.catalogue import Catalogue
 from urscript.catalogue.types import Generation, Version
-from urscript.check import with_advice
+from urscript.check.checking import with_advice
 from urscript.commands.run_output import JsonOutput, MoveWatch, RunOutput, TextOutput
 from urscript.commands.support import AsJson, catalogue_of, read_program, show, shown_name
 from urscript.errors import ScriptCompileError
@@ -219,13 +219,7 @@ def _tracer(program: CompiledProgram, cycle: Callable[[], int], limit: int) -> A
 
 
 class TracedLine(NamedTuple):
-    """A line about to be executed.
-
-    Attributes:
-        thread: Name of the thread that executes it.
-        line: From 1.
-        text: The line without surrounding spaces.
-    """
+    """A line about to be executed: name of the thread, number from 1, text without surrounding spaces."""
 
     thread: str
     line: int

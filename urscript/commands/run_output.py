@@ -59,15 +59,12 @@ class RunOutput(Protocol):
 
 
 class TextOutput:
-    """Prints lines at once: what the program does to standard output, errors and the result to the other."""
+    """Prints lines at once: what the program does to standard output, errors and the result to the other.
+
+    `quiet`: texts of textmsg and errors only.
+    """
 
     def __init__(self, source: Source, *, quiet: bool) -> None:
-        """Print what a program reports.
-
-        Args:
-            source: the program.
-            quiet: print texts of textmsg and errors only.
-        """
         self._source = source
         self._quiet = quiet
 
@@ -124,12 +121,6 @@ class JsonOutput:
     """Collects everything and prints it at the end, as one JSON document."""
 
     def __init__(self, source: Source, file: str) -> None:
-        """Collect what a program reports.
-
-        Args:
-            source: the program.
-            file: name of its file.
-        """
         self._source = source
         self._file = file
         self._events: list[dict[str, Any]] = []
@@ -267,6 +258,12 @@ class WatchedMove:
 class MoveWatch:
     """Watches one run of a program.
 
+    Args:
+        program: The compiled program.
+        step_time: Length of a cycle [s].
+        clock: Returns the robot time [s].
+        on_move: Called with each move that has ended.
+
     Attributes:
         program: Run this instead of the one that was given.
     """
@@ -278,14 +275,6 @@ class MoveWatch:
         clock: Callable[[], float],
         on_move: Callable[[WatchedMove], None],
     ) -> None:
-        """Watch a program.
-
-        Args:
-            program: the compiled program.
-            step_time: length of a cycle [s].
-            clock: returns the robot time [s].
-            on_move: called with each move that has ended.
-        """
         inherited = {item.name: getattr(program, item.name) for item in fields(program)}
         self.program: CompiledProgram = _WatchedProgram(**inherited, watch=self)
         self._clock = clock

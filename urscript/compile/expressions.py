@@ -400,10 +400,7 @@ def _interpreter_call(made: ast.expr, scope: FunctionScope, span: Span) -> ast.e
 
         ((_l := (yield from _interpret(b_interpreter_mode(...), "f0", {"l_x": v_x})), v_x := _l[0]), None)[1]
 
-    Args:
-        made: The call of the builtin, which returns where the statements come from.
-        scope: Of the function that calls it.
-        span: Of the call.
+    `made` is the call of the builtin, which returns where the statements come from.
     """
     at = place(span)
     names = sorted(scope.locals)

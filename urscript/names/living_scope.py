@@ -24,11 +24,9 @@ class VisibleFunction:
     """A function or thread of the running program, or of an earlier statement.
 
     Attributes:
-        name: In the script.
         python_name: Of what it is compiled to.
         kind: "def" or "thread".
-        parameters: Their names.
-        optional: Those that have a default.
+        optional: Parameters that have a default.
         depth: Calls inside one another at most, from its own on.
     """
 
@@ -73,13 +71,7 @@ class LivingScope:
         )
 
     def open(self, source: Source, block: Block, prefix: str) -> ResolvedProgram:
-        """A program of these statements, to be resolved.
-
-        Args:
-            source: Their text.
-            block: The statements.
-            prefix: Of the Python names of their functions and values.
-        """
+        """A program of these statements, to be resolved; Python names in it begin with `prefix`."""
         main = FunctionScope(CALL, None, None, block, f"{prefix}main")
         main.functions.update((function.name, function.as_scope()) for function in self.functions)
         return ResolvedProgram(

@@ -44,12 +44,7 @@ def resolve(
 ) -> tuple[ResolvedProgram, list[ScriptCompileError]]:
     """Find every name of a parsed program.
 
-    Args:
-        block: The program.
-        source: Its text.
-        catalogue: The builtins.
-        dialect: Options of the language.
-        within: What it becomes, with the names that it finds (statements of interpreter mode).
+    `within` is what statements of interpreter mode become, with the names that they find.
 
     Returns:
         What was found, and all errors in the order of the text; with errors the program cannot be compiled.

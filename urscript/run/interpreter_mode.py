@@ -30,7 +30,17 @@ _NESTED: Final = "interpreter_mode cannot be called in interpreter mode: it cann
 
 
 class InterpreterMode:
-    """The interpreter mode of one running program."""
+    """The interpreter mode of one running program.
+
+    Args:
+        namespace: The globals of the compiled program.
+        scheduler: Its threads.
+        meter: Counts what they do.
+        bind: Gives builtins by their names in Python.
+        texts: Code and text of the program, and of all statements that are linked, by pseudo file name.
+        scopes: The names that statements find, pickled, by the function that calls `interpreter_mode`.
+        is_secondary: The program is a `sec`, which has no interpreter mode.
+    """
 
     def __init__(
         self,
@@ -43,17 +53,6 @@ class InterpreterMode:
         *,
         is_secondary: bool,
     ) -> None:
-        """Prepare.
-
-        Args:
-            namespace: The globals of the compiled program.
-            scheduler: Its threads.
-            meter: Counts what they do.
-            bind: Gives builtins by their names in Python.
-            texts: Code and text of the program, and of all statements that are linked, by pseudo file name.
-            scopes: The names that statements find, pickled, by the function that calls `interpreter_mode`.
-            is_secondary: The program is a `sec`, which has no interpreter mode.
-        """
         self._namespace = namespace
         self._scheduler = scheduler
         self._meter = meter

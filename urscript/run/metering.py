@@ -96,12 +96,6 @@ class Meter:
     """
 
     def __init__(self, namespace: dict[str, Any], work: WorkBudget) -> None:
-        """Count for a program.
-
-        Args:
-            namespace: globals of the compiled program.
-            work: what the program may do in a cycle.
-        """
         self._namespace = namespace
         self._granted: float = 0
         self.work = work

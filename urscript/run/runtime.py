@@ -253,12 +253,6 @@ def _ordering(sign: str, compare: Callable[[Any, Any], bool]) -> Callable[[Any, 
     return ordered
 
 
-less = _ordering("<", operator.lt)
-less_equal = _ordering("<=", operator.le)
-greater = _ordering(">", operator.gt)
-greater_equal = _ordering(">=", operator.ge)
-
-
 def truth(value: Any) -> bool:
     """A condition: a bool, a number that is not 0, or a string that is not empty; see `dialect`."""
     if value is True or value is False:
@@ -282,53 +276,31 @@ def _refuse(text: str) -> Any:
 
 
 _COMMON: Final[dict[str, Any]] = {
-    "_MISSING": object(),
-    "_NEXT_CYCLE": NEXT_CYCLE,
-    "_UNDEFINED": variables.UNDEFINED,
-    "_undefined": variables.undefined,
+    **{
+        f"_{function.__name__.lstrip('_')}": function
+        for function in (
+            add, sub, mul, div, mod, neg, pos, equal, unequal, truth,
+            variables.item, variables.cell, variables.member, variables.undefined, variables.kept,
+            variables.store_item, variables.store_cell, variables.store_member, variables.store_inside,
+            join, _halt, _refuse,
+        )
+    },
+    "_less": _ordering("<", operator.lt),
+    "_less_equal": _ordering("<=", operator.le),
+    "_greater": _ordering(">", operator.gt),
+    "_greater_equal": _ordering(">=", operator.ge),
+    "_wrap": wrap_int,
     "_Pose": Pose,
     "_pose": variables.make_pose,
     "_list": variables.make_list,
-    "_item": variables.item,
-    "_cell": variables.cell,
-    "_store_item": variables.store_item,
-    "_store_cell": variables.store_cell,
-    "_member": variables.member,
-    "_store_member": variables.store_member,
-    "_store_inside": variables.store_inside,
-    "_kept": variables.kept,
-    "_refuse": _refuse,
-    "_truth": truth,
-    "_wrap": wrap_int,
-    "_add": add,
-    "_sub": sub,
-    "_mul": mul,
-    "_div": div,
-    "_mod": mod,
-    "_neg": neg,
-    "_pos": pos,
-    "_equal": equal,
-    "_unequal": unequal,
-    "_less": less,
-    "_less_equal": less_equal,
-    "_greater": greater,
-    "_greater_equal": greater_equal,
-    "_join": join,
-    "_halt": _halt,
+    "_UNDEFINED": variables.UNDEFINED,
+    "_MISSING": object(),
+    "_NEXT_CYCLE": NEXT_CYCLE,
     "_OUT_OF_UNITS": OUT_OF_UNITS,
-}
+}  # fmt: skip
+"""What is the same for all programs; a function has its own name, behind an underscore."""
 
-
-_ARITHMETIC: Final = {
-    "_add": "+",
-    "_sub": "-",
-    "_mul": "*",
-    "_div": "/",
-    "_mod": "%",
-    "_neg": "-",
-    "_pos": "+",
-}
-
+_SIGNS: Final = {"_add": "+", "_sub": "-", "_mul": "*", "_div": "/", "_mod": "%", "_neg": "-", "_pos": "+"}
 
 _ASSIGN: Final = {
     "free": variables.assign_resizing,
@@ -347,7 +319,7 @@ def base_namespace(dialect: Dialect, methods: variables.Methods, meter: Meter) -
         "_change": calls.change,
     }
     if not dialect.array_arithmetic:
-        names |= {name: without_arrays(sign, _COMMON[name]) for name, sign in _ARITHMETIC.items()}
+        names |= {name: without_arrays(sign, _COMMON[name]) for name, sign in _SIGNS.items()}
     return names | meter.operations(names)
 
 

@@ -11,7 +11,8 @@ thread scheduling; the fixed order: streaming programs stutter without it.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator
-from typing import Any, Final
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from urscript.dialect import MAX_OPEN_CALLS, MAX_THREADS, Dialect
 from urscript.errors import ScriptBudgetError, ScriptRuntimeError
@@ -30,6 +31,7 @@ class ProgramHalted(BaseException):
     """Unwinds the thread that executed `halt`."""
 
 
+@dataclass(eq=False, repr=False, slots=True)
 class ScriptThread:
     """One thread of a program, and the value of its handle in the script.
 
@@ -48,38 +50,20 @@ class ScriptThread:
         body: The generator that runs it.
     """
 
-    __slots__ = (
-        "body",
-        "budget",
-        "children",
-        "depth",
-        "finished",
-        "label",
-        "name",
-        "open_calls",
-        "parent",
-        "resuming",
-        "slice_used",
-        "thread_id",
-        "wait",
-    )
-
-    script_type: Final = "thread"
-
-    def __init__(self, thread_id: int, name: str, parent: ScriptThread | None, body: ThreadBody) -> None:
-        self.thread_id = thread_id
-        self.name = name
-        self.parent = parent
-        self.body = body
-        self.children: list[ScriptThread] = []
-        self.finished = False
-        self.wait: Blocked | None = None
-        self.label = ""
-        self.budget: float = 0
-        self.slice_used = False
-        self.depth = 0
-        self.open_calls = 0
-        self.resuming = 0
+    thread_id: int
+    name: str
+    parent: ScriptThread | None
+    body: ThreadBody
+    children: list[ScriptThread] = field(default_factory=list)
+    finished: bool = False
+    wait: Blocked | None = None
+    label: str = ""
+    budget: float = 0
+    slice_used: bool = False
+    depth: int = 0
+    open_calls: int = 0
+    resuming: int = 0
+    script_type: ClassVar[str] = "thread"
 
     def subtree(self) -> Iterator[ScriptThread]:
         """Its unfinished descendants, deepest first, then itself."""
@@ -115,14 +99,6 @@ class Scheduler:
         dialect: Dialect,
         thread_ended: Callable[[ScriptThread], None],
     ) -> None:
-        """Prepare.
-
-        Args:
-            namespace: The globals of the compiled program.
-            meter: Counts what its threads do.
-            dialect: Says how many statements a time slice has, and how deep functions may call themselves.
-            thread_ended: Called at every end.
-        """
         self._namespace = namespace
         self._meter = meter
         self._budget = dialect.statement_budget
@@ -139,13 +115,9 @@ class Scheduler:
     def start(
         self, function: Callable[[], ThreadBody], name: str, parent: ScriptThread | None, depth: int
     ) -> ScriptThread:
-        """Start `function` as a thread; it first runs when its turn in the cycle comes.
+        """Start the generator that `function` makes as a thread; it first runs when its turn comes.
 
-        Args:
-            function: Makes the generator.
-            name: Of its definition.
-            parent: The thread that starts it.
-            depth: Calls inside one another that its functions allow.
+        `depth`: calls inside one another that its functions allow.
 
         Raises:
             ScriptRuntimeError: the program has as many threads as it may, or as many open calls.

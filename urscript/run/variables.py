@@ -130,11 +130,7 @@ def assign_within_capacity(value: Any, old: Any, name: str) -> Any:
 def fitted(value: Any, old: Any, kind: str, name: str) -> Any:
     """What a variable or member that holds `old` holds after `value` is stored in it.
 
-    Args:
-        value: The new value.
-        old: The present one.
-        kind: "variable" or "member", for messages.
-        name: Its name.
+    Messages say which `kind` it is, "variable" or "member", and its name.
     """
     if isinstance(old, list):
         if type(value) is Struct and (members := list(value.members.values())):

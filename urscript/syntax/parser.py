@@ -310,13 +310,18 @@ def prepare() -> None:
 
 @cache
 def _lark() -> Lark:
+    return make_parser(_TreeBuilder())
+
+
+def make_parser(transformer: Any) -> Lark:
+    """A parser of the language; without a transformer its tree has every bracket and comma."""
     from importlib.resources import files
 
     from lark import Lark
 
     grammar = files("urscript.syntax").joinpath("grammar.lark").read_text(encoding="utf-8")
     # The basic lexer, not the contextual one: a reserved word is reserved everywhere.
-    return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True, transformer=_TreeBuilder())
+    return Lark(grammar, parser="lalr", lexer="basic", keep_all_tokens=True, transformer=transformer)
 
 
 # --- errors --------------------------------------------------------------------------------------------
