@@ -1,7 +1,7 @@
 """A fuzz campaign: `python tests/fuzz/campaign.py [TARGET ...] --cases N --minutes M --seed S`.
 
 Targets take turns: `box` is a whole box under fire, which lives for some thousand cases; the others read files and
-answers (see fuzz_targets.py). A failure of a box names its seed; `box --only SEED` runs it again, step by step the same.
+answers (see fuzz_files.py). A failure of a box names its seed; `box --only SEED` runs it again, step by step the same.
 What has failed in a reader is written to out/fuzz/; once it is mended it belongs into the corpus.
 """
 
@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "pc_client"))
 from dashboard_support import write_programs
 from fuzz_box import CB3, E_SERIES, POLYSCOPE_X, run
 from fuzz_cases import run_cases
-from fuzz_targets import TARGETS
+from fuzz_files import TARGETS
 
 # Boxes, one after the other: most cases between few cycles, some with time for programs and stops.
 BOXES = tuple(

@@ -1,7 +1,6 @@
 """Ports 30001 and 30002: captured bytes, documented totals, and every codec four ways."""
 
-from __future__ import annotations
-
+import math
 import struct
 from dataclasses import asdict, fields, replace
 from types import SimpleNamespace
@@ -14,12 +13,16 @@ from protocol.primary import framing as F
 from protocol.primary import layout as L
 from protocol.primary import messages as M
 from protocol.primary import packages as P
+from protocol.primary import values as V
+from protocol.primary.framing import encode_package
 from protocol.primary.messages import encode_message, version_message
+from protocol.primary.packages import encode_message_package
+from protocol.primary.values import TypedValue, ValueType
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import codec_for, wire_fields
 
 V3_15 = SoftwareVersion(3, 15, 8)
-NO_TIME_HEX = "ff" * 8
+NO_TIME = "ff" * 8
 
 
 def read(data, version=V3_15, step=None):
@@ -36,11 +39,11 @@ def read(data, version=V3_15, step=None):
 MESSAGES = [
     ("3.3.1",
      M.VersionMessage(major=3, minor=3, bugfix=1, build=60, build_date="Jul 08 2016, 16:07:20"),
-     f"00000038 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 03 00000001 0000003c "
+     f"00000038 14 {NO_TIME} fe 03 09 {b'URControl'.hex()} 03 03 00000001 0000003c "
      f"{b'Jul 08 2016, 16:07:20'.hex()}"),
     ("3.10",
      M.VersionMessage(major=3, minor=10, build_date="03-05-2019, 06:39:00"),
-     f"00000037 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 0a 00000000 00000000 "
+     f"00000037 14 {NO_TIME} fe 03 09 {b'URControl'.hex()} 03 0a 00000000 00000000 "
      f"{b'03-05-2019, 06:39:00'.hex()}"),
     ("5.24",
      M.VersionMessage(timestamp=0, major=5, minor=24, build_date="04-10-2025, 00:25:33"),
@@ -50,11 +53,11 @@ MESSAGES = [
      M.KeyMessage(timestamp=0, source=-2, title="PROGRAM_XXX_STARTED", text="textmsg"),
      f"00000032 14 {'00' * 8} fe 07 00000000 00000000 13 {b'PROGRAM_XXX_STARTED'.hex()} {b'textmsg'.hex()}"),
     ("5.24", M.ErrorCodeMessage(source=7, code=210, report_level=2, data_type=2, data=1, text="C210A0"),
-     f"00000029 14 {NO_TIME_HEX} 07 06 000000d2 00000000 00000002 00000002 00000001 {b'C210A0'.hex()}"),
+     f"00000029 14 {NO_TIME} 07 06 000000d2 00000000 00000002 00000002 00000001 {b'C210A0'.hex()}"),
     ("5.24", M.SafetyModeMessage(source=7, safety_mode=13, data_type=4),
-     f"00000020 14 {NO_TIME_HEX} 07 05 00000000 00000000 0d 00000004 00000000"),
+     f"00000020 14 {NO_TIME} 07 05 00000000 00000000 0d 00000004 00000000"),
     ("5.24", M.PopupMessage(request_id=1, is_error=True, title="T", text="text"),
-     f"00000020 14 {NO_TIME_HEX} fd 02 00000001 00000008 00 01 00 01 54 {b'text'.hex()}"),
+     f"00000020 14 {NO_TIME} fd 02 00000001 00000008 00 01 00 01 54 {b'text'.hex()}"),
     ("5.0.5", M.RuntimeExceptionMessage(timestamp=0, line=3, column=1, text="compile_error_name_not_found:txtmsg:"),
      f"0000003b 14 {'00' * 8} fd 0a 00000003 00000001 {b'compile_error_name_not_found:txtmsg:'.hex()}"),
     ("3.15.8",
@@ -64,27 +67,27 @@ MESSAGES = [
      M.RuntimeExceptionMessage(timestamp=0, line=3, column=1, text="compile_error_name_not_found:txtmsg:"),
      f"0000003b 14 {'00' * 8} fd 0a 00000003 00000001 {b'compile_error_name_not_found:txtmsg:'.hex()}"),
     ("3.10", M.StartupMessage(first=510, second=259),
-     f"00000018 14 {NO_TIME_HEX} fe 0c 000001fe 00000103 01"),
+     f"00000018 14 {NO_TIME} fe 0c 000001fe 00000103 01"),
     # as UR's client library reads it
     ("5.26", M.HardwareInfoMessage(robot_type=7, box_series=7, tool_flange_type=2),
-     f"0000001b 14 {NO_TIME_HEX} fe 12 00000007 0000 0007 0000 0002"),
+     f"0000001b 14 {NO_TIME} fe 12 00000007 0000 0007 0000 0002"),
     ("3.15.8", M.TextMessage(timestamp=16_634_482_000, text="hello\xe9"),
      f"00000015 14 {16_634_482_000:016x} fd 00 {b'hello'.hex()} e9"),
     ("3.15.8", M.ErrorCodeMessage(source=20, code=210, report_level=3, data_type=4, data=0xC0FFEE, text="x"),
-     f"00000024 14 {NO_TIME_HEX} 14 06 000000d2 00000000 00000003 00000004 00c0ffee 78"),
+     f"00000024 14 {NO_TIME} 14 06 000000d2 00000000 00000003 00000004 00c0ffee 78"),
     ("3.15.8", M.SafetyModeMessage(safety_mode=3, code=1, argument=-1, data_type=2, data=5),
-     f"00000020 14 {NO_TIME_HEX} fd 05 00000001 ffffffff 03 00000002 00000005"),
+     f"00000020 14 {NO_TIME} fd 05 00000001 ffffffff 03 00000002 00000005"),
     ("3.15.8", M.PopupMessage(request_id=1, is_warning=True, is_blocking=True, title="T", text="text"),
-     f"00000020 14 {NO_TIME_HEX} fd 02 00000001 00000008 01 00 01 01 54 {b'text'.hex()}"),
+     f"00000020 14 {NO_TIME} fd 02 00000001 00000008 01 00 01 01 54 {b'text'.hex()}"),
     # the forms of software up to 3.2
     ("3.2", M.VersionMessage(major=3, minor=2, bugfix=19171, build_date="May 01 2016, 00:00:00"),
-     f"00000034 14 {NO_TIME_HEX} fe 03 09 {b'URControl'.hex()} 03 02 00004ae3 "
+     f"00000034 14 {NO_TIME} fe 03 09 {b'URControl'.hex()} 03 02 00004ae3 "
      f"{b'May 01 2016, 00:00:00'.hex()}"),
     ("3.2", M.ErrorCodeMessage(code=4, argument=5, text="old"),
-     f"0000001a 14 {NO_TIME_HEX} fd 06 00000004 00000005 {b'old'.hex()}"),
+     f"0000001a 14 {NO_TIME} fd 06 00000004 00000005 {b'old'.hex()}"),
     ("3.2", M.PopupMessage(is_error=True, title="T", text="x"),
-     f"00000014 14 {NO_TIME_HEX} fd 02 00 01 01 54 78"),
-    ("3.2", M.RuntimeExceptionMessage(text="old"), f"00000012 14 {NO_TIME_HEX} fd 0a {b'old'.hex()}"),
+     f"00000014 14 {NO_TIME} fd 02 00 01 01 54 78"),
+    ("3.2", M.RuntimeExceptionMessage(text="old"), f"00000012 14 {NO_TIME} fd 0a {b'old'.hex()}"),
 ]  # fmt: skip
 MESSAGE_IDS = [f"{type(message).__name__} {version}" for version, message, _ in MESSAGES]
 
@@ -135,7 +138,7 @@ def test_messages_cut_anywhere_are_refused_or_shorter_texts(version, message, da
 
 
 def test_unknown_messages_and_packages_come_out_as_they_are():
-    header = f"{NO_TIME_HEX} fd"
+    header = f"{NO_TIME} fd"
     (message,) = read(F.encode_package(20, bytes.fromhex(f"{header} 08 00112233")))
     assert message == M.UnknownMessage(message_type=8, body=b"\x00\x11\x22\x33")
     with pytest.raises(LocalProtocolError, match="UnknownMessage has no table"):
@@ -391,3 +394,249 @@ def test_software_before_3_0_has_no_table():
         encode_message(M.TextMessage(text="x"), old)
     data = P.encode_message_package(M.TextMessage(text="x"), V3_15)
     assert read(data, old) == [M.TextMessage(text="x")]  # a reader makes the best of it
+
+
+# --- where a program stands in PolyScope's tree
+
+
+TWO = M.ProgramThreadsMessage(
+    threads=(
+        M.ThreadLabel(label_id=3, text="Move", thread_name="main"),
+        M.ThreadLabel(label_id=-1, thread_name="t"),
+    )
+)
+LABELS = [
+    ("3.2", M.ProgramLabelMessage(label_id=12, text="Wait"), f"00000017 14 {NO_TIME} fd 01 0000000c 57616974"),
+    ("3.15.8", TWO,
+     f"00000030 14 {NO_TIME} fd 0e 00000003 00000004 4d6f7665 00000004 6d61696e ffffffff 00000000 00000001 74"),
+    ("3.15.8", M.ProgramThreadsMessage(timestamp=8000), "0000000f 14 0000000000001f40 fd 0e"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("version", "message", "data"), LABELS)
+def test_labels_by_four_methods(version, message, data):
+    version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
+    assert encode_message_package(message, version).hex(" ") == data.hex(" ")
+    assert read(data, version) == [message]
+    assert read(data, version, step=1) == [message]
+    assert read(data + data[:7], version) == [message]
+
+
+def test_a_threads_message_ends_between_threads_only():
+    data = encode_message_package(TWO, V3_15)
+    whole = {15: 0, 35: 1, 48: 2}  # bytes to threads
+    for end in range(15, len(data) + 1):
+        package = encode_package(20, data[5:end])
+        if end in whole:
+            assert len(read(package)[0].threads) == whole[end]
+        else:
+            with pytest.raises(RemoteProtocolError):
+                read(package)
+
+
+@pytest.mark.parametrize("length", ["ffffffff", "7fffffff", "00000005"])
+def test_a_text_longer_than_its_package_is_refused(length):
+    body = bytes.fromhex(f"{NO_TIME} fd 0e 00000001 {length} 41")
+    with pytest.raises(RemoteProtocolError, match="cut off"):
+        read(encode_package(20, body))
+
+
+# --- names and values of global variables
+
+
+def boolean(value):
+    return TypedValue(ValueType.BOOL, value)
+
+
+def text(value):
+    return TypedValue(ValueType.CONST_STRING, value)
+
+
+def integer(value):
+    return TypedValue(ValueType.INT, value)
+
+
+def real(value):
+    return TypedValue(ValueType.FLOAT, value)
+
+
+def listed(*values):
+    return TypedValue(ValueType.LIST, values)
+
+
+POSE = TypedValue(ValueType.POSE, (0.5, -0.25, 1.0, 0.0, 2.0, -4.0))
+POSE_HEX = "3f000000 be800000 3f800000 00000000 40000000 c0800000"
+MATRIX = TypedValue(
+    ValueType.MATRIX, ((integer(1), integer(2), integer(3)), (integer(4), integer(5), integer(6)))
+)
+
+# (version, message, bytes). The first update is the example of the document, the second a capture.
+VARIABLES = [
+    ("3.3", V.GlobalVariablesUpdate(timestamp=0, values=(boolean(True), text("aaaa"))),
+     f"0000001b 19 {'00' * 8} 01 0000 0c 01 0a 03 0004 61616161 0a"),
+    ("5.4", V.GlobalVariablesUpdate(), f"00000010 19 {NO_TIME} 01 0000"),
+    ("3.15.8", V.GlobalVariablesSetup(timestamp=16_634_482_000, names=("i", "pose_1")),
+     f"00000019 19 {16_634_482_000:016x} 00 0000 690a {b'pose_1'.hex()}0a"),
+    ("3.15.8", V.GlobalVariablesSetup(start_index=300, names=("\xe9",)), f"00000012 19 {NO_TIME} 00 012c e90a"),
+    ("3.15.8", V.GlobalVariablesSetup(), f"00000010 19 {NO_TIME} 00 0000"),
+    ("3.15.8", V.GlobalVariablesUpdate(start_index=2, values=(integer(10), POSE)),
+     f"00000030 19 {NO_TIME} 01 0002 0f 0000000a 0a 0c {POSE_HEX} 0a"),
+    ("3.15.8", V.GlobalVariablesUpdate(values=(listed(real(0.5), real(-2.0)), TypedValue(ValueType.NONE))),
+     f"00000020 19 {NO_TIME} 01 0000 11 0002 10 3f000000 10 c0000000 0a 00 0a"),
+    ("3.15.8", V.GlobalVariablesUpdate(values=(MATRIX,)),
+     f"00000034 19 {NO_TIME} 01 0000 12 0002 0003 0f 00000001 0f 00000002 0f 00000003"
+     "0f 00000004 0f 00000005 0f 00000006 0a"),
+    ("3.15.8", V.VariableUpdate(title="x", text="1.5"), f"00000013 19 {NO_TIME} 02 01 78 312e35"),
+]  # fmt: skip
+VARIABLE_IDS = [
+    f"{type(message).__name__} {version} {i}" for i, (version, message, _) in enumerate(VARIABLES)
+]
+
+
+@pytest.mark.parametrize(("version", "message", "data"), VARIABLES, ids=VARIABLE_IDS)
+def test_variables_by_four_methods(version, message, data):
+    version, data = SoftwareVersion.parse(version), bytes.fromhex(data)
+    assert V.encode_program_state(message, version).hex(" ") == data.hex(" ")
+    assert read(data, version) == [message]
+    assert read(data, version, step=1) == [message]
+    assert read(data + data[:7], version) == [message]
+
+
+# One value of each type and its bytes behind the code, which is that of the version.
+VALUES = [
+    (TypedValue(ValueType.NONE), ""),
+    (text("a\nb"), "0003 610a62"),
+    (TypedValue(ValueType.VAR_STRING, ""), "0000"),
+    (POSE, POSE_HEX),
+    (boolean(False), "00"),
+    (TypedValue(ValueType.NUM, 1.0), "3f800000"),
+    (integer(-2), "fffffffe"),
+    (real(-0.5), "bf000000"),
+    (listed(), "0000"),
+    (MATRIX, None),
+    (TypedValue(ValueType.MATRIX, ()), "0000 0000"),
+    (listed(listed(boolean(True)), listed(boolean(False))), None),
+]
+CODES = {
+    "3.0": {"const string": 3, "list": 4, "pose": 9, "bool": 11, "num": 12, "int": 13, "float": 14},
+    "3.3": {"var string": 4, "list": 5, "pose": 10, "bool": 12, "num": 13, "int": 14, "float": 15},
+    "3.14": {
+        "var string": 4,
+        "pose": 12,
+        "bool": 13,
+        "num": 14,
+        "int": 15,
+        "float": 16,
+        "list": 17,
+        "matrix": 18,
+    },
+}
+VERSIONS = [("3.0", "3.0"), ("3.2.19", "3.0"), ("3.3", "3.3"), ("3.13.9", "3.3"), ("3.14", "3.14"), ("3.15.8", "3.14"),
+            ("5.0", "3.3"), ("5.8.2", "3.3"), ("5.9", "3.14"), ("5.24", "3.14")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("version", "like"), VERSIONS)
+def test_codes_follow_the_version(version, like):
+    codes = V.value_codes(SoftwareVersion.parse(version))
+    assert codes[ValueType.NONE] == 0
+    for name, code in CODES[like].items():
+        assert codes[ValueType(name)] == code
+    assert (ValueType.MATRIX in codes) == (like == "3.14")
+    assert (ValueType.VAR_STRING in codes) == (like != "3.0")
+
+
+@pytest.mark.parametrize(("version", "like"), VERSIONS)
+@pytest.mark.parametrize(("value", "data"), VALUES, ids=[str(value) for value, _ in VALUES])
+def test_values_go_there_and_back(version, like, value, data):
+    version = SoftwareVersion.parse(version)
+    codes = V.value_codes(version)
+    if value.type not in codes:
+        with pytest.raises(LocalProtocolError, match=f"no variables of type {value.type.value}"):
+            V.encode_value(value, version)
+        return
+    encoded = V.encode_value(value, version)
+    assert encoded[0] == codes[value.type]
+    if data is not None:
+        assert encoded[1:] == bytes.fromhex(data)
+    assert V.decode_value(b"??" + encoded + b"\n", 2, version) == (value, 2 + len(encoded))
+    for end in range(len(encoded)):
+        with pytest.raises(RemoteProtocolError):
+            V.decode_value(encoded[:end], 0, version)
+
+
+def test_floats_beyond_32_bits_become_infinite_and_no_number_stays_none():
+    for value, expected in ((1e300, math.inf), (-1e300, -math.inf), (math.inf, math.inf)):
+        assert V.decode_value(V.encode_value(real(value), V3_15), 0, V3_15)[0] == real(expected)
+    (back, _) = V.decode_value(V.encode_value(real(math.nan), V3_15), 0, V3_15)
+    assert math.isnan(back.value)
+
+
+@pytest.mark.parametrize(
+    ("value", "problem"),
+    [
+        (integer(2**31), "cannot be sent"),
+        (integer("x"), "cannot be sent"),
+        (text("x" * 40_000), "cannot be sent"),
+        (TypedValue(ValueType.POSE, (1.0,) * 5), "a pose has 6 numbers, not 5"),
+        (TypedValue(ValueType.MATRIX, ((integer(1),), ())), "equally long"),
+        (listed(1.0), "cannot be sent"),
+    ],
+)
+def test_values_of_variables_that_do_not_fit_are_named(value, problem):
+    with pytest.raises(LocalProtocolError, match=problem):
+        V.encode_value(value, V3_15)
+
+
+def test_lists_are_read_and_written_to_a_depth():
+    value = integer(1)
+    for _ in range(V.MAX_NESTING):
+        value = listed(value)
+    encoded = V.encode_value(value, V3_15)
+    assert V.decode_value(encoded, 0, V3_15) == (value, len(encoded))
+    with pytest.raises(LocalProtocolError, match="nested deeper than 32"):
+        V.encode_value(listed(value), V3_15)
+    with pytest.raises(RemoteProtocolError, match="nested deeper than 32"):
+        V.decode_value(bytes.fromhex("110001") * 5000, 0, V3_15)
+
+
+@pytest.mark.parametrize(
+    ("body", "problem"),
+    [
+        ("", "shorter than its header"),
+        (f"{NO_TIME} 00", "before its start index"),
+        (f"{NO_TIME} 01 00", "before its start index"),
+        (f"{NO_TIME} 00 0000 61", "not ended by a line feed"),
+        (f"{NO_TIME} 01 0005 0d 01", "no line feed ends the value of variable 5"),
+        (f"{NO_TIME} 01 0000 0d 01 0b", "no line feed ends the value of variable 0"),
+        (f"{NO_TIME} 01 0000 63 0a", "99 at byte 2 is not a type"),
+        (f"{NO_TIME} 01 0000 03 ffff 0a", "cut off"),
+        (f"{NO_TIME} 01 0000 11 ffff 0a", "has -1 elements"),
+        (f"{NO_TIME} 01 0000 12 7fff 7fff 00", "cut off"),
+        (f"{NO_TIME} 02", "title of a variable is cut off"),
+        (f"{NO_TIME} 02 05 61", "title of a variable is cut off"),
+    ],
+)
+def test_messages_that_do_not_add_up_are_refused(body, problem):
+    with pytest.raises(RemoteProtocolError, match=problem):
+        read(encode_package(25, bytes.fromhex(body)))
+
+
+def test_an_unknown_sub_type_comes_out_as_it_is():
+    (message,) = read(encode_package(25, bytes.fromhex(f"{NO_TIME} 07 0102")))
+    assert message == V.UnknownProgramState(sub_type=7, body=b"\x01\x02")
+    with pytest.raises(LocalProtocolError, match="UnknownProgramState has no table"):
+        V.encode_program_state(message, V3_15)
+
+
+@pytest.mark.parametrize(
+    ("message", "problem"),
+    [
+        (V.GlobalVariablesSetup(start_index=70_000), "start index 70000"),
+        (V.GlobalVariablesUpdate(timestamp=-1), "timestamp -1"),
+        (V.GlobalVariablesSetup(names=("a\nb",)), "no line feed"),
+        (V.VariableUpdate(title="x" * 256), "256 characters"),
+    ],
+)
+def test_messages_that_do_not_fit_are_named(message, problem):
+    with pytest.raises(LocalProtocolError, match=problem):
+        V.encode_program_state(message, V3_15)

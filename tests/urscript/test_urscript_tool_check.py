@@ -1,6 +1,8 @@
-"""Each warning: programs that get it, with its place, and programs like them that do not."""
+"""`urscript check`: each warning, programs that get it and programs like them that do not; the command."""
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -235,13 +237,13 @@ def test_programs_with_errors_get_no_warnings_that_may_follow_from_them():
 
 # --- the command -----------------------------------------------------------------------------------------
 
-TEXT = body("global gr\u00f6n = 1", "x = 2").replace("\u00f6", "oe") + "# \u00fc\n"
+WARNED_TEXT = body("global gr\u00f6n = 1", "x = 2").replace("\u00f6", "oe") + "# \u00fc\n"
 
 
 @pytest.fixture
 def check(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.script").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "a.script").write_text(WARNED_TEXT, encoding="utf-8")
     (tmp_path / "b.script").write_text('def b():\n  txtmsg("\u00fc")\nend\n', encoding="utf-8")
     return lambda *words, **more: CliRunner().invoke(app, ["check", *words], **more)
 
@@ -318,3 +320,91 @@ def test_json_of_fmt_says_what_would_change(check):
         {"file": "b.script", "changes": False},
     ]
     assert [item["code"] for item in document["diagnostics"]] == ["E101"]
+
+
+# --- the page
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "urscript-tool.md"
+
+
+def test_the_table_of_warnings_is_that_of_the_rules():
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    table = [line for line in lines if re.match(r"\| W\d+ \|", line)]
+    assert table == [f"| {rule.code} | {rule.meaning} | {rule.reason} |" for rule in RULES]
+
+
+# --- all commands
+
+
+GOOD = 'def good():\n  movej([0,0,0,0,0,0])\n  textmsg("gr\u00fc\u00dfe")\nend\n'
+BAD = "def bad():\n  txtmsg(1)\n  y = nothing\nend\n"
+
+
+@pytest.fixture
+def call(tmp_path):
+    def run(*words, **files):
+        paths = []
+        for name, text in files.items():
+            path = tmp_path / f"{name}.script"
+            path.write_text(text, encoding="utf-8")
+            paths.append(str(path))
+        return CliRunner().invoke(app, [*words, *paths])
+
+    return run
+
+
+def test_check_is_silent_about_good_programs(call):
+    result = call("check", good=GOOD, crlf=GOOD.replace("\n", "\r\n"), bom="\ufeff" + GOOD)
+    assert (result.exit_code, result.output) == (0, "")
+
+
+def test_check_shows_all_errors_of_all_files(call):
+    result = call("check", bad=BAD, good=GOOD, broken="def f(:\nend")
+    assert result.exit_code == 1
+    assert (
+        "bad.script:2:3: Compile error: name 'txtmsg' is not defined (did you mean 'textmsg'?)"
+        in result.output
+    )
+    assert "bad.script:3:7: Compile error: name 'nothing' is not defined" in result.output
+    assert "broken.script:1:7: Syntax error" in result.output
+    assert "      txtmsg(1)\n      ^^^^^^\n" in result.output
+
+
+@pytest.mark.parametrize(
+    "words", [("check", "/nowhere.script"), ("run", "/nowhere.script"), ("run",), ("check",)]
+)
+def test_wrong_use_exits_with_2(call, words):
+    assert call(*words).exit_code == 2
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("command", ["check", "run", "fmt"])
+def test_a_file_in_utf_16_is_refused_as_that(tmp_path, command, encoding):
+    path = tmp_path / "windows.script"
+    path.write_text(GOOD, encoding=encoding)
+    result = CliRunner().invoke(app, [command, str(path)])
+    assert result.exit_code == 2
+    assert result.stderr == f"{path} is UTF-16 text: a controller reads UTF-8, save it as that\n"
+
+
+def test_the_software_version_decides_which_names_exist(call):
+    late = "set_target_payload(1, [0,0,0])\n"
+    assert call("check", late=late).exit_code == 1
+    assert call("check", "--software", "5.11", late=late).exit_code == 0
+    assert call("check", "--software", "9.9", late=late).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("software", "name", "hint"),
+    [
+        ("5.9", "set_target_payload", "known since e-Series 5.10, PolyScope X 10.0; this is e-Series 5.9"),
+        ("3.15", "struct", "known since e-Series 5.14, PolyScope X 10.0; this is CB3 3.15"),
+        ("5.17", "optimovej", "known since e-Series 5.21, PolyScope X 10.8; this is e-Series 5.17"),
+        ("5.11", "set_euromap_output", "known since CB3 3.0; this is e-Series 5.11"),
+        ("3.7", "str_cat", "known since CB3 3.8, e-Series 5.0, PolyScope X 10.0; this is CB3 3.7"),
+    ],
+)
+def test_a_name_of_other_software_comes_with_its_first_releases(call, software, name, hint):
+    result = call("check", "--software", software, other=f"def p():\n  {name}()\nend\n")
+    assert f"other.script:2:3: Compile error: name '{name}' is not defined ({hint})" in result.output
