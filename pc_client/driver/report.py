@@ -1,13 +1,15 @@
 """Which robot answers and what it reports of itself: the record that `experiment.preflight` judges.
 
-Everything here only reads. `read_report` asks for it, `probe` looks at every port and at the rhythm of the
-frames, too. Nothing is sent that could move an arm. What a robot does not report stays unknown.
+`read_report` asks for it, `probe` looks at every port and at the rhythm of the frames, too. Everything here
+only reads: nothing is sent that could move an arm. What a robot does not report stays unknown.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
@@ -30,18 +32,23 @@ from protocol.ur_types import (
     SoftwareVersion,
 )
 
-_MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
-_SERIAL, _MODEL = "get serial number", "get robot model"
-
 UNKNOWN = "unknown"
 """Stands for what a robot does not report."""
 
-_CB3_PERIOD = 0.008
-_E_SERIES_PERIOD = 0.002
+_CONNECT_TIMEOUT = 2.0
+
+_SERIAL, _MODEL = "get serial number", "get robot model"
+_REMOTE, _MODE = "is in remote control", "get operational mode"
+_ANSWERS = {"true": True, "false": False}
+_OPERATIONAL_MODES = ("NONE", "MANUAL", "AUTOMATIC")
+_MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
 
 _E_SERIES = ("UR3", "UR5", "UR10", "UR16")
 """What e-Series arms report without their "e". Source: UR's client library: type 1 with software 5 is a UR5e;
 a UR7e reports the type of a UR5, a UR12e that of a UR10."""
+
+_CB3_PERIOD = 0.008
+_E_SERIES_PERIOD = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,74 +102,6 @@ class RobotInfo:
         return f"{self.model}, software {self.version}, serial number {self.serial}, {origin}"
 
 
-def read_robot_info(network: Network, host: str, dashboard_port: int, primary: PackageStream) -> RobotInfo:
-    """Ask the robot for its identity; what it does not answer stays unknown.
-
-    Args:
-        network: makes the connection.
-        host: the robot.
-        dashboard_port: its dashboard port.
-        primary: a fresh connection to the primary port: its greeting names the software; its first state the
-            marks of a simulator, and the arm when the dashboard server, before 3.12, does not.
-
-    Raises:
-        DriverError: the primary port does not report its version.
-    """
-    version = primary.wait_for_version()
-    answers = ask_dashboard(network, host, dashboard_port, (_SERIAL, _MODEL))
-    configuration = primary.wait_for_configuration()
-    try:
-        serial = parse_serial(answers.get(_SERIAL, ""))
-    except RemoteProtocolError:  # software before 3.12 does not know the question
-        serial = None
-    model = answers.get(_MODEL, "")
-    kinematics = primary.newest(KinematicsInfo)
-    has_calibration = kinematics is None or set(kinematics.checksum) != {SIMULATOR_CHECKSUM}
-    return RobotInfo(
-        version,
-        arm_name(model if _MODEL_NAME.fullmatch(model) else _model_in(configuration), version),
-        UNKNOWN if serial is None else serial.text,
-        _is_simulated(serial, configuration, has_calibration),
-        None if serial is None else serial.seed,
-        configuration is not None and configuration.masterboard_version == LOCKSTEP_MASTERBOARD,
-        has_calibration,
-    )
-
-
-def _is_simulated(
-    serial: SerialNumber | None, configuration: ConfigurationData | None, has_calibration: bool
-) -> bool | None:
-    """Whether the robot is a simulated one; None when neither is certain.
-
-    A missing calibration proves nothing: a real arm may have lost its own.
-    """
-    marks = (SIMULATED_MASTERBOARD, LOCKSTEP_MASTERBOARD)
-    if configuration is not None and configuration.masterboard_version in marks:
-        return True
-    if serial is not None and serial.simulated:
-        return True
-    return None if serial is None or configuration is None or not has_calibration else False
-
-
-def _model_in(configuration: ConfigurationData | None) -> str:
-    try:
-        return UNKNOWN if configuration is None else RobotType(configuration.robot_type).name
-    except ValueError:  # an arm that was built after this was written
-        return UNKNOWN
-
-
-def arm_name(reported: str, version: SoftwareVersion) -> str:
-    """The name of an arm that a robot calls `UR5`, for example: `UR5e` with software of the e-Series."""
-    return f"{reported}e" if version.major >= 5 and reported in _E_SERIES else reported
-
-
-_CONNECT_TIMEOUT = 2.0
-
-_REMOTE, _MODE = "is in remote control", "get operational mode"
-_ANSWERS = {"true": True, "false": False}
-_OPERATIONAL_MODES = ("NONE", "MANUAL", "AUTOMATIC")
-
-
 @dataclass(frozen=True, slots=True)
 class RobotReport:
     """What a robot reports. None stands for what it does not report.
@@ -196,92 +135,163 @@ class RobotReport:
         return value if isinstance(value, float) else None
 
 
+class StatePorts:
+    """The ports that tell which robot answers and how it stands: primary and realtime.
+
+    `close` must follow, also when connecting has failed. As a context manager it connects, and closes.
+
+    Args:
+        network: makes the connections.
+        host: the robot's name or address.
+        ports: its ports.
+        timeout: for each connection [s].
+
+    Attributes:
+        primary: states and messages; there from `identify` on.
+        info: which robot answered; likewise.
+        frames: the realtime port; there from `open_frames` on.
+    """
+
+    primary: PackageStream
+    info: RobotInfo
+    frames: RealtimeClient
+
+    def __init__(
+        self, network: Network, host: str, ports: Ports, *, timeout: float = _CONNECT_TIMEOUT
+    ) -> None:
+        self.network = network
+        self.host = host
+        self.ports = ports
+        self._timeout = timeout
+        self._closing: list[Callable[[], None]] = []
+
+    def __enter__(self) -> Self:
+        try:
+            self.identify()
+            self.open_frames()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all; harmless if closed already."""
+        for close in self._closing:
+            close()
+        self._closing.clear()
+
+    def identify(self) -> RobotInfo:
+        """Connect to the primary port, and ask the robot for its identity.
+
+        Raises:
+            DriverError: the primary port does not answer, or does not report its version.
+        """
+        self.primary = self._open_packages(self.ports.primary, "primary")
+        version = self.primary.wait_for_version()
+        answers = self._ask_dashboard(_SERIAL, _MODEL)
+        # The first state has the marks of a simulator, and the arm: before 3.12 the dashboard server does not
+        # report it.
+        configuration = self.primary.wait_for_configuration()
+        try:
+            serial = parse_serial(answers.get(_SERIAL, ""))
+        except RemoteProtocolError:  # software before 3.12 does not know the question
+            serial = None
+        kinematics = self.primary.newest(KinematicsInfo)
+        has_calibration = kinematics is None or set(kinematics.checksum) != {SIMULATOR_CHECKSUM}
+        model = answers.get(_MODEL, "")
+        self.info = RobotInfo(
+            version,
+            _arm_name(model, version)
+            if _MODEL_NAME.fullmatch(model)
+            else _configured_arm(configuration, version) or UNKNOWN,
+            UNKNOWN if serial is None else serial.text,
+            _is_simulated(serial, configuration, has_calibration),
+            None if serial is None else serial.seed,
+            configuration is not None and configuration.masterboard_version == LOCKSTEP_MASTERBOARD,
+            has_calibration,
+        )
+        return self.info
+
+    def open_frames(self) -> None:
+        """Connect to the realtime port; `identify` comes before.
+
+        Raises:
+            DriverError: the port does not answer.
+        """
+        transport = self.network.connect(self.host, self.ports.realtime, self._timeout)
+        self.frames = RealtimeClient(transport, self.network, time_waits=self.info.lockstep)
+        self._closing.append(self.frames.close)
+
+    def read_frame(self) -> RealtimeFrame:
+        """The state of the robot now.
+
+        Raises:
+            DriverError: no frames come.
+        """
+        self.frames.drain()
+        return self.frames.receive().latest
+
+    def report(self) -> RobotReport:
+        """What the robot reports of itself now.
+
+        Raises:
+            DriverError: no frames come, a connection broke, or a state on the primary port makes no sense.
+        """
+        self.primary.poll()
+        frame = self.read_frame()
+        cartesian = self.primary.newest(CartesianInfo)
+        kinematics = self.primary.newest(KinematicsInfo)
+        answers = self._ask_dashboard(_REMOTE, _MODE) if self.info.version.major == 5 else {}
+        mode = answers.get(_MODE, "").upper()
+        return RobotReport(
+            info=self.info,
+            configured=self.configured,
+            frame=frame,
+            slider=self.slider,
+            tcp_offset=None if cartesian is None else cartesian.tcp_offset,
+            rtde=ask_rtde(
+                self.network, self.host, self.ports.rtde, ("actual_q", "actual_TCP_pose", "payload")
+            ),
+            calibration=None if kinematics is None else kinematics.calibration,
+            remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
+            operational_mode=mode if mode in _OPERATIONAL_MODES else None,
+        )
+
+    @property
+    def configured(self) -> str | None:
+        """The arm by the configuration data of the primary port; None when it was not reported."""
+        configuration = self.primary.newest(ConfigurationData)
+        if configuration is None:
+            return None
+        return _configured_arm(configuration, self.info.version) or f"type {configuration.robot_type}"
+
+    @property
+    def slider(self) -> float | None:
+        """The speed slider, 0 to 1, as the primary port was last polled; None when it was not reported."""
+        mode = self.primary.newest(RobotModeData)
+        return None if mode is None else mode.target_speed_fraction
+
+    def _ask_dashboard(self, *questions: str) -> dict[str, str]:
+        return ask_dashboard(self.network, self.host, self.ports.dashboard, questions)
+
+    def _open_packages(self, port: int, name: str) -> PackageStream:
+        transport = self.network.connect(self.host, port, self._timeout)
+        stream = PackageStream(transport, self.network, name)
+        self._closing.append(stream.close)
+        return stream
+
+
 def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
     """Ask a robot, on connections of its own.
 
     Raises:
         DriverError: nothing answers on the primary or the realtime port, or something else than a robot.
     """
-    primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
-    try:
-        info = read_robot_info(network, host, ports.dashboard, primary)
-        connection = network.connect(host, ports.realtime, _CONNECT_TIMEOUT)
-        frames = RealtimeClient(connection, network, time_waits=info.lockstep)
-        try:
-            frame = frames.receive().latest
-        finally:
-            frames.close()
-        return make_report(network, host, ports, info, frame, primary)
-    finally:
-        primary.close()
-
-
-def make_report(
-    network: Network,
-    host: str,
-    ports: Ports,
-    info: RobotInfo,
-    frame: RealtimeFrame,
-    primary: PackageStream,
-) -> RobotReport:
-    """Put together what open connections have reported, and ask RTDE and dashboard server for the rest.
-
-    Args:
-        network: makes the connections.
-        host: the robot.
-        ports: its ports.
-        info: which robot it is.
-        frame: its state.
-        primary: its primary port; what has come is to be polled by the caller.
-
-    Raises:
-        DriverError: a state on the primary port makes no sense.
-    """
-    configuration = primary.newest(ConfigurationData)
-    cartesian = primary.newest(CartesianInfo)
-    kinematics = primary.newest(KinematicsInfo)
-    asked = (_REMOTE, _MODE) if info.version.major == 5 else ()
-    answers = ask_dashboard(network, host, ports.dashboard, asked) if asked else {}
-    mode = answers.get(_MODE, "").upper()
-    return RobotReport(
-        info=info,
-        configured=None if configuration is None else _configured(configuration, info),
-        frame=frame,
-        slider=reported_slider(primary),
-        tcp_offset=None if cartesian is None else cartesian.tcp_offset,
-        rtde=ask_rtde(network, host, ports.rtde, ("actual_q", "actual_TCP_pose", "payload")),
-        calibration=None if kinematics is None else kinematics.calibration,
-        remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
-        operational_mode=mode if mode in _OPERATIONAL_MODES else None,
-    )
-
-
-def check_arm(info: RobotInfo, primary: PackageStream) -> None:
-    """Refuse a robot that calls itself one arm on the dashboard server and another on port 30001.
-
-    Raises:
-        DriverError: they differ.
-    """
-    configuration = primary.newest(ConfigurationData)
-    if configuration is None or info.model in (UNKNOWN, configured := _configured(configuration, info)):
-        return
-    raise DriverError(
-        f"the robot's arm is {info.model} (dashboard), {configured} (port 30001), must be one of them; "
-        "look which arm it is, and set it so in the installation"
-    )
-
-
-def reported_slider(primary: PackageStream) -> float | None:
-    """The speed slider, 0 to 1, as the port was last polled; None when it was not reported."""
-    mode = primary.newest(RobotModeData)
-    return None if mode is None else mode.target_speed_fraction
-
-
-def _configured(configuration: ConfigurationData, info: RobotInfo) -> str:
-    try:
-        return arm_name(RobotType(configuration.robot_type).name, info.version)
-    except ValueError:  # an arm that was built after this was written
-        return f"type {configuration.robot_type}"
+    with StatePorts(network, host, ports) as robot:
+        return robot.report()
 
 
 @dataclass(frozen=True, slots=True)
@@ -347,27 +357,43 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
             raise
         except DriverError as error:
             states[item.name] = _state(error)
-    info: RobotInfo | None = None
-    rhythm: FrameRhythm | None = None
-    report: RobotReport | None = None
+    robot = StatePorts(network, host, ports)
+    info = rhythm = report = None
     obstacle = ""
     try:
-        primary = PackageStream(network.connect(host, ports.primary, _CONNECT_TIMEOUT), network, "primary")
-        try:
-            info = read_robot_info(network, host, ports.dashboard, primary)
-            rhythm, frame = _listen(network, host, ports.realtime, seconds, time_waits=info.lockstep)
-            primary.poll()
-            report = make_report(network, host, ports, info, frame, primary)
-        finally:
-            primary.close()
+        info = robot.identify()
+        robot.open_frames()
+        rhythm = _listen(robot, seconds)
+        report = robot.report()
     except DriverError as error:
         obstacle = str(error)
+    finally:
+        robot.close()
     if report is not None and report.rtde is None and states["rtde"] == "open":
         states["rtde"] = "open, but it does not answer as RTDE"
     if not obstacle and states["secondary"] != "open":
         obstacle = f"the secondary port {ports.secondary} takes no programs"
     numbered = tuple((name, getattr(ports, name), state) for name, state in states.items())
     return Diagnosis(numbered, info, rhythm, report, obstacle)
+
+
+def _listen(robot: StatePorts, seconds: float) -> FrameRhythm:
+    frames = robot.frames
+    size = frames.layout.size
+    stamps: list[float] = []
+    arrivals: list[float] = []
+    n_heartbeats = 0
+    deadline = robot.network.now() + seconds
+    while not arrivals or arrivals[-1] <= deadline:
+        arrival = frames.receive()
+        arrivals.append(robot.network.now())
+        stamps += [frame.timestamp for frame in arrival.new]
+        n_heartbeats += arrival.n_heartbeats
+    steps, waits = np.diff(stamps), np.diff(arrivals)
+    cycle = float(np.median(steps)) if len(steps) else None
+    lost = 0 if cycle is None else int(np.sum(np.rint(steps / cycle) - 1))
+    spread = (float(waits.std()), float(waits.max())) if len(waits) else (0.0, 0.0)
+    return FrameRhythm(size, len(stamps), n_heartbeats, cycle, lost, *spread)
 
 
 def _state(error: DriverError) -> str:
@@ -380,27 +406,29 @@ def _state(error: DriverError) -> str:
     return "closed"
 
 
-def _listen(
-    network: Network, host: str, port: int, seconds: float, *, time_waits: bool
-) -> tuple[FrameRhythm, RealtimeFrame]:
-    frames = RealtimeClient(network.connect(host, port, _CONNECT_TIMEOUT), network, time_waits=time_waits)
-    stamps: list[float] = []
-    arrivals: list[float] = []
-    n_heartbeats = 0
+def _is_simulated(
+    serial: SerialNumber | None, configuration: ConfigurationData | None, has_calibration: bool
+) -> bool | None:
+    """Whether the robot is a simulated one; None when neither is certain.
+
+    A missing calibration proves nothing: a real arm may have lost its own.
+    """
+    marks = (SIMULATED_MASTERBOARD, LOCKSTEP_MASTERBOARD)
+    if configuration is not None and configuration.masterboard_version in marks:
+        return True
+    if serial is not None and serial.simulated:
+        return True
+    return None if serial is None or configuration is None or not has_calibration else False
+
+
+def _configured_arm(configuration: ConfigurationData | None, version: SoftwareVersion) -> str | None:
+    """The arm that the configuration data name; None without data, and for an arm that is newer than this."""
     try:
-        size = frames.layout.size
-        deadline = network.now() + seconds
-        while True:
-            arrival = frames.receive()
-            arrivals.append(network.now())
-            stamps += [frame.timestamp for frame in arrival.new]
-            n_heartbeats += arrival.n_heartbeats
-            if arrivals[-1] > deadline:
-                break
-    finally:
-        frames.close()
-    steps, waits = np.diff(stamps), np.diff(arrivals)
-    cycle = float(np.median(steps)) if len(steps) else None
-    lost = 0 if cycle is None else int(np.sum(np.rint(steps / cycle) - 1))
-    spread = (float(waits.std()), float(waits.max())) if len(waits) else (0.0, 0.0)
-    return FrameRhythm(size, len(stamps), n_heartbeats, cycle, lost, *spread), arrival.latest
+        return None if configuration is None else _arm_name(RobotType(configuration.robot_type).name, version)
+    except ValueError:
+        return None
+
+
+def _arm_name(reported: str, version: SoftwareVersion) -> str:
+    """The name of an arm that a robot calls `UR5`, for example: `UR5e` with software of the e-Series."""
+    return f"{reported}e" if version.major >= 5 and reported in _E_SERIES else reported

@@ -16,16 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.driver.primary import PackageStream, raise_on_error
-from pc_client.driver.realtime import REST_TIMEOUT, RealtimeClient, wait_for_rest, wait_until
+from pc_client.driver.realtime import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.receiver import DIAL_TIMEOUT, STOP_DECELERATION, ReverseServer, receiver_script
-from pc_client.driver.report import (
-    RobotInfo,
-    RobotReport,
-    check_arm,
-    make_report,
-    read_robot_info,
-    reported_slider,
-)
+from pc_client.driver.report import UNKNOWN, RobotReport, StatePorts
 from pc_client.driver.transport import Network, TcpNetwork, Transport
 from pc_client.driver.velocity_stream import (
     CommandSource,
@@ -52,36 +45,202 @@ from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from protocol.velocity_stream import VelocityMode, encode_velocity
 
-CONNECT_TIMEOUT = 5.0  # s
+_CONNECT_TIMEOUT = 5.0  # s
+
+_START_TIMEOUT = 5.0
+"""A program that does not show as running within this [s] was not accepted."""
+_READ_ONLY = 210
+"""Error code for a program that came in local control. Source: test of the maker's client library."""
+
+STOP_WORD = "stop program\n"
+"""A controller's own word, no program: ends what runs or is paused. Source: public client library."""
 
 
-class Connections:
-    """All connections to one robot; `close` must follow, also when making them has failed.
+class UrDriver:
+    """A session with one robot.
+
+    Use as a context manager; leaving it stops the arm if it is still moving and closes all connections.
 
     Args:
-        network: opens them.
         host: the robot's name or address.
         ports: its ports.
+        reverse_port: where its programs dial back; see ReverseServer.
+        network: tests hand in a network in memory.
 
     Attributes:
         info: which robot answered.
-        primary: states and messages.
-        scripts: the secondary port; takes programs.
-        frames: the realtime port.
-        server: where its programs dial back.
+        layout: columns of its realtime frames.
     """
 
-    info: RobotInfo
-    primary: PackageStream
+    def __init__(
+        self,
+        host: str,
+        ports: Ports | None = None,
+        *,
+        reverse_port: int | None = None,
+        network: Network | None = None,
+    ) -> None:
+        self._robot = robot = _SessionPorts(network or TcpNetwork(), host, ports or Ports.standard())
+        self._watch = _ProgramWatch(robot)
+        self._in_motion = False
+        try:
+            robot.open(reverse_port)
+        except BaseException:
+            robot.close()
+            raise
+        self.info = robot.info
+        self.layout = robot.frames.layout
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop the arm if we left it in motion, and close all connections."""
+        try:
+            if self._in_motion:
+                self.stop(None)
+        finally:
+            self._robot.close()
+
+    def actual_q(self) -> NDArray[np.float64]:
+        """Joint positions (6,) as reported now [rad].
+
+        Raises:
+            DriverError: no frames come, or one reports what is no angle.
+        """
+        frame = self._robot.read_frame()
+        check_angles(frame)
+        q: NDArray[np.float64] = frame.actual_q
+        return q.copy()
+
+    def report(self) -> RobotReport:
+        """What the robot reports of itself now.
+
+        Raises:
+            DriverError: no frames come, or a connection broke.
+        """
+        return self._robot.report()
+
+    def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
+        """Stream the commands of one source: start the receiver program, stream, stop, wait for rest.
+
+        Args:
+            source: a fresh one; the arm must stand where its run begins.
+            on_row: takes every new frame with the command sent; what it raises ends the run.
+            acceleration: of the robot's `speedj` [rad/s2].
+
+        Returns:
+            What happened on the wire; the arm rests and no program runs.
+
+        Raises:
+            RobotStoppedError: the robot stopped, or its program failed.
+            DriverError: anything else that ended the run; the arm has been stopped.
+        """
+        self.check_ready()
+        self._robot.server.forget_callers()
+        try:
+            return self._stream_and_stop(source, on_row, acceleration)
+        except RobotStoppedError:
+            raise
+        except DriverError as error:
+            self._raise_safety_stop(error)
+            raise
+
+    def stop(self, reverse: Transport | None) -> None:
+        """Bring the arm to rest, by every available method.
+
+        Args:
+            reverse: connection to the receiver program, when one runs.
+
+        Raises:
+            DriverError: the arm could not be seen to come to rest.
+        """
+        _stop_arm(self._robot, reverse)
+        self._in_motion = False
+
+    def check_ready(self) -> RealtimeFrame:
+        """Refuse a robot that may not move now; returns its state.
+
+        Raises:
+            RobotStoppedError: safety mode or robot mode forbids it.
+            DriverError: a program is running, the speed slider was moved, or the ports name different arms.
+        """
+        robot, model = self._robot, self.info.model
+        frame = robot.read_frame()
+        check_safety(frame)
+        check_idle(frame)
+        robot.primary.poll()
+        configured = robot.configured
+        if configured is not None and model not in (UNKNOWN, configured):
+            raise DriverError(
+                f"the robot's arm is {model} (dashboard), {configured} (port 30001), must be one of them; "
+                "look which arm it is, and set it so in the installation"
+            )
+        check_slider(robot.slider)
+        return frame
+
+    def _stream_and_stop(
+        self, source: CommandSource[S], on_row: RowSink[S], acceleration: float
+    ) -> StreamReport:
+        """Run the receiver program for one stream; any exception, Ctrl-C included, stops the arm."""
+        robot, watch, period = self._robot, self._watch, self.info.period
+        server, frames = robot.server, robot.frames
+        reverse: Transport | None = None
+        self._in_motion = True
+        try:
+            watch.start(
+                receiver_script(server.address, server.port, acceleration=acceleration, period=period)
+            )
+            reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
+            stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
+            try:
+                with collector_paused():
+                    report = stream.run(source, on_row)
+            except ProgramEndedError as error:
+                raise watch.explain(error) from error
+            watch.wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
+            wait_for_rest(frames, robot.network)
+        except BaseException as error:
+            try:
+                self.stop(reverse)
+            except DriverError as not_stopped:
+                error.add_note(str(not_stopped))
+            raise
+        finally:
+            # Tried once with everything there is; closing the session would only try the same again.
+            self._in_motion = False
+            if reverse is not None:
+                reverse.close()
+        return report
+
+    def _raise_safety_stop(self, error: DriverError) -> None:
+        """Raise a safety stop that the robot reports now: it may be the cause of an error, or its effect."""
+        try:
+            check_safety(self._robot.read_frame())
+        except RobotStoppedError as stop:
+            raise RobotStoppedError(f"{stop}; before that: {full_message(error)}") from error
+        except DriverError:
+            pass  # a robot that is gone reports nothing
+
+
+class _SessionPorts(StatePorts):
+    """All connections of a session: those that report, the one that takes programs, and the way back.
+
+    Attributes:
+        scripts: the secondary port.
+        server: where the robot's programs dial back.
+    """
+
     scripts: PackageStream
-    frames: RealtimeClient
     server: ReverseServer
 
     def __init__(self, network: Network, host: str, ports: Ports) -> None:
-        self.network = network
-        self.host = host
-        self.ports = ports
-        self._open: list[RealtimeClient | PackageStream | ReverseServer] = []
+        super().__init__(network, host, ports, timeout=_CONNECT_TIMEOUT)
 
     def open(self, reverse_port: int | None) -> None:
         """Connect to the robot and listen for its programs.
@@ -92,16 +251,13 @@ class Connections:
         Raises:
             DriverError: a port does not answer, or the robot's software is not one that we drive.
         """
-        self.primary = self._open_packages(self.ports.primary, "primary")
-        self.scripts = self._open_packages(self.ports.secondary, "secondary")
-        self.info = read_robot_info(self.network, self.host, self.ports.dashboard, self.primary)
-        if not (condition := software(self.info.version)).holds:
+        if not (condition := software(self.identify().version)).holds:
             raise DriverError(condition.complaint)
-        self.frames = self._open_frames()
-        self.server = ReverseServer(
-            self.network, self.frames.local_address, self.frames.robot_address, reverse_port
-        )
-        self._open.append(self.server)
+        self.scripts = self._open_packages(self.ports.secondary, "secondary")
+        self.open_frames()
+        frames = self.frames
+        self.server = ReverseServer(self.network, frames.local_address, frames.robot_address, reverse_port)
+        self._closing.append(self.server.close)
 
     def renew(self) -> None:
         """Make new connections for programs and frames: the present ones may be broken.
@@ -112,92 +268,13 @@ class Connections:
         for connection in (self.scripts, self.frames):
             connection.close()
         self.scripts = self._open_packages(self.ports.secondary, "secondary")
-        self.frames = self._open_frames()
-
-    def close(self) -> None:
-        """Close all; harmless if closed already."""
-        for connection in self._open:
-            connection.close()
-        self._open.clear()
-
-    def _open_packages(self, port: int, name: str) -> PackageStream:
-        transport = self.network.connect(self.host, port, CONNECT_TIMEOUT)
-        stream = PackageStream(transport, self.network, name)
-        self._open.append(stream)
-        return stream
-
-    def _open_frames(self) -> RealtimeClient:
-        transport = self.network.connect(self.host, self.ports.realtime, CONNECT_TIMEOUT)
-        frames = RealtimeClient(transport, self.network, time_waits=self.info.lockstep)
-        self._open.append(frames)
-        return frames
+        self.open_frames()
 
 
-STOP_WORD = "stop program\n"
-"""A controller's own word, no program: ends what runs or is paused. Source: public client library."""
-
-
-def stop_script() -> str:
-    """A program that replaces whatever runs and brings the arm to rest."""
-    return f"def ur_client_stop():\n  stopj({STOP_DECELERATION})\nend\n"
-
-
-def stop_arm(robot: Connections, reverse: Transport | None) -> None:
-    """Bring the arm to rest, and end the program that moves it.
-
-    Args:
-        robot: the connections; those for programs and frames are made anew if the stop word does not help.
-        reverse: connection to the receiver program, when one runs.
-
-    Raises:
-        DriverError: the arm could not be seen to come to rest.
-    """
-    if reverse is not None and _attempt(
-        robot, lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
-    ):
-        return
-    if not _attempt(robot, lambda: _send_stop_program(robot)):
-        raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
-
-
-def _attempt(robot: Connections, act: Callable[[], object]) -> bool:
-    """Try one method to stop; True when the arm then rests and no program runs."""
-    try:
-        act()
-        wait_until(has_ended, robot.frames, robot.network, REST_TIMEOUT, "the robot's program goes on")
-        if not is_stopped(wait_for_rest(robot.frames, robot.network)):
-            _end_paused_program(robot)
-    except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
-        return False
-    return True
-
-
-def _end_paused_program(robot: Connections) -> None:
-    """End the program that a safety stop has paused, so that it cannot be resumed without this client.
-
-    A robot that does not answer keeps it; nothing moves meanwhile, and the next run reports it.
-    """
-    with suppress(DriverError):
-        robot.scripts.send_program(STOP_WORD)
-        wait_until(is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
-
-
-def _send_stop_program(robot: Connections) -> None:
-    """Replace whatever runs by a program that stops the arm."""
-    robot.renew()
-    robot.scripts.send_program(stop_script())
-
-
-_START_TIMEOUT = 5.0
-"""A program that does not show as running within this [s] was not accepted."""
-_READ_ONLY = 210
-"""Error code for a program that came in local control. Source: test of the maker's client library."""
-
-
-class ProgramWatch:
+class _ProgramWatch:
     """Watches one program after the other on one robot."""
 
-    def __init__(self, robot: Connections) -> None:
+    def __init__(self, robot: _SessionPorts) -> None:
         self._robot = robot
         self._program = self._last_text = ""
         self._is_read_only = False
@@ -246,7 +323,7 @@ class ProgramWatch:
                 self._last_text = message.text
             self._is_read_only |= isinstance(message, ErrorCodeMessage) and message.code == _READ_ONLY
         raise_on_error(messages, self._program)
-        check_slider(reported_slider(self._robot.primary))
+        check_slider(self._robot.slider)
 
     def look_after(self) -> None:
         """Read everything that has come, while waiting for something else; at least one frame comes.
@@ -274,191 +351,52 @@ class ProgramWatch:
         return not is_stopped(frame)
 
 
-class UrDriver:
-    """A session with one robot.
-
-    Use as a context manager; leaving it stops the arm if it is still moving and closes all connections.
+def _stop_arm(robot: _SessionPorts, reverse: Transport | None) -> None:
+    """Bring the arm to rest, and end the program that moves it.
 
     Args:
-        host: the robot's name or address.
-        ports: its ports.
-        reverse_port: where its programs dial back; see ReverseServer.
-        network: tests hand in a network in memory.
+        robot: the connections; those for programs and frames are made anew if the stop word does not help.
+        reverse: connection to the receiver program, when one runs.
 
-    Attributes:
-        info: which robot answered.
-        layout: columns of its realtime frames.
+    Raises:
+        DriverError: the arm could not be seen to come to rest.
     """
-
-    def __init__(
-        self,
-        host: str,
-        ports: Ports | None = None,
-        *,
-        reverse_port: int | None = None,
-        network: Network | None = None,
-    ) -> None:
-        self._robot = robot = Connections(network or TcpNetwork(), host, ports or Ports.standard())
-        self._watch = ProgramWatch(robot)
-        self._in_motion = False
-        try:
-            robot.open(reverse_port)
-        except BaseException:
-            robot.close()
-            raise
-        self.info = robot.info
-        self.layout = robot.frames.layout
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Stop the arm if we left it in motion, and close all connections."""
-        try:
-            if self._in_motion:
-                self.stop(None)
-        finally:
-            self._robot.close()
-
-    def read_frame(self) -> RealtimeFrame:
-        """The state of the robot now.
-
-        Raises:
-            DriverError: no frames come.
-        """
-        self._robot.frames.drain()
-        return self._robot.frames.receive().latest
-
-    def actual_q(self) -> NDArray[np.float64]:
-        """Joint positions (6,) as reported now [rad].
-
-        Raises:
-            DriverError: no frames come, or one reports what is no angle.
-        """
-        frame = self.read_frame()
-        check_angles(frame)
-        q: NDArray[np.float64] = frame.actual_q
-        return q.copy()
-
-    def report(self) -> RobotReport:
-        """What the robot reports of itself now.
-
-        Raises:
-            DriverError: no frames come, or a connection broke.
-        """
-        self._robot.primary.poll()
-        robot = self._robot
-        return make_report(
-            robot.network, robot.host, robot.ports, self.info, self.read_frame(), robot.primary
-        )
-
-    def check_ready(self) -> RealtimeFrame:
-        """Refuse a robot that may not move now; returns its state.
-
-        Raises:
-            RobotStoppedError: safety mode or robot mode forbids it.
-            DriverError: a program is running, the speed slider was moved, or the ports name different arms.
-        """
-        frame = self.read_frame()
-        check_safety(frame)
-        check_idle(frame)
-        self._robot.primary.poll()
-        check_arm(self.info, self._robot.primary)
-        check_slider(reported_slider(self._robot.primary))
-        return frame
-
-    def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
-        """Stream the commands of one source: start the receiver program, stream, stop, wait for rest.
-
-        Args:
-            source: a fresh one; the arm must stand where its run begins.
-            on_row: takes every new frame with the command sent; what it raises ends the run.
-            acceleration: of the robot's `speedj` [rad/s2].
-
-        Returns:
-            What happened on the wire; the arm rests and no program runs.
-
-        Raises:
-            RobotStoppedError: the robot stopped, or its program failed.
-            DriverError: anything else that ended the run; the arm has been stopped.
-        """
-        self.check_ready()
-        robot, watch = self._robot, self._watch
-        server, frames, period = robot.server, robot.frames, self.info.period
-        server.forget_callers()
-        reverse: Transport | None = None
-        try:
-            with _AlwaysStopped(self) as guard:
-                text = receiver_script(server.address, server.port, acceleration=acceleration, period=period)
-                watch.start(text)
-                reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
-                guard.reverse = reverse
-                stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
-                try:
-                    with collector_paused():
-                        report = stream.run(source, on_row)
-                except ProgramEndedError as error:
-                    raise watch.explain(error) from error
-                watch.wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
-                wait_for_rest(frames, robot.network)
-        except RobotStoppedError:
-            raise
-        except DriverError as error:
-            self._raise_safety_stop(error)
-            raise
-        finally:
-            if reverse is not None:
-                reverse.close()
-        return report
-
-    def _raise_safety_stop(self, error: DriverError) -> None:
-        """Raise a safety stop that the robot reports now: it may be the cause of an error, or its effect."""
-        try:
-            check_safety(self.read_frame())
-        except RobotStoppedError as stop:
-            raise RobotStoppedError(f"{stop}; before that: {full_message(error)}") from error
-        except DriverError:
-            pass  # a robot that is gone reports nothing
-
-    def stop(self, reverse: Transport | None) -> None:
-        """Bring the arm to rest, by every available method.
-
-        Args:
-            reverse: connection to the receiver program, when one runs.
-
-        Raises:
-            DriverError: the arm could not be seen to come to rest.
-        """
-        stop_arm(self._robot, reverse)
-        self._in_motion = False
+    if reverse is not None and _attempt(
+        robot, lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
+    ):
+        return
+    if not _attempt(robot, lambda: _send_stop_program(robot)):
+        raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
 
 
-class _AlwaysStopped:
-    """Stops the arm when the block is left by an exception of any kind, Ctrl-C included."""
+def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:
+    """Try one method to stop; True when the arm then rests and no program runs."""
+    try:
+        act()
+        wait_until(has_ended, robot.frames, robot.network, REST_TIMEOUT, "the robot's program goes on")
+        if not is_stopped(wait_for_rest(robot.frames, robot.network)):
+            _end_paused_program(robot)
+    except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
+        return False
+    return True
 
-    def __init__(self, driver: UrDriver) -> None:
-        self._driver = driver
-        self.reverse: Transport | None = None
 
-    def __enter__(self) -> Self:
-        self._driver._in_motion = True
-        return self
+def _end_paused_program(robot: _SessionPorts) -> None:
+    """End the program that a safety stop has paused, so that it cannot be resumed without this client.
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self._driver._in_motion = False
-            return
-        try:
-            self._driver.stop(self.reverse)
-        except DriverError as not_stopped:
-            error.add_note(str(not_stopped))
-        finally:
-            # Tried once with everything there is; closing the session would only try the same again.
-            self._driver._in_motion = False
+    A robot that does not answer keeps it; nothing moves meanwhile, and the next run reports it.
+    """
+    with suppress(DriverError):
+        robot.scripts.send_program(STOP_WORD)
+        wait_until(is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
+
+
+def _send_stop_program(robot: _SessionPorts) -> None:
+    """Replace whatever runs by a program that stops the arm."""
+    robot.renew()
+    robot.scripts.send_program(stop_script())
+
+
+def stop_script() -> str:
+    """A program that replaces whatever runs and brings the arm to rest."""
+    return f"def ur_client_stop():\n  stopj({STOP_DECELERATION})\nend\n"

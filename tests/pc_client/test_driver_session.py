@@ -95,7 +95,7 @@ def test_software_that_does_not_report_whether_a_program_runs_is_refused():
     robot.version = SoftwareVersion(3, 1)
     with pytest.raises(DriverError, match=r"3\.1\.0, CB3, must be 3\.2 or later, CB3 or e-Series"):
         UrDriver("robot", network=robot)
-    assert set(robot.closed) == {"dashboard", "primary", "secondary"}
+    assert set(robot.closed) == {"dashboard", "primary"}
 
 
 @pytest.mark.parametrize(
