@@ -51,10 +51,23 @@ from pc_client.errors import RecordingError
 from pc_client.recording.recording import Recording
 from pc_client.recording.rows import Phase
 
+Array = NDArray[np.float64]
+
 # Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
 MIN_LAG_S, MAX_LAG_S = -0.1, 0.4
 
-_VelocityOf = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+SPLIT_HZ = 6.0
+"""Between the slow and the fast rest of the budget."""
+
+PARTS = ("delay", "scale and ramp", "slow rest", "fast rest", "noise")
+"""Of the budget."""
+
+_SHORTEST_REST = 8
+
+_NODES = 5
+"""Nodes of the Gauss-Hermite rule an axis: exact for polynomials up to the ninth degree."""
+
+_VelocityOf = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +85,7 @@ class Snr:
     velocity_lag_s: float
 
 
-def snr_db(reference: NDArray[np.float64], actual: NDArray[np.float64]) -> float:
+def snr_db(reference: Array, actual: Array) -> float:
     """Eq. 10 on two signals of the same shape, (n,) or (n, 3).
 
     Returns:
@@ -80,6 +93,11 @@ def snr_db(reference: NDArray[np.float64], actual: NDArray[np.float64]) -> float
     """
     signal = float(np.sum(np.square(reference)))
     noise = float(np.sum(np.square(actual - reference)))
+    return decibels(signal, noise)
+
+
+def decibels(signal: float, noise: float) -> float:
+    """Ratio of two powers in dB; inf without noise, -inf of noise alone."""
     if noise == 0.0:
         return math.inf
     return 10.0 * math.log10(signal / noise) if signal > 0.0 else -math.inf
@@ -131,7 +149,7 @@ def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _Veloci
 
 def shifted_pair(
     track: TcpTrack, reference: ShiftedReference, lag_s: float, velocity_of: _VelocityOf
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Return reference and actual over the movement, both taken `lag_s` later at the robot.
 
     The window moves with the lag, so that the same piece of the reference is judged as without a shift.
@@ -214,49 +232,42 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
     )
 
 
-def joint_errors(recording: Recording, track: TcpTrack) -> NDArray[np.float64]:
+def joint_errors(recording: Recording, track: TcpTrack) -> Array:
     """Return reference minus actual joint position at the samples of the track, (n, 6) rad."""
-    error: NDArray[np.float64] = (
-        recording.column("ref_q")[track.rows] - recording.column("actual_q")[track.rows]
-    )
+    error: Array = recording.column("ref_q")[track.rows] - recording.column("actual_q")[track.rows]
     return error
 
 
-def position_errors(track: TcpTrack) -> NDArray[np.float64]:
+def position_errors(track: TcpTrack) -> Array:
     """Return the distance between reference and reported position over the movement, (n,) m."""
     moving = track.movement
-    distance: NDArray[np.float64] = np.linalg.norm(track.p_actual[moving] - track.p_ref[moving], axis=1)
+    distance: Array = np.linalg.norm(track.p_actual[moving] - track.p_ref[moving], axis=1)
     return distance
 
 
-def rest_noise(recording: Recording, track: TcpTrack) -> NDArray[np.float64] | None:
+def rest_noise(recording: Recording, track: TcpTrack) -> Array | None:
     """Return the covariance (3, 3) of the differenced position at rest, (m/s)^2: the noise floor of velocity.
 
-    Only the half of each settling phase farther from the movement counts, and a slow drift (the mean
-    velocity of that half) is taken out. None when no phase of rest is long enough.
+    A slow drift (the mean velocity of each rest) is taken out. None when no phase of rest is long enough.
     """
+    rests = [velocity(track.t[s], track.p_actual[s]) for s in rest_samples(recording, track)]
+    if not rests:
+        return None
+    v = np.concatenate([one - one.mean(axis=0) for one in rests])
+    return v.T @ v / (len(v) - len(rests))
+
+
+def rest_samples(recording: Recording, track: TcpTrack) -> list[NDArray[np.intp]]:
+    """Samples of the track at rest, for each settling phase: the half that is farther from the movement."""
     phase = recording.column("phase")[track.rows]
     before = np.flatnonzero(phase == Phase.SETTLE_BEFORE)
     after = np.flatnonzero(phase == Phase.SETTLE_AFTER)
-    pieces = []
-    for samples in (before[: len(before) // 2], after[len(after) // 2 :]):
-        if len(samples) >= 8:
-            v = velocity(track.t[samples], track.p_actual[samples])
-            pieces.append(v - v.mean(axis=0))
-    if not pieces:
-        return None
-    v = np.concatenate(pieces)
-    return v.T @ v / (len(v) - len(pieces))
+    halves = (before[: len(before) // 2], after[len(after) // 2 :])
+    return [samples for samples in halves if len(samples) >= _SHORTEST_REST]
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-Array = NDArray[np.float64]
-
-_NODES = 5
-"""Nodes of the Gauss-Hermite rule an axis: exact for polynomials up to the ninth degree."""
 
 
 def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
@@ -283,10 +294,6 @@ def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
     return mean, np.maximum(variance, 0.0)
 
 
-SPLIT_HZ = 6.0
-PARTS = ("delay", "scale and ramp", "slow rest", "fast rest", "noise")
-
-
 @dataclass(frozen=True, slots=True)
 class Budget:
     """Error power of one run by part.
@@ -307,8 +314,7 @@ class Budget:
 
     def alone_db(self, part: str) -> float:
         """Return the SNR in dB that would be reached if this part were the only error."""
-        power = self.parts[part]
-        return 10.0 * math.log10(self.signal_power / power) if power > 0.0 < self.signal_power else math.inf
+        return decibels(self.signal_power, self.parts[part]) if self.signal_power > 0.0 else math.inf
 
 
 def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
@@ -348,11 +354,11 @@ def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
     return Budget(_power(ref_speed), error_power, dict(zip(PARTS, parts, strict=True)))
 
 
-def _power(signal: NDArray[np.float64]) -> float:
+def _power(signal: Array) -> float:
     return float(np.mean(np.square(signal)))
 
 
-def _power_above(signal: NDArray[np.float64], cycles_per_sample: float) -> float:
+def _power_above(signal: Array, cycles_per_sample: float) -> float:
     """Return the mean square of the part of a signal above a frequency (Parseval)."""
     n = len(signal)
     power = np.square(np.abs(np.fft.rfft(signal))) / n**2

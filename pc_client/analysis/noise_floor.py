@@ -18,20 +18,18 @@ drops out there: of a movement with long slow tails this figure is better than t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pc_client.analysis.measures import speed_noise
+from pc_client.analysis.measures import decibels, rest_samples, speed_noise
 from pc_client.analysis.run import MeasuredRun
 from pc_client.analysis.track import speed, velocity
 from pc_client.control.loop_model import LoopModel, velocity_response
 from pc_client.kinematics.forward import tcp_jacobian
 from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
-from pc_client.recording.rows import Phase
 
 Array = NDArray[np.float64]
 
@@ -40,19 +38,9 @@ LEAST_STEPS = 30
 
 
 def _rest_steps(run: MeasuredRun) -> Array:
-    """Return one-cycle differences (n, 6) [rad] of the reported joints at rest, each stretch less its mean.
-
-    The half of each settling phase that is farther from the movement counts, as in `metrics.rest_noise`.
-    """
-    phase = run.recording.column("phase")[run.track.rows]
+    """One-cycle differences (n, 6) [rad] of the reported joints at rest, each stretch less its mean."""
     q = run.recording.column("actual_q")[run.track.rows]
-    before = np.flatnonzero(phase == Phase.SETTLE_BEFORE)
-    after = np.flatnonzero(phase == Phase.SETTLE_AFTER)
-    stretches = [
-        np.diff(q[samples], axis=0)
-        for samples in (before[: len(before) // 2], after[len(after) // 2 :])
-        if len(samples) >= 8
-    ]
+    stretches = [np.diff(q[samples], axis=0) for samples in rest_samples(run.recording, run.track)]
     centred = [steps - steps.mean(axis=0) for steps in stretches]
     return np.concatenate(centred) if centred else np.empty((0, q.shape[1]))
 
@@ -93,7 +81,7 @@ def floor_db(run: MeasuredRun, covariance: Array | None) -> float | None:
         return None
     power = _floor_power(run, covariance, robot_model(name))
     signal = run.budget.signal_power
-    return 10.0 * math.log10(signal / power) if power > 0.0 < signal else None
+    return decibels(signal, power) if power > 0.0 < signal else None
 
 
 def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:

@@ -5,7 +5,6 @@ One frame, a row a movement, in three forms: `table1.json`, `table1.md` and a ta
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from pc_client.analysis.measures import decibels
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import GIVEN_UP, MeasuredRun
 from pc_client.errors import RecordingError
@@ -223,7 +223,7 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
 def _unrepeatable_db(runs: Sequence[MeasuredRun]) -> float | None:
     """SNR that what does not repeat from run to run would leave; None when it is not known."""
     power = unrepeatable_power(runs)
-    return 10.0 * math.log10(runs[0].budget.signal_power / power) if power else None
+    return decibels(runs[0].budget.signal_power, power) if power else None
 
 
 def _rank(run: MeasuredRun) -> tuple[int, str, int, str]:
