@@ -22,6 +22,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pc_client.results.sheet import (
+    AXIS_GREY,
+    GRID_GREY,
     LETTERS,
     MARK_EDGE,
     MARK_FILL,
@@ -31,10 +33,7 @@ from pc_client.results.sheet import (
     Curve,
     Panel,
     Sheet,
-    matplotlib_style,
 )
-
-__all__ = ["Bars", "bars_of_levels", "draw", "figure", "image_bytes", "svg_text"]
 
 _DPI = 110
 _FEW_GROUPS = 6
@@ -46,7 +45,7 @@ def figure(
     height: float, mark: str = "", *, width: float = WIDTH, title: str = "", letters: float = LETTERS
 ) -> Iterator[Figure]:
     """Give an empty figure in the theme, to be filled inside the block; arguments as of `Sheet`."""
-    with mpl.rc_context(matplotlib_style(letters)):
+    with mpl.rc_context(_style(letters)):
         page = Figure(figsize=(width, height))
         yield page
         if title:
@@ -60,7 +59,7 @@ def figure(
 def svg_text(page: Figure) -> str:
     """A figure as SVG text, without date or program."""
     text = io.StringIO()
-    with mpl.rc_context(matplotlib_style()):
+    with mpl.rc_context(_style()):
         FigureCanvasSVG(page)
         page.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     return text.getvalue()
@@ -69,7 +68,7 @@ def svg_text(page: Figure) -> str:
 def image_bytes(page: Figure, kind: Literal["png", "webp"] = "png") -> bytes:
     """A figure as the bytes of an image file; WebP takes a third of PNG."""
     data = io.BytesIO()
-    with mpl.rc_context(matplotlib_style()):
+    with mpl.rc_context(_style()):
         FigureCanvasAgg(page)
         page.savefig(data, format=kind, dpi=_DPI, metadata={"Software": None} if kind == "png" else None)
     return data.getvalue()
@@ -228,3 +227,37 @@ def bars_of_levels(
         # At the left, where it is seen on a narrow screen, too.
         axes.legend(ncols=5, loc="lower left", bbox_to_anchor=(-0.005, 0.99))
     return page
+
+
+def _style(letters: float = LETTERS) -> dict[str, Any]:
+    """Parameters of matplotlib (`matplotlib.rc_context`) with letters of a size [points]."""
+    return {
+        "font.family": "DejaVu Sans",  # comes with matplotlib, so every machine draws the same letters
+        "font.size": letters,
+        "text.parse_math": False,  # a name with two dollar signs is a name
+        "axes.titlesize": letters + 0.5,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+        "axes.labelsize": letters,
+        "xtick.labelsize": letters - 0.5,
+        "ytick.labelsize": letters - 0.5,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "grid.color": GRID_GREY,
+        "grid.linewidth": 0.6,
+        "axes.axisbelow": True,
+        "axes.edgecolor": AXIS_GREY,
+        "xtick.color": "#333333",
+        "ytick.color": "#333333",
+        "legend.frameon": False,
+        "legend.fontsize": letters - 1.0,
+        "legend.borderaxespad": 0.2,
+        "legend.columnspacing": 1.2,
+        "legend.handlelength": 1.5,
+        "lines.solid_joinstyle": "round",
+        "svg.hashsalt": "ur-hil",  # the same data give the same file
+        "svg.fonttype": "path",
+        "path.simplify": True,
+        "path.simplify_threshold": 0.2,
+    }
