@@ -5,13 +5,10 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+import pc_client as ur
 from bench.box_process import box_process
 from bench.limit import measure_limit
-from pc_client.control.controller import CONTROLLERS
-from pc_client.driver.session import UrDriver
-from pc_client.experiment.experiment import load_movements, prepare_experiment
-from pc_client.experiment.runner import ExperimentRunner
-from pc_client.movements import library_names
+from pc_client.movements.files import library_names, load_motion
 
 
 def measure_lockstep(robot: str = "ur3") -> dict[str, float]:
@@ -40,10 +37,9 @@ def _measure(robot: str, fidelity: str) -> tuple[float, float]:
     """Wall time of a cycle [us] with an arm of this fidelity, and the cycle of the robot [s]."""
     options = ("--robot", robot, "--pace", "lockstep", "--seed", "7", "--fidelity", fidelity)
     with box_process(*options) as box, tempfile.TemporaryDirectory() as folder:
-        movements = load_movements(library_names())
-        experiment = prepare_experiment(movements, repeat=1, out=Path(folder), robot=robot)
-        with UrDriver("127.0.0.1", box.ports) as driver:
-            report = ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
-        period = driver.info.period
+        arm = ur.connect("127.0.0.1", box.ports)
+        plans = [ur.plan(load_motion(name), arm) for name in library_names()]
+        report = arm.experiment(plans, 1, ur.Controller.preview(), Path(folder))
+        period = arm.report.info.period
     cycles = sum(stream.robot_time for stream in report.streams) / period
     return 1e6 * sum(stream.wall_time for stream in report.streams) / cycles, period

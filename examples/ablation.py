@@ -11,25 +11,24 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from pc_client.control.controller import CONTROLLERS, Controller
-from pc_client.errors import ClientError
-from pc_client.experiment.experiment import Experiment, load_movements, prepare_experiment
+import pc_client as ur
+from pc_client.analysis.measures import PARTS
+from pc_client.analysis.run import analyse_run
+from pc_client.analysis.table import build_table
 from pc_client.movements.files import library_names
-from protocol.ur_types import Ports
+from pc_client.recording.recording import load_recording
+from ur_emulator import ControlBox
 
-HOST = "127.0.0.1"
-
-PAPER, PREVIEW, BEST = CONTROLLERS["paper"], CONTROLLERS["preview"], CONTROLLERS["best"]
+PAPER, PREVIEW, BEST = ur.Controller.paper(), ur.Controller.preview(), ur.Controller.best()
 LAG = replace(BEST, compensates_gear=False, uses_ilc=False)
 
-COMPOSITIONS: dict[str, tuple[Controller, str]] = {
+COMPOSITIONS: dict[str, tuple[ur.Controller, str]] = {
     "paper": (PAPER, "PI and feed-forward, as published"),
     "short ramp": (
         replace(PREVIEW, uses_preview=False, path_tolerance=PAPER.path_tolerance),
@@ -74,14 +73,14 @@ def main() -> int:
             for fidelity in options.fidelity
             for name in options.composition
         ]
-    planned = prepare_experiment(load_movements(movements), repeat=3, out=options.out)
+    plans = [ur.plan(ur.Movement.library(name)) for name in movements]
     results: list[dict[str, Any]] = []
     for name, fidelity, seed, pace in cases:
         words = (name.replace(", ", "_").replace(" ", "_"), Path(fidelity).stem, str(seed), pace)
         folder = options.out / "-".join(words)
         try:
-            result = run_case(name, fidelity, seed, pace, replace(planned, out=folder, overwrite=True))
-        except ClientError as error:
+            result = run_case(name, fidelity, seed, pace, plans, folder)
+        except ur.ClientError as error:
             print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {error}", flush=True)
             continue
         print(f"{name:18} {fidelity:8} seed {seed} {pace:8}  {result['summary']}", flush=True)
@@ -97,17 +96,13 @@ def write(results: list[dict[str, Any]], out: Path) -> None:
     draw(results, out / "ablation.png")
 
 
-def run_case(name: str, fidelity: str, seed: int, pace: str, planned: Experiment) -> dict[str, Any]:
+def run_case(
+    name: str, fidelity: str, seed: int, pace: str, plans: Sequence[ur.Plan], out: Path
+) -> dict[str, Any]:
     """Run the movements with one composition on one box; returns figures by movement."""
-    from pc_client.analysis.measures import PARTS
-    from pc_client.analysis.run import analyse_run
-    from pc_client.analysis.table import build_table
-    from pc_client.driver.session import UrDriver
-    from pc_client.experiment.runner import ExperimentRunner
-    from pc_client.recording.recording import load_recording
-
-    with box(fidelity, seed, pace) as ports, UrDriver(HOST, ports) as driver:
-        report = ExperimentRunner(driver, planned, COMPOSITIONS[name][0]).run()
+    with ControlBox(port_base=None, pace=pace, fidelity=fidelity, seed=seed) as box:
+        arm = ur.connect(box.host, box.ports)
+        report = arm.experiment(plans, 3, COMPOSITIONS[name][0], out, overwrite=True)
     table = build_table([analyse_run(load_recording(path)) for path in report.paths])
     rows = {
         row["name"]: {
@@ -243,15 +238,6 @@ def _of_main(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _mean(result: dict[str, Any], kind: str, figure_name: str) -> float:
     return fmean(row[figure_name] for row in result["rows"].values() if row["kind"] == kind)
-
-
-@contextmanager
-def box(fidelity: str, seed: int, pace: str) -> Iterator[Ports]:
-    """Run a box on free ports, so that one on the standard ports is not disturbed."""
-    from ur_emulator import ControlBox
-
-    with ControlBox(host=HOST, port_base=None, fidelity=fidelity, seed=seed, pace=pace) as control_box:
-        yield control_box.ports
 
 
 if __name__ == "__main__":

@@ -10,23 +10,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
+import pc_client as ur
 from pc_client.analysis.report import build_report, build_tables
 from pc_client.analysis.side_by_side import build_side_by_side
-from pc_client.control.controller import CONTROLLERS, Controller
-from pc_client.driver.session import UrDriver
-from pc_client.errors import ClientError
-from pc_client.experiment.experiment import Experiment, load_movements, prepare_experiment
-from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements.files import library_names
-from pc_client.studies.sweep.box import Box, simulated_box
-from pc_client.studies.sweep.case import SimulatedArm
+from ur_emulator import ControlBox
 
-PAPER, PREVIEW = CONTROLLERS["paper"], CONTROLLERS["preview"]
+PAPER, PREVIEW = ur.Controller.paper(), ur.Controller.preview()
 # The paper gives neither gains nor acceleration: the page shows what other ordinary numbers would have given.
 # P [1/s], I [1/s2] and the acceleration of `speedj` [rad/s2].
 OTHER_NUMBERS = ((2.0, 0.5, 3.0), (10.0, 5.0, 3.0), (4.0, 2.0, 5.0), (4.0, 2.0, 20.0))
@@ -42,9 +38,6 @@ def main() -> int:
     options = parser.parse_args()
     out, console = options.out, Console(highlight=False)
     try:
-        planned = prepare_experiment(
-            load_movements(options.movements.split(",")), repeat=options.repeat, out=out
-        )
         shown = [(PAPER, "paper"), (PREVIEW, "preview")]
         others = [
             (
@@ -53,28 +46,36 @@ def main() -> int:
             )
             for p, i, a in OTHER_NUMBERS
         ]
-        with simulated_box(SimulatedArm("ur3", options.fidelity, options.seed)) as box:
-            for config, folder in shown:
-                run(replace(planned, out=out / folder, overwrite=True), config, box, console)
-            for config, folder in others:
-                run(replace(planned, out=out / folder, repeat=1, overwrite=True), config, box, console)
+        with ControlBox(port_base=None, pace="lockstep", fidelity=options.fidelity, seed=options.seed) as box:
+            arm = ur.connect(box.host, box.ports)
+            plans = [ur.plan(ur.Movement.library(name), arm) for name in options.movements.split(",")]
+            for controller, folder in shown:
+                run(arm, plans, options.repeat, controller, out / folder, console)
+            for controller, folder in others:
+                run(arm, plans, 1, controller, out / folder, console)
         reports = [build_report(out / folder, console) for _, folder in shown]
         reports += [build_tables(out / folder, console) for _, folder in others]
         table = build_side_by_side(reports, out / "report.html")
-    except ClientError as error:
+    except ur.ClientError as error:
         sys.exit(f"demo: {error}")
     console.print(table.to_rich())
     console.print(f"report: {out / 'report.html'}", soft_wrap=True)
     return 0
 
 
-def run(experiment: Experiment, config: Controller, box: Box, console: Console) -> None:
-    """Run an experiment on a box, and say how fast that was."""
-    with UrDriver(box.host, box.ports) as driver:
-        streams = ExperimentRunner(driver, experiment, config).run().streams
+def run(
+    arm: ur.Arm,
+    plans: Sequence[ur.Plan],
+    times: int,
+    controller: ur.Controller,
+    out: Path,
+    console: Console,
+) -> None:
+    """Run all plans with one controller, and say how fast that was."""
+    streams = arm.experiment(plans, times, controller, out, overwrite=True).streams
     moved, wall_time = sum(s.robot_time for s in streams), sum(s.wall_time for s in streams)
     console.print(
-        f"{config.title}: {experiment.n_runs} runs, {moved:.0f} s of movement in {wall_time:.1f} s",
+        f"{controller.title}: {len(streams)} runs, {moved:.0f} s of movement in {wall_time:.1f} s",
         soft_wrap=True,
     )
 
