@@ -254,7 +254,8 @@ def rest_noise(recording: Recording, track: TcpTrack) -> Array | None:
     if not rests:
         return None
     v = np.concatenate([one - one.mean(axis=0) for one in rests])
-    return v.T @ v / (len(v) - len(rests))
+    covariance: Array = v.T @ v / (len(v) - len(rests))
+    return covariance
 
 
 def rest_samples(recording: Recording, track: TcpTrack) -> list[NDArray[np.intp]]:
