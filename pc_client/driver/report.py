@@ -234,14 +234,13 @@ class StatePorts:
         self.frames.drain()
         return self.frames.receive().latest
 
-    def report(self) -> RobotReport:
-        """What the robot reports of itself now.
+    def report(self, frame: RealtimeFrame) -> RobotReport:
+        """Put together what the robot reports of itself, with this frame as its state.
 
         Raises:
-            DriverError: no frames come, a connection broke, or a state on the primary port makes no sense.
+            DriverError: a connection broke, or a state on the primary port makes no sense.
         """
         self.primary.poll()
-        frame = self.read_frame()
         cartesian = self.primary.newest(CartesianInfo)
         kinematics = self.primary.newest(KinematicsInfo)
         answers = self._ask_dashboard(_REMOTE, _MODE) if self.info.version.major == 5 else {}
@@ -291,7 +290,7 @@ def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
         DriverError: nothing answers on the primary or the realtime port, or something else than a robot.
     """
     with StatePorts(network, host, ports) as robot:
-        return robot.report()
+        return robot.report(robot.frames.receive().latest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,8 +362,8 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
     try:
         info = robot.identify()
         robot.open_frames()
-        rhythm = _listen(robot, seconds)
-        report = robot.report()
+        rhythm, frame = _listen(robot, seconds)
+        report = robot.report(frame)
     except DriverError as error:
         obstacle = str(error)
     finally:
@@ -377,23 +376,26 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
     return Diagnosis(numbered, info, rhythm, report, obstacle)
 
 
-def _listen(robot: StatePorts, seconds: float) -> FrameRhythm:
+def _listen(robot: StatePorts, seconds: float) -> tuple[FrameRhythm, RealtimeFrame]:
+    """The rhythm of the frames, and the last one."""
     frames = robot.frames
     size = frames.layout.size
     stamps: list[float] = []
     arrivals: list[float] = []
     n_heartbeats = 0
     deadline = robot.network.now() + seconds
-    while not arrivals or arrivals[-1] <= deadline:
+    while True:
         arrival = frames.receive()
         arrivals.append(robot.network.now())
         stamps += [frame.timestamp for frame in arrival.new]
         n_heartbeats += arrival.n_heartbeats
+        if arrivals[-1] > deadline:
+            break
     steps, waits = np.diff(stamps), np.diff(arrivals)
     cycle = float(np.median(steps)) if len(steps) else None
     lost = 0 if cycle is None else int(np.sum(np.rint(steps / cycle) - 1))
     spread = (float(waits.std()), float(waits.max())) if len(waits) else (0.0, 0.0)
-    return FrameRhythm(size, len(stamps), n_heartbeats, cycle, lost, *spread)
+    return FrameRhythm(size, len(stamps), n_heartbeats, cycle, lost, *spread), arrival.latest
 
 
 def _state(error: DriverError) -> str:

@@ -124,7 +124,7 @@ class UrDriver:
         Raises:
             DriverError: no frames come, or a connection broke.
         """
-        return self._robot.report()
+        return self._robot.report(self._robot.read_frame())
 
     def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
         """Stream the commands of one source: start the receiver program, stream, stop, wait for rest.
