@@ -66,7 +66,7 @@ CONTROLLER_ORDER = (
     {"safety"},
     {"settings"},
     {"arm_dynamics", "client_inputs", "world_model"},
-    {"electrics", "snapshot"},
+    {"snapshot"},
     {"past_cycles"},
     {"compliance", "force_sense"},
     {"state"},

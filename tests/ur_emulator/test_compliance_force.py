@@ -512,15 +512,6 @@ def test_a_force_that_no_arm_has_ends_in_a_protective_stop_not_in_numbers(wrench
     assert np.abs(bench.controller.plant.qd_true).max() < 1e-2
 
 
-def test_two_equal_runs_are_equal_to_the_last_bit():
-    def run():
-        bench = above_table(pressing(20) + "  sleep(100)", seed=4)
-        bench.tick(400)
-        return [(s.actual_q, s.actual_current, s.actual_tcp_force) for s in bench.snapshots]
-
-    assert run() == run()
-
-
 def test_what_is_not_in_use_is_not_looked_after(monkeypatch):
     from ur_emulator.controller.compliance import Compliance
 

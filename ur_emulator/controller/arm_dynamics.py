@@ -24,7 +24,7 @@ _TORQUE_SHARE = 0.7
 # Share for a stop, in which the arm's motion is accounted for and friction helps. Chosen.
 _BRAKING_SHARE = 0.9
 _LEAST = 1e-9  # Nm; a joint that needs less does not limit anything
-# What a stop has at least, also where the drives cannot hold the arm [rad/s^2].
+# A stop is never planned slower than this, even where the drives cannot hold the arm [rad/s^2].
 _LEAST_DECELERATION = 1.0
 
 

@@ -13,12 +13,12 @@ CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 
 @dataclass(slots=True)
 class Clock:
-    """Counts the cycles of the controller, and those that primary programs have had.
+    """Counts the cycles of the controller, and those in which a primary program ran.
 
     Attributes:
         generation: of the robot, which says how long a cycle is.
         tick: number of the present cycle.
-        program_tick: cycles that primary programs have had; it does not count while a program is paused.
+        program_tick: cycles in which a primary program ran; a paused program does not run.
         period_s: duration of a control cycle [s].
     """
 

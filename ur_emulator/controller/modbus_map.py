@@ -62,16 +62,6 @@ def write_bit(bits: Sequence[int], forced: bool | None = None) -> Writer:
     return write
 
 
-def in_bit(state: ControllerState, offset: int) -> int:
-    """Read one input."""
-    return box_word(state.io.digital_in) >> offset & 1
-
-
-def out_bit(state: ControllerState, offset: int) -> int:
-    """Read one output."""
-    return box_word(state.io.digital_out) >> offset & 1
-
-
 # --- analogue lines, by the name of their list
 
 
@@ -136,11 +126,6 @@ def clock(state: ControllerState, offset: int) -> int:
     return (milliseconds % 1000, seconds % 60, seconds // 60 % 60, seconds // 3600 % 24, seconds // 86400)[
         offset
     ]
-
-
-def write_general(state: ControllerState, offset: int, value: int) -> None:
-    """Write a general purpose word."""
-    state.modbus_map.write(offset, value)
 
 
 def write_gp_input(state: ControllerState, offset: int, value: int) -> None:
@@ -220,7 +205,8 @@ REGISTERS: tuple[MapRow, ...] = (
     MapRow(33, 1, "configurable outputs to clear", None,
             write_bits(CONFIGURABLE.bits, False)),
     MapRow(34, 94, "reserved"),
-    MapRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i], write_general),
+    MapRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i],
+            lambda s, i, word: s.modbus_map.write(i, word)),
     MapRow(256, 2, "software version, major and minor", lambda s, i: s.modbus_map.version[i]),
     MapRow(258, 1, "robot mode", lambda s, i: s.past.snapshot.robot_mode),
     MapRow(260, 6, "flags, see the coils", flag),
@@ -248,8 +234,10 @@ REGISTERS: tuple[MapRow, ...] = (
 )  # fmt: skip
 
 COILS: tuple[MapRow, ...] = (
-    MapRow(0, 16, "digital inputs, 0-7 standard, 8-9 tool", in_bit),
-    MapRow(16, 16, "digital outputs, same order", out_bit, write_bit(STANDARD_AND_TOOL)),
+    MapRow(0, 16, "digital inputs, 0-7 standard, 8-9 tool",
+            lambda s, i: box_word(s.io.digital_in) >> i & 1),
+    MapRow(16, 16, "digital outputs, same order",
+            lambda s, i: box_word(s.io.digital_out) >> i & 1, write_bit(STANDARD_AND_TOOL)),
     MapRow(32, 16, "output to set", None, write_bit(STANDARD_AND_TOOL, True)),
     MapRow(48, 16, "output to clear", None, write_bit(STANDARD_AND_TOOL, False)),
     MapRow(64, N_EUROMAP, "Euromap67 inputs", lambda s, i: s.io.euromap.read_input(i)),

@@ -12,7 +12,6 @@ from ur_emulator.controller.arm_dynamics import ArmDynamics
 from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance import Compliance
-from ur_emulator.controller.electrics import EnergyMeter
 from ur_emulator.controller.events import EventQueue, ProgramRequests
 from ur_emulator.controller.force_sense import ForceSense
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
@@ -29,6 +28,7 @@ from ur_emulator.controller.safety.inputs import EnablingDevice, OperationalMode
 from ur_emulator.controller.safety.safety_state import SafetyState, limits_of
 from ur_emulator.controller.safety.speed_scaling import SpeedScaling
 from ur_emulator.controller.settings import ErrorSettings, PlanningSettings, ToolSettings
+from ur_emulator.controller.snapshot import EnergyMeter
 from ur_emulator.controller.world_model import WorldModel
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6

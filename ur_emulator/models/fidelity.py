@@ -94,7 +94,7 @@ class Fidelity:
         ripples: waves of the gears.
         backlash: play of each gear [rad]; within it the joint stands still while the motor turns.
         friction_presliding: angle over which the friction of a joint follows a reversal [rad]: it depends on
-            the path then, with hysteresis (`presliding.py`). 0: it depends on the speed alone.
+            the path then, with hysteresis (`plant/friction.py`). 0: it depends on the speed alone.
         friction_error: sd of the relative error of the controller's friction model, per joint [1].
         mass_error: sd of the relative error of each link's mass in the controller's model [1].
         calibration_length: sd of each length of the factory calibration [m].

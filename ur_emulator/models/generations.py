@@ -59,7 +59,7 @@ CB3 = RobotGeneration(
         robot_voltage=48.0,
         joint_voltage=48.0,  # its drop along the arm's cable is small and left out
         idle_current=0.25,  # chosen from the same captures
-        joint_temperatures=(28.0, 29.0, 31.0, 36.0, 38.0, 39.0),  # production log of a UR3 (thermometers.py)
+        joint_temperatures=(28.0, 29.0, 31.0, 36.0, 38.0, 39.0),  # production log of a UR3 (plant.py)
     ),
     force_sensing=ForceSensing(
         has_sensor=False,

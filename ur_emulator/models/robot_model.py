@@ -177,7 +177,7 @@ class RobotModel:
         first_version: oldest software that the maker has released for it; None: the generation's first.
         reversal_speed: friction changes its sign over about this, in the controller's model [rad/s].
         friction_rise: speed over which the true dry friction grows from zero to its size [rad/s]; None: over
-            what suits MuJoCo's friction (`physics.py`), slower than the model.
+            what suits MuJoCo's friction (`arm_physics.py`), slower than the model.
         viscous_kink: joint speed beyond which viscous friction has another slope [rad/s]; None: it has one.
         viscous_fast: that slope [Nm s/rad].
         has_point_masses: the controller's model takes the links for points, without inertia tensors.

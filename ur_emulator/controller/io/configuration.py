@@ -9,10 +9,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, InputOutput, RunState, level
-from ur_emulator.controller.io.modbus_signals import ModbusSignals
+from ur_emulator.controller.io.modbus_signals import DEFAULT_ACTION, FREEDRIVE_ACTION, ModbusSignals
 from ur_emulator.controller.io.registers import Registers
-
-DEFAULT_ACTION, FREEDRIVE_ACTION = "default", "freedrive"
 
 
 class OutputKind(IntEnum):
@@ -96,7 +94,7 @@ class IoConfiguration:
         self._follow(program_runs=True)
 
     def program_stopped(self, *, unscheduled: bool = False) -> None:
-        """Set the outputs that follow the program; `unscheduled` as in `run_states.level`."""
+        """Set the outputs that follow the program; `unscheduled` as in `lines.level`."""
         self._follow(program_runs=False, unscheduled=unscheduled)
 
     def _follow(self, *, program_runs: bool, unscheduled: bool = False) -> None:

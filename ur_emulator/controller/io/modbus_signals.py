@@ -205,7 +205,7 @@ class ModbusSignals:
             signal.invalid_cycles = signal.invalid_cycles + 1 if has_error else 0
             if signal.frequency and tick >= signal.due:
                 interval = self._rate / signal.frequency
-                # Of requests that were missed at most one is made up for.
+                # After missed requests at most one follows at once.
                 signal.due = (signal.due if tick - signal.due < interval else tick) + interval
                 self.refresh(signal)
 
@@ -238,7 +238,7 @@ class ModbusSignals:
         self._set_level(signal, level(rule, program_runs))
 
     def follow(self, program_runs: bool, *, unscheduled: bool) -> None:
-        """Set the outputs that follow the program, which has started or ended; see `run_states.level`."""
+        """Set the outputs that follow the program, which has started or ended; see `lines.level`."""
         for signal in self.signals.values():
             self._set_level(signal, level(signal.rule, program_runs, unscheduled=unscheduled))
 

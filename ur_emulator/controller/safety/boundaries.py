@@ -27,9 +27,9 @@ MOST_PLANES = 8
 # A program is ended this far before a boundary [m, rad]; the manuals name such a tolerance without a number.
 # Source of the numbers: UR5/CB3 manual 3.1, trueness of TCP position and orientation.
 PLANE_TOLERANCE, DIRECTION_TOLERANCE = 0.020, radians(1.15)
-# So far back behind a plane reduced mode ends [m].
+# Reduced mode ends when the arm is this far back on the allowed side of the plane [m].
 TRIGGER_BAND = 0.020
-# What comes no nearer than this does not move towards a boundary [m, rad].
+# An arm that comes nearer to a boundary by no more than this does not move towards it [m, rad].
 _NO_MOTION = 1e-6
 
 

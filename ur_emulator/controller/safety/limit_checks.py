@@ -24,7 +24,7 @@ from ur_emulator.plant.plant import PlantState
 MAX_POSITION_DEVIATION = 0.15
 # A drive at its torque limit for longer than this cannot follow [s].
 MAX_SATURATION_TIME = 0.1
-# A joint that is not faster is at rest, for the high holding torque [rad/s]. Source: see there.
+# For the high holding torque a joint is at rest up to this speed [rad/s]. Source: see `HighHoldingTorque`.
 RESTING_SPEED = 0.01
 # Rounding of a joint speed.
 SPEED_TOLERANCE = 1.0 + 1e-6

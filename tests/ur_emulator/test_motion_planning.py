@@ -1,13 +1,21 @@
-"""optimovej, optimovel, and moves of motion version 2: limited jerk, limits of the arm, the same path and end."""
+"""How moves are planned: optimovej, optimovel, motion version 2, and tool_wrench_limit_set.
+
+Jerk and the arm's limits are kept on the same path, and what the payload feels stays below its limits.
+"""
 
 import numpy as np
 import pytest
+from box_support import Bench
 from e_series_support import DT, ESeriesBench, program
 from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.pose import rotvec_to_matrix
+from ur_emulator.controller.settings import PlanningSettings, ToolWrenchLimit
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.motion.speed_plan import Interval, SmoothPlan, plan
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
 
 GOAL = "[0.6, -1.3, -1.6, -0.5, 1.2, 1.2]"
 AHEAD = "pose_add(get_target_tcp_pose(), p[0, 0.25, 0, 0, 0, 0])"
@@ -137,3 +145,77 @@ def test_optimovej_blends_into_the_next_move():
     speeds = np.linalg.norm(np.diff(q, axis=0) / DT, axis=1)
     assert speeds[100 : len(speeds) - 200].min() > 0.01
     assert bench.now.target_q == pytest.approx((0.2, -1.7, -1.8, -0.3, 1.4, 1.7), abs=1e-9)
+
+
+MASS, COG = 2.0, (0.01, 0.02, 0.1)
+INERTIA = np.diag([0.01, 0.02, 0.03])
+PAYLOAD = f"  set_target_payload({MASS}, {list(COG)}, [0.01, 0.02, 0.03, 0, 0, 0])\n"
+THERE = "pose_trans(get_target_tcp_pose(), p[0.1, 0.05, 0.1, 0.3, 0, 0])"
+MOVES = {
+    "movej": "movej(get_inverse_kin({there}), a=20, v=3)",
+    "movel": "movel({there}, a=5, v=1)",
+    "movel in a time": "movel({there}, t=0.4)",
+    "movep": "movep({there}, a=5, v=1)",
+    "movec": "movec(pose_trans(get_target_tcp_pose(), p[0.1, 0, 0, 0, 0, 0]), {there}, a=5, v=1)",
+    "optimovel": "optimovel({there}, a=1, v=1)",
+    "motion version 2": "motion_version_set(2)\n  movel({there}, a=5, v=1)",
+}
+
+
+def wrenches(move, limit=""):
+    """Run a move; return the wrench of motion at the centre of gravity in flange axes, a row for each cycle."""
+    bench = Bench(fidelity="exact", robot="ur5e", generation=E_SERIES)
+    text = f"def p():\n{PAYLOAD}{limit}  {MOVES[move].format(there=THERE)}\nend\n"
+    bench.controller.programs.start(compile_program(text, catalogue=catalogue_for("5.25")))
+    bench.tick(2_000)
+    arm = bench.controller.state.arm
+    rows = []
+    for snapshot in bench.snapshots:
+        pose = arm.fk(snapshot.target_q)
+        moving = arm.state(snapshot.target_q, snapshot.target_qd).tcp_speed
+        rows.append((pose, moving))
+    turns = [rotvec_to_matrix(pose[3:]) for pose, _ in rows]
+    spins = np.array([turn.T @ moving[3:] for turn, (_, moving) in zip(turns, rows, strict=True)])
+    # Of the centre of gravity, in base axes.
+    speeds = np.array(
+        [
+            np.array(moving[:3]) + np.cross(moving[3:], turn @ COG)
+            for turn, (_, moving) in zip(turns, rows, strict=True)
+        ]
+    )
+    accelerations = np.diff(speeds, axis=0) / E_SERIES.period_s
+    forces = MASS * np.array([turn.T @ a for turn, a in zip(turns[1:], accelerations, strict=True)])
+    momenta = spins @ INERTIA
+    torques = np.diff(momenta, axis=0) / E_SERIES.period_s + np.cross(spins[1:], momenta[1:])
+    assert np.abs(speeds).max() > 0.02  # it has moved
+    assert np.abs(speeds[-1]).max() < 1e-9
+    return np.concatenate([forces, torques], axis=1)
+
+
+@pytest.mark.parametrize("move", MOVES)
+def test_a_move_keeps_the_limits_in_their_frame(move):
+    most = [3.0, 2.0, 4.0, 0.02, 0.05, 0.05]
+    names = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+    frame = f"p[{COG[0]}, {COG[1]}, {COG[2]}, 0, 0, 0]"
+    given = ", ".join(f"{name}={value}" for name, value in zip(names, most, strict=True))
+    free = np.abs(wrenches(move)).max(axis=0)
+    kept = np.abs(wrenches(move, f"  tool_wrench_limit_set({frame}, {given})\n")).max(axis=0)
+    assert (free > most).any()
+    assert (kept <= 1.05 * np.array(most)).all()
+    # It is not slower than it must be by much: some axis uses half of its limit.
+    assert (kept / most).max() > 0.4
+
+
+def test_axes_without_a_limit_are_free():
+    free = wrenches("movel")
+    assert np.array_equal(wrenches("movel", "  tool_wrench_limit_set(p[0, 0, 0, 0, 0, 0], Fx=1000)\n"), free)
+
+
+def test_a_limit_stays_until_it_is_removed():
+    planning = PlanningSettings()
+    limit = ToolWrenchLimit((0.0,) * 6, (1.0,) * 6)
+    planning.limit_tool_wrench(limit)
+    planning.set_motion_version(2)
+    assert planning.tool_wrench_limit is limit
+    planning.limit_tool_wrench(None)
+    assert planning.tool_wrench_limit is None

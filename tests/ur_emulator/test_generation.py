@@ -1,18 +1,150 @@
-"""Robots with other control cycles: the same times in seconds, and frames, packages and steps at the new period."""
+"""What the box decides by its generation, it reads from the record.
 
-from dataclasses import replace
+A second record makes a second kind of box, with other control cycles: the same times in seconds, and frames,
+packages and steps at its own period. A software version has one number, build and date on all ports.
+"""
+
+import json
+import zipfile
+from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 import pytest
-from box_support import Bench, FrameReader, MessageReader, connect
-from generation_support import SECOND
+from box_support import Bench, FrameReader, MessageReader, connect, inside
+from dashboard_support import Dashboard, write_programs
+from generation_support import MISSING_BUILTIN, SECOND
 from rtde_support import RtdeClient
 
-from protocol.primary.layout import RobotModeData
+from protocol.primary import messages as M
+from protocol.primary.layout import ConfigurationData, ForceModeData, MasterboardData, RobotModeData
+from protocol.primary.messages import VersionMessage
+from protocol.rtde import codec as R
+from protocol.ur_types import SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.errors import EmulatorError
+from ur_emulator.controller.safety.safety_state import limits_of
+from ur_emulator.controller.safety.speed_scaling import ModeLimits, limits_of_mode
+from ur_emulator.errors import ArgumentError, EmulatorError
+from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.generations import CB3
+from ur_emulator.models.safety_limits import ArmLimits
+
+
+@pytest.fixture(scope="module")
+def box():
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, generation=SECOND) as box:
+        yield box
+
+
+def test_the_second_record_differs_in_every_field():
+    assert not [f.name for f in fields(CB3) if getattr(SECOND, f.name) == getattr(CB3, f.name)]
+
+
+def test_every_arm_names_its_generation_and_the_box_follows_it(box):
+    assert UR3.generation is CB3
+    assert inside(box)._box.controller.generation is SECOND
+    assert box.identity["software"] == "5.1.0"
+
+
+def test_the_dashboard_has_its_commands(box):
+    with Dashboard(box) as dashboard:
+        assert dashboard.ask("PolyscopeVersion") == "second: URSoftware 5.1.0.77 (Feb 03 2031)"
+        assert dashboard.ask("power on") == "could not understand: 'power on'"
+
+
+def test_frames_have_its_columns_and_its_size(box):
+    with connect(box, "realtime") as sock:
+        frame = FrameReader(sock).next()
+    assert (frame.layout.size, frame.names[-1]) == (1060, "runtime_state")
+
+
+def test_states_have_its_sub_packages_and_configuration(box):
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        version = reader.message(VersionMessage)
+        state = reader.state()
+    assert (version.major, version.build_date) == (5, "03-02-2031, 00:00:00")
+    assert state.find(MasterboardData) is not None
+    assert state.find(ForceModeData) is None
+    configuration = state.find(ConfigurationData)
+    assert configuration.robot_sub_type == 3
+    assert configuration.joint_max_acceleration == (55.0,) * 6
+
+
+def test_rtde_has_its_variables_and_its_rate(box):
+    with connect(box, "rtde") as sock:
+        client = RtdeClient(sock)
+        assert client.ask(R.GetControllerVersion()).version == (5, 1, 0, 77)
+        assert client.ask(R.SetupOutputs(("timestamp", "actual_momentum"), 250.0)).types == (
+            "DOUBLE",
+            "NOT_FOUND",
+        )
+        assert client.ask(R.SetupInputs(("speed_slider_mask", "speed_slider_fraction"))).types == (
+            "NOT_FOUND",
+            "DOUBLE",
+        )
+
+
+def test_programs_have_its_builtins(box):
+    box.run_program("def p():\n  textmsg(get_steptime())\nend\n")
+    box.wait_until(log="0.004")
+    with pytest.raises(ArgumentError, match=MISSING_BUILTIN):
+        box.run_program(f'def p():\n  {MISSING_BUILTIN}("x")\nend\n')
+
+
+def test_an_arm_is_as_good_as_one_of_its_fidelities():
+    bench = Bench(generation=SECOND, fidelity="ideal")
+    assert bench.controller.plant.dead_time == pytest.approx(CB3.fidelity("ideal").dead_time + 0.004)
+    with pytest.raises(EmulatorError, match="unknown fidelity 'poor': choose one of exact, ideal, typical"):
+        ControlBox(in_process=True, fidelity="poor", generation=SECOND)
+
+
+def test_reduced_and_recovery_mode_have_its_limits():
+    robot = replace(UR3, generation=SECOND)
+    rules = SECOND.limits
+    of = partial(limits_of_mode, limits=limits_of(robot), rules=rules)
+    reduced = tuple(0.25 * speed for speed in UR3.qd_max)
+    assert of(SafetyMode.REDUCED, is_manual=False) == ModeLimits(reduced, rules.reduced)
+    assert of(SafetyMode.RECOVERY, is_manual=True) == ModeLimits((0.1,) * 6, rules.recovery)
+    assert of(SafetyMode.NORMAL, is_manual=True) == ModeLimits(robot.qd_safety, rules.manual)
+    assert of(SafetyMode.REDUCED, is_manual=True).arm == ArmLimits(tool_speed=0.3)
+
+
+# Version given, all four numbers, day, and what the version message says: third number, build, date.
+TOLD = [
+    ("3.2.0", (3, 2, 0, 19171), "Jan 01 2016", (19171, 0, "Jan 01 2016, 00:00:00")),
+    ("3.4.5", (3, 4, 5, 60), "Jul 08 2016", (5, 60, "Jul 08 2016, 16:07:20")),
+    ("3.12.1", (3, 12, 1, 76000), "May 03 2019", (1, 0, "03-05-2019, 06:39:00")),
+    ("3.15.8", (3, 15, 8, 106339), "Nov 30 2021", (8, 0, "30-11-2021, 00:00:00")),
+    ("3.15.8.7", (3, 15, 8, 7), "Nov 30 2021", (8, 0, "30-11-2021, 00:00:00")),
+    ("5.11.11", (5, 11, 11, 1010452), "Apr 11 2022", (11, 0, "11-04-2022, 07:48:21")),
+    ("5.12.2", (5, 12, 2, 1101497), "Jun 28 2022", (2, 0, "28-06-2022, 11:30:43")),
+    ("5.24.0", (5, 24, 0, 1214860), "Oct 04 2025", (0, 0, "04-10-2025, 00:25:33")),
+]
+REPORTS_SINCE = SoftwareVersion(3, 13)
+
+
+@pytest.mark.parametrize(("given", "numbers", "day", "message"), TOLD, ids=[row[0] for row in TOLD])
+def test_every_port_reports_the_same_software(tmp_path, given, numbers, day, message):
+    version = SoftwareVersion(*numbers)
+    folder = write_programs(tmp_path)
+    robot = "ur3" if version.major == 3 else "ur5e"
+    with ControlBox(robot=robot, version=given, pace="lockstep", port_base=None, programs=folder) as box:
+        with connect(box, "rtde") as sock:
+            assert RtdeClient(sock).ask(R.GetControllerVersion()).version == version
+        with connect(box, "primary") as sock:
+            told = MessageReader(sock).message(M.VersionMessage)
+        assert (told.major, told.minor) == numbers[:2]
+        assert (told.bugfix, told.build, told.build_date) == message
+        with Dashboard(box) as dashboard:
+            assert dashboard.ask("PolyscopeVersion") == f"URSoftware {version} ({day})"
+            if version >= REPORTS_SINCE:
+                assert dashboard.ask("generate flight report").endswith(":1")
+                with zipfile.ZipFile(folder / "flightreports" / "flightreport_1.zip") as report:
+                    assert json.loads(report.read("versions.json"))["software"] == str(version)
+        assert box.identity["software"] == given
+
 
 # Control cycle and physics step [us].
 CYCLES = [(8_000, 2_000), (4_000, 2_000), (4_000, 1_000), (2_000, 2_000)]

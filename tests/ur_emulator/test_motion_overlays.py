@@ -1,0 +1,516 @@
+"""Overlays: the joints get a displaced target, the program's path stays the same.
+
+A conveyor moves the tool with a belt, whose encoder a program may feed; a path offset displaces the tool in
+each of the frames, within limits and through a filter.
+"""
+
+import math
+from math import exp
+
+import numpy as np
+import pytest
+from box_support import Bench
+from e_series_support import DT as E_SERIES_DT
+from e_series_support import ESeriesBench, program
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motion_support import DT, HOME, START, TOOL, at, line
+
+from protocol.pose import pose_add, pose_inv, pose_sub, pose_trans, rotvec_to_matrix
+from ur_emulator.commands.programs import StopProgram
+from ur_emulator.controller.events import ScriptFailed
+from ur_emulator.controller.io.encoders import RANGES, Encoder
+from ur_emulator.motion.arm_motion import ArmMotion
+from ur_emulator.motion.generators import SpeedJ
+from ur_emulator.motion.move import Move
+from ur_emulator.motion.overlay import (
+    CATCH_UP_ACCELERATION,
+    BeltEstimate,
+    CircularBelt,
+    Conveyor,
+    LinearBelt,
+)
+
+
+class Swing:
+    """Displaces the tool along base z, smoothly from rest."""
+
+    tool = TOOL
+
+    def __init__(self, reach=0.02, rate=2.0):
+        self.time, self.reach, self.rate = 0.0, reach, rate
+
+    def displace(self, tool_pose, dt):
+        self.time += dt
+        lift = self.reach * (1.0 - math.cos(self.rate * self.time))
+        return (tool_pose[0], tool_pose[1], tool_pose[2] + lift, *tool_pose[3:])
+
+
+def run_cycles(motion, n):
+    return [motion.step(DT, 1.0) for _ in range(n)]
+
+
+def test_without_overlays_target_and_path_are_one_object():
+    motion = ArmMotion(HOME, 20.0)
+    motion.command("me", Move(line(START, at(0.05, 0, 0))))
+    for _ in range(100):
+        motion.step(DT, 1.0)
+        assert motion.target is motion.path
+
+
+def test_a_move_under_an_overlay_is_displaced_and_the_path_is_not():
+    plain, displaced = ArmMotion(HOME, 20.0), ArmMotion(HOME, 20.0)
+    swing = Swing()
+    displaced.add_overlay(swing)
+    for motion in (plain, displaced):
+        motion.command("me", Move(line(START, at(0.05, 0, 0))))
+    for _ in range(60):
+        plain.step(DT, 1.0)
+        displaced.step(DT, 1.0)
+        assert displaced.path == plain.path
+        lift = swing.reach * (1.0 - math.cos(swing.rate * swing.time))
+        expected = np.add(TOOL.pose(plain.path.q)[:3], (0, 0, lift))
+        assert TOOL.pose(displaced.target.q)[:3] == pytest.approx(expected, abs=1e-8)
+
+
+def test_speeds_of_a_displaced_target_are_those_of_its_positions():
+    motion = ArmMotion(HOME, 20.0)
+    motion.add_overlay(Swing(rate=4.0))
+    targets = run_cycles(motion, 200)
+    q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
+    central = (q[2:] - q[:-2]) / (2 * DT)
+    assert np.abs(central - qd[1:-1]).max() < 0.01 * np.abs(qd).max()
+
+
+def test_overlays_act_one_after_the_other():
+    motion = ArmMotion(HOME, 20.0)
+    swings = Swing(), Swing(reach=0.01, rate=3.0)
+    for swing in swings:
+        motion.add_overlay(swing)
+    targets = run_cycles(motion, 100)
+    lift = sum(s.reach * (1.0 - math.cos(s.rate * s.time)) for s in swings)
+    assert TOOL.pose(targets[-1].q)[2] == pytest.approx(START[2] + lift, abs=1e-8)
+
+
+def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest():
+    motion = ArmMotion(HOME, 20.0)
+    swing = Swing()
+    motion.add_overlay(swing)
+    assert motion.is_moving
+    targets = run_cycles(motion, 90)
+    speed = np.abs(targets[-1].qd).max()
+    assert speed > 0.01
+    motion.remove_overlay(swing)
+    assert motion.path is motion.target
+    after = [targets[-1], *run_cycles(motion, 50)]
+    assert not motion.is_moving
+    qd = np.array([t.qd for t in after])
+    assert np.abs(np.diff(qd, axis=0)).max() <= 20.0 * DT * 1.001
+    assert np.abs(np.diff([t.q for t in after], axis=0)).max() <= speed * DT * 1.01
+
+
+def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end():
+    motion = ArmMotion(HOME, 20.0)
+    swing = Swing()
+    motion.add_overlay(swing)
+    motion.command("me", move := Move(line(START, at(0.05, 0, 0))))
+    run_cycles(motion, 30)
+    motion.remove_overlay(swing)
+    targets = [motion.target]
+    while motion.is_moving:
+        targets.append(motion.step(DT, 1.0))
+        assert len(targets) < 300
+    assert move.done
+    assert motion.path is motion.target
+    speed = [TOOL.twist(t.q, t.qd)[2] for t in targets]
+    assert np.abs(np.diff(speed)).max() < 0.03
+    x, y, z = TOOL.pose(motion.path.q)[:3]
+    assert (x, y) == pytest.approx(at(0.05, 0, 0)[:2], abs=1e-8)
+    assert z > START[2] + 0.002
+
+
+def test_a_stream_goes_on_from_the_displaced_target():
+    motion = ArmMotion(HOME, 20.0)
+    swing = Swing()
+    motion.add_overlay(swing)
+    motion.command("me", SpeedJ((0.1,) * 6, 2.0))
+    for _ in range(60):
+        motion.renew()
+        motion.step(DT, 1.0)
+    before = motion.target
+    motion.remove_overlay(swing)
+    motion.renew()
+    after = motion.step(DT, 1.0)
+    assert np.abs(np.subtract(after.qd, before.qd)).max() <= 2.0 * DT * 1.001
+
+
+@pytest.mark.parametrize("end", ["stop", "place"])
+def test_stops_end_all_overlays(end):
+    motion = ArmMotion(HOME, 20.0)
+    motion.add_overlay(Swing())
+    run_cycles(motion, 40)
+    if end == "stop":
+        before = motion.target.qd
+        motion.stop()
+        assert np.abs(np.subtract(motion.step(DT, 1.0).qd, before)).max() <= 20.0 * DT * 1.001
+    else:
+        motion.place(HOME)
+    run_cycles(motion, 30)
+    assert not motion.is_moving
+    assert motion.target is motion.path
+
+
+def test_a_changed_tool_does_not_make_the_arm_jump():
+    swing = Swing()
+    motion = ArmMotion(HOME, 20.0)
+    motion.add_overlay(swing)
+    run_cycles(motion, 50)
+    before = TOOL.pose(motion.target.q)
+    swing.tool = type(TOOL)(TOOL.arm, (0.0, 0.05, 0.1, 0.3, 0.0, 0.0))
+    after = TOOL.pose(motion.step(DT, 1.0).q)
+    assert np.subtract(after[:3], before[:3]) == pytest.approx(0.0, abs=1e-3)
+    assert pose_trans(before, (0, 0, 0, 0, 0, 0))[3:] == pytest.approx(after[3:], abs=1e-6)
+
+
+PLACE = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
+
+
+class RunningBelt:
+    """A belt that runs at a constant speed, and its encoder with whole ticks."""
+
+    def __init__(self, motion, belt, speed, *, density=1000.0, range_id=0):
+        self.motion, self.speed, self.density = motion, speed, density
+        self.time = self.way = 0.0
+        self.encoder = Encoder()
+        self.encoder.feed(range_id)
+        self.conveyor = Conveyor(belt, TOOL, lambda: self.encoder.travel, lambda: self.time)
+        motion.add_overlay(self.conveyor)
+
+    def step(self):
+        self.time += DT
+        self.way += self.speed * DT
+        low, size = RANGES[self.encoder.range_id]
+        self.encoder.set_count(float((math.floor(self.way * self.density) - low) % size + low))
+        return self.motion.step(DT, 1.0)
+
+
+def linear(motion, speed, direction=(0.0, 1.0, 0.0), density=1000.0, **kwargs):
+    return RunningBelt(motion, LinearBelt(direction, density), speed, density=density, **kwargs)
+
+
+@pytest.mark.parametrize("range_id", [0, 1, 2])
+@pytest.mark.parametrize("speed", [0.08, -0.05])
+def test_a_move_on_a_running_belt_is_a_move_in_the_frame_of_the_belt(speed, range_id):
+    motion = ArmMotion(HOME, 20.0)
+    belt = linear(motion, speed, range_id=range_id)
+    for _ in range(150):
+        belt.step()
+    motion.command("me", move := Move(line(START, at(0.03, 0.0, -0.02), v=0.1)))
+    while not move.done:
+        target = belt.step()
+        offset = np.subtract(TOOL.pose(target.q)[:3], TOOL.pose(motion.path.q)[:3])
+        assert offset == pytest.approx((0.0, belt.way, 0.0), abs=1e-3)
+    assert TOOL.pose(motion.path.q) == pytest.approx(at(0.03, 0.0, -0.02), abs=1e-9)
+
+
+@settings(max_examples=15)
+@given(st.floats(-0.15, 0.15), st.sampled_from([200.0, 1000.0, 20000.0]))
+def test_the_arm_catches_up_with_bounded_acceleration_and_without_a_jump(speed, density):
+    motion = ArmMotion(HOME, 20.0)
+    belt = linear(motion, speed, density=density)
+    start = np.array(TOOL.pose(HOME)[:3])
+    carried = np.array([(TOOL.pose(belt.step().q)[:3] - start)[1] for _ in range(110)])
+    velocity = np.diff(carried, prepend=0.0) / DT
+    assert np.abs(np.diff(velocity, prepend=0.0)).max() <= CATCH_UP_ACCELERATION * DT * 1.001 + 1e-9
+    # The count itself is only known to a tick.
+    assert abs(carried[-1] - belt.way) <= 1e-3 + 1.0 / density
+
+
+def test_targets_of_a_carried_arm_are_consistent():
+    motion = ArmMotion(HOME, 20.0)
+    belt = linear(motion, 0.1)
+    targets = [belt.step() for _ in range(120)]
+    q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
+    assert np.abs((q[2:] - q[:-2]) / (2 * DT) - qd[1:-1]).max() < 0.02
+    assert motion.path.q == HOME
+
+
+@pytest.mark.parametrize("rotate_tool", [False, True])
+def test_a_turning_conveyor_carries_the_tool_around_its_axis(rotate_tool):
+    motion = ArmMotion(HOME, 20.0)
+    centre = (START[0] - 0.05, START[1] - 0.1, 0.0, 0.0, 0.0, 0.4)
+    per_turn = 5000.0
+    belt = RunningBelt(
+        motion,
+        CircularBelt(centre, per_turn, rotate_tool),
+        0.4 / (2 * math.pi),  # turns per second
+        density=per_turn,
+    )
+    for _ in range(150):
+        target = belt.step()
+    pose = TOOL.pose(target.q)
+    turn = (0.0, 0.0, 0.0, 0.0, 0.0, 2.0 * math.pi * belt.way)
+    expected = pose_trans(pose_trans(centre, turn), pose_trans(pose_inv(centre), START))
+    assert pose[:3] == pytest.approx(expected[:3], abs=1e-3)
+    assert pose[3:] == pytest.approx(expected[3:] if rotate_tool else START[3:], abs=3e-3)
+
+
+def test_a_pause_stands_still_and_catches_up_afterwards():
+    motion = ArmMotion(HOME, 20.0)
+    belt = linear(motion, 0.05, range_id=1)
+    targets = [belt.step() for _ in range(100)]
+    motion.pause()
+    targets += [belt.step() for _ in range(100)]
+    assert motion.is_paused
+    motion.resume()
+    targets += [belt.step() for _ in range(150)]
+    carried = TOOL.pose(targets[-1].q)[1] - START[1]
+    assert carried == pytest.approx(belt.way, abs=2e-3)
+    speed = np.array([TOOL.twist(t.q, t.qd)[1] for t in targets])
+    assert np.abs(np.diff(speed)).max() < 2.5 * CATCH_UP_ACCELERATION * DT
+    assert speed.max() < 0.35
+
+
+@given(st.floats(-1e6, 1e6), st.floats(0.5, 50.0))
+def test_the_estimate_of_a_steady_belt_has_no_lag(first, speed):
+    estimate = BeltEstimate(first, 0.0)
+    for k in range(1, 400):
+        estimate.update(first + speed * k * DT, k * DT)
+    assert estimate.position == pytest.approx(first + speed * 399 * DT, abs=1e-6 * max(1.0, speed))
+    assert estimate.speed == pytest.approx(speed, rel=1e-3)
+
+
+# --- from scripts
+
+
+FEED = (
+    "  encoder_enable_set_tick_count(0, 2)\n  n = 0\n"
+    "  thread belt():\n    while True:\n      n = n + 1\n"
+    "      encoder_set_tick_count(0, (n * 0.8 + 65000) % 65536)\n      sync()\n    end\n  end\n"
+    "  encoder_set_tick_count(0, 65000)\n"
+)
+
+
+@pytest.fixture
+def bench():
+    bench = Bench(fidelity="ideal")
+    bench.run(f"movej({PLACE}, a=8, v=3)\n")
+    bench.events.clear()
+    bench.snapshots.clear()
+    return bench
+
+
+def failures(bench):
+    return [e.text for e in bench.events if isinstance(e, ScriptFailed)]
+
+
+def test_a_program_tracks_moves_and_stops(bench):
+    said = bench.run(
+        f"def f():\n{FEED}  run belt()\n  track_conveyor_linear(p[0,1,0,0,0,0], 1000)\n  sleep(1)\n"
+        f"  movel(pose_add({PLACE}, p[0.05,0,0,0,0,0]))\n"
+        f"  textmsg(pose_dist(get_target_tcp_pose_along_path(), pose_add({PLACE}, p[0.05,0,0,0,0,0])) < 0.000001)\n"
+        f"  textmsg(get_target_tcp_pose()[1] > get_target_tcp_pose_along_path()[1] + 0.1)\n"
+        f"  textmsg(get_target_tcp_speed_along_path() == p[0,0,0,0,0,0])\n"
+        f"  textmsg(get_target_tcp_speed()[1] > 0.09)\n"
+        f"  stop_conveyor_tracking(8)\n"
+        f"  textmsg(get_target_joint_speeds() == [0,0,0,0,0,0])\n"
+        f"  textmsg(get_target_tcp_pose() == get_target_tcp_pose_along_path())\n"
+        f"  movel({PLACE})\nend\n"
+    )
+    assert not failures(bench)
+    assert said == ["True"] * 6
+    assert bench.now.target_tcp_pose[:3] == pytest.approx((0.25, -0.25, 0.25), abs=1e-9)
+
+
+@pytest.mark.parametrize("how", ["end", "stop"])
+def test_tracking_ends_with_the_program(bench, how):
+    wait = "sleep(1)" if how == "end" else "sleep(10)"
+    bench.start(
+        f"def f():\n{FEED}  run belt()\n  track_conveyor_linear(p[0,1,0,0,0,0], 1000)\n  {wait}\nend\n"
+    )
+    bench.tick(120)
+    if how == "stop":
+        bench.tick(1, StopProgram())
+    bench.tick(30)
+    assert bench.now.target_qd == (0.0,) * 6
+    assert bench.now.target_tcp_pose[1] > -0.2
+    assert not bench.controller.state.motion.is_moving
+
+
+def test_a_secondary_program_leaves_the_tracking_alone(bench):
+    bench.start(
+        f"def f():\n{FEED}  run belt()\n  track_conveyor_linear(p[0,1,0,0,0,0], 1000)\n  sleep(10)\nend\n"
+    )
+    bench.tick(80)
+    bench.start("sec s():\n  textmsg(1)\nend\n")
+    bench.tick(5)
+    assert bench.now.target_tcp_speed[1] > 0.09
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "track_conveyor_linear(p[1,0,0,0,0,0], 0)",
+        "track_conveyor_linear(p[1,0,0,0,0,0], pow(10, 300) * pow(10, 300))",
+        "track_conveyor_linear(p[1,0,0,0,0,0], 0.0000001)",
+        "track_conveyor_linear(p[0,0,0,0,0,1], 1000)",
+        "track_conveyor_circular(p[0,0,0,0,0,0], 0)",
+        "stop_conveyor_tracking(-1)",
+    ],
+)
+def test_absurd_arguments_are_runtime_errors(bench, call):
+    bench.run(f"def f():\n  {call}\nend\n")
+    (text,) = failures(bench)
+    assert "\n" not in text
+
+
+def test_a_count_that_jumps_never_makes_the_arm_jump(bench):
+    bench.start(
+        "def f():\n  encoder_enable_set_tick_count(0, 0)\n  track_conveyor_linear(p[0,1,0,0,0,0], 1000)\n"
+        "  sleep(0.1)\n  encoder_set_tick_count(0, 2000000000)\n  sleep(5)\nend\n"
+    )
+    bench.tick(400)
+    velocity = np.array([s.target_tcp_speed[:3] for s in bench.snapshots])
+    assert bench.now.target_qd == (0.0,) * 6  # out of reach: protective stop
+    assert np.isfinite(velocity).all()
+    qd = np.array([s.target_qd for s in bench.snapshots])
+    assert np.abs(qd).max() <= 2 * math.pi
+
+
+FILTER = "path_offset_set_alpha_filter(0.01)"
+OFFSET = (0.02, -0.01, 0.03, 0.05, 0.02, -0.04)
+
+
+def settled(kind, *more, offset=OFFSET, at_rest=True):
+    """A resting arm after an offset: the bench, the path's pose and the target's."""
+    bench = ESeriesBench(fidelity="exact")
+    path = bench.now.target_tcp_pose
+    bench.start(
+        program(
+            "path_offset_enable()",
+            FILTER,
+            *more,
+            f"path_offset_set({list(offset)}, {kind})",
+            "sleep(3)",
+            *(f"global in_{frame} = path_offset_get({frame})" for frame in (1, 2, 3, 4)),
+            "sync()",
+            "path_offset_disable()",
+            "sleep(0.5)",
+        )
+    )
+    bench.tick(1500)
+    assert not bench.errors
+    return bench, path, bench.now.target_tcp_pose
+
+
+@pytest.mark.parametrize(
+    ("kind", "displaced"),
+    [
+        (1, lambda path: pose_add(OFFSET, path)),
+        (2, lambda path: pose_trans(path, OFFSET)),
+        (4, lambda path: pose_trans(pose_inv(OFFSET), path)),
+    ],
+)
+def test_frames(kind, displaced):
+    bench, path, target = settled(kind)
+    assert target == pytest.approx(displaced(path), abs=1e-6)
+    bench.tick(100)
+    assert tuple(bench[f"in_{kind}"]) == pytest.approx(OFFSET, abs=1e-6)
+    assert tuple(bench["in_1"]) == pytest.approx(pose_sub(target, path), abs=1e-6)
+    assert tuple(bench["in_2"]) == pytest.approx(pose_trans(pose_inv(path), target), abs=1e-6)
+
+
+def test_a_resting_arm_has_the_tool_as_motion_frame():
+    _, path, target = settled(3)
+    turn = rotvec_to_matrix(path[3:])
+    assert np.array(target[:3]) - path[:3] == pytest.approx(turn @ OFFSET[:3], abs=1e-6)
+
+
+def test_the_motion_frame_follows_the_path():
+    bench = ESeriesBench(fidelity="exact")
+    start = np.array(bench.now.target_tcp_pose)
+    side = np.cross([1.0, 0.0, 0.0], rotvec_to_matrix(start[3:])[:, 2])
+    side /= np.linalg.norm(side)
+    bench.start(
+        program(
+            "path_offset_enable()",
+            FILTER,
+            "path_offset_set([0, 0.02, 0, 0, 0, 0], 3)",
+            "movel(pose_add(get_target_tcp_pose(), p[0.1, 0, 0, 0, 0, 0]), a=0.5, v=0.02)",
+        )
+    )
+    bench.tick(2000)
+    assert not bench.errors
+    off = np.array(bench.now.target_tcp_pose[:3]) - start[:3]
+    assert off[0] == pytest.approx(np.dot(off, [1, 0, 0]), abs=1e-9)
+    assert off - [off[0] - 0.02 * side[0], 0, 0] == pytest.approx(0.02 * side, abs=1e-4)
+
+
+def test_limits_and_filter():
+    bench = ESeriesBench(fidelity="exact")
+    start = bench.now.target_tcp_pose[2]
+    bench.start(
+        program(
+            "path_offset_enable()",
+            "path_offset_set_max_offset(0.01, 0.1)",
+            "path_offset_set_alpha_filter(0.02)",
+            "path_offset_set([0, 0, 0.05, 0, 0, 0], 1)",
+            "sleep(2)",
+        )
+    )
+    bench.tick(100)
+    # 1 - 0.98^n of the way after n cycles.
+    n = round(np.log(1 - (bench.now.target_tcp_pose[2] - start) / 0.01) / np.log(0.98))
+    assert n in (98, 99, 100, 101)
+    assert 1 - 0.98**n == pytest.approx(1 - exp(-0.02 * n), abs=0.01)
+    bench.tick(800)
+    assert bench.now.target_tcp_pose[2] - start == pytest.approx(0.01, abs=1e-6)
+
+
+def test_a_sudden_offset_is_a_protective_stop():
+    bench = ESeriesBench(fidelity="exact")
+    bench.start(program("path_offset_enable()", "path_offset_set([0, 0, 0.05, 0, 0, 0], 1)", "sleep(1)"))
+    bench.tick(20)
+    assert bench.errors[0][0] == 204
+
+
+def test_a_weave_of_a_thread_lies_on_a_move():
+    """The manual's example: 2 Hz, 5 mm, along z of the base."""
+    bench = ESeriesBench(fidelity="typical")
+    start = np.array(bench.now.target_tcp_pose)
+    bench.start(
+        program(
+            "path_offset_enable()",
+            "global p = 0.0",
+            "thread weave():",
+            "  while True:",
+            "    path_offset_set([0, 0, 0.005 * (cos(p) - 1), 0, 0, 0], 1)",
+            "    p = p + 4 * 3.14159265 / 500",
+            "    sync()",
+            "  end",
+            "end",
+            "weaving = run weave()",
+            "movel(pose_add(get_target_tcp_pose(), p[0, 0.1, 0, 0, 0, 0]), a=0.5, v=0.05)",
+            "kill weaving",
+            "path_offset_disable()",
+        )
+    )
+    poses = np.array([bench.tick().target_tcp_pose for _ in range(900)])
+    assert not bench.errors
+    z = poses[:, 2] - start[2]
+    assert z.min() == pytest.approx(-0.01, abs=2e-4)
+    assert z.max() == pytest.approx(0.0, abs=2e-4)
+    spectrum = np.abs(np.fft.rfft(z - z.mean()))
+    assert np.argmax(spectrum) * 1.0 / (len(z) * E_SERIES_DT) == pytest.approx(2.0, abs=0.6)
+    assert poses[-1, 1] - start[1] > 0.08
+    assert np.abs(poses[:, 0] - start[0]).max() < 1e-6
+
+
+def test_the_end_of_a_program_ends_it_and_the_arm_stays():
+    bench = ESeriesBench(fidelity="exact")
+    bench.run(program("path_offset_enable()", FILTER, f"path_offset_set({list(OFFSET)}, 1)", "sleep(2)"))
+    assert not bench.errors
+    before = bench.now.target_q
+    bench.run(program("global off = path_offset_get(1)", "sleep(0.1)"))
+    assert tuple(bench["off"]) == (0.0,) * 6
+    assert bench.now.target_q == before
