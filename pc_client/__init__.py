@@ -48,7 +48,7 @@ _HOMES = {
     "Controller": "control.controller",
     "JointTrajectory": "movements.movement",
     "Movement": "api.movement",
-    "Plan": "experiment.prepare",
+    "Plan": "experiment.experiment",
     "PlanningError": "errors",
     "RobotStoppedError": "errors",
     "Run": "analysis.run",

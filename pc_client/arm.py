@@ -49,7 +49,7 @@ from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from ur_hil.records import checked
 
-__all__ = ["QUESTION", "Arm", "Confirm", "ask_at_terminal", "connect", "experiment_description", "plan"]
+__all__ = ["QUESTION", "Arm", "Confirm", "connect", "plan"]
 
 Confirm = Callable[[str], bool]
 """Gets the text that describes the motion; returns whether the arm may move."""
@@ -61,7 +61,7 @@ _NO_TERMINAL = (
 )
 
 
-def ask_at_terminal(text: str) -> bool:
+def _ask_at_terminal(text: str) -> bool:
     """Show the description of a motion and ask at the terminal.
 
     Raises:
@@ -76,7 +76,7 @@ def ask_at_terminal(text: str) -> bool:
         raise ClientError(_NO_TERMINAL) from None
 
 
-def experiment_description(host: str, report: RobotReport, model: RobotModel, wanted: Experiment) -> str:
+def _experiment_description(host: str, report: RobotReport, model: RobotModel, wanted: Experiment) -> str:
     """Describe the motion of an experiment, for the people beside the arm.
 
     Raises:
@@ -99,7 +99,7 @@ def connect(
     *,
     cell: Cell | str | Path | None = None,
     reverse_port: int | None = None,
-    confirm: Confirm = ask_at_terminal,
+    confirm: Confirm = _ask_at_terminal,
 ) -> Arm:
     """Read the state of a robot and compare it with the model of its arm. Nothing moves.
 
@@ -368,7 +368,7 @@ class Arm:
         Raises:
             ClientError: there is no clear path to the start.
         """
-        return experiment_description(self._host, self._report_now(), self.model, wanted)
+        return _experiment_description(self._host, self._report_now(), self.model, wanted)
 
     def _report_now(self) -> RobotReport:
         report = read_report(TcpNetwork(), self._host, self._ports)

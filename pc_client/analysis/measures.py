@@ -114,10 +114,10 @@ def measure_snr(track: TcpTrack) -> Snr:
     velocity_lag = _best_lag(track, reference, velocity)
     return Snr(
         speed_db=raw[0],
-        speed_shifted_db=snr_db(*shifted_pair(track, reference, speed_lag, speed)),
+        speed_shifted_db=snr_db(*_shifted_pair(track, reference, speed_lag, speed)),
         speed_lag_s=speed_lag,
         velocity_db=raw[1],
-        velocity_shifted_db=snr_db(*shifted_pair(track, reference, velocity_lag, velocity)),
+        velocity_shifted_db=snr_db(*_shifted_pair(track, reference, velocity_lag, velocity)),
         velocity_lag_s=velocity_lag,
     )
 
@@ -147,7 +147,7 @@ def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _Veloci
     return float(fine.x)
 
 
-def shifted_pair(
+def _shifted_pair(
     track: TcpTrack, reference: ShiftedReference, lag_s: float, velocity_of: _VelocityOf
 ) -> tuple[Array, Array]:
     """Return reference and actual over the movement, both taken `lag_s` later at the robot.
@@ -330,7 +330,7 @@ def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
     ref_speed = speed(track.t, track.p_ref)[steps]
     error_power = _power(speed(track.t, track.p_actual)[steps] - ref_speed)
 
-    reference, actual = shifted_pair(track, ShiftedReference(track), lag_s, speed)
+    reference, actual = _shifted_pair(track, ShiftedReference(track), lag_s, speed)
     cycle = float(np.median(np.diff(track.t)))
     error = actual - reference
     after_shift = min(_power(error), error_power)

@@ -114,7 +114,7 @@ class Signals:
         """A figure: speed of the TCP, joint angles, joint velocities."""
         from pc_client.results.matplotlib_figures import draw
 
-        return draw(signals_sheet(self))
+        return draw(_signals_sheet(self))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,7 +274,7 @@ def budget_column(part: str) -> str:
     return f"budget_{part.replace(' ', '_')}"
 
 
-def signals_sheet(signals: Signals) -> Sheet:
+def _signals_sheet(signals: Signals) -> Sheet:
     """A motion without a reference: speed of the TCP, joint angles, joint velocities."""
     t, free = signals.t, (None, None)
     size = (WIDTH, 7.2)

@@ -34,7 +34,7 @@ PortBaseOption = Annotated[
 OutOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Folder for recordings, tables and report.")
 ]
-ControllerOption = Annotated[
+_ControllerOption = Annotated[
     str,
     typer.Option(
         "--controller",
@@ -44,13 +44,13 @@ ControllerOption = Annotated[
         show_default=True,
     ),
 ]
-GainPOption = Annotated[
+_GainPOption = Annotated[
     float | None, typer.Option("--gain-p", metavar="X", help="Proportional gain, 1/s, instead of its own.")
 ]
-GainIOption = Annotated[
+_GainIOption = Annotated[
     float | None, typer.Option("--gain-i", metavar="X", help="Integral gain, 1/s2, instead of its own.")
 ]
-AccelerationOption = Annotated[
+_AccelerationOption = Annotated[
     float | None,
     typer.Option(
         "--acceleration", metavar="X", help="The a of the robot's speedj, rad/s2, instead of its own."
@@ -84,7 +84,7 @@ CellOption = Annotated[
         help="What stands around the arm and what it carries, .toml; without: the bare arm on a plane z = 0.",
     ),
 ]
-ReversePortOption = Annotated[
+_ReversePortOption = Annotated[
     int | None,
     typer.Option(
         "--reverse-port",
@@ -94,10 +94,10 @@ ReversePortOption = Annotated[
         help="TCP port of this computer that the robot's program calls; 0: any free one.  [default: 31000]",
     ),
 ]
-OverwriteOption = Annotated[
+_OverwriteOption = Annotated[
     bool, typer.Option("--overwrite", help="Replace simulated recordings of the same names.")
 ]
-DryRunOption = Annotated[
+_DryRunOption = Annotated[
     bool,
     typer.Option("--dry-run", help="Connect, check, plan and show what would happen; nothing moves."),
 ]
@@ -181,16 +181,16 @@ class RunSettings:
 
 
 def _read_settings(
-    controller: ControllerOption = DEFAULT,
-    gain_p: GainPOption = None,
-    gain_i: GainIOption = None,
-    acceleration: AccelerationOption = None,
+    controller: _ControllerOption = DEFAULT,
+    gain_p: _GainPOption = None,
+    gain_i: _GainIOption = None,
+    acceleration: _AccelerationOption = None,
     cell: CellOption = None,
     port_base: PortBaseOption = 0,
-    reverse_port: ReversePortOption = None,
-    overwrite: OverwriteOption = False,
+    reverse_port: _ReversePortOption = None,
+    overwrite: _OverwriteOption = False,
     yes: YesOption = False,
-    dry_run: DryRunOption = False,
+    dry_run: _DryRunOption = False,
 ) -> RunSettings:
     """Make the record from what was given on the command line.
 

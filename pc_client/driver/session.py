@@ -52,7 +52,7 @@ _START_TIMEOUT = 5.0
 _READ_ONLY = 210
 """Error code for a program that came in local control. Source: test of the maker's client library."""
 
-STOP_WORD = "stop program\n"
+_STOP_WORD = "stop program\n"
 """A controller's own word, no program: ends what runs or is paused. Source: public client library."""
 
 
@@ -387,7 +387,7 @@ def _end_paused_program(robot: _SessionPorts) -> None:
     A robot that does not answer keeps it; nothing moves meanwhile, and the next run reports it.
     """
     with suppress(DriverError):
-        robot.scripts.send_program(STOP_WORD)
+        robot.scripts.send_program(_STOP_WORD)
         wait_until(is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
 
 

@@ -27,18 +27,18 @@ from pc_client.kinematics.arm_tree import ArmTree, Joint, Quaternion
 
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
+_JOINT_STATE = "sensor_msgs/msg/JointState"
 POSE = "geometry_msgs/msg/PoseStamped"
-TRANSFORMS = "tf2_msgs/msg/TFMessage"
+_TRANSFORMS = "tf2_msgs/msg/TFMessage"
 TEXT = "std_msgs/msg/String"
 
 _FIELDS = {
-    JOINT_STATE: (
+    _JOINT_STATE: (
         "std_msgs/Header header",
         *("string[] name", "float64[] position", "float64[] velocity", "float64[] effort"),
     ),
     POSE: ("std_msgs/Header header", "geometry_msgs/Pose pose"),
-    TRANSFORMS: ("geometry_msgs/TransformStamped[] transforms",),
+    _TRANSFORMS: ("geometry_msgs/TransformStamped[] transforms",),
     TEXT: ("string data",),
     "std_msgs/Header": ("builtin_interfaces/Time stamp", "string frame_id"),
     "builtin_interfaces/Time": ("int32 sec", "uint32 nanosec"),
@@ -74,7 +74,7 @@ def text(value: str) -> tuple[Value, ...]:
     return len(data), data
 
 
-def cdr_layout(values: Sequence[Value]) -> Struct:
+def _cdr_layout(values: Sequence[Value]) -> Struct:
     """How a message with values of these types and lengths lies in CDR; packs the head and the values."""
     code, size = "<4s", 0
     for value in values:
@@ -131,7 +131,7 @@ class _Publisher:
     def write(self, log_time: int, values: Sequence[Value]) -> None:
         """Write a message."""
         if self._layout is None:
-            self._layout = cdr_layout(values)
+            self._layout = _cdr_layout(values)
         data = self._layout.pack(CDR_LITTLE_ENDIAN, *values)
         self._writer.add_message(self._channel, log_time, data, log_time, self._n_written)
         self._n_written += 1
@@ -159,16 +159,16 @@ class ArmView:
         )
         schemas = {
             message: writer.register_schema(message, "ros2msg", definition(message).encode())
-            for message in (TEXT, TRANSFORMS, JOINT_STATE, POSE)
+            for message in (TEXT, _TRANSFORMS, _JOINT_STATE, POSE)
         }
 
         def publisher(topic: str, message: str, *, is_latched: bool = False) -> _Publisher:
             return _Publisher(writer, topic, message, schemas[message], is_latched=is_latched)
 
         self._description = publisher("/robot_description", TEXT, is_latched=True)
-        self._static = publisher("/tf_static", TRANSFORMS, is_latched=True)
-        self._transforms = publisher("/tf", TRANSFORMS)
-        self._joints = publisher("/joint_states", JOINT_STATE)
+        self._static = publisher("/tf_static", _TRANSFORMS, is_latched=True)
+        self._transforms = publisher("/tf", _TRANSFORMS)
+        self._joints = publisher("/joint_states", _JOINT_STATE)
         self._tcp = publisher("/tcp_pose", POSE)
         self._desired_tcp = publisher("/desired_tcp_pose", POSE)
 
