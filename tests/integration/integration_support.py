@@ -290,24 +290,17 @@ def at(box):
 
 
 @contextmanager
-def client_run(box, out):
-    """A `ur-client run` on a box of this process; no longer than the block."""
+def run_in_movement(box, frames, out):
+    """A `ur-client run` on a box, no longer than the block, which begins well inside the movement."""
     client = start("pc_client", "run", "lognorm_4_1", *at(box), "--out", out)
     try:
+        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
+        assert client.poll() is None
         yield client
     finally:
         if not client.stdout.closed:
             client.kill()
             finish(client)
-
-
-@contextmanager
-def run_in_movement(box, frames, out):
-    """The same; the block begins when the arm is well inside the movement."""
-    with client_run(box, out) as client:
-        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
-        assert client.poll() is None
-        yield client
 
 
 def port_base_of(box):

@@ -1,4 +1,4 @@
-"""`ur-client` against what may go wrong: one line on stderr, exit code 1, the arm at rest, no traceback."""
+"""`ur-client run` against what may go wrong: one line on stderr, its exit code, the arm at rest, no traceback."""
 
 import re
 import socket
@@ -13,6 +13,7 @@ from integration_support import (
     command,
     finish,
     free_port_base,
+    port_base_of,
     programs_since,
     run_in_movement,
     send,
@@ -21,17 +22,13 @@ from integration_support import (
 from pc_client import cli
 from pc_client.driver import primary, questions, realtime
 from protocol.primary.framing import PackageType
-from protocol.ur_types import Ports, ProgramState, SafetyMode
+from protocol.ur_types import Ports, ProgramState
 
 FAR = "t,x,y,z\n" + "".join(f"{0.2 * i:.1f},{0.3 + 0.05 * i:.2f},0.1,0.3\n" for i in range(20))
 MOVEMENT_FILES = {
     "empty.toml": ("", "empty.toml"),
-    "empty.csv": ("", "empty.csv"),
     "no.toml": ("this is not TOML [", "no.toml"),
-    "other.toml": ("[tool]\nname = 3\n", "other.toml"),
     "nan.csv": (FAR.replace("0.30,", "nan,"), "nan"),
-    "words.csv": (FAR.replace("0.1,", "left,"), "left"),
-    "backwards.csv": (FAR.replace("0.4,0.40", "0.1,0.40"), "line"),
     "binary.toml": ("\udcff\udcfe", "UTF-8"),
 }
 
@@ -62,29 +59,13 @@ def test_a_movement_out_of_the_arm_s_reach_is_refused_before_anything_moves(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("name", "code"), [("lognorm_9_9", 2), ("nowhere.toml", 1), (".", 1), ("", 1)])
-def test_a_movement_that_does_not_exist_is_one_line(ur_client, tmp_path, monkeypatch, name, code):
-    monkeypatch.chdir(tmp_path)
-    done = ur_client("run", name, "--robot", "127.0.0.1", "--out", tmp_path / "out")
-    assert done.code == code
-    assert done.complaint()
-
-
 @pytest.mark.parametrize(
     ("host", "words"),
     [
         ("127.0.0.1", "refuses the connection"),
         ("robot.invalid", "cannot be looked up"),
-        ("256.1.1.1", "cannot be looked up"),
         ("127.0.0.1:30003", "give the name or address alone; --port-base"),
-        pytest.param(
-            "a..b",
-            "a..b",
-        ),
-        pytest.param(
-            "x" * 300,
-            "xxx",
-        ),
+        ("x" * 300, "xxx"),
     ],
 )
 def test_a_wrong_address_is_one_line(ur_client, tmp_path, host, words):
@@ -93,22 +74,6 @@ def test_a_wrong_address_is_one_line(ur_client, tmp_path, host, words):
     assert done.code == 1
     assert words in done.complaint()
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("run",),
-        ("run", "uniform_4_1", "--robot", "127.0.0.1"),
-        ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--repeat", "0"),
-        ("run", "uniform_4_1", "--robot", "127.0.0.1", "--out", "o", "--port-base", "60000"),
-        ("fly",),
-    ],
-)
-def test_wrong_usage_is_one_line_and_exit_2(ur_client, arguments):
-    done = ur_client(*arguments)
-    assert done.code == 2
-    assert done.complaint()
 
 
 @pytest.mark.parametrize(
@@ -169,9 +134,7 @@ def _answer(server, data):
     [
         ({}, "says nothing about its version"),
         ({"primary": b"HTTP/1.1 400 Bad Request\r\n\r\n"}, "does not speak its protocol"),
-        ({"primary": b"\x00\x00\x00\x05\x14"}, "does not speak its protocol"),
         ({"primary": b"\xff" * 5000}, "does not speak its protocol"),
-        ({"primary": b"\x00\x00\x00\x00bye"}, "primary"),
         ({"primary": b"bye"}, "primary"),
     ],
 )
@@ -190,7 +153,7 @@ def test_a_port_that_is_no_robots_is_one_line(answers, words, command_name, tmp_
 
 
 @pytest.mark.usefixtures("hasty")
-@pytest.mark.parametrize("realtime", [b"", b"\x00\x00\x04\x74" + bytes(500), b"garbage!" * 400, b"bye"])
+@pytest.mark.parametrize("realtime", [b"", b"garbage!" * 400])
 def test_a_realtime_port_that_gives_no_frames_is_one_line(lockstep_box, realtime, tmp_path, capsys):
     with Messages(lockstep_box) as primary:
         greeting = _greeting(primary.sock)
@@ -239,11 +202,10 @@ REPLACED = r"program|closed the connection"
     ("meddling", "words"),
     [
         ("sec p():\n  protective_stop()\nend\n", "PROTECTIVE_STOP"),
-        ("stop program\n", "program"),
         ("def bad():\n  x = 1 / 0\nend\n", REPLACED),
         ("power off\n", "must be RUNNING"),
     ],
-    ids=["protective stop", "stop", "program error", "power off"],
+    ids=["protective stop", "program error", "power off"],
 )
 def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(standard_box, tmp_path, meddling, words):
     with Frames(standard_box) as frames, run_in_movement(standard_box, frames, tmp_path) as client:
@@ -259,32 +221,23 @@ def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(standard_bo
     assert not list(tmp_path.glob("table1.*"))
 
 
-def test_a_robot_in_a_protective_stop_is_refused_before_anything_moves(ur_client, standard_box, tmp_path):
-    with Messages(standard_box) as primary, Frames(standard_box) as frames:
-        send(standard_box, "secondary", "sec p():\n  protective_stop()\nend\n")
-        frames.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
-        done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "out")
-        assert done.code == 1
-        assert "PROTECTIVE_STOP" in done.complaint()
-        send(standard_box, "secondary", "set unlock protective stop\n")
-        frames.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
-        assert programs_since(primary, standard_box) == []
+HOST = "127.0.0.1"
 
 
-def test_a_robot_that_runs_a_program_is_refused(ur_client, standard_box, tmp_path):
-    with Frames(standard_box) as frames:
-        send(
-            standard_box,
-            "secondary",
-            'def busy():\n  socket_open("127.0.0.1", 9)\n  while True:\n    sync()\n  end\nend\n',
-        )
-        frames.until(lambda f: f.runtime_state == ProgramState.PLAYING)
-        reader = threading.Thread(
-            target=frames.until, args=(lambda f: f.runtime_state == ProgramState.STOPPED,)
-        )
-        reader.start()
-        done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "out")
-        send(standard_box, "secondary", "stop program\n")
-        reader.join()
-    assert done.code == 1
-    assert "the robot's program is PLAYING" in done.complaint()
+@pytest.fixture
+def run_movement(ur_client, standard_box, tmp_path, without_page):
+    def run(*options):
+        where = ("--robot", standard_box.host, "--port-base", port_base_of(standard_box))
+        return ur_client("run", "uniform_4_1", *where, "--out", tmp_path / "out", *options)
+
+    return run
+
+
+def test_a_given_port_serves_all_programs_of_a_session_and_the_next_session(run_movement, tmp_path):
+    # The approach, the excitation and a run: a program each, and each leaves a connection behind.
+    with socket.create_server((HOST, 0)) as found:
+        port = found.getsockname()[1]
+    for _ in range(2):
+        done = run_movement("--reverse-port", port, "--repeat", 1, "--overwrite")
+        assert done.code == 0, done.err
+    assert len(list(tmp_path.glob("out/*.mcap"))) == 1

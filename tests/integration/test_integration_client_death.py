@@ -1,40 +1,215 @@
-"""A client that dies in motion: the arm ramps to rest, the program ends, the next client works."""
+"""A client that is lost in motion: the arm ramps to rest in 0.3 s, the program ends, the next client works.
 
-import os
+In every phase of an experiment, and for every way in which a client can be lost. Time to rest is counted in robot
+time, from the last command that the robot got. In lockstep the client dies at an exact command:
+`DyingNetwork` stands between the real client and its sockets. Killed: all sockets close, as the kernel closes
+those of a process. Frozen: the client stands still, its sockets stay open. Cut off: the client goes on, but
+nothing reaches the robot any more and nothing comes from it.
+"""
+
 import signal
 import struct
+import threading
+from dataclasses import replace
 
 import pytest
-from dying_client import Bystander
 from integration_support import (
+    LAYOUT,
     PERIOD,
     Frames,
-    Messages,
     VelocitySession,
     at,
-    client_run,
     finish,
-    free_port_base,
     is_closed,
     run_in_movement,
     send,
 )
 
+import ur_emulator.realtime.pacing as pacing
+from pc_client.control.controller import CONTROLLERS
+from pc_client.driver.session import UrDriver
+from pc_client.driver.transport import TcpNetwork
+from pc_client.driver.watchdog import REST_SPEED
+from pc_client.errors import DriverError
+from pc_client.experiment.experiment import load_movements, prepare_experiment
+from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.recording import load_recording
-from protocol.primary.messages import KeyMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator import ControlBox
+from protocol.velocity_stream import VelocityMode
+
+KILLED, FROZEN, CUT_OFF = "killed", "frozen", "cut off"
+
+
+class Killed(BaseException):
+    """Where a killed process would not go on."""
+
+
+class DyingNetwork:
+    """A network whose client dies.
+
+    Args:
+        death: how.
+        program: in which of the programs that it sends, counted from 1.
+        speed: after the first command of that program with a joint faster than this [rad/s]; None: before the
+            program is sent.
+
+    Attributes:
+        dead: set when it has happened.
+        last_command: time stamp of the frame that the last command answered [s].
+    """
+
+    def __init__(self, death, program, speed):
+        self.death, self.program, self.speed = death, program, speed
+        self.dead, self.awake = threading.Event(), threading.Event()
+        self.last_command = self.stamp = 0.0
+        self.programs = 0
+        self.sockets = []
+        self._tcp = TcpNetwork()
+        self._skew = 0.0
+
+    # ---- Network
+    def now(self):
+        return self._tcp.now() + self._skew
+
+    def connect(self, host, port, timeout):
+        if self.is_gone():
+            self.pass_time(timeout)
+            raise DriverError(f"{host}:{port} does not answer")
+        return self._watched(self._tcp.connect(host, port, timeout))
+
+    def listen(self, address, port):
+        self.is_gone()
+        return _Listener(self, self._tcp.listen(address, port))
+
+    # ---- death
+    def die(self):
+        self.dead.set()
+        if self.death == KILLED:
+            self.close()
+        elif self.death == FROZEN:
+            self.awake.wait()
+
+    def is_gone(self):
+        """True when nothing gets through any more; a killed client does not even come back."""
+        if not self.dead.is_set() or self.death == FROZEN:
+            return False
+        if self.death == KILLED:
+            raise Killed
+        return True
+
+    def pass_time(self, seconds):
+        """A client that waits for a lost robot need not really wait."""
+        self._skew += seconds
+
+    def close(self):
+        for each in self.sockets:
+            each.close()
+
+    def before(self, data):
+        """The client is going to send this; dies before the program that was chosen."""
+        if data.startswith(b"def velocity_receiver"):
+            self.programs += 1
+            if self.speed is None and self.programs == self.program:
+                self.die()
+
+    def took(self, data):
+        """The robot has a message; dies after the one that was chosen."""
+        if self.dead.is_set() or len(data) != 28:
+            return
+        mode, *steps = struct.unpack(">7i", data)
+        if mode == VelocityMode.VELOCITY:
+            self.last_command = self.stamp
+            is_fast = self.speed is not None and max(map(abs, steps)) > 1e6 * self.speed
+            if is_fast and self.programs == self.program:
+                self.die()
+
+    def _watched(self, transport):
+        self.sockets.append(transport)
+        return _Transport(self, transport)
+
+
+class _Transport:
+    def __init__(self, network, inner):
+        self._network, self._inner = network, inner
+        self.local_address, self.peer_address = inner.local_address, inner.peer_address
+
+    def send(self, data):
+        self._network.before(data)
+        if not self._network.is_gone():
+            self._inner.send(data)
+            self._network.took(data)
+
+    def receive(self, timeout):
+        if self._network.is_gone():
+            self._network.pass_time(timeout)
+            return None
+        data = self._inner.receive(timeout)
+        if data and len(data) % LAYOUT.size == 0:  # no package of another port has this size
+            (self._network.stamp,) = struct.unpack_from(">d", data, len(data) - LAYOUT.size + 4)
+        return data
+
+    def close(self):
+        if not self._network.is_gone():
+            self._inner.close()
+
+
+class _Listener:
+    def __init__(self, network, inner):
+        self._network, self._inner, self.port = network, inner, inner.port
+        network.sockets.append(inner)
+
+    def accept(self, timeout):
+        if self._network.is_gone():
+            self._network.pass_time(timeout)
+            return None
+        caller = self._inner.accept(timeout)
+        return None if caller is None else self._network._watched(caller)
+
+    def close(self):
+        if not self._network.is_gone():
+            self._inner.close()
+
+
+class Bystander:
+    """Reads the frames of a robot on a connection of its own, while a client works and dies.
+
+    Attributes:
+        latest: the newest frame.
+    """
+
+    def __init__(self, frames):
+        self._frames = frames
+        self.latest = frames.next()
+        self._last_motion = 0.0
+
+    def read(self):
+        frame = self.latest = self._frames.next()
+        if any(frame.target_qd) or abs(frame.actual_qd).max() > REST_SPEED:
+            self._last_motion = frame.timestamp
+
+    def read_what_has_come(self):
+        while self._frames.has_come():
+            self.read()
+
+    def until(self, condition):
+        while not condition():
+            self.read()
+
+    def until_rest(self):
+        """Read until no program runs and nothing has moved for as long as time goes on without one."""
+        still = 0
+        while still < 40:
+            self.read()
+            at_rest = self.latest.timestamp > self._last_motion
+            still = still + 1 if at_rest and self.latest.runtime_state == ProgramState.STOPPED else 0
+
+    def time_to_rest(self, since):
+        """From a time stamp to the first of the frames in which the arm rests for good [s]; 0 if it rested."""
+        return max(self._last_motion + PERIOD - since, 0.0)
+
 
 STOP_DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
 PROGRAM_END_DECELERATION = 20.0  # rad/s^2; of a program that is stopped from outside
-AT_REST_IN_TIME = 0.3  # s of robot time, from the last command
-
-
-@pytest.fixture
-def nameable_box():
-    """A box in real time on ports that `--port-base` can name."""
-    with ControlBox(pace="realtime", port_base=free_port_base(), seed=7) as box:
-        yield box
 
 
 def ramp(frames, deceleration):
@@ -49,54 +224,12 @@ def ramp(frames, deceleration):
             return frames.new()  # the target of the cycle in which the program stopped
 
 
-def test_a_closed_reverse_socket_ramps_the_arm_to_rest_and_ends_the_program(lockstep_box):
-    with Messages(lockstep_box) as primary, VelocitySession(lockstep_box) as session:
-        session.spin_up()
-        session.reverse.close()
-        last = ramp(session.frames, STOP_DECELERATION)
-        assert not last.target_qd.any()
-        assert last.safety_mode == SafetyMode.NORMAL
-        said = primary.message(TextMessage).text
-        assert said == "velocity_receiver: no message from the client"
-        primary.message(KeyMessage, title="PROGRAM_XXX_STOPPED")
-        assert session.frames.lost() == 0
-
-
-def test_a_reset_reverse_socket_does_the_same(lockstep_box):
-    with VelocitySession(lockstep_box) as session:
-        session.spin_up()
-        session.reverse.setsockopt(
-            1, 13, struct.pack("ii", 1, 0)
-        )  # SOL_SOCKET, SO_LINGER 0: RST instead of FIN
-        session.reverse.close()
-        assert not ramp(session.frames, STOP_DECELERATION).target_qd.any()
-
-
-def test_a_silent_client_is_not_waited_for_in_motion(realtime_box):
-    with Messages(realtime_box) as primary, VelocitySession(realtime_box, read_timeout=0.3) as session:
-        last = session.spin_up()
-        still = session.frames.until(lambda f: not any(f.target_qd))
-        assert still.timestamp - last.timestamp < 0.2
-        assert still.runtime_state == ProgramState.PLAYING
-        ended = session.frames.rest()
-        assert 0.2 < ended.timestamp - last.timestamp < 1.0
-        assert primary.message(TextMessage).text == "velocity_receiver: no message from the client"
-
-
 def test_a_stop_word_from_another_client_stops_the_arm(lockstep_box):
     with VelocitySession(lockstep_box) as session:
         session.spin_up()
         send(lockstep_box, "secondary", "stop program\n")
         assert not ramp(session.frames, PROGRAM_END_DECELERATION).target_qd.any()
         assert is_closed(session.reverse)
-
-
-@pytest.mark.parametrize("port", ["primary", "secondary", "realtime"])
-def test_a_program_outlives_the_connection_that_sent_it(lockstep_box, port):
-    with Frames(lockstep_box) as frames:
-        send(lockstep_box, port, "def m():\n  movej([0.1,-1.6,-1.8,0,1.2,1.5])\nend\n")
-        frames.until(lambda f: f.runtime_state == ProgramState.PLAYING)
-        assert frames.rest().target_q == pytest.approx([0.1, -1.6, -1.8, 0, 1.2, 1.5])
 
 
 def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(ur_client, standard_box, tmp_path):
@@ -125,35 +258,103 @@ def cut_off(box, frames, out, signal_number):
         return finish(client)
 
 
-def test_a_client_killed_on_the_way_to_the_start_leaves_the_arm_at_rest_in_time(nameable_box, tmp_path):
-    with Frames(nameable_box) as frames, client_run(nameable_box, tmp_path) as client:
+ALLOWED = 0.3  # s
+
+# The programs of an experiment of two runs, and a speed [rad/s] that the phase reaches.
+PHASES = {
+    "approach": (1, 0.4),
+    "identification": (2, 0.08),
+    "stream": (3, 0.3),
+    "return": (4, 0.3),
+    "pause between runs": (4, None),
+}
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory):
+    movements = load_movements(["lognorm_4_1"])
+    return prepare_experiment(movements, repeat=2, out=tmp_path_factory.mktemp("unused"))
+
+
+class Client(threading.Thread):
+    """A client in a thread; `error` is what ended it."""
+
+    def __init__(self, box, network, experiment):
+        super().__init__()
+        self.box, self.network, self.experiment = box, network, experiment
+        self.error = None
+
+    def run(self):
+        try:
+            with UrDriver(self.box.host, self.box.ports, network=self.network) as driver:
+                ExperimentRunner(driver, self.experiment, CONTROLLERS["preview"]).run()
+        except BaseException as error:
+            self.error = error
+
+
+def lose_client(box, experiment, death, phase, monkeypatch):
+    """Run an experiment until its client is lost and the arm rests, then let the client go on if it can.
+
+    Returns:
+        What ended the client, the time to rest [s] and the frame at rest.
+    """
+    network = DyingNetwork(death, *PHASES[phase])
+    client = Client(box, network, experiment)
+    with Frames(box) as frames:
         bystander = Bystander(frames)
-        bystander.until(lambda: abs(bystander.latest.actual_qd).max() > 0.3)
-        client.send_signal(signal.SIGKILL)
-        client.wait()
-        assert time_to_rest(bystander) <= AT_REST_IN_TIME
-        assert list(tmp_path.iterdir()) == []  # it was still on the way
+        client.start()
+        try:
+            bystander.until(lambda: network.dead.is_set() or not client.is_alive())
+            assert network.dead.is_set(), client.error
+            monkeypatch.setattr(
+                pacing, "HANG_LIMIT", 0.05
+            )  # s, instead of a minute: time goes on without a command
+            bystander.until_rest()
+            time_to_rest, at_rest = bystander.time_to_rest(network.last_command), bystander.latest
+            monkeypatch.undo()
+        finally:
+            network.awake.set()
+            bystander.until(lambda: not client.is_alive())
+            network.close()
+    return client.error, time_to_rest, at_rest
 
 
-def test_a_client_that_was_stopped_in_a_movement_ends_with_one_line_when_it_goes_on(nameable_box, tmp_path):
-    with Frames(nameable_box) as frames, client_run(nameable_box, tmp_path) as client:
-        bystander = Bystander(frames)
-        bystander.until(lambda: abs(bystander.latest.actual_qd).max() > 0.1 and any(tmp_path.iterdir()))
-        client.send_signal(signal.SIGSTOP)
-        os.waitpid(client.pid, os.WUNTRACED)
-        assert time_to_rest(bystander) <= AT_REST_IN_TIME
-        client.send_signal(signal.SIGCONT)
-        ended = finish(client)
-        assert ended.code == 1
-        assert "ur-client: the robot had no command for" in ended.complaint()
-        bystander.until_rest()
-    (recording,) = tmp_path.iterdir()
-    assert "DriverError: the robot had no command for" in load_recording(recording).aborted
+@pytest.mark.parametrize("phase", PHASES)
+@pytest.mark.parametrize("death", [KILLED, FROZEN, CUT_OFF])
+def test_the_arm_rests_in_time(lockstep_box, twice, tmp_path, death, phase, monkeypatch):
+    experiment = replace(twice, out=tmp_path)
+    error, time_to_rest, at_rest = lose_client(lockstep_box, experiment, death, phase, monkeypatch)
+    rests_already = phase == "pause between runs"
+    assert time_to_rest <= ALLOWED
+    assert rests_already or time_to_rest >= 5 * PERIOD  # it was in motion
+    assert at_rest.runtime_state == ProgramState.STOPPED
+    assert at_rest.safety_mode == SafetyMode.NORMAL
+    if death == KILLED:
+        assert isinstance(error, Killed)
+        return
+    assert (
+        kept_recordings(experiment)
+        == {
+            "approach": [],
+            "identification": [],
+            "stream": ["aborted"],
+            "return": ["complete"],
+            "pause between runs": ["complete"] * (2 if death == FROZEN else 1),
+        }[phase]
+    )
+    if death == FROZEN and rests_already:
+        assert error is None  # nothing has happened that it need know of
+    else:
+        words = "the robot had no command for" if death == FROZEN else "no new realtime frame for 120 s"
+        assert str(error).startswith(words)
+        assert "\n" not in str(error)
+        # A client that cannot see the robot any more says so; one that was frozen sees that the arm rests.
+        notes = [it for it in getattr(error, "__notes__", []) if not it.startswith("recorded until then")]
+        assert bool(notes) == (death == CUT_OFF)
 
 
-def time_to_rest(bystander):
-    """From now, when the client is known to be lost, until the arm rests [s]: no more than from its last command."""
-    bystander.read_what_has_come()
-    now = bystander.latest.timestamp
-    bystander.until_rest()
-    return bystander.time_to_rest(now)
+def kept_recordings(experiment):
+    """How each recording that was begun ended; all can be read and hold rows."""
+    recordings = [load_recording(path) for path in sorted(experiment.out.glob("*.mcap"))]
+    assert all(len(recording.column("timestamp")) > 20 for recording in recordings)
+    return ["aborted" if "aborted" in recording.summary else "complete" for recording in recordings]

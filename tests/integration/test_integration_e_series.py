@@ -1,4 +1,4 @@
-"""The client on arms of the e-Series: it finds out which arm answers, runs at 500 Hz, and learns from run to run."""
+"""The client on arms of the e-Series: it reads every port, names the arm, runs at 500 Hz, learns from run to run."""
 
 import re
 
@@ -8,6 +8,8 @@ from integration_support import at, free_port_base
 
 from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.track import speed
+from pc_client.driver.report import probe
+from pc_client.driver.transport import TcpNetwork
 from pc_client.movements.files import load_movement
 from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
@@ -24,8 +26,6 @@ def e_series_box(robot, **options):
     [
         ("ur3e", "5.0.0", "UR3e"),
         ("ur5e", "5.9.4", "UR5e"),
-        ("ur7e", "5.22.0", "UR5e"),
-        ("ur20", "5.25.1", "UR20"),
         ("ur8long", "5.25.1", "UR8LONG"),
     ],
 )
@@ -104,3 +104,22 @@ def test_a_movement_of_the_library_is_where_the_arm_can_do_it(recordings):
     moved = np.array(recording.provenance.target_points) - load_movement("uniform_4_1").target_points
     there = (0.075, 0.0, 0.0) if recording.provenance.robot_model == "UR5e" else (0.0, 0.0, 0.0)
     np.testing.assert_allclose(moved, np.tile(there, (len(moved), 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("software", "size", "payload"),
+    [
+        ("5.0.5", 1108, None), ("5.3.0", 1108, None), ("5.4.0", 1116, None), ("5.8.0", 1116, 0.0),
+        ("5.9.4", 1140, 0.0), ("5.12.2", 1220, 0.0), ("5.25.1", 1220, 0.0),
+    ],
+)  # fmt: skip
+def test_the_client_reads_every_port(software, size, payload):
+    with ControlBox(robot="ur5e", version=software, pace="lockstep", port_base=None, seed=7) as box:
+        found = probe(TcpNetwork(), box.host, box.ports, 0.02)
+    assert found.obstacle == ""
+    assert str(found.info.version).startswith(software.removesuffix(".0"))
+    assert found.info.simulated is True
+    assert found.rhythm.frame_size == size
+    assert found.report.configured == found.info.model == "UR5e"
+    assert found.report.payload == payload
+    assert found.report.tcp_offset == (0.0,) * 6

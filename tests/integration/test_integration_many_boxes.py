@@ -1,4 +1,7 @@
-"""Several boxes in one process: each on its own address with the same ports, none knowing of the others."""
+"""Several boxes in one process, each on its own address with the same ports, none knowing of the others.
+
+A box is called at its address, and its programs call from there, as a robot's do.
+"""
 
 import signal
 import socket
@@ -6,6 +9,7 @@ import sys
 import threading
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from integration_support import (
     LAYOUT,
@@ -20,6 +24,12 @@ from integration_support import (
     serving,
 )
 
+from pc_client.control.controller import APPROACH
+from pc_client.control.reference import ReferenceTable
+from pc_client.control.tracker import Tracker
+from pc_client.driver.session import UrDriver
+from pc_client.kinematics.robot_model import robot_model
+from pc_client.planning.approach import JointLines
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import BoxRack, ControlBox
 from ur_emulator.box_options import MAX_BOXES
@@ -89,17 +99,6 @@ def test_a_program_on_one_box_does_nothing_to_another():
             run_move(one)
             after = [frames.next() for _ in range(3)]
         assert {frame.timestamp for frame in after} == {before.timestamp}
-
-
-def test_boxes_in_real_time_all_give_every_frame():
-    with ControlBox.many(4, port_base=None) as boxes:
-        readers = [Frames(box) for box in boxes]
-        for _ in range(100):
-            for reader in readers:
-                reader.raw()
-        assert [reader.lost() for reader in readers] == [0, 0, 0, 0]
-        for reader in readers:
-            reader.sock.close()
 
 
 def test_boxes_in_real_time_take_turns_within_a_period():
@@ -249,3 +248,48 @@ def test_the_loop_waits_also_where_select_cannot(monkeypatch):
         assert frames.lost() == 0
         with connect(box, "dashboard") as sock:
             assert sock.recv(100).startswith(b"Connected")
+
+
+ELSEWHERE = "127.0.37.1"
+
+
+@pytest.fixture
+def box():
+    with ControlBox(pace="lockstep", seed=7, host=ELSEWHERE, port_base=None) as box:
+        yield box
+
+
+def dial(box, host, port):
+    with socket.create_connection((box.host, box.ports.secondary), timeout=10) as client:
+        client.sendall(f'def p():\n  socket_open("{host}", {port})\n  sleep(0.1)\nend\n'.encode())
+
+
+@pytest.mark.parametrize("listening", ["127.0.0.1", ELSEWHERE])
+def test_programs_call_from_the_address_of_the_box(box, listening):
+    with socket.create_server((listening, 0)) as server:
+        server.settimeout(10)
+        dial(box, listening, server.getsockname()[1])
+        caller, (address, _) = server.accept()
+        caller.close()
+    assert address == ELSEWHERE
+
+
+def test_a_name_is_called_from_there_too(box):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(10)
+        dial(box, "localhost", server.getsockname()[1])
+        caller, (address, _) = server.accept()
+        caller.close()
+    assert address == ELSEWHERE
+
+
+def test_the_client_moves_an_arm_at_any_loopback_address(box):
+    with UrDriver(ELSEWHERE, box.ports) as driver:
+        q = driver.actual_q()
+        goal = q + np.array([0.05, 0, 0, 0, 0, 0])
+        lines = JointLines([q, goal], v=0.5, a=1.0)
+        table = ReferenceTable(lines, period=driver.info.period, lead=0.0, settle=0.8)
+        driver.stream(
+            Tracker(table, APPROACH, robot_model("ur3")), lambda frame, step: None, acceleration=5.0
+        )
+        assert driver.actual_q()[0] == pytest.approx(goal[0], abs=1e-3)

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from box_support import TIMEOUT, Bench, connect, inside
+from box_support import TIMEOUT, Bench, inside
 from control_support import control_box
 
 from ur_emulator import ControlBox
@@ -43,12 +43,6 @@ def test_the_state_is_a_frozen_view_of_the_last_cycle(box):
     with pytest.raises(AttributeError):
         state.tick = 0
     assert box.state == state  # in lockstep nothing happens by itself
-
-
-def test_an_operation_reports_its_cycle_and_time_goes_on_by_one(box):
-    before = box.state.tick
-    assert box.set_digital_input("standard", 0, True) == before + 1
-    assert box.state.tick == before + 1
 
 
 def test_waiting_ends_in_the_cycle_in_which_all_holds(box):
@@ -171,17 +165,6 @@ def test_a_push_lasts_as_long_as_it_was_given(cycles):
     assert not bench.controller.is_active
 
 
-def test_the_last_push_counts():
-    bench = Bench(fidelity="ideal")
-    bench.tick(1, Push((0.0, 0.0, -20.0), duration=0.04))
-    bench.tick(1, Push((0.0, 0.0, -20.0)))
-    bench.tick(30)
-    assert bench.now.actual_tcp_force[2] < -10.0
-    bench.tick(1, Push((0.0, 0.0, 0.0)))
-    bench.tick(5)
-    assert bench.now.actual_tcp_force[2] == pytest.approx(0.0, abs=1.0)
-
-
 @pytest.mark.parametrize("duration", [-1.0, float("nan"), float("inf"), 1e9])
 def test_an_absurd_duration_is_refused(duration):
     with pytest.raises(ArgumentError, match=r"duration .* given: allowed is 0 to 600 s"):
@@ -263,34 +246,12 @@ def test_an_emergency_stop_is_left_step_by_step(box):
     assert box.state.safety_mode == "SYSTEM_EMERGENCY_STOP"
 
 
-def test_a_safeguard_stop_pauses_the_program_until_it_is_closed(box):
-    box.run_program(LOOP)
-    box.safeguard_stop()
-    box.wait_until(safety_mode="SAFEGUARD_STOP", program_state="PAUSED")
-    box.safeguard_stop(False)
-    box.wait_until(safety_mode="NORMAL", program_state="PLAYING")
-
-
-def test_reduced_mode_goes_on_and_off(box):
-    box.reduced_mode()
-    assert box.state.safety_mode == "REDUCED"
-    box.reduced_mode(active=False)
-    assert box.state.safety_mode == "NORMAL"
-
-
 @pytest.mark.parametrize(("name", "mode"), [("trigger_violation", "VIOLATION"), ("trigger_fault", "FAULT")])
 def test_violation_and_fault_are_left_by_a_restart(box, name, mode):
     getattr(box, name)("the guard dog bit")
     box.wait_until(safety_mode=mode, robot_mode="POWER_OFF", log="the guard dog bit")
     box.restart_safety()
     box.wait_until(safety_mode="NORMAL", robot_mode="POWER_OFF")
-
-
-def test_a_protective_stop_on_request(box):
-    box.protective_stop()
-    assert box.state.safety_mode == "PROTECTIVE_STOP"
-    box.power_off()
-    box.wait_until(robot_mode="POWER_OFF")
 
 
 # --- programs
@@ -354,29 +315,11 @@ def test_a_program_that_was_asked_for_before_one_that_has_begun_does_not_begin()
         assert box.state.program_state == "STOPPED"
 
 
-def test_a_program_whose_file_cannot_be_used_leaves_the_one_that_runs(tmp_path):
-    (tmp_path / "broken.urp").write_bytes(b"no program")
-    with control_box(programs=tmp_path, control_port=None) as box:
-        box.run_program(LOOP)
-        for name in ("nowhere.script", "broken.urp"):
-            with pytest.raises(RefusedError, match=name):
-                box.run_program(file=name)
-        assert box.state.program_state == "PLAYING"
-
-
 def test_a_program_can_be_waited_for_with_its_error(box):
     box.run_program(MOVE, wait=True)
     assert (box.state.program_state, box.state.steady) == ("STOPPED", True)
     with pytest.raises(RefusedError, match=r"program f ended with an error: .*zero"):
         box.run_program("def f():\n  sync()\n  x = 1 / 0\nend\n", wait=True)
-
-
-def test_a_secondary_program_runs_beside_the_other(box):
-    box.run_program(LOOP)
-    box.run_program("sec beside():\n  set_standard_digital_out(2, True)\nend\n")
-    state = box.state
-    assert state.program_state == "PLAYING"
-    assert state.digital_outputs["standard"][2]
 
 
 def test_a_program_comes_from_a_file_of_this_machine_or_of_the_box(tmp_path):
@@ -392,30 +335,7 @@ def test_a_program_comes_from_a_file_of_this_machine_or_of_the_box(tmp_path):
         box.wait_until(log="sent as text")
 
 
-def test_the_speed_slider(box):
-    box.set_speed(0.25)
-    assert box.state.speed == 0.25
-
-
 # --- the operator
-
-
-@pytest.mark.parametrize(
-    ("kind", "value", "said"),
-    [("integer", 7, "7"), ("float", 2.5, "2.5"), ("boolean", True, "True"), ("string", "abc", "abc")],
-)
-def test_questions_are_answered_with_what_they_ask_for(box, kind, value, said):
-    program = f'def ask():\n  textmsg("said ", request_{kind}_from_primary_client("how?"))\nend\n'
-    wrong = object if kind == "string" else "words"
-    with connect(box, "primary"):
-        box.run_program(program)
-        state = box.wait_until(question=True)
-        assert [q.text for q in state.questions] == ["how?"]
-        if wrong == "words":
-            with pytest.raises(RefusedError, match="how"):
-                box.answer("words")
-        box.answer(value, id=state.questions[0].id)
-        box.wait_until(log=f"said {said}", question=False)
 
 
 def test_answers_without_a_question_are_refused(box):
@@ -430,13 +350,6 @@ def test_popups_are_seen_and_closed(box):
     assert box.wait_until(popup=True).popups == ("mind your head",)
     box.close_popups()
     box.wait_until(popup=False, log="closed")
-
-
-@pytest.mark.parametrize("text", ["", "snow ☃ and 🤖", "two\nlines", "x" * 1000, "\x00\x07"])
-def test_any_text_can_be_logged(box, text):
-    with connect(box, "primary"):
-        box.add_to_log(text)
-    assert box.log[-2].text == text.rstrip("\r\n") or text.rstrip("\r\n") in [e.text for e in box.log]
 
 
 def test_a_text_that_nobody_can_send_on_is_refused(box):
@@ -526,19 +439,6 @@ def test_many_threads_use_one_box(box):
     assert not failures
     assert len(ticks) == 160
     assert box.state.digital_inputs["standard"] == (False,) * 8
-
-
-def test_the_boxes_of_a_rack_are_controlled_one_by_one():
-    with ControlBox.many(2, pace="lockstep", port_base=None, control_port=0) as boxes:
-        boxes[1].set_speed(0.5)
-        assert [box.state.speed for box in boxes] == [1.0, 0.5]
-        assert boxes[0].control_port != boxes[1].control_port
-
-
-def test_in_real_time_operations_work_as_well():
-    with ControlBox(port_base=None) as box:
-        box.run_program(MOVE)
-        assert box.wait_until(program_state="STOPPED", timeout=60).tick > 0
 
 
 @pytest.mark.parametrize("port", [-1, 65536])

@@ -1,4 +1,4 @@
-"""The control port: every answer, and everything that a client may do wrong or with bad intent."""
+"""The control port: every answer, its token, and everything that a client may do wrong or with bad intent."""
 
 import json
 import random
@@ -10,8 +10,11 @@ from box_support import inside
 from control_support import Http, control_box
 
 from protocol.primary.messages import ReportLevel
+from ur_emulator import ControlBox
+from ur_emulator.box_options import MAX_TOKEN
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.control_api.operations import OPERATIONS
+from ur_emulator.errors import EmulatorError
 from ur_emulator.servers.http.messages import MAX_HEADER
 
 JSON = "Content-Type: application/json"
@@ -468,3 +471,80 @@ def test_there_is_no_port_unless_it_is_asked_for(box):
     with control_box(in_process=True, control_port=None) as other:
         assert other.control_port == 0
         assert "control" not in other.identity["ports"]
+
+
+TOKEN = "correct-horse"
+
+
+@pytest.fixture(scope="module")
+def guarded_box():
+    with control_box(control_token=TOKEN) as box:
+        yield box
+
+
+@pytest.fixture
+def guarded(guarded_box):
+    with Http(guarded_box) as http:
+        yield http
+
+
+def test_every_operation_needs_the_token(guarded):
+    for name in ("operations", *OPERATIONS):
+        method = "GET" if name == "operations" or OPERATIONS[name].only_reads else "POST"
+        status, answer = guarded.ask(method, f"/v1/{name}")
+        assert (status, guarded.headers["www-authenticate"]) == (401, "Bearer")
+        assert list(answer) == ["error"]
+        assert "Authorization: Bearer" in answer["error"]
+        assert TOKEN not in str(answer)
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        "",
+        "Bearer",
+        "Bearer ",
+        TOKEN,
+        f"Basic {TOKEN}",
+        f"Bearer {TOKEN}x",
+        f"Bearer {TOKEN[:-1]}",
+        f"Bearer {TOKEN.upper()}",
+        f"Bearer x {TOKEN}",
+        f"Bearer {TOKEN}\xe9",
+    ],
+)
+def test_another_token_does_not_do(guarded_box, guarded, shown):
+    asked = guarded.request("POST", "/v1/trigger_fault", headers=[f"Authorization: {shown}"])
+    guarded.send(asked.decode().encode("latin-1"))
+    assert guarded.answer()[0] == 401
+    assert guarded_box.state.safety_mode == "NORMAL"
+
+
+def test_with_the_token_all_is_done_on_the_same_connection(guarded):
+    assert guarded.ask("GET", "/v1/state")[0] == 401
+    for scheme in ("Bearer", "bearer", "BEARER "):
+        assert guarded.ask("GET", "/v1/state", headers=[f"Authorization: {scheme} {TOKEN}"])[0] == 200
+    assert guarded.ask("GET", "/v1/state")[0] == 401
+
+
+def test_pages_are_refused_also_with_the_token(guarded):
+    shown = f"Authorization: Bearer {TOKEN}"
+    assert guarded.ask("GET", "/v1/state", headers=[shown, "Origin: http://evil.example"])[0] == 403
+    assert guarded.ask("GET", "/v1/state", headers=[shown], host="evil.example")[0] == 403
+
+
+@pytest.mark.parametrize("token", ["", "two words", "a\nb", "caf\xe9", "x" * (MAX_TOKEN + 1)])
+def test_a_token_that_is_none(token):
+    with pytest.raises(EmulatorError, match="1 to 200 printed characters of ASCII"):
+        ControlBox(control_port=0, control_token=token)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "box.example", "127.0.0.1.example"])
+def test_beyond_loopback_a_control_port_demands_a_token(host):
+    with pytest.raises(EmulatorError, match="give it a token"):
+        ControlBox(host=host, control_port=0, port_base=None)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "localhost", "::1"])
+def test_on_loopback_a_control_port_demands_no_token(host):
+    ControlBox(host=host, control_port=0, port_base=None).close()

@@ -1,15 +1,54 @@
-"""Peers that do not read, or flood: nobody else loses anything, memory stays bounded, time goes on."""
+"""Clients that read, read late or never: every frame once and in order, and nobody else loses anything.
+
+What a process that is stopped for half a minute changes is held where clocks are handed in:
+test_realtime_pacing.py, test_driver_stream.py.
+"""
 
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 
 import pytest
-from integration_support import PERIOD, Frames, Messages, connect, in_background, send, serving
+from integration_support import (
+    PERIOD,
+    Frames,
+    Messages,
+    connect,
+    in_background,
+    send,
+    serving,
+)
 
 import ur_emulator.realtime.pacing as pacing
 from protocol.primary.layout import RobotModeData
-from protocol.primary.messages import ErrorCodeMessage, TextMessage
+from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState
+from protocol.ur_types import ProgramState
+
+
+def test_several_clients_see_the_same_frames(lockstep_box):
+    ports = ("realtime", "realtime", "realtime_ro")
+    with ExitStack() as stack:
+        readers = [stack.enter_context(Frames(lockstep_box, port)) for port in ports]
+        begins = [reader.next().timestamp for reader in readers]
+        send(lockstep_box, "secondary", "def f():\n  sleep(1)\nend\n")
+        seen = [{} for _ in readers]
+        while min(reader.stamps[-1] for reader in readers) < begins[0] + 1.0:
+            for reader, frames in zip(readers, seen, strict=True):
+                frame = reader.raw()
+                frames[reader.stamps[-1]] = frame
+        shared = set.intersection(*map(set, seen))
+        assert len(shared) > 100
+        for stamp in shared:
+            assert len({frames[stamp] for frames in seen}) == 1
+        assert [reader.lost() for reader in readers] == [0, 0, 0]
+
+
+def test_speed_makes_the_same_frames_faster(tmp_path):
+    with serving(tmp_path, "--pace", "realtime", "--speed", 10) as box, Frames(box) as frames:
+        begin = frames.next().timestamp
+        frames.until_stamp(begin + 1.0)
+        assert frames.lost() == 0
+
 
 MINUTE = 'def minute():\n  sleep(60)\n  textmsg("done")\nend\n'
 PATIENCE = 0.2  # s; instead of the seconds that a box waits for a reader in lockstep
@@ -69,41 +108,6 @@ def test_a_reader_that_comes_back_gets_whole_frames_again(lockstep_box):
         assert after[-1] - after[0] + 1 == len(set(after))
 
 
-def test_memory_stays_bounded_with_peers_that_never_read(tmp_path):
-    """In real time nobody is waited for; sixty times as fast to be done in a second."""
-    with serving(tmp_path, "--pace", "realtime", "--speed", 30) as box:
-        with never_read(box, *["realtime"] * 20), Frames(box) as frames:
-            begin = frames.next().timestamp
-            frames.until_stamp(begin + 5.0)
-            early = resident(box.process.pid)
-            frames.until_stamp(begin + 35.0)
-            grown = resident(box.process.pid) - early
-        unread = 20 * 3750 * 1140
-        assert grown < 0.1 * unread
-
-
-def resident(pid):
-    """Resident memory of a process [bytes]."""
-    with open(f"/proc/{pid}/statm") as statm:
-        return int(statm.read().split()[1]) * 4096
-
-
-def test_a_flood_of_statements_is_bounded_and_delays_nobody_for_long(realtime_box):
-    with (
-        Messages(realtime_box) as primary,
-        Frames(realtime_box) as frames,
-        connect(realtime_box, "secondary") as flood,
-    ):
-        frames.next()
-        with in_background(frames.raw):
-            flood.sendall(b"x\n" * 50_000)
-            send(realtime_box, "secondary", 'def hello():\n  textmsg("hello")\nend\n')
-            primary.message(TextMessage, limit=500_000, text="hello")
-        texts = [m.text for m in primary.all if isinstance(m, ErrorCodeMessage)]
-        assert "programs come faster than they compile, some were dropped" in texts
-        assert frames.lost() == 0
-
-
 @pytest.mark.parametrize("pause", ["sync()", ""], ids=["over cycles", "in one cycle"])
 def test_a_flood_of_messages_from_a_program_reaches_who_reads(lockstep_box, pause):
     n = 1000
@@ -116,3 +120,16 @@ def test_a_flood_of_messages_from_a_program_reaches_who_reads(lockstep_box, paus
         send(lockstep_box, "secondary", text)
         primary.message(TextMessage, limit=50_000, text="end")
         assert [m.text for m in said(primary)] == [*map(str, range(n)), "end"]
+
+
+def test_a_client_that_reads_nothing_for_a_while_is_waited_for_and_loses_nothing(lockstep_box):
+    with Frames(lockstep_box) as late, Frames(lockstep_box) as frames:
+        begin = late.next().timestamp
+        send(lockstep_box, "secondary", "def f():\n  sleep(60)\nend\n")
+        frames.until(
+            lambda f: f.runtime_state == ProgramState.PLAYING and frames.stamps[-2:-1] == frames.stamps[-1:]
+        )
+        held = frames.stamps[-1]
+        assert held < begin + 60.0
+        late.until_stamp(held)
+        assert late.lost() == 0
