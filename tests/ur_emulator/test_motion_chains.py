@@ -27,6 +27,7 @@ from protocol.ur_types import SafetyMode
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.controller.safety.limit_checks import SetpointCheck
 from ur_emulator.controller.safety.safety_state import limits_of
+from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.motion.leg import move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
@@ -242,6 +243,31 @@ def test_a_set_point_that_is_not_a_finite_number_is_invalid(joint, value, field)
     found = CHECK.find_invalid(LIMITS, before, before._replace(**{field: tuple(values)}))
     assert found is not None
     assert (found.error.code, found.error.argument) == (204, joint)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("q", "qd", "is_valid"),
+    [
+        (6.2, 2.0, True),  # from 2 rad/s the arm stops within 0.1 rad
+        (6.3, 2.0, False),  # it would come to rest beyond 363 degrees
+        (6.3, -2.0, True),
+        (6.4, 0.1, False),
+        (6.4, -0.1, True),  # what was pushed beyond the range may move back
+        (0.0, 3.34, True),
+        (0.0, 3.35, False),  # faster than 191.5 degrees a second
+    ],
+)
+def test_a_set_point_leaves_the_way_to_rest_within_the_range(side, q, qd, is_valid):
+    before = JointTarget((side * (q - qd * DT), *HOME[1:]))
+    found = CHECK.find_invalid(LIMITS, before, JointTarget((side * q, *HOME[1:]), (side * qd, *ZERO6[1:])))
+    assert (found is None) is is_valid
+
+
+def test_a_set_point_that_jumps_is_invalid_at_any_speed():
+    found = CHECK.find_invalid(LIMITS, JointTarget(HOME), JointTarget((HOME[0] + 0.03, *HOME[1:])))
+    assert found is not None
+    assert found.error.argument == 0
 
 
 # --- random chains
