@@ -22,7 +22,7 @@ from pc_client.files import as_file_name
 from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
-    from pc_client.studies.extraction.batch import Outcome, Row
+    from pc_client.studies.extraction.batch import ExtractionOutcome, Row
     from pc_client.studies.extraction.extract import ExtractOptions
     from pc_client.studies.extraction.pen import PenSource
 
@@ -115,7 +115,7 @@ def _run(
     n_pictures: int,
     workers: int | None,
     dask: str | None,
-) -> list[Outcome]:
+) -> list[ExtractionOutcome]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from pc_client.studies.executors import open_executor, usable_cores
@@ -141,7 +141,7 @@ def _run(
         )
 
 
-def _pictures(outcomes: Sequence[Outcome]) -> dict[str, bytes]:
+def _pictures(outcomes: Sequence[ExtractionOutcome]) -> dict[str, bytes]:
     """Pictures by file name: the place in the batch makes names differ that are equal in their last part."""
     digits = len(str(len(outcomes)))
     return {
@@ -151,7 +151,7 @@ def _pictures(outcomes: Sequence[Outcome]) -> dict[str, bytes]:
     }
 
 
-def _show(outcomes: Sequence[Outcome], rows: Sequence[Row]) -> None:
+def _show(outcomes: Sequence[ExtractionOutcome], rows: Sequence[Row]) -> None:
     if not rows:
         return
     import polars as pl

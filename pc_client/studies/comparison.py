@@ -1,11 +1,10 @@
-"""Which movements are compared: every generator in the same time, for one or more seeds.
+"""The comparison of generators: how human-like their movements are, planned and executed.
 
-All but the duplicate, which moves its target points as people do, have the same target points.
-
-The signals of one movement: as planned, as planned but sampled and filtered, as executed; their figures.
-
-The last two go through the same steps (sampled at the control cycle with some rest at both ends, filtered,
-differentiated), so that they differ by what the robot did and by nothing else.
+Every generator makes a movement in the same time, for one or more seeds; all but the duplicate, which moves
+its target points as people do, through the same target points. Each movement is measured as three signals: as
+planned, as planned but sampled and filtered, and as executed. The last two go through the same steps (sampled
+at the control cycle with some rest at both ends, filtered, differentiated), so that they differ by what the
+robot did and by nothing else.
 
 One filter serves what was planned and what was measured, so that both can be differentiated and compared.
 The second derivative of the speed is the third of the position: the encoders' noise, some micrometres at
@@ -15,19 +14,16 @@ leaves less than .05 m/s^3, where executed movements have .3 to 6; what is lost 
 trapezoids, and they are lost from the plan, too. 5 Hz is far above the movements themselves: the speed
 profiles of a robot's strokes last a second or more.
 
-One table of all generators: how human-like each is as planned, as sampled and filtered, and as executed.
-
-One frame, a row for each signal of each movement, in three forms: `compare.json`, `compare.md` and a table
-for the terminal.
-
-What a comparison shows: the speed of every generator beside the others, and its path.
+The figures are one frame, a row for each signal of each movement, in three forms: `compare.json`,
+`compare.md` and a table for the terminal. The picture shows the speed of every generator beside the others,
+and its path. Nothing here moves an arm.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +31,6 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from pc_client.analysis.run import MeasuredRun
 from pc_client.control.loop_model import SAMPLING_TIME
@@ -43,17 +38,18 @@ from pc_client.errors import ClientError
 from pc_client.movements.files import save_movement
 from pc_client.movements.generate import generate_movement
 from pc_client.movements.movement import Movement
-from pc_client.movements.sigma_lognormal import Motion
 from pc_client.movements.twins import GENERATORS
 from pc_client.results.sheet import BLUE, REFERENCE_GREY, Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.tables import Column, finite, to_markdown, to_rich
 from pc_client.studies.likeness import (
+    Likeness,
     between_peaks,
     fit_power_law,
     log_dimensionless_jerk,
     sparc,
     speed_peaks,
 )
+from pc_client.studies.signals import Trace, low_passed
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
@@ -63,16 +59,15 @@ __all__ = [
     "CUTOFF_HZ",
     "EXECUTED_COLUMNS",
     "Comparison",
-    "Likeness",
     "MovementSet",
-    "Signal",
+    "Sampled",
     "build_comparison",
     "comparison_sheet",
     "executed_signal",
-    "filtered_motion",
+    "filtered",
     "filtered_signal",
     "make_sets",
-    "measure_likeness",
+    "measured",
     "planned_signal",
     "save_sets",
 ]
@@ -121,72 +116,65 @@ CUTOFF_HZ = 5.0
 _ORDER = 2
 #: What the filter is, for tables.
 _FILTER_TEXT = f"Butterworth order {_ORDER}, forwards and backwards, half amplitude at {CUTOFF_HZ:g} Hz"
-
-
-def filtered_motion(p: NDArray[np.float64], rate: float) -> Motion:
-    """Smoothed positions and their first two central differences.
-
-    Args:
-        p: positions, (n, 3), m, at equal steps, at rest for the first and the last few tenths of a second.
-        rate: samples a second, Hz, more than twice the cutoff.
-
-    Returns:
-        Position, velocity and acceleration, each (n, 3).
-    """
-    if not (math.isfinite(rate) and rate > 2.0 * CUTOFF_HZ):
-        raise ClientError(
-            f"rate of {rate} Hz: a filter at {CUTOFF_HZ:g} Hz needs more than "
-            f"{2.0 * CUTOFF_HZ:g} samples a second"
-        )
-    sections = butter(_ORDER, CUTOFF_HZ, fs=rate, output="sos")
-    # The rests at both ends are long enough to be continued as they are.
-    smooth = sosfiltfilt(sections, p, axis=0, padtype="constant", padlen=min(len(p) - 1, round(rate)))
-    v = np.gradient(smooth, 1.0 / rate, axis=0)
-    return Motion(smooth, v, np.gradient(v, 1.0 / rate, axis=0))
-
-
 #: Samples a second (Hz) of the plan: the rate of the reference figures.
 _PLAN_RATE = 1000.0
 #: Rest (s) before and after a movement that is filtered with it.
 _REST = 0.2
 
 
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """A movement as samples, from start to end.
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampled(Trace):
+    """A movement from start to end, m and s since its start, with its accelerations.
 
     Attributes:
-        t: (n,), s since its start.
-        motion: each (n, 3).
-        rate: samples a second, Hz.
+        a: accelerations, (n, 3), m/s^2.
     """
 
-    t: NDArray[np.float64]
-    motion: Motion
-    rate: float
-
-    @property
-    def speed(self) -> NDArray[np.float64]:
-        """(n,), m/s."""
-        speed: NDArray[np.float64] = np.linalg.norm(self.motion.v, axis=1)
-        return speed
+    a: NDArray[np.float64]
 
 
-def planned_signal(movement: Movement) -> Signal:
-    """The movement's own closed form, at 1 kHz, unfiltered."""
-    t = np.arange(math.floor(movement.duration * _PLAN_RATE + 1e-6) + 1) / _PLAN_RATE
-    return Signal(t, movement.motion(t), _PLAN_RATE)
-
-
-def filtered_signal(movement: Movement, rate: float) -> Signal:
-    """The plan as a perfect robot would report it, through the filter.
+def filtered(t: NDArray[np.float64], p: NDArray[np.float64], rate: float) -> Sampled:
+    """Positions through the filter, and their first two central differences.
 
     Args:
-        movement: what was planned.
-        rate: of the control cycle, Hz.
+        t: times, (n,), s.
+        p: positions, (n, 3), m, at rest for the first and the last few tenths of a second.
+        rate: samples a second, Hz, more than twice the cutoff.
     """
+    if not (math.isfinite(rate) and rate > 2.0 * CUTOFF_HZ):
+        raise ClientError(
+            f"rate of {rate} Hz: a filter at {CUTOFF_HZ:g} Hz needs more than "
+            f"{2.0 * CUTOFF_HZ:g} samples a second"
+        )
+    # The rests at both ends are long enough to be continued as they are.
+    smooth = low_passed(p, rate, cutoff=CUTOFF_HZ, order=_ORDER, padding=round(rate), ends="rest")
+    v = np.gradient(smooth, 1.0 / rate, axis=0)
+    return Sampled(t, smooth, v, np.gradient(v, 1.0 / rate, axis=0))
+
+
+def planned_signal(movement: Movement) -> Sampled:
+    """The movement's own closed form, at 1 kHz, unfiltered."""
+    t = np.arange(math.floor(movement.duration * _PLAN_RATE + 1e-6) + 1) / _PLAN_RATE
+    return Sampled(t, *movement.motion(t))
+
+
+def filtered_signal(movement: Movement, rate: float) -> Sampled:
+    """The plan as a perfect robot would report it at the rate (Hz) of its control cycle, filtered."""
     t = _grid(movement.duration, rate)
-    return _inner(t, filtered_motion(movement.sample(t).p, rate), movement.duration, rate)
+    return _inner(filtered(t, movement.sample(t).p, rate), movement.duration)
+
+
+def executed_signal(run: MeasuredRun, duration: float) -> Sampled:
+    """What the robot did in a movement of this duration (s), filtered.
+
+    The window is that of the plan, later by the robot's lag, so that a late robot is not cut off.
+    """
+    rate = _sampling_rate(run)
+    t = _grid(duration, rate)
+    at = t + run.track.t_begin + run.snr.speed_lag_s
+    # Frames come on the same grid but for the lag, which is no whole number of cycles.
+    p = CubicSpline(run.track.t, run.track.p_actual)(np.clip(at, run.track.t[0], run.track.t[-1]))
+    return _inner(filtered(t, p, rate), duration)
 
 
 def _sampling_rate(run: MeasuredRun) -> float:
@@ -194,76 +182,33 @@ def _sampling_rate(run: MeasuredRun) -> float:
     return 1.0 / max(run.provenance.cycle_time_s, SAMPLING_TIME)
 
 
-def executed_signal(run: MeasuredRun, duration: float) -> Signal:
-    """What the robot did, through the filter.
-
-    The window is that of the plan, later by the robot's lag, so that a late robot is not cut off.
-
-    Args:
-        run: a recording and what was measured on it.
-        duration: of the movement, s.
-    """
-    rate = _sampling_rate(run)
-    t = _grid(duration, rate)
-    at = t + run.track.t_begin + run.snr.speed_lag_s
-    # Frames come on the same grid but for the lag, which is no whole number of cycles.
-    p = CubicSpline(run.track.t, run.track.p_actual)(np.clip(at, run.track.t[0], run.track.t[-1]))
-    return _inner(t, filtered_motion(p, rate), duration, rate)
-
-
 def _grid(duration: float, rate: float) -> NDArray[np.float64]:
     before, after = round(_REST * rate), round((duration + _REST) * rate)
     return np.arange(-before, after + 1) / rate
 
 
-def _inner(t: NDArray[np.float64], motion: Motion, duration: float, rate: float) -> Signal:
-    moving = (t >= -1e-9) & (t <= duration + 1e-9)
-    return Signal(t[moving], Motion(*(values[moving] for values in motion)), rate)
+def _inner(signal: Sampled, duration: float) -> Sampled:
+    moving = (signal.t >= -1e-9) & (signal.t <= duration + 1e-9)
+    return Sampled(signal.t[moving], signal.p[moving], signal.v[moving], signal.a[moving])
 
 
-@dataclass(frozen=True, slots=True)
-class Likeness:
-    """How human-like a signal is.
+def measured(signal: Sampled) -> dict[str, float]:
+    """The figures of `Likeness`, and the highest speed (m/s) and acceleration (m/s^2), by column.
 
-    Attributes:
-        sparc: spectral arc length.
-        log_jerk: log dimensionless jerk.
-        peaks: peaks of the speed, a mean over movements where there are several.
-        exponent: beta of speed = k curvature^-beta between the first and the last peak of the speed; nan for
-            a path of straight lines.
-        r_squared: how well that law holds, 0 to 1; nan likewise.
-        peak_speed: m/s.
-        peak_acceleration: m/s^2.
+    The power law is fitted from the first to the last peak of the speed.
     """
-
-    sparc: float
-    log_jerk: float
-    peaks: float
-    exponent: float
-    r_squared: float
-    peak_speed: float
-    peak_acceleration: float
-
-
-def measure_likeness(motion: Motion, rate: float) -> Likeness:
-    """Measure a movement from start to end.
-
-    Args:
-        motion: at equal steps, each (n, 3); filtered if it was measured.
-        rate: samples a second, Hz.
-    """
-    speed = np.linalg.norm(motion.v, axis=1)
+    speed, rate = signal.speed, 1.0 / signal.step
     inner = between_peaks(speed)
-    law = fit_power_law(motion.v[inner], motion.a[inner])
-    return Likeness(
+    law = fit_power_law(signal.v[inner], signal.a[inner])
+    likeness = Likeness(
+        peaks=speed_peaks(speed),
         sparc=sparc(speed, rate),
         log_jerk=log_dimensionless_jerk(speed, rate),
-        peaks=float(speed_peaks(speed)),
         exponent=law.exponent,
         r_squared=law.r_squared,
-        peak_speed=float(speed.max()),
-        peak_acceleration=float(np.linalg.norm(motion.a, axis=1).max()),
     )
+    top = {"peak_speed": speed.max(), "peak_acceleration": np.linalg.norm(signal.a, axis=1).max()}
+    return {name: float(value) for name, value in (asdict(likeness) | top).items()}
 
 
 COLUMNS = (
@@ -281,7 +226,7 @@ EXECUTED_COLUMNS = (Column("snr_db", "SNR", "dB", ".1f"), Column("shifted_snr_db
 """The two more where the movements were executed."""
 
 _SIGNALS = ("planned", "filtered", "executed")
-_LIKENESS = [field.name for field in fields(Likeness)]
+_FIGURES = [column.name for column in COLUMNS[2:]]
 _LEVELS = [column.name for column in EXECUTED_COLUMNS]
 
 
@@ -332,10 +277,10 @@ class Comparison:
     @property
     def means(self) -> pl.DataFrame:
         """A row for each generator and signal: means over the movements that have the figure."""
-        likeness = pl.col(_LIKENESS)
+        figures = pl.col(_FIGURES)
         grouped = self.frame.group_by("generator", "signal", maintain_order=True)
         return grouped.agg(
-            likeness.filter(likeness.is_finite()).mean().fill_null(math.nan), pl.col(_LEVELS).mean()
+            figures.filter(figures.is_finite()).mean().fill_null(math.nan), pl.col(_LEVELS).mean()
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -427,14 +372,14 @@ def _rows(
             "movement": movement.name,
             "duration": movement.duration,
             "signal": name,
-            **asdict(measure_likeness(signal.motion, signal.rate)),
+            **measured(signal),
             **dict(zip(_LEVELS, levels, strict=True)),
         }
 
 
 def _by_signal(rows: pl.DataFrame) -> dict[str, Any]:
     """The figures of one movement or generator, by signal; the levels are those of the last, if executed."""
-    figures = {row["signal"]: {name: row[name] for name in _LIKENESS} for row in rows.to_dicts()}
+    figures = {row["signal"]: {name: row[name] for name in _FIGURES} for row in rows.to_dicts()}
     return figures | {name: rows[name][-1] for name in _LEVELS}
 
 
@@ -461,13 +406,13 @@ def comparison_sheet(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = 
     )
     plans = {movement.name: planned_signal(movement) for movement in one.values()}
     top = 1.08e3 * max(float(plan.speed.max()) for plan in plans.values())
-    cube = cube_around(np.vstack([1e3 * plan.motion.p for plan in plans.values()]))
+    cube = cube_around(np.vstack([1e3 * plan.p for plan in plans.values()]))
     panels = []
     for index, (kind, movement) in enumerate(one.items()):
         row, column = divmod(index, _COLUMNS)
         plan, run = plans[movement.name], (runs or {}).get(movement.name)
         speeds = [Curve(np.c_[plan.t, 1e3 * plan.speed], REFERENCE_GREY, width=2.6)]
-        paths = [Curve(1e3 * plan.motion.p, REFERENCE_GREY, width=2.4, opacity=0.7)]
+        paths = [Curve(1e3 * plan.p, REFERENCE_GREY, width=2.4, opacity=0.7)]
         if run is not None:
             done = executed_signal(run, movement.duration)
             speeds.append(Curve(np.c_[done.t, 1e3 * done.speed], BLUE))

@@ -5,10 +5,10 @@
     log_dimensionless_jerk   smoothness, from the second derivative of the speed: -5.3 for minimum jerk,
                              lower for a less smooth speed
     speed_peaks              number of speed peaks: one a stroke in human movements
-    power_law_exponent       beta in speed = k curvature^-beta: one third for drawing hands
+    fit_power_law            beta in speed = k curvature^-beta: one third for drawing hands
 
 Pure functions on samples at equal steps of time. None of them filters. Differentiation amplifies noise, so
-measured signals are low-passed before (`comparison.signals`).
+measured signals are low-passed before (`signals.low_passed`).
 
 Source: S. Balasubramanian et al., "On the analysis of movement smoothness", JNER 12:112 (2015), for the
 first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.
@@ -17,6 +17,7 @@ first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -25,35 +26,52 @@ from numpy.typing import ArrayLike, NDArray
 from pc_client.errors import ClientError
 
 __all__ = [
+    "Likeness",
     "PowerLawFit",
     "between_peaks",
     "curvature_of",
     "fit_power_law",
     "log_dimensionless_jerk",
     "peaks_of",
-    "power_law_exponent",
     "sparc",
     "speed_peaks",
 ]
 
 #: Fewest samples that a figure is computed from.
 _MIN_SAMPLES = 8
+#: A peak of the speed stands out by this share of the highest.
+_PROMINENCE = 0.05
 
 
-def sparc(
-    speed: ArrayLike, rate: float, *, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4
-) -> float:
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How human-like a movement is.
+
+    Attributes:
+        peaks: of the speed.
+        sparc: spectral arc length.
+        log_jerk: log dimensionless jerk.
+        exponent: beta of speed = k curvature^-beta; nan for a path of straight lines.
+        r_squared: how well that law holds, 0 to 1; nan likewise.
+    """
+
+    peaks: float
+    sparc: float
+    log_jerk: float
+    exponent: float
+    r_squared: float
+
+
+def sparc(speed: ArrayLike, rate: float, *, cutoff: float = 10.0) -> float:
     """The spectral arc length: minus the length of the speed's spectrum, drawn in a unit square.
 
     The amplitude spectrum is divided by its maximum; it counts from the first to the last frequency below
-    the cutoff at which it reaches the threshold, and this range of frequencies is scaled to 1.
+    the cutoff at which it reaches 5 %, and this range of frequencies is scaled to 1.
 
     Args:
         speed: (n,), any unit, n >= 8, not all zero.
         rate: samples a second, Hz.
         cutoff: highest frequency that is looked at, Hz.
-        threshold: amplitude below which the spectrum is taken to be over, 0 to 1.
-        padding: the transform is 2^padding times as long as the signal, for a smooth curve.
 
     Returns:
         Below -1; the nearer to 0, the smoother. Figures compare only among movements of the same number of
@@ -63,13 +81,13 @@ def sparc(
         ClientError: the speed or the rate is not as above, or the spectrum has only one line.
     """
     values = _checked(speed, rate)
-    size = 2 ** (math.ceil(math.log2(len(values))) + padding)
+    size = 2 ** (math.ceil(math.log2(len(values))) + 4)  # longer than the signal, for a smooth curve
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
     amplitude = np.abs(np.fft.rfft(values, size))
     amplitude /= amplitude.max()
     low = frequency <= cutoff
     frequency, amplitude = frequency[low], amplitude[low]
-    reached = np.flatnonzero(amplitude >= threshold)
+    reached = np.flatnonzero(amplitude >= 0.05)
     kept = slice(int(reached[0]), int(reached[-1]) + 1)
     frequency, amplitude = frequency[kept], amplitude[kept]
     if len(frequency) < 2:
@@ -102,20 +120,17 @@ def log_dimensionless_jerk(speed: ArrayLike, rate: float) -> float:
     return -math.log(cost) if cost > 0.0 else math.inf
 
 
-def peaks_of(speed: ArrayLike, *, prominence: float = 0.05) -> list[int]:
-    """Samples at which the speed has a peak that stands out by a share of the highest; a plateau is one peak.
+def peaks_of(speed: ArrayLike) -> list[int]:
+    """Samples at which the speed (n,) has a peak; a plateau is one peak.
 
-    A peak counts when the speed has risen by that share from the dip before it and falls by as much after it.
-
-    Args:
-        speed: (n,), any unit.
-        prominence: share of the top speed, above 0, up to 1.
+    A peak counts when the speed has risen by 5 % of the highest from the dip before it and falls by as much
+    after it.
 
     Returns:
         Indices in order; of a plateau, the first of its highest samples.
     """
     values = np.asarray(speed, dtype=np.float64).tolist()
-    step = prominence * max(values, default=0.0)
+    step = _PROMINENCE * max(values, default=0.0)
     peaks: list[int] = []
     if step <= 0.0:
         return peaks
@@ -136,14 +151,14 @@ def peaks_of(speed: ArrayLike, *, prominence: float = 0.05) -> list[int]:
     return peaks
 
 
-def speed_peaks(speed: ArrayLike, *, prominence: float = 0.05) -> int:
-    """How many peaks the speed has; arguments as of `peaks_of`."""
-    return len(peaks_of(speed, prominence=prominence))
+def speed_peaks(speed: ArrayLike) -> int:
+    """How many peaks the speed has, as `peaks_of` counts them."""
+    return len(peaks_of(speed))
 
 
-def between_peaks(speed: ArrayLike, *, prominence: float = 0.05) -> slice:
-    """The samples from the first to the last peak of the speed; arguments as of `peaks_of`."""
-    peaks = peaks_of(speed, prominence=prominence)
+def between_peaks(speed: ArrayLike) -> slice:
+    """The samples from the first to the last peak of the speed."""
+    peaks = peaks_of(speed)
     return slice(peaks[0], peaks[-1] + 1) if peaks else slice(0, 0)
 
 
@@ -175,25 +190,22 @@ class PowerLawFit(NamedTuple):
     n_samples: int
 
 
-def fit_power_law(
-    v: ArrayLike, a: ArrayLike, *, min_speed: float = 0.1, max_radius: float = 1.0
-) -> PowerLawFit:
+def fit_power_law(v: ArrayLike, a: ArrayLike, *, max_radius: float = 1.0) -> PowerLawFit:
     """Fit ln speed = ln k - beta ln curvature by least squares over the samples.
 
     Noise alone makes the curvature high where the speed is low, which looks like a power law. So look at
-    r_squared too, and low-pass measured signals first.
+    r_squared too, and low-pass measured signals first. Samples slower than a tenth of the top speed are left
+    out: starts and stops do not follow the power law.
 
     Args:
         v: velocities, (n, 3), m/s, at equal steps of time.
         a: accelerations, (n, 3), m/s^2.
-        min_speed: samples slower than this share of the top speed are left out: starts and stops do not
-            follow the power law.
         max_radius: samples on a path straighter than this radius (m) are left out: the curvature of a line
             is nearly zero.
     """
     speed = np.linalg.norm(np.asarray(v, dtype=np.float64), axis=1)
     curvature = curvature_of(v, a)
-    used = (speed > min_speed * speed.max(initial=0.0)) & (curvature > 1.0 / max_radius)
+    used = (speed > 0.1 * speed.max(initial=0.0)) & (curvature > 1.0 / max_radius)
     n_used = int(np.count_nonzero(used))
     if n_used < _MIN_SAMPLES:
         return PowerLawFit(math.nan, math.nan, n_used)
@@ -204,16 +216,6 @@ def fit_power_law(
         return PowerLawFit(math.nan, math.nan, n_used)
     slope = float(x @ y) / spread
     return PowerLawFit(-slope, slope**2 * spread / total if total > 0.0 else math.nan, n_used)
-
-
-def power_law_exponent(
-    v: ArrayLike, a: ArrayLike, *, min_speed: float = 0.1, max_radius: float = 1.0
-) -> float:
-    """Beta in speed = k curvature^-beta: 1/3 is the two-thirds power law; nan for a path without bends.
-
-    Arguments as of `fit_power_law`.
-    """
-    return fit_power_law(v, a, min_speed=min_speed, max_radius=max_radius).exponent
 
 
 def _checked(speed: ArrayLike, rate: float) -> NDArray[np.float64]:

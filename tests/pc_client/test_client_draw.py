@@ -54,27 +54,11 @@ def one_line(capsys):
 
 def test_a_drawing_becomes_recordings_tables_and_a_page(robot, file, tmp_path, capsys):
     out, saved = tmp_path / "out", tmp_path / "letter.toml"
-    words = [
-        "draw",
-        str(file),
-        "--robot",
-        "127.0.0.1",
-        "--out",
-        str(out),
-        "--save",
-        str(saved),
-        "--size",
-        "60",
-    ]
-    assert cli.run(words) == 0
+    options = ["--out", str(out), "--save", str(saved), "--size", "60"]
+    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", *options]) == 0
     assert robot.at_rest
-    assert {path.name for path in out.iterdir()} == {
-        "letter_a_r1.mcap",
-        "draw.json",
-        "draw.md",
-        "report.html",
-        "figures",
-    }
+    written = {path.name for path in out.iterdir()}
+    assert written == {"letter_a_r1.mcap", "draw.json", "draw.md", "report.html", "figures"}
     said = capsys.readouterr().out
     assert "letter_a: 3 marks" in said
     assert "report.html" in said
@@ -101,19 +85,8 @@ def test_several_drawings_repeated_are_one_page_with_a_section_each(robot, tmp_p
         packed.writestr("b/same.txt", recording_text(one_part()))
     files = [f"{archive}:a/same.txt", f"{archive}:b/same.txt"]
     out = tmp_path / "out"
-    words = [
-        "--robot",
-        "127.0.0.1",
-        "--out",
-        str(out),
-        "--repeat",
-        "2",
-        "--size",
-        "50",
-        "--plane",
-        "horizontal",
-    ]
-    assert cli.run(["draw", *files, *words]) == 0
+    options = ["--out", str(out), "--repeat", "2", "--size", "50", "--plane", "horizontal"]
+    assert cli.run(["draw", *files, "--robot", "127.0.0.1", *options]) == 0
     names = {path.name for path in out.glob("*.mcap")}
     assert names == {"same_r1.mcap", "same_r2.mcap", "same_2_r1.mcap", "same_2_r2.mcap"}
     page = (out / "report.html").read_text()
@@ -163,12 +136,6 @@ def test_what_cannot_be_drawn_is_one_line_and_moves_nothing(robot, name, content
     assert not out.exists()
 
 
-def test_an_unknown_controller_is_refused_before_any_work(robot, file, capsys, tmp_path):
-    words = ["draw", str(file), "--robot", "127.0.0.1", "--out", str(tmp_path / "o"), "--controller", "pid"]
-    assert cli.run(words) == 1
-    assert "preview" in one_line(capsys)
-
-
 def test_a_real_arm_does_not_move_before_the_answer(robot, file, tmp_path, capsys, monkeypatch):
     robot.serial = "2017355123"
 
@@ -182,15 +149,6 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, file, tmp_path, capsy
     assert robot.programs == []
     assert not out.exists()
     assert "box of motion" in capsys.readouterr().out
-
-
-def test_a_robot_that_is_not_as_it_must_be_is_refused_before_the_work_is_done(robot, file, tmp_path, capsys):
-    robot.slider = 0.5
-    out = tmp_path / "out"
-    assert cli.run(["draw", str(file), "--robot", "127.0.0.1", "--yes", "--out", str(out)]) == 1
-    assert "the robot's speed slider is 50 %, must be 100 %" in one_line(capsys)
-    assert robot.programs == []
-    assert not out.exists()
 
 
 def test_ctrl_c_leaves_the_arm_at_rest_and_what_is_recorded(robot, file, tmp_path, capsys):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import erf, ndtr
-from test_analysis_human_likeness import REFERENCE
+from test_likeness import REFERENCE
 
 from pc_client.movements.durations import Fitts, Isochrony
 from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, Lognormal, TwoSidedTiming
@@ -118,7 +118,7 @@ PRINTED_NAMES = {
 
 
 def test_smoothness_is_the_reference_table() -> None:
-    """Whose figures test_analysis_human_likeness.py computes."""
+    """Whose figures test_likeness.py computes."""
     printed = {cells[0]: tuple(cells[1:]) for cells in table("profile")}
     assert printed == {name: REFERENCE[key][1:] for name, key in PRINTED_NAMES.items()}
     assert len(REFERENCE) == len(printed)

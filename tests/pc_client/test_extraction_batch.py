@@ -1,4 +1,7 @@
-"""Batches: any executor, every outcome in its place, broken files beside good ones, the drawings' figures."""
+"""Batches: any executor, every outcome in its place, broken files beside good ones, the drawings' figures.
+
+Pictures of extractions are made of anything that moves.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 import numpy as np
 import pytest
 from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot, own_strokes, recorded
+from matplotlib.image import imread
 
 import pc_client.studies.extraction.batch as batch
 from pc_client.errors import ClientError, RecordingError
@@ -26,7 +30,8 @@ from pc_client.studies.extraction.batch import (
     to_json,
 )
 from pc_client.studies.extraction.extract import extract
-from pc_client.studies.extraction.pen import pen_sources
+from pc_client.studies.extraction.figures import draw_extraction, draw_overview
+from pc_client.studies.extraction.pen import PenPart, PenRecording, pen_sources
 
 
 class AtOnce(Executor):
@@ -89,24 +94,8 @@ def test_one_after_the_other(folder):
     check(extract_many(pen_sources([folder]), AtOnce()), folder)
 
 
-def test_in_threads(folder):
-    with ThreadPoolExecutor(2) as executor:
-        check(extract_many(pen_sources([folder]), executor), folder)
-
-
 def test_in_processes(folder):
     with open_executor(workers=1) as executor:
-        check(extract_many(pen_sources([folder]), executor), folder)
-
-
-def test_on_a_dask_cluster(folder):
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
-        ) as cluster,
-        open_executor(dask=cluster.scheduler_address) as executor,
-    ):
         check(extract_many(pen_sources([folder]), executor), folder)
 
 
@@ -203,3 +192,32 @@ def test_drawings_drawn_at_random_reach_the_figures():
     assert (snr_v > 15.0).mean() >= 0.95
     assert table["snr_t_db"].mean() >= 25.0
     assert table["n_strokes"].sum() <= 1.2 * table["n_speed_peaks"].sum()
+
+
+def ink(png):
+    """Share of pixels that are not white."""
+    return float(np.mean(imread(io.BytesIO(png))[..., :3].min(axis=2) < 0.9))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_recording(dim, caplog):
+    (part,) = recorded(own_strokes(0, dim, n=2), dim).parts
+    dot = PenPart([9.0], [[0.0] * dim])
+    assert ink(draw_extraction(extract(PenRecording("folder/own.csv", (part, dot))))) > 0.02
+    assert caplog.text == ""  # nothing that matplotlib complains about
+
+
+@pytest.mark.parametrize("n", [0, 1, 40])
+def test_a_batch(n):
+    rows = [
+        {
+            "file": f"{i}.txt",
+            "snr_v_db": 20.0 + i,
+            "snr_t_db": 30.0 + i,
+            "n_strokes": 5 + i,
+            "n_speed_peaks": 6,
+        }
+        for i in range(n)
+    ]
+    empty = ink(draw_overview(table_of([{"file": "dot", "n_strokes": 0, "n_speed_peaks": 0}])))
+    assert (ink(draw_overview(table_of(rows))) > empty + 0.01) is (n > 0)

@@ -47,6 +47,9 @@ def test_the_same_case_gives_the_same_figures_here_and_in_another_process():
     assert here.status == "done", here.error
     assert len(here.rows) == 2
     assert here.rows[0]["snr_db"] > 20.0
+    assert here.rows[0]["delay_ms"] == pytest.approx(32.0, abs=4.0)
+    assert here.rows[0]["gain_margin"] > 2.0
+    assert here.rows[0]["late_frames"] == here.rows[0]["lost_frames"] == 0
     assert here.rows[0]["snr_db"] != here.rows[1]["snr_db"]
     assert here == there  # figures and recordings, to the last bit
     assert [name for name, _ in here.recordings] == ["uniform_4_1_r1.mcap", "uniform_4_1_r2.mcap"]

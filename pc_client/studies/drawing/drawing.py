@@ -1,6 +1,7 @@
-"""A recording prepared for an arm: placed, joined, slowed down as far as needed.
+"""`drawing`: what a hand drew, as a movement of an arm.
 
-`drawing`: a human drawing as strokes, placed and slowed down for an arm.
+The strokes of a recording are extracted, placed in the workspace, joined with lifts between them, and slowed
+down as far as the arm needs it.
 """
 
 from __future__ import annotations
@@ -28,6 +29,45 @@ from pc_client.studies.extraction.pen import PenRecording, on_one_axis, ordered_
 __all__ = ["Drawing", "drawing", "make_drawing", "spatial"]
 
 
+def drawing(
+    source: str | Path | Sequence[tuple[ArrayLike, ArrayLike]],
+    arm: Arm,
+    *,
+    name: str = "drawing",
+    plane: str = "vertical",
+    size: float = 0.1,
+    slower: float = 1.0,
+) -> Drawing:
+    """Extract the lognormal strokes of a drawing and make them a movement of an arm.
+
+    Args:
+        source: a file of pen samples (docs/extraction.md), or its parts: for each time that the pen was down,
+            times (n,) [s] and positions (n, 2) or (n, 3) in any unit.
+        arm: that shall execute it.
+        name: of the movement.
+        plane: of the sheet: "vertical", "horizontal" or "inclined".
+        size: longest side of the drawing [m]; never larger than the workspace.
+        slower: factor of time beyond the limits of the arm, >= 1.
+
+    Returns:
+        The drawing; `arm.run(drawing.movement)` executes it.
+
+    Raises:
+        ClientError: the file or the samples are not valid, or the arm cannot execute it.
+    """
+    recording = read_recording(source) if isinstance(source, str | Path) else _recording(name, source)
+    options = PlacementOptions(plane=plane, size=size, box=WORKING_BOXES[arm.model.name])
+    return make_drawing(extract(recording), name, arm.model, options, slower)
+
+
+def _recording(name: str, parts: Sequence[tuple[ArrayLike, ArrayLike]]) -> PenRecording:
+    ordered = [ordered_part(t, p) for t, p in parts]
+    kept = [part for part, _ in ordered if part is not None]
+    if not kept:
+        raise RecordingError(f"{name}: no samples; give parts of times (n,) and positions (n, 2)")
+    return on_one_axis(name, kept, [remark for _, remarks in ordered for remark in remarks])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
     """A drawing as the arm executes it.
@@ -52,6 +92,11 @@ class Drawing:
     def flat(self) -> bool:
         """Whether the recording is flat."""
         return _is_flat(self.extraction)
+
+    @property
+    def moving(self) -> list[int]:
+        """Indices of the marks that move: those of the extraction's parts, in their order."""
+        return [index for index, mark in enumerate(self.marks) if mark.trajectory is not None]
 
     @property
     def drawn(self) -> NDArray[np.float64]:
@@ -88,11 +133,6 @@ class Drawing:
         motion = self.joined.trajectory.evaluate(t + self.joined.shifts[mark])
         back = inverse(self.placement.similarity)
         return Motion(back.points(motion.p), back.vectors(motion.v), back.vectors(motion.a))
-
-
-def spatial(p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (n, 2) with a third coordinate 0; points (n, 3) as they are."""
-    return p if p.shape[1] == 3 else np.column_stack((p, np.zeros(len(p))))
 
 
 def make_drawing(
@@ -138,6 +178,11 @@ def make_drawing(
     return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
 
 
+def spatial(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (n, 2) with a third coordinate 0; points (n, 3) as they are."""
+    return p if p.shape[1] == 3 else np.column_stack((p, np.zeros(len(p))))
+
+
 def _drawn(extraction: Extraction, marks: Sequence[Mark]) -> NDArray[np.float64]:
     lines = [spatial(part.p) for part in extraction.parts]
     return np.vstack([*lines, *(mark.first for mark in marks if mark.trajectory is None)])
@@ -163,42 +208,3 @@ def _between_slow_moments(trajectory: SigmaLognormal) -> NDArray[np.float64]:
     t = np.linspace(0.0, trajectory.duration, max(200, int(500 * trajectory.duration)))
     slow, _ = find_peaks(-np.linalg.norm(trajectory.evaluate(t).v, axis=1))
     return np.diff(np.concatenate(([0.0], t[slow], [trajectory.duration])))
-
-
-def drawing(
-    source: str | Path | Sequence[tuple[ArrayLike, ArrayLike]],
-    arm: Arm,
-    *,
-    name: str = "drawing",
-    plane: str = "vertical",
-    size: float = 0.1,
-    slower: float = 1.0,
-) -> Drawing:
-    """Extract the lognormal strokes of a drawing and make them a movement of an arm.
-
-    Args:
-        source: a file of pen samples (docs/extraction.md), or its parts: for each time that the pen was down,
-            times (n,) [s] and positions (n, 2) or (n, 3) in any unit.
-        arm: that shall execute it.
-        name: of the movement.
-        plane: of the sheet: "vertical", "horizontal" or "inclined".
-        size: longest side of the drawing [m]; never larger than the workspace.
-        slower: factor of time beyond the limits of the arm, >= 1.
-
-    Returns:
-        The drawing; `arm.run(drawing.movement)` executes it.
-
-    Raises:
-        ClientError: the file or the samples are not valid, or the arm cannot execute it.
-    """
-    recording = read_recording(source) if isinstance(source, str | Path) else _recording(name, source)
-    options = PlacementOptions(plane=plane, size=size, box=WORKING_BOXES[arm.model.name])
-    return make_drawing(extract(recording), name, arm.model, options, slower)
-
-
-def _recording(name: str, parts: Sequence[tuple[ArrayLike, ArrayLike]]) -> PenRecording:
-    ordered = [ordered_part(t, p) for t, p in parts]
-    kept = [part for part, _ in ordered if part is not None]
-    if not kept:
-        raise RecordingError(f"{name}: no samples; give parts of times (n,) and positions (n, 2)")
-    return on_one_axis(name, kept, [remark for _, remarks in ordered for remark in remarks])

@@ -26,21 +26,17 @@ from pc_client.results.sheet import (
     cube_around,
 )
 from pc_client.studies.drawing.drawing import Drawing
-from pc_client.studies.drawing.judgement import Execution, Signal, Verdict, signals
+from pc_client.studies.drawing.judgement import Execution, signals
+from pc_client.studies.signals import Trace
 
-__all__ = [
-    "COLOURS",
-    "FIGURES",
-    "Shown",
-    "sheets_of",
-]
+__all__ = ["COLOURS", "FIGURES", "Shown", "sheets_of"]
 
 Array = NDArray[np.float64]
 
 #: Colour of each signal; names as of `judgement.signals`.
 COLOURS = {"human": "#3A3A3A", "reconstructed": BLUE, "planned": GREEN, "executed": RED}
-#: Colour of what the pen does in the air.
-_AIR = "#A8A8A8"
+#: Colours of what the pen does in the air, of the person's signal behind others, of the sheet.
+_AIR, _FAINT, _PAPER_EDGE = "#A8A8A8", "#BDBDBD", "#C9B37E"
 #: The figures are shown to audiences: letters [points] for a width [inches].
 _LETTERS, _SHEET_WIDTH = 11.0, 12.0
 
@@ -50,31 +46,22 @@ class Shown:
     """What the pictures of a drawing are made of.
 
     Attributes:
-        drawing: the drawing.
-        execution: the run that is shown.
-        verdict: its figures.
         parts: the four signals, each with the parts that move.
     """
 
     drawing: Drawing
     execution: Execution
-    verdict: Verdict
-    parts: dict[str, tuple[Signal, ...]]
+    parts: dict[str, tuple[Trace, ...]]
 
     @classmethod
-    def of(cls, drawing: Drawing, execution: Execution, verdict: Verdict) -> Shown:
+    def of(cls, drawing: Drawing, execution: Execution) -> Shown:
         """Take the signals of a drawing and a run."""
-        return cls(drawing, execution, verdict, signals(drawing, execution))
+        return cls(drawing, execution, signals(drawing, execution))
 
     @property
     def unit(self) -> float:
         """Millimetres on the sheet per unit of the recording."""
         return 1e3 * self.drawing.placement.similarity.scale
-
-    @property
-    def moving(self) -> list[int]:
-        """Indices of the marks that move."""
-        return [index for index, mark in enumerate(self.drawing.marks) if mark.trajectory is not None]
 
     @property
     def mark(self) -> str:
@@ -102,13 +89,12 @@ class Shown:
         times = self.drawing.joined.pen_down - self.start
         return np.column_stack((times[:, 0], np.maximum(times[:, 1], times[:, 0] + 0.012)))
 
-    def whole(self, *, executed: bool) -> tuple[Array, Array, Array]:
-        """Times (n,), positions, velocities (n, 3) of all, lifts too: base frame, s of the hand."""
+    def whole(self, *, executed: bool) -> Trace:
+        """All of the movement, lifts too: base frame, s of the hand since it began."""
         if executed:
-            return self.execution.t, self.execution.p, self.execution.v
+            return self.execution.whole
         t = np.linspace(0.0, self.drawing.joined.trajectory.duration, 1500)
-        motion = self.drawing.joined.trajectory.evaluate(t)
-        return t, motion.p, motion.v
+        return Trace(t, *self.drawing.joined.trajectory.evaluate(t)[:2])
 
     def on_page(self, p: Array) -> Array:
         """Points (n, 3) in the recording's frame, on the page: (n, 2), mm, from the middle of the drawing."""
@@ -145,7 +131,6 @@ FIGURES = {
 _FAR = 0.45
 #: From where a plane is seen: elevation and azimuth [degrees].
 _VIEWS = {"vertical": (18.0, -152.0), "horizontal": (32.0, -152.0), "inclined": (24.0, -152.0)}
-_FAINT, _PAPER_EDGE = "#D9D9D9", "#C9B37E"
 
 
 def sheets_of(shown: Shown) -> dict[str, Sheet]:
@@ -224,7 +209,11 @@ def _numbers(shown: Shown, half: float) -> list[tuple[Array, str]]:
     """The order of the marks, where there are several, beside their starts."""
     marks = shown.drawing.marks
     begins = dict(
-        zip(shown.moving, (part.p[: 1 + len(part.p) // 8] for part in shown.parts["human"]), strict=True)
+        zip(
+            shown.drawing.moving,
+            (part.p[: 1 + len(part.p) // 8] for part in shown.parts["human"]),
+            strict=True,
+        )
     )
     numbers = []
     for index, mark in enumerate(marks if len(marks) > 1 else ()):
@@ -250,9 +239,9 @@ def _targets(shown: Shown) -> Array:
 
 def _air(shown: Shown, *, executed: bool) -> Array:
     """The whole path on the page, with gaps (nan) where the pen is down; (n, 2), mm."""
-    t, p, _ = shown.whole(executed=executed)
-    page = shown.on_page(shown.drawing.points_back(p))
-    page[_pen_is_down(t, shown.drawing.joined.pen_down)] = np.nan
+    whole = shown.whole(executed=executed)
+    page = shown.on_page(shown.drawing.points_back(whole.p))
+    page[_pen_is_down(whole.t, shown.drawing.joined.pen_down)] = np.nan
     return page
 
 
@@ -266,9 +255,9 @@ def _space_sheet(shown: Shown) -> Sheet:
 
 
 def _space(box: Box, shown: Shown) -> Panel:
-    t, p, _ = shown.whole(executed=False)
-    p, done = 1e3 * p, 1e3 * shown.execution.p
-    down = _pen_is_down(t, shown.drawing.joined.pen_down)[:, None]
+    plan = shown.whole(executed=False)
+    p, done = 1e3 * plan.p, 1e3 * shown.execution.whole.p
+    down = _pen_is_down(plan.t, shown.drawing.joined.pen_down)[:, None]
     similarity = shown.drawing.placement.similarity
     curves = [
         Curve(np.where(down, np.nan, p), _AIR, "pen lifted", 1.4, "--"),
@@ -313,10 +302,9 @@ def _height(box: Box, shown: Shown) -> Panel:
         out, zero, title = np.array([0.0, 0.0, 1.0]), 0.0, "height of the pen, z of the base frame"
     curves = []
     for name, width, opacity in (("planned", 4.0, 0.5), ("executed", 1.4, 1.0)):
-        t, p, _ = shown.whole(executed=name == "executed")
-        curves.append(
-            Curve(np.c_[t - shown.start, 1e3 * (p @ out - zero)], COLOURS[name], name, width, opacity=opacity)
-        )
+        whole = shown.whole(executed=name == "executed")
+        height = np.c_[whole.t - shown.start, 1e3 * (whole.p @ out - zero)]
+        curves.append(Curve(height, COLOURS[name], name, width, opacity=opacity))
     return Panel(
         box,
         curves,
@@ -330,7 +318,6 @@ def _height(box: Box, shown: Shown) -> Panel:
 
 #: Lognormals that are this many times as high as the speed itself, since they cancel, are cut off.
 _TALL = 1.5
-_FAINT = "#BDBDBD"
 
 
 def _speeds_sheet(shown: Shown) -> Sheet:
@@ -375,7 +362,7 @@ def _profile(shown: Shown, name: str) -> list[Curve]:
     """One signal, with its strokes or with the movement of the arm while the pen is up."""
     curves = []
     if name == "reconstructed":
-        for index, part in zip(shown.moving, shown.drawing.extraction.parts, strict=True):
+        for index, part in zip(shown.drawing.moving, shown.drawing.extraction.parts, strict=True):
             mark, nearly = shown.drawing.marks[index], 1e-3 * float(np.ptp(part.p, axis=0).max())
             t = np.arange(mark.begin - mark.lead(nearly), mark.end + mark.lag(nearly), 0.002)
             at = shown.since_pen_down(t, index)
@@ -383,13 +370,13 @@ def _profile(shown: Shown, name: str) -> list[Curve]:
                 visible = stroke > 1e-3 * stroke.max()
                 curves.append(Curve(np.c_[at, stroke][visible], SKY, width=0.8, filled=True))
     if name in ("planned", "executed"):
-        t, _, v = shown.whole(executed=name == "executed")
-        curves.append(Curve(np.c_[t - shown.start, 1e3 * np.linalg.norm(v, axis=1)], _AIR, width=1.1))
+        whole = shown.whole(executed=name == "executed")
+        curves.append(Curve(np.c_[whole.t - shown.start, 1e3 * whole.speed], _AIR, width=1.1))
     return curves + _speeds(shown, name, 1.8, COLOURS[name])
 
 
 def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
-    parts = zip(shown.moving, shown.parts[name], strict=True)
+    parts = zip(shown.drawing.moving, shown.parts[name], strict=True)
     return [
         Curve(
             np.c_[shown.since_pen_down(part.t, index), shown.unit * part.speed],
@@ -405,7 +392,9 @@ def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
 def _differences(shown: Shown) -> list[Curve]:
     curves = [Curve(np.array([[at, 0.0] for at in shown.span]), AXIS_GREY, width=0.7)]
     for name in ("reconstructed", "executed"):
-        for index, own, human in zip(shown.moving, shown.parts[name], shown.parts["human"], strict=True):
+        for index, own, human in zip(
+            shown.drawing.moving, shown.parts[name], shown.parts["human"], strict=True
+        ):
             t = shown.since_pen_down(human.t, index)
             curves.append(Curve(np.c_[t, shown.unit * (own.speed - human.speed)], COLOURS[name], "", 1.3))
     return curves

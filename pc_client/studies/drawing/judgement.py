@@ -1,19 +1,17 @@
-"""What the arm did, mapped back: in the frame, the unit and the time of the recording.
+"""How well a reconstruction, a plan and what the arm did agree with the person who drew.
 
-The similarity and the scaling of time are undone exactly; nothing is shifted or fitted. Of each part that
-moves there are two signals: the positions at the robot's own time stamps, as they were reported, for
-signal-to-noise ratios; and the same on the grid of the recording, low-passed, for everything that is
-differentiated. That low-pass removes only the encoders' noise: its cut-off is twice that of the recording's
-low-pass, which would flatten the speed profiles a second time.
-
-How well a reconstruction, a plan and its execution agree with the person, in figures.
+A run is mapped into the frame, the unit and the time of the recording. The similarity and the scaling of time
+are undone exactly; nothing is shifted or fitted. Of each part that moves there are two signals: the positions
+at the robot's own time stamps, as they were reported, for signal-to-noise ratios; and the same on the grid of
+the recording, low-passed, for everything that is differentiated. That low-pass removes only the encoders'
+noise: its cut-off is twice that of the recording's low-pass, which would flatten the speed profiles a second
+time.
 
     SNR_v  10 log10( sum |v|^2 / sum |v - v'|^2 )              velocity vectors
     SNR_t  10 log10( sum |p - mean p|^2 / sum |p - p'|^2 )     positions, mean p of each part by itself
 
 both over all parts that move, while the pen is down. What is compared with the arm is taken at the arm's own
-time stamps, all signals through the same first difference, neither shifted nor smoothed. The figures of
-fluency are those of `analysis.human_likeness`; the executed signal is low-passed for them, see `execution`.
+time stamps, all signals through the same first difference, neither shifted nor smoothed.
 
 Source: docs/extraction.md, section 1.
 """
@@ -21,39 +19,40 @@ Source: docs/extraction.md, section 1.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from pc_client.analysis.run import MeasuredRun
 from pc_client.errors import RecordingError
 from pc_client.movements.geometry import read_only
 from pc_client.studies.drawing.drawing import Drawing, spatial
-from pc_client.studies.extraction.smoothing import CUTOFF_HZ, RATE_HZ, velocity
-from pc_client.studies.likeness import fit_power_law, log_dimensionless_jerk, sparc, speed_peaks
+from pc_client.studies.extraction.smoothing import CUTOFF_HZ, RATE_HZ
+from pc_client.studies.likeness import Likeness, fit_power_law, log_dimensionless_jerk, sparc, speed_peaks
+from pc_client.studies.signals import Trace, decibels, low_passed, velocity
 
 __all__ = [
     "Agreement",
     "ExecutedPart",
     "Execution",
-    "Fluency",
     "RunVerdict",
-    "Signal",
     "Verdict",
     "executed",
     "judge",
     "signals",
 ]
 
-#: Cut-off of the low-pass, Hz in the time of the hand, and its order; it runs forwards and backwards.
+#: Cut-off of the low-pass of what was executed, Hz in the time of the hand, and its order.
 _NOISE_HZ = 2.0 * CUTOFF_HZ
 _ORDER = 4
 #: This much of the movement (s of the hand) before and after a part goes through the low-pass with it.
 _MARGIN_S = 0.25
+#: Fewest samples of a part that is smooth or not.
+_MIN_SAMPLES = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,16 +60,12 @@ class ExecutedPart:
     """One part as it was executed, in the recording's frame, unit and time.
 
     Attributes:
-        t: the part's own grid, (n,), s.
-        p: low-passed positions on it, (n, 3).
-        v: their velocities, (n, 3), per second.
+        trace: low-passed, on the part's own grid.
         frame_t: the robot's time stamps while the pen was down, (m,), s of the recording.
         frame_p: positions as reported then, (m, 3).
     """
 
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
+    trace: Trace
     frame_t: NDArray[np.float64]
     frame_p: NDArray[np.float64]
 
@@ -82,16 +77,12 @@ class Execution:
     Attributes:
         run: the recording and what is measured on every movement.
         parts: those that move, in order.
-        t: all of the movement on a uniform grid, (k,), s of the hand since it began.
-        p: TCP positions then, through the same low-pass, (k, 3), m, base frame.
-        v: their velocities, (k, 3), m per s of the hand.
+        whole: all of the movement through the same low-pass: s of the hand since it began, m, base frame.
     """
 
     run: MeasuredRun
     parts: tuple[ExecutedPart, ...]
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
+    whole: Trace
 
 
 def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Execution:
@@ -105,30 +96,22 @@ def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Executio
     Raises:
         RecordingError: the run ended before the drawing did.
     """
-    track = run.track
-    t = track.t - track.t_begin
+    t = run.track.t - run.track.t_begin
     if t[-1] < float(drawing.joined.pen_down[-1, 1]) * drawing.factor:
         raise RecordingError(f"{run.recording.path}: ends at {t[-1]:.1f} s, before the drawing was done")
-    path = CubicSpline(t - shift, track.p_actual)
-    moving = [index for index, mark in enumerate(drawing.marks) if mark.trajectory is not None]
+    path = CubicSpline(t - shift, run.track.p_actual)
     parts = tuple(
-        _part(drawing, index, part.t, path)
-        for index, part in zip(moving, drawing.extraction.parts, strict=True)
+        _executed_part(drawing, mark, part.t, path)
+        for mark, part in zip(drawing.moving, drawing.extraction.parts, strict=True)
     )
     whole = np.arange(0.0, drawing.joined.trajectory.duration, 1.0 / RATE_HZ)
     p = _less_noise(path(np.clip(whole * drawing.factor, path.x[0], path.x[-1])), RATE_HZ)
-    return Execution(run, parts, read_only(whole), read_only(p), read_only(velocity(whole, p)))
+    return Execution(run, parts, Trace(read_only(whole), read_only(p), read_only(velocity(whole, p))))
 
 
-def _less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-    """Positions (n, 3) at a uniform rate, Hz of the hand, without frequencies above those of a hand."""
-    sections = butter(_ORDER, _NOISE_HZ, fs=rate, output="sos")
-    padding = min(len(p) - 1, round(_MARGIN_S * rate))
-    smooth: NDArray[np.float64] = sosfiltfilt(sections, p, axis=0, padtype="odd", padlen=padding)
-    return smooth
+def _executed_part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpline) -> ExecutedPart:
+    """A part on its grid (s of the recording), from the path of the arm over its own time."""
 
-
-def _part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpline) -> ExecutedPart:
     def positions(t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Positions of the arm at times of the recording; outside the run it rests."""
         at = np.clip(drawing.arm_time(t, mark), path.x[0], path.x[-1])
@@ -141,17 +124,33 @@ def _part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpl
     inside = slice(margin, margin + len(grid))
     frame_t = drawing.recording_time(path.x, mark)
     frame_t = frame_t[(frame_t >= grid[0]) & (frame_t <= grid[-1])]
-    return ExecutedPart(
-        grid,
-        read_only(smooth[inside]),
-        read_only(velocity(wide, smooth)[inside]),
-        read_only(frame_t),
-        read_only(positions(frame_t)),
-    )
+    trace = Trace(grid, read_only(smooth[inside]), read_only(velocity(wide, smooth)[inside]))
+    return ExecutedPart(trace, read_only(frame_t), read_only(positions(frame_t)))
 
 
-#: Fewest samples of a part from which figures of fluency are taken.
-_MIN_SAMPLES = 16
+def _less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Positions (n, 3) at a uniform rate, Hz of the hand, without frequencies above those of a hand."""
+    padding = round(_MARGIN_S * rate)
+    return low_passed(p, rate, cutoff=_NOISE_HZ, order=_ORDER, padding=padding, ends="reflected")
+
+
+def signals(drawing: Drawing, execution: Execution | None = None) -> dict[str, tuple[Trace, ...]]:
+    """The parts that move as "human", "reconstructed", "planned" and, given a run, "executed".
+
+    All are in space, in the recording's frame, unit and time.
+    """
+    parts = drawing.extraction.parts
+    found = {
+        "human": tuple(Trace(part.t, spatial(part.p), spatial(part.v)) for part in parts),
+        "reconstructed": tuple(Trace(part.t, *part.trajectory.evaluate(part.t)[:2]) for part in parts),
+        "planned": tuple(
+            Trace(part.t, *drawing.planned(part.t, mark)[:2])
+            for mark, part in zip(drawing.moving, parts, strict=True)
+        ),
+    }
+    if execution is not None:
+        found["executed"] = tuple(part.trace for part in execution.parts)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,48 +162,8 @@ class Agreement:
 
 
 @dataclass(frozen=True, slots=True)
-class Fluency:
-    """How human-like a signal is, while the pen is down.
-
-    Attributes:
-        peaks: of the speed, all parts together.
-        sparc: spectral arc length, mean over the parts by their durations; nan when all are too short.
-        log_jerk: log dimensionless jerk, likewise.
-        exponent: beta of speed = k curvature^-beta over all parts; nan for straight lines.
-        r_squared: how well that law holds, 0 to 1; nan likewise.
-    """
-
-    peaks: int
-    sparc: float
-    log_jerk: float
-    exponent: float
-    r_squared: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Signal:
-    """One part of one signal on a uniform grid.
-
-    Attributes:
-        t: (n,), s of the recording.
-        p: (n, 3), in the recording's frame and unit.
-        v: (n, 3), per second.
-    """
-
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
-
-    @property
-    def speed(self) -> NDArray[np.float64]:
-        """(n,), per second."""
-        speed: NDArray[np.float64] = np.linalg.norm(self.v, axis=1)
-        return speed
-
-
-@dataclass(frozen=True, slots=True)
 class RunVerdict:
-    """One run.
+    """One run; its fields are keys of `draw.json`.
 
     Attributes:
         repetition: its number.
@@ -218,7 +177,7 @@ class RunVerdict:
         speed_db: Eq. 10 of the paper over the whole movement with its lifts, scalar speed.
         max_error: largest distance from the plan while the pen is down, m, at equal time stamps.
         off_sheet: largest distance from the sheet while the pen is down, m; nan for recordings in space.
-        fluency: of the executed signal.
+        fluency: how human-like the executed signal is.
     """
 
     repetition: int
@@ -231,25 +190,25 @@ class RunVerdict:
     speed_db: float
     max_error: float
     off_sheet: float
-    fluency: Fluency
+    fluency: Likeness
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """All figures of a drawing.
+    """All figures of a drawing; its fields are keys of `draw.json`.
 
     Attributes:
         reconstruction: strokes against the recording.
         plan: the plan, with tails of neighbours and lifts, against the recording.
-        human: fluency of the recording.
-        reconstructed: fluency of the strokes.
+        human: how human-like the recording is.
+        reconstructed: how human-like the strokes are.
         runs: what the arm did.
     """
 
     reconstruction: Agreement
     plan: Agreement
-    human: Fluency
-    reconstructed: Fluency
+    human: Likeness
+    reconstructed: Likeness
     runs: tuple[RunVerdict, ...]
 
     @property
@@ -258,134 +217,116 @@ class Verdict:
         return self.runs[-1]
 
 
-def signals(drawing: Drawing, execution: Execution | None = None) -> dict[str, tuple[Signal, ...]]:
-    """The parts that move as "human", "reconstructed", "planned" and, given a run, "executed"."""
-    moving = [index for index, mark in enumerate(drawing.marks) if mark.trajectory is not None]
-    parts = drawing.extraction.parts
-    found: dict[str, tuple[Signal, ...]] = {
-        "human": tuple(Signal(part.t, spatial(part.p), spatial(part.v)) for part in parts),
-        "reconstructed": tuple(Signal(part.t, *part.trajectory.evaluate(part.t)[:2]) for part in parts),
-        "planned": tuple(
-            Signal(part.t, *drawing.planned(part.t, index)[:2])
-            for index, part in zip(moving, parts, strict=True)
-        ),
-    }
-    if execution is not None:
-        found["executed"] = tuple(Signal(part.t, part.p, part.v) for part in execution.parts)
-    return found
-
-
 def judge(drawing: Drawing, executions: Sequence[Execution]) -> Verdict:
     """Compute all figures of a drawing and its runs."""
     own = signals(drawing)
-    human, planned = own["human"], own["planned"]
     extraction = drawing.extraction
     assert extraction.snr_v_db is not None  # something moves
     assert extraction.snr_t_db is not None
     metres = drawing.placement.similarity.scale
     return Verdict(
-        Agreement(extraction.snr_v_db, extraction.snr_t_db),
-        _agreement([(h.t, h.p, p.p) for h, p in zip(human, planned, strict=True)]),
-        fluency(human, metres),
-        fluency(own["reconstructed"], metres),
-        tuple(_judge_run(drawing, execution) for execution in executions),
+        reconstruction=Agreement(extraction.snr_v_db, extraction.snr_t_db),
+        plan=_agreement(
+            _Pair(human.t, human.p, planned.p)
+            for human, planned in zip(own["human"], own["planned"], strict=True)
+        ),
+        human=_likeness(own["human"], metres),
+        reconstructed=_likeness(own["reconstructed"], metres),
+        runs=tuple(_judge_run(drawing, execution) for execution in executions),
     )
 
 
-def fluency(parts: Sequence[Signal], metres: float) -> Fluency:
-    """Figures of one signal.
+def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
+    run, metres = execution.run, drawing.placement.similarity.scale
+    pairs = _against_plan(drawing, execution)
+    errors = np.concatenate([np.linalg.norm(pair.actual - pair.reference, axis=1) for pair in pairs])
+    heights = np.concatenate([np.abs(pair.actual[:, 2]) for pair in pairs])
+    # What is left of the error when the delay is undone is, in its mean, the offset of the nominal arm.
+    lag = run.snr.velocity_lag_s
+    aligned = executed(drawing, run, lag)
+    aligned_pairs = _against_plan(drawing, aligned)
+    offset = np.vstack([pair.actual - pair.reference for pair in aligned_pairs]).mean(axis=0)
+    return RunVerdict(
+        repetition=run.provenance.repetition,
+        planned=_agreement(pairs),
+        human=_agreement(_against_human(drawing, execution)),
+        planned_aligned=_agreement(aligned_pairs, offset),
+        human_aligned=_agreement(_against_human(drawing, aligned), offset),
+        lag=lag,
+        offset=metres * float(np.linalg.norm(offset)),
+        speed_db=run.snr.speed_db,
+        max_error=metres * float(errors.max()),
+        off_sheet=metres * float(heights.max()) if drawing.flat else math.nan,
+        fluency=_likeness([part.trace for part in execution.parts], metres),
+    )
+
+
+class _Pair(NamedTuple):
+    """Two signals of one part: times (n,), s, and positions (n, 3), in the recording's frame and unit."""
+
+    t: NDArray[np.float64]
+    reference: NDArray[np.float64]
+    actual: NDArray[np.float64]
+
+
+def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
+    """Planned and executed positions of each part at the robot's time stamps."""
+    return [
+        _Pair(part.frame_t, drawing.planned(part.frame_t, mark).p, part.frame_p)
+        for mark, part in zip(drawing.moving, execution.parts, strict=True)
+    ]
+
+
+def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
+    """Recorded and executed positions of each part at the robot's time stamps."""
+    return [
+        _Pair(part.frame_t, CubicSpline(human.t, spatial(human.p))(part.frame_t), part.frame_p)
+        for human, part in zip(drawing.extraction.parts, execution.parts, strict=True)
+    ]
+
+
+def _agreement(pairs: Iterable[_Pair], offset: NDArray[np.float64] | float = 0.0) -> Agreement:
+    """SNR_v and SNR_t over all parts, after an offset of the actual positions, (3,), is taken off."""
+    v_signal = v_noise = p_signal = p_noise = 0.0
+    for t, reference, reported in pairs:
+        if len(t) < 2:
+            continue  # a part between two frames of the robot
+        error = reported - offset - reference
+        steps = np.diff(t)[:, None]
+        v_signal += float(np.sum((np.diff(reference, axis=0) / steps) ** 2))
+        v_noise += float(np.sum((np.diff(error, axis=0) / steps) ** 2))
+        p_signal += float(np.sum((reference - reference.mean(axis=0)) ** 2))
+        p_noise += float(np.sum(error**2))
+    return Agreement(decibels(v_signal, v_noise), decibels(p_signal, p_noise))
+
+
+def _likeness(parts: Sequence[Trace], metres: float) -> Likeness:
+    """How human-like a signal is while the pen is down.
+
+    Peaks are those of all parts, smoothness is the mean over the parts by their durations (nan when all are
+    too short), and one power law is fitted to all parts.
 
     Args:
         parts: of the signal.
         metres: metres per unit: the power law is fitted where the path bends by less than 1 m radius.
     """
     long = [part for part in parts if len(part.t) >= _MIN_SAMPLES and part.speed.max() > 0.0]
-    weights = [float(part.t[-1] - part.t[0]) for part in long]
-    rates = [(len(part.t) - 1) / weight for part, weight in zip(long, weights, strict=True)]
-    v = np.vstack([metres * part.v for part in parts])
-    a = np.vstack([metres * np.gradient(part.v, part.t, axis=0) for part in parts])
-    law = fit_power_law(v, a)
-    return Fluency(
-        sum(speed_peaks(part.speed) for part in parts),
-        _mean([sparc(part.speed, rate) for part, rate in zip(long, rates, strict=True)], weights),
-        _mean(
+    weights = [part.duration for part in long]
+    rates = [(len(part.t) - 1) / part.duration for part in long]
+    law = fit_power_law(
+        np.vstack([metres * part.v for part in parts]),
+        np.vstack([metres * np.gradient(part.v, part.t, axis=0) for part in parts]),
+    )
+    return Likeness(
+        peaks=sum(speed_peaks(part.speed) for part in parts),
+        sparc=_mean([sparc(part.speed, rate) for part, rate in zip(long, rates, strict=True)], weights),
+        log_jerk=_mean(
             [log_dimensionless_jerk(part.speed, rate) for part, rate in zip(long, rates, strict=True)],
             weights,
         ),
-        law.exponent,
-        law.r_squared,
+        exponent=law.exponent,
+        r_squared=law.r_squared,
     )
-
-
-def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
-    run = execution.run
-    lag = run.snr.velocity_lag_s
-    shifted = executed(drawing, run, lag)
-    rest = np.vstack([actual - reference for _, reference, actual in _against_plan(drawing, shifted)])
-    offset = rest.mean(axis=0)
-    metres = drawing.placement.similarity.scale
-    errors, heights = [], []
-    for _, reference, actual in _against_plan(drawing, execution):
-        errors.append(np.linalg.norm(actual - reference, axis=1))
-        heights.append(np.abs(actual[:, 2]))
-    own = tuple(Signal(part.t, part.p, part.v) for part in execution.parts)
-    return RunVerdict(
-        run.provenance.repetition,
-        _agreement(_against_plan(drawing, execution)),
-        _agreement(_against_human(drawing, execution)),
-        _agreement(_less(_against_plan(drawing, shifted), offset)),
-        _agreement(_less(_against_human(drawing, shifted), offset)),
-        lag,
-        metres * float(np.linalg.norm(offset)),
-        run.snr.speed_db,
-        metres * float(np.concatenate(errors).max()),
-        metres * float(np.concatenate(heights).max()) if drawing.flat else math.nan,
-        fluency(own, metres),
-    )
-
-
-_Pair = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-
-
-def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
-    """Times, planned and executed positions of each part at the robot's time stamps."""
-    moving = [index for index, mark in enumerate(drawing.marks) if mark.trajectory is not None]
-    return [
-        (part.frame_t, drawing.planned(part.frame_t, index).p, part.frame_p)
-        for index, part in zip(moving, execution.parts, strict=True)
-    ]
-
-
-def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
-    """Times, recorded and executed positions of each part at the robot's time stamps."""
-    return [
-        (part.frame_t, CubicSpline(human.t, spatial(human.p))(part.frame_t), part.frame_p)
-        for human, part in zip(drawing.extraction.parts, execution.parts, strict=True)
-    ]
-
-
-def _less(pairs: Sequence[_Pair], offset: NDArray[np.float64]) -> list[_Pair]:
-    return [(t, reference, actual - offset) for t, reference, actual in pairs]
-
-
-def _agreement(pairs: Sequence[_Pair]) -> Agreement:
-    """Pool parts: times (n,), reference and actual positions (n, 3)."""
-    v_signal = v_noise = p_signal = p_noise = 0.0
-    for t, reference, actual in pairs:
-        if len(t) < 2:
-            continue  # a part between two frames of the robot
-        steps = np.diff(t)[:, None]
-        v, error = np.diff(reference, axis=0) / steps, np.diff(actual - reference, axis=0) / steps
-        v_signal, v_noise = v_signal + float(np.sum(v**2)), v_noise + float(np.sum(error**2))
-        p_signal += float(np.sum((reference - reference.mean(axis=0)) ** 2))
-        p_noise += float(np.sum((actual - reference) ** 2))
-    return Agreement(_decibels(v_signal, v_noise), _decibels(p_signal, p_noise))
-
-
-def _decibels(signal: float, noise: float) -> float:
-    if signal <= 0.0:
-        return math.nan
-    return 10.0 * math.log10(signal / max(noise, 1e-30 * signal))
 
 
 def _mean(values: Sequence[float], weights: Sequence[float]) -> float:

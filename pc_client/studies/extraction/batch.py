@@ -18,7 +18,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pc_client.errors import ClientError, RecordingError
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COLUMNS",
     "STROKE_COLUMNS",
-    "Job",
-    "Outcome",
+    "ExtractionOutcome",
     "Row",
     "extract_many",
     "figures_of",
@@ -114,26 +113,7 @@ _BYTES_IN_FLIGHT = 16 * MIB
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
-    """One recording to do.
-
-    Attributes:
-        name: of the recording.
-        content: bytes of its file.
-        options: of the extraction.
-        time_unit: a key of `pen.TIME_UNITS`, or None: from the file.
-        with_picture: whether a picture is wanted.
-    """
-
-    name: str
-    content: bytes
-    options: ExtractOptions = field(default_factory=ExtractOptions)
-    time_unit: str | None = None
-    with_picture: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class ExtractionOutcome:
     """The result of one recording.
 
     Attributes:
@@ -153,31 +133,14 @@ class Outcome:
     error: str | None = None
 
 
-def _run_job(job: Job) -> Outcome:
-    """Read, extract, and draw where it is wanted."""
-    try:
-        recording = parse_pen(job.content, job.name, job.time_unit)
-        extraction = extract(recording, job.options)
-    except ClientError as error:
-        return Outcome(job.name, error=str(error))
-    picture = None
-    if job.with_picture and extraction.parts:
-        from pc_client.studies.extraction.figures import draw_extraction
-
-        picture = draw_extraction(extraction)
-    return Outcome(
-        job.name, figures_of(extraction), tuple(strokes_of(extraction)), extraction.remarks, picture
-    )
-
-
 def extract_many(
     sources: Sequence[PenSource],
     executor: Executor,
     options: ExtractOptions | None = None,
     time_unit: str | None = None,
     n_pictures: int = 0,
-    on_outcome: Callable[[Outcome], None] = lambda outcome: None,
-) -> list[Outcome]:
+    on_outcome: Callable[[ExtractionOutcome], None] = lambda outcome: None,
+) -> list[ExtractionOutcome]:
     """Extract recordings.
 
     Args:
@@ -194,38 +157,53 @@ def extract_many(
     Raises:
         ClientError: the executor broke down.
     """
-    outcomes: dict[int, Outcome] = {}
-    running: dict[Future[Outcome], tuple[int, Job]] = {}
+    outcomes: dict[int, ExtractionOutcome] = {}
+    running: dict[Future[ExtractionOutcome], tuple[int, str, int]] = {}  # index, name, bytes
 
-    def keep(index: int, outcome: Outcome) -> None:
+    def keep(index: int, outcome: ExtractionOutcome) -> None:
         outcomes[index] = outcome
         on_outcome(outcome)
 
-    def collect(futures: Iterable[Future[Outcome]]) -> None:
-        for future in futures:
-            index, job = running.pop(future)
-            keep(index, _result(future, job.name))
+    def wait_for_some() -> None:
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            index, name, _ = running.pop(future)
+            keep(index, _result(future, name))
 
     for index, (source, content) in enumerate(contents(sources)):
         if isinstance(content, RecordingError):
-            keep(index, Outcome(source.name, error=str(content)))
+            keep(index, ExtractionOutcome(source.name, error=str(content)))
             continue
-        job = Job(source.name, content, options or ExtractOptions(), time_unit, index < n_pictures)
-        running[executor.submit(_run_job, job)] = (index, job)
-        while (
-            len(running) >= _IN_FLIGHT
-            or sum(len(job.content) for _, job in running.values()) > _BYTES_IN_FLIGHT
-        ):
-            collect(wait(running, return_when=FIRST_COMPLETED).done)
+        arguments = (source.name, content, options or ExtractOptions(), time_unit, index < n_pictures)
+        running[executor.submit(_extract_one, *arguments)] = (index, source.name, len(content))
+        while len(running) >= _IN_FLIGHT or sum(n for _, _, n in running.values()) > _BYTES_IN_FLIGHT:
+            wait_for_some()
     while running:
-        collect(wait(running, return_when=FIRST_COMPLETED).done)
+        wait_for_some()
     return [outcomes[index] for index in sorted(outcomes)]
 
 
-def _result(future: Future[Outcome], name: str) -> Outcome:
+def _extract_one(
+    name: str, content: bytes, options: ExtractOptions, time_unit: str | None, with_picture: bool
+) -> ExtractionOutcome:
+    """The job of a worker: read a recording, extract its strokes, and draw where that is wanted."""
+    try:
+        extraction = extract(parse_pen(content, name, time_unit), options)
+    except ClientError as error:
+        return ExtractionOutcome(name, error=str(error))
+    picture = None
+    if with_picture and extraction.parts:
+        from pc_client.studies.extraction.figures import draw_extraction
+
+        picture = draw_extraction(extraction)
+    strokes = tuple(strokes_of(extraction))
+    return ExtractionOutcome(name, figures_of(extraction), strokes, extraction.remarks, picture)
+
+
+def _result(future: Future[ExtractionOutcome], name: str) -> ExtractionOutcome:
     try:
         return future.result()
     except BrokenExecutor as error:
         raise ClientError(f"a worker ended while it extracted {name} ({error}); try fewer workers") from error
     except Exception as error:  # a fault of ours in one recording must not cost the others of the batch
-        return Outcome(name, error=f"{name}: the extraction failed ({type(error).__name__}: {error})")
+        why = f"{name}: the extraction failed ({type(error).__name__}: {error})"
+        return ExtractionOutcome(name, error=why)

@@ -99,6 +99,17 @@ class Chain:
         )
         return lengths
 
+    def picked(self, which: NDArray[np.bool_ | np.intp], targets: NDArray[np.float64]) -> Chain:
+        """Some of the strokes, or all in another order, from target to target of these."""
+        return Chain(
+            self.median[which],
+            self.width[which],
+            self.sigma[which],
+            self.arc_angle[which],
+            self.normal[which],
+            targets,
+        )
+
     def time_at_deviation(self, z: float) -> NDArray[np.float64]:
         """Times (s,) at which each stroke has done Phi(z) of its length."""
         times: NDArray[np.float64] = self.median + self.width * np.expm1(self.sigma * z) / self.sigma
@@ -152,14 +163,7 @@ def without(chain: Chain, drop: NDArray[np.bool_]) -> Chain:
     targets = np.vstack((chain.targets[:1], chain.targets[1:][keep]))
     if drop[-1]:
         targets[-1] = chain.targets[-1]
-    return Chain(
-        chain.median[keep],
-        chain.width[keep],
-        chain.sigma[keep],
-        chain.arc_angle[keep],
-        chain.normal[keep],
-        targets,
-    )
+    return chain.picked(keep, targets)
 
 
 def with_chords(chain: Chain, least: float) -> Chain:
@@ -185,14 +189,7 @@ def in_order(chain: Chain) -> Chain:
     if np.array_equal(order, np.arange(len(order))):
         return chain
     ends = chain.targets[0] + np.cumsum(chain.chords[order], axis=0)
-    return Chain(
-        chain.median[order],
-        chain.width[order],
-        chain.sigma[order],
-        chain.arc_angle[order],
-        chain.normal[order],
-        np.vstack((chain.targets[:1], ends)),
-    )
+    return chain.picked(order, np.vstack((chain.targets[:1], ends)))
 
 
 def sigma_lognormal(chain: Chain, duration: float) -> SigmaLognormal:

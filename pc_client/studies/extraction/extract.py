@@ -28,7 +28,8 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.studies.extraction.chain import Bounds, Chain, sigma_lognormal
 from pc_client.studies.extraction.fitting import FitOptions, fit_parts, left_over
 from pc_client.studies.extraction.pen import PenPart, PenRecording
-from pc_client.studies.extraction.smoothing import SmoothPart, moves, smooth_part, speed_peaks
+from pc_client.studies.extraction.smoothing import moves, smooth_part, speed_peaks
+from pc_client.studies.signals import Trace, decibels
 
 __all__ = ["ExtractOptions", "Extraction", "PartExtraction", "extract"]
 
@@ -118,15 +119,14 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
     n_peaks = [len(speed_peaks(part)) for part in smooth]
     budget = max(len(smooth), math.floor(options.strokes_per_peak * sum(n_peaks) + 1e-9))
     fitted = fit_parts(smooth, budget, options.fit)
-    chains = fitted.chains
-    remarks += _degenerate(chains)
+    remarks += _degenerate(fitted.chains)
     judged = [
         _judge(part, chain, count, fitted.through)
-        for part, chain, count in zip(smooth, chains, n_peaks, strict=True)
+        for part, chain, count in zip(smooth, fitted.chains, n_peaks, strict=True)
     ]
     powers = np.sum([power for _, power in judged], axis=0)
-    snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])
-    n_strokes = sum(len(chain) for chain in chains)
+    snr_v, snr_t = decibels(powers[0], powers[1]), decibels(powers[2], powers[3])
+    n_strokes = sum(map(len, fitted.chains))
     if n_strokes > budget:
         remarks.append(
             f"{n_strokes} strokes, {n_strokes - budget} more than asked: fewer reconstruct too little"
@@ -145,21 +145,22 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
 
 
 def _judge(
-    part: SmoothPart, chain: Chain, n_peaks: int, through: bool
+    part: Trace, chain: Chain, n_peaks: int, through: bool
 ) -> tuple[PartExtraction, NDArray[np.float64]]:
     """A part's result, and its powers: of velocity and its error, of position and its error."""
-    trajectory = sigma_lognormal(chain, float(part.t[-1]))
     p_left, v_left = left_over(chain, part, through=through)
-    powers = np.array(
-        [
-            np.sum(part.v**2),
-            np.sum(v_left**2),
-            np.sum((part.p - part.p.mean(axis=0)) ** 2),
-            np.sum(p_left**2),
-        ]
+    moved = part.p - part.p.mean(axis=0)
+    powers = np.array([np.sum(values**2) for values in (part.v, v_left, moved, p_left)])
+    result = PartExtraction(
+        part.t,
+        part.p,
+        part.v,
+        sigma_lognormal(chain, float(part.t[-1])),
+        decibels(powers[0], powers[1]),
+        decibels(powers[2], powers[3]),
+        len(chain),
+        n_peaks,
     )
-    snr_v, snr_t = _db(powers[0], powers[1]), _db(powers[2], powers[3])
-    result = PartExtraction(part.t, part.p, part.v, trajectory, snr_v, snr_t, len(chain), n_peaks)
     return result, powers
 
 
@@ -173,8 +174,3 @@ def _degenerate(chains: Sequence[Chain]) -> list[str]:
         f"{count} of {len(sigma)} strokes held at the least sigma, {least}: "
         "their speed profiles are near Gaussians, t0 is open"
     ]
-
-
-def _db(signal: float, noise: float) -> float:
-    """Signal to noise in dB, with a floor of the noise at the rounding of the signal (300 dB)."""
-    return 10.0 * math.log10(signal / max(noise, 1e-30 * signal))

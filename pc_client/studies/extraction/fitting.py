@@ -20,107 +20,11 @@ from numpy.typing import NDArray
 
 from pc_client.studies.extraction.chain import Bounds, Chain, inserted, with_chords, without
 from pc_client.studies.extraction.initial import TYPICAL_SIGMA, initial_chain
-from pc_client.studies.extraction.refine import Fit, FitTarget, refine, residuals
-from pc_client.studies.extraction.smoothing import CUTOFF_HZ, SmoothPart, low_passed, velocity
+from pc_client.studies.extraction.refine import Fit, Goal, refine, residuals
+from pc_client.studies.extraction.smoothing import CUTOFF_HZ, less_noise
+from pc_client.studies.signals import Trace, velocity
 
-__all__ = [
-    "Candidate",
-    "FitOptions",
-    "Fitted",
-    "Scales",
-    "best_candidates",
-    "fit_parts",
-    "left_over",
-]
-
-
-#: Widths (s) of the lognormals that are tried: of the strokes of handwriting, from hasty to calm.
-_TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
-_REACH = 3.0
-
-
-class Candidate(NamedTuple):
-    """A candidate stroke: its place, and the energy (squared velocity summed over samples) it explains."""
-
-    median: float
-    width: float
-    energy: float
-
-
-def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: int) -> list[Candidate]:
-    """The lognormals that reduce the energy of a residual velocity most, best first.
-
-    Args:
-        t: uniform times, (n,), s.
-        v_left: residual velocity, (n, dim).
-        count: how many at most.
-    """
-    step = float(t[1] - t[0])
-    left = np.array(v_left)
-    kernels = [_kernel(width / step) for width in _TRIED_WIDTHS_S]
-    found: list[Candidate] = []
-    gains = np.stack([_gains(left, kernel) for kernel in kernels])
-    for _ in range(count):
-        which, at = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        energy = float(gains[which, at])
-        if energy <= 0.0:
-            break
-        found.append(Candidate(float(t[at]), _TRIED_WIDTHS_S[which], energy))
-        _subtract(left, kernels[which], int(at))
-        # Only the neighbourhood has changed; no second candidate is wanted in the first one's core.
-        reach = 2 * max(len(kernel) for kernel in kernels)
-        low, high = max(0, int(at) - reach), min(len(t), int(at) + reach + 1)
-        blocked = gains == -1.0
-        for row, kernel in enumerate(kernels):
-            gains[row, low:high] = _gains(left[max(0, low - reach) : high + reach], kernel)[
-                low - max(0, low - reach) :
-            ][: high - low]
-        gains[blocked] = -1.0
-        core = max(1, round(_TRIED_WIDTHS_S[which] / step))
-        gains[:, max(0, int(at) - core) : int(at) + core + 1] = -1.0
-    return found
-
-
-def _idle_strokes(chain: Chain, v_scale: float, step: float, cost: float) -> NDArray[np.bool_]:
-    """Strokes with a velocity that is small against the residual, (s,).
-
-    Args:
-        chain: the strokes.
-        v_scale: scale of velocities in the cost.
-        step: distance of the samples, s.
-        cost: what is left.
-    """
-    # Energy of a lognormal: D^2 integral Lambda^2 dt = D^2 exp(sigma^2 / 4) / (2 w sqrt(pi)).
-    energy = chain.lengths**2 * np.exp(0.25 * chain.sigma**2) / (2.0 * chain.width * np.sqrt(np.pi)) / step
-    idle: NDArray[np.bool_] = v_scale**2 * energy < 0.01 * cost
-    return idle
-
-
-def _kernel(width: float) -> NDArray[np.float64]:
-    """A lognormal with energy 1, width in samples."""
-    reach = max(1, round(_REACH * width))
-    shape = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    scaled: NDArray[np.float64] = shape / np.sqrt(shape @ shape)
-    return scaled
-
-
-def _gains(left: NDArray[np.float64], kernel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
-    n, reach = len(left), len(kernel) // 2
-    power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
-    total = np.zeros(n)
-    for column in left.T:
-        total += np.convolve(column, kernel)[reach : reach + n] ** 2
-    gains: NDArray[np.float64] = total / power
-    return gains
-
-
-def _subtract(left: NDArray[np.float64], kernel: NDArray[np.float64], at: int) -> None:
-    reach = len(kernel) // 2
-    low, high = max(0, at - reach), min(len(left), at + reach + 1)
-    piece = kernel[low - at + reach : high - at + reach]
-    left[low:high] -= np.outer(piece, piece @ left[low:high] / (piece @ piece))
-
+__all__ = ["Candidate", "FitOptions", "Fitted", "best_candidates", "fit_parts", "left_over"]
 
 #: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
 _DECIMATION = 4
@@ -138,6 +42,8 @@ _GIVE_BACKS = 24
 _STAGNANT = 0.9
 #: Times that a tenth of the strokes is added beyond the budget, at most.
 _RESCUES = 12
+#: Share of the cost below which the velocity of a stroke has no effect.
+_IDLE = 0.01
 #: Shortest chord of a stroke over the extent of its part.
 _LEAST_CHORD = 1e-6
 
@@ -164,26 +70,6 @@ class FitOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Scales:
-    """Size of a recording's movement, by which errors are measured.
-
-    Attributes:
-        p: root of the summed squared distances of all samples from the mean of their part.
-        v: root of the summed squared velocities of all samples.
-    """
-
-    p: float
-    v: float
-
-    @classmethod
-    def of(cls, parts: Sequence[SmoothPart]) -> Scales:
-        """The scales of a recording with these moving parts."""
-        p = math.sqrt(sum(float(np.sum((part.p - part.p.mean(axis=0)) ** 2)) for part in parts))
-        v = math.sqrt(sum(float(np.sum(part.v**2)) for part in parts))
-        return cls(p, v)
-
-
-@dataclass(frozen=True, slots=True)
 class Fitted:
     """The result of a fit.
 
@@ -197,7 +83,7 @@ class Fitted:
     through: bool
 
 
-def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> Fitted:
+def fit_parts(parts: Sequence[Trace], budget: int, options: FitOptions) -> Fitted:
     """Strokes for all parts.
 
     Args:
@@ -206,40 +92,27 @@ def fit_parts(parts: Sequence[SmoothPart], budget: int, options: FitOptions) -> 
             `FitOptions`. Every part gets one for each of its speed peaks in any case.
         options: effort.
     """
-    scales = Scales.of(parts)
-    fit_targets = [_fit_target(part, part.p, part.v, scales) for part in parts]
-    fits = [
-        refine(initial_chain(part), fit_target, options.iterations)
-        for part, fit_target in zip(parts, fit_targets, strict=True)
-    ]
-    if _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_PERHAPS_CLEAN_DB / 10.0):
-        sharp = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
-        if _passed_cost(sharp, parts, scales) < 10.0 ** (-options.enough_db / 10.0):
-            return Fitted(_with_all_chords(sharp, parts), through=True)
+    fitting = _Fitting(parts, options)
+    if fitting.unexplained() < _share(_PERHAPS_CLEAN_DB):
+        sharp = fitting.given_back()
+        if fitting.unexplained(sharp, through=True) < _share(options.enough_db):
+            return Fitted(fitting.chains(sharp), through=True)
     for round_ in range(options.rounds):
-        left = budget - sum(len(fit.chain) for fit in fits)
+        left = budget - fitting.n_strokes
         wanted = left if round_ == options.rounds - 1 else math.ceil(left / 2)
-        if left <= 0 or not _add(fits, parts, fit_targets, scales, wanted, options):
+        if left <= 0 or not fitting.add(wanted):
             break
     for _ in range(_RESCUES):
-        chains = [fit.chain for fit in fits]
-        if _velocity_cost(chains, parts, scales) < 10.0 ** (-options.least_db / 10.0):
+        if fitting.unexplained() < _share(options.least_db):
             break
-        if not _add(fits, parts, fit_targets, scales, math.ceil(0.1 * sum(map(len, chains))), options):
+        if not fitting.add(math.ceil(0.1 * fitting.n_strokes)):
             break
-    fits = [
-        refine(_tidy(fit, fit_target), fit_target, options.last_iterations)
-        for fit, fit_target in zip(fits, fit_targets, strict=True)
-    ]
-    is_clean = _velocity_cost([fit.chain for fit in fits], parts, scales) < 10.0 ** (-_CLEAN_DB / 10.0)
-    if is_clean:
-        fits = [_given_back(fit, part, scales, options) for fit, part in zip(fits, parts, strict=True)]
-    return Fitted(_with_all_chords(fits, parts), through=is_clean)
+    fitting.finish()
+    is_clean = fitting.unexplained() < _share(_CLEAN_DB)
+    return Fitted(fitting.chains(fitting.given_back() if is_clean else fitting.fits), through=is_clean)
 
 
-def left_over(
-    chain: Chain, part: SmoothPart, *, through: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def left_over(chain: Chain, part: Trace, *, through: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Residual positions and velocities of a part, (n, dim) each.
 
     Args:
@@ -249,102 +122,202 @@ def left_over(
     """
     # What trajectory.evaluate leaves, but piece by piece: all strokes at all times are too many in a long
     # recording.
-    p_left, v_left = residuals(chain, part.t, part.p, part.v)
+    p_left, v_left = residuals(chain, part)
     if not through:
         return p_left, v_left
-    passed = low_passed(part.p - p_left, 1.0 / part.step)
+    passed = less_noise(part.p - p_left, 1.0 / part.step)
     return part.p - passed, part.v - velocity(part.t, passed)
 
 
-def _with_all_chords(fits: Sequence[Fit], parts: Sequence[SmoothPart]) -> list[Chain]:
-    """The chains of the fits, every stroke with a chord."""
-    return [
-        with_chords(fit.chain, _LEAST_CHORD * float(np.linalg.norm(np.ptp(part.p, axis=0))))
-        for fit, part in zip(fits, parts, strict=True)
-    ]
+class _Fitting:
+    """The parts of a recording and the strokes that they have so far.
 
-
-def _add(
-    fits: list[Fit],
-    parts: Sequence[SmoothPart],
-    fit_targets: Sequence[FitTarget],
-    scales: Scales,
-    wanted: int,
-    options: FitOptions,
-) -> bool:
-    """Add the best candidates to the fits and refine those fits; False when none is worth adding."""
-    left = [residuals(fit.chain, part.t, part.p, part.v)[1] for fit, part in zip(fits, parts, strict=True)]
-    energy = sum(float(np.sum(v**2)) for v in left)
-    if energy < scales.v**2 * 10.0 ** (-options.enough_db / 10.0):
-        return False
-    snr = 10.0 * math.log10(scales.v**2 / energy)
-    raised = _PAYS * max(snr, 0.0) / sum(len(fit.chain) for fit in fits)
-    least = energy * (1.0 - 10.0 ** (-raised / 10.0))
-    found = [
-        (candidate, index)
-        for index, (part, v) in enumerate(zip(parts, left, strict=True))
-        for candidate in best_candidates(part.t, v, wanted)
-        if candidate.energy > least
-    ]
-    found.sort(key=lambda pair: -pair[0].energy)
-    for index in sorted({index for _, index in found[:wanted]}):
-        mine = [candidate for candidate, owner in found[:wanted] if owner == index]
-        median = np.array([candidate.median for candidate in mine])
-        width = np.array([candidate.width for candidate in mine])
-        chain = inserted(_tidy(fits[index], fit_targets[index]), median, width, TYPICAL_SIGMA)
-        fits[index] = refine(chain, fit_targets[index], options.iterations)
-    return bool(found)
-
-
-def _tidy(fit: Fit, fit_target: FitTarget) -> Chain:
-    """The fit's chain without strokes of no effect; one is kept in any case."""
-    idle = _idle_strokes(fit.chain, fit_target.v_scale, float(fit_target.t[1] - fit_target.t[0]), fit.cost)
-    if idle.all():
-        idle[int(np.argmax(fit.chain.lengths))] = False
-    return without(fit.chain, idle) if idle.any() else fit.chain
-
-
-def _given_back(fit: Fit, part: SmoothPart, scales: Scales, options: FitOptions) -> Fit:
-    """Refine against the signal with what the low-pass takes from these strokes given back to it.
-
-    The low-pass flattens fast speed profiles a little. That is far below the noise of a hand's recording, but
-    strokes fitted to a clean signal would come out too wide by it.
+    Errors are measured by the size of the whole recording: the root of the summed squared distances of all
+    samples from the mean of their part, and that of the summed squared velocities.
     """
-    cost = math.inf
-    for _ in range(_GIVE_BACKS):
-        p_left, v_left = residuals(fit.chain, part.t, part.p, part.v)
-        p_model, v_model = part.p - p_left, part.v - v_left
-        passed = low_passed(p_model, 1.0 / part.step)
-        p, v = part.p + p_model - passed, part.v + v_model - velocity(part.t, passed)
-        fit = refine(fit.chain, _fit_target(part, p, v, scales), options.last_iterations, tolerance=1e-4)
-        if fit.cost > _STAGNANT * cost:
+
+    def __init__(self, parts: Sequence[Trace], options: FitOptions) -> None:
+        self._parts = parts
+        self._options = options
+        self._p_size = math.sqrt(sum(float(np.sum((part.p - part.p.mean(axis=0)) ** 2)) for part in parts))
+        self._v_size = math.sqrt(sum(float(np.sum(part.v**2)) for part in parts))
+        self._goals = [self._goal(part, part.p, part.v) for part in parts]
+        self.fits = [
+            refine(initial_chain(part), goal, options.iterations)
+            for part, goal in zip(parts, self._goals, strict=True)
+        ]
+
+    @property
+    def n_strokes(self) -> int:
+        """Of all parts."""
+        return sum(len(fit.chain) for fit in self.fits)
+
+    def unexplained(self, fits: Sequence[Fit] | None = None, *, through: bool = False) -> float:
+        """Share of the energy of the velocity that strokes leave: 10^(-SNR_v / 10)."""
+        left = (
+            left_over(fit.chain, part, through=through)[1]
+            for fit, part in zip(fits or self.fits, self._parts, strict=True)
+        )
+        return sum(float(np.sum(v**2)) for v in left) / self._v_size**2
+
+    def add(self, wanted: int) -> bool:
+        """Add the best candidates and refine their parts; False when none is worth adding."""
+        left = [residuals(fit.chain, part)[1] for fit, part in zip(self.fits, self._parts, strict=True)]
+        energy = sum(float(np.sum(v**2)) for v in left)
+        if energy < self._v_size**2 * _share(self._options.enough_db):
+            return False
+        snr = 10.0 * math.log10(self._v_size**2 / energy)
+        raised = _PAYS * max(snr, 0.0) / self.n_strokes
+        least = energy * (1.0 - _share(raised))
+        found = [
+            (candidate, index)
+            for index, (part, v) in enumerate(zip(self._parts, left, strict=True))
+            for candidate in best_candidates(part.t, v, wanted)
+            if candidate.energy > least
+        ]
+        found.sort(key=lambda pair: -pair[0].energy)
+        for index in sorted({index for _, index in found[:wanted]}):
+            mine = [candidate for candidate, owner in found[:wanted] if owner == index]
+            median = np.array([candidate.median for candidate in mine])
+            width = np.array([candidate.width for candidate in mine])
+            chain = inserted(self._tidy(index), median, width, TYPICAL_SIGMA)
+            self.fits[index] = refine(chain, self._goals[index], self._options.iterations)
+        return bool(found)
+
+    def finish(self) -> None:
+        """The last refinement, without strokes of no effect."""
+        self.fits = [
+            refine(self._tidy(index), goal, self._options.last_iterations)
+            for index, goal in enumerate(self._goals)
+        ]
+
+    def given_back(self) -> list[Fit]:
+        """Refine against the signal with what the low-pass takes from these strokes given back to it.
+
+        The low-pass flattens fast speed profiles a little. That is far below the noise of a hand's recording,
+        but strokes fitted to a clean signal would come out too wide by it.
+        """
+        fits = []
+        for fit, part in zip(self.fits, self._parts, strict=True):
+            cost = math.inf
+            for _ in range(_GIVE_BACKS):
+                p_left, v_left = residuals(fit.chain, part)
+                p_model, v_model = part.p - p_left, part.v - v_left
+                passed = less_noise(p_model, 1.0 / part.step)
+                goal = self._goal(
+                    part, part.p + p_model - passed, part.v + v_model - velocity(part.t, passed)
+                )
+                fit = refine(fit.chain, goal, self._options.last_iterations, tolerance=1e-4)
+                if fit.cost > _STAGNANT * cost:
+                    break
+                cost = fit.cost
+            fits.append(fit)
+        return fits
+
+    def chains(self, fits: Sequence[Fit]) -> list[Chain]:
+        """The chains of fits, every stroke with a chord."""
+        return [
+            with_chords(fit.chain, _LEAST_CHORD * float(np.linalg.norm(np.ptp(part.p, axis=0))))
+            for fit, part in zip(fits, self._parts, strict=True)
+        ]
+
+    def _goal(self, part: Trace, p: NDArray[np.float64], v: NDArray[np.float64]) -> Goal:
+        """What the strokes of a part shall approximate: some of the samples of p and v."""
+        decimation = max(1, min(_DECIMATION, len(part.t) // _LEAST_SAMPLES))
+        rows = np.arange(0, len(part.t), decimation)
+        if rows[-1] != len(part.t) - 1:
+            rows = np.append(rows, len(part.t) - 1)
+        weight = math.sqrt(len(part.t) / len(rows))
+        freedom = part.p.shape[1] * (1.0 + 2.0 * CUTOFF_HZ * part.duration)
+        signal = Trace(part.t[rows], p[rows], v[rows])
+        return Goal(signal, weight / self._p_size, weight / self._v_size, freedom, Bounds.of(part.duration))
+
+    def _tidy(self, index: int) -> Chain:
+        """The chain of a part without strokes of no effect; one is kept in any case."""
+        fit, goal = self.fits[index], self._goals[index]
+        chain = fit.chain
+        # Energy of a lognormal: D^2 integral Lambda^2 dt = D^2 exp(sigma^2 / 4) / (2 w sqrt(pi)).
+        energy = chain.lengths**2 * np.exp(0.25 * chain.sigma**2) / (2.0 * chain.width * np.sqrt(np.pi))
+        idle = goal.v_scale**2 * (energy / goal.signal.step) < _IDLE * fit.cost
+        if idle.all():
+            idle[int(np.argmax(chain.lengths))] = False
+        return without(chain, idle) if idle.any() else chain
+
+
+def _share(db: float) -> float:
+    """The share of an energy that is so many dB below it."""
+    return float(10.0 ** (-db / 10.0))
+
+
+#: Widths (s) of the lognormals that are tried: of the strokes of handwriting, from hasty to calm.
+_TRIED_WIDTHS_S = (0.02, 0.032, 0.05)
+#: Of a tried lognormal, in widths on each side of its middle.
+_REACH = 3.0
+
+
+class Candidate(NamedTuple):
+    """A candidate stroke: its place, and the energy (squared velocity summed over samples) it explains."""
+
+    median: float
+    width: float
+    energy: float
+
+
+def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: int) -> list[Candidate]:
+    """The lognormals that reduce the energy of a residual velocity most, best first.
+
+    Args:
+        t: uniform times, (n,), s.
+        v_left: residual velocity, (n, dim).
+        count: how many at most.
+    """
+    step = float(t[1] - t[0])
+    left = np.array(v_left)
+    kernels = [_kernel(width / step) for width in _TRIED_WIDTHS_S]
+    reach = 2 * max(len(kernel) for kernel in kernels)
+    gains = np.stack([_gains(left, kernel) for kernel in kernels])
+    found: list[Candidate] = []
+    for _ in range(count):
+        which, at = map(int, np.unravel_index(int(np.argmax(gains)), gains.shape))
+        energy = float(gains[which, at])
+        if energy <= 0.0:
             break
-        cost = fit.cost
-    return fit
+        found.append(Candidate(float(t[at]), _TRIED_WIDTHS_S[which], energy))
+        _subtract(left, kernels[which], at)
+        # Only the neighbourhood has changed; no second candidate is wanted in the first one's core.
+        low, high = max(0, at - reach), min(len(t), at + reach + 1)
+        margin = low - max(0, low - reach)
+        blocked = gains == -1.0
+        for row, kernel in enumerate(kernels):
+            nearby = _gains(left[low - margin : high + reach], kernel)
+            gains[row, low:high] = nearby[margin:][: high - low]
+        gains[blocked] = -1.0
+        core = max(1, round(_TRIED_WIDTHS_S[which] / step))
+        gains[:, max(0, at - core) : at + core + 1] = -1.0
+    return found
 
 
-def _passed_cost(fits: Sequence[Fit], parts: Sequence[SmoothPart], scales: Scales) -> float:
-    """Share of the velocity that low-passed strokes do not explain."""
-    energy = 0.0
-    for fit, part in zip(fits, parts, strict=True):
-        energy += float(np.sum(left_over(fit.chain, part, through=True)[1] ** 2))
-    return energy / scales.v**2
+def _kernel(width: float) -> NDArray[np.float64]:
+    """A lognormal with energy 1, width in samples."""
+    reach = max(1, round(_REACH * width))
+    shape = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    scaled: NDArray[np.float64] = shape / np.sqrt(shape @ shape)
+    return scaled
 
 
-def _velocity_cost(chains: Sequence[Chain], parts: Sequence[SmoothPart], scales: Scales) -> float:
-    left = (residuals(chain, part.t, part.p, part.v)[1] for chain, part in zip(chains, parts, strict=True))
-    return sum(float(np.sum(v**2)) for v in left) / scales.v**2
+def _gains(left: NDArray[np.float64], kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
+    n, reach = len(left), len(kernel) // 2
+    power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
+    total = np.zeros(n)
+    for column in left.T:
+        total += np.convolve(column, kernel)[reach : reach + n] ** 2
+    gains: NDArray[np.float64] = total / power
+    return gains
 
 
-def _fit_target(
-    part: SmoothPart, p: NDArray[np.float64], v: NDArray[np.float64], scales: Scales
-) -> FitTarget:
-    decimation = max(1, min(_DECIMATION, len(part.t) // _LEAST_SAMPLES))
-    rows = np.arange(0, len(part.t), decimation)
-    if rows[-1] != len(part.t) - 1:
-        rows = np.append(rows, len(part.t) - 1)
-    weight = math.sqrt(len(part.t) / len(rows))
-    duration = float(part.t[-1] - part.t[0])
-    freedom = part.p.shape[1] * (1.0 + 2.0 * CUTOFF_HZ * duration)
-    bounds = Bounds.of(duration)
-    return FitTarget(part.t[rows], p[rows], v[rows], weight / scales.p, weight / scales.v, freedom, bounds)
+def _subtract(left: NDArray[np.float64], kernel: NDArray[np.float64], at: int) -> None:
+    reach = len(kernel) // 2
+    low, high = max(0, at - reach), min(len(left), at + reach + 1)
+    piece = kernel[low - at + reach : high - at + reach]
+    left[low:high] -= np.outer(piece, piece @ left[low:high] / (piece @ piece))

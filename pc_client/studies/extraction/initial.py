@@ -23,7 +23,7 @@ from scipy.signal import find_peaks
 from pc_client.errors import MovementError
 from pc_client.movements.lognormal import Lognormal, evaluate_lognormals
 from pc_client.studies.extraction.chain import Bounds, Chain, normals_across
-from pc_client.studies.extraction.smoothing import SmoothPart
+from pc_client.studies.signals import Trace
 
 __all__ = [
     "CharacteristicPoints",
@@ -35,6 +35,108 @@ __all__ = [
     "sigma_from_slope_ratio",
     "turn_rate",
 ]
+
+
+#: Peaks that stand out by less than this share of the top speed are ripples on their neighbours at first;
+#: strokes for those that deserve one are added where the refined residual is worst.
+_RIPPLE = 0.05
+#: Sigma of a speed profile whose shape says nothing: the middle of what is found in handwriting.
+TYPICAL_SIGMA = 0.2
+#: Peak speed times width over length of a speed profile, 1 / sqrt(2 pi), nearly for every sigma.
+_PEAK_WIDTH = 1.0 / math.sqrt(2.0 * math.pi)
+#: Largest arc angle that a first guess may have, rad.
+_MAX_FIRST_TURN = 2.5
+
+
+def salient_points(part: Trace) -> NDArray[np.intp]:
+    """Indices (n_intervals + 1,) that divide a part: its first sample, the speed minima, its last sample."""
+    speed = part.speed
+    peaks, _ = find_peaks(speed, prominence=_RIPPLE * float(speed.max()))
+    minima = [a + int(np.argmin(speed[a:b])) for a, b in pairwise(peaks)]
+    return np.array([0, *minima, len(speed) - 1])
+
+
+def initial_chain(part: Trace) -> Chain:
+    """One stroke for each interval."""
+    marks = salient_points(part)
+    speed = part.speed
+    path_length = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * part.step))
+    first = [_timing(part.t[a : b + 1], speed[a : b + 1]) for a, b in pairwise(marks)]
+    median, width, sigma = np.array(first).T
+    targets = part.p[marks]
+    dim = targets.shape[1]
+    arc_angles = [_arc_angle(part, path_length, a, b) for a, b in pairwise(marks)]
+    vectors = np.array(arc_angles)
+    chords = np.zeros((len(vectors), 3))
+    chords[:, :dim] = np.diff(targets, axis=0)
+    if dim == 2:
+        return Chain(
+            median, width, sigma, vectors[:, 2], np.tile([0.0, 0.0, 1.0], (len(vectors), 1)), targets
+        )
+    sizes = np.linalg.norm(vectors, axis=1)
+    normals = np.where(sizes[:, None] > 1e-6, vectors, [0.0, 0.0, 1.0])
+    return Chain(median, width, sigma, sizes, normals_across(chords, normals), targets)
+
+
+def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Median, width and sigma for a speed profile between two minima: the best of the candidates."""
+    candidates = [_by_area(t, speed), *_by_closed_forms(t, speed)]
+    errors = []
+    for median, width, sigma in candidates:
+        shape = evaluate_lognormals(t, median - width / sigma, math.log(width / sigma), sigma).rate
+        power = float(shape @ shape)
+        scale = float(shape @ speed) / power if power > 0.0 else 0.0
+        errors.append(float(np.sum((speed - scale * shape) ** 2)))
+    return candidates[int(np.argmin(errors))]
+
+
+def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
+    """The lognormal with the area and the peak of the measured speed profile; it always exists."""
+    top = int(np.argmax(speed))
+    area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
+    peak = float(speed[top])
+    width = _clipped(_PEAK_WIDTH * area / peak if peak > 0.0 else 0.0, Bounds().width)
+    return float(t[top]) + width * TYPICAL_SIGMA, width, TYPICAL_SIGMA
+
+
+def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list[tuple[float, float, float]]:
+    points = characteristic_points(t, speed)
+    if points is None:
+        return []
+    v2, v3, v4 = points.speeds
+    found = []
+    for sigma in (
+        sigma_from_peak_ratio(v2 / v3),
+        sigma_from_peak_ratio(v4 / v3),
+        sigma_from_slope_ratio(v4 / v2),
+    ):
+        lognormal = lognormal_from_points(points, _clipped(sigma, Bounds().sigma)).lognormal
+        width = _clipped(math.exp(lognormal.mu) * lognormal.sigma, Bounds().width)
+        found.append((lognormal.median, width, lognormal.sigma))
+    return found
+
+
+def _arc_angle(part: Trace, path_length: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
+    """Arc angle of the stroke between two salient points as a vector along its axis, (3,), rad."""
+    length = float(path_length[b] - path_length[a])
+    if length <= 0.0:
+        return np.zeros(3)
+    # A quarter and three quarters of the length stand for the inflections: they always exist.
+    i, k = np.searchsorted(path_length, (path_length[a] + 0.25 * length, path_length[a] + 0.75 * length))
+    v = np.zeros((2, 3))
+    v[:, : part.v.shape[1]] = part.v[[i, min(k, len(part.v) - 1)]]
+    axis = np.cross(v[0], v[1])
+    size = float(np.linalg.norm(axis))
+    if size == 0.0 or path_length[k] <= path_length[i]:
+        return np.zeros(3)
+    angle = math.atan2(size, float(v[0] @ v[1]))
+    total = turn_rate((0.0, angle), (float(path_length[i]), float(path_length[k]))) * length
+    turned: NDArray[np.float64] = min(total, _MAX_FIRST_TURN) * axis / size
+    return turned
+
+
+def _clipped(value: float, bounds: tuple[float, float]) -> float:
+    return min(max(value, bounds[0]), bounds[1])
 
 
 class CharacteristicPoints(NamedTuple):
@@ -96,85 +198,6 @@ def turn_rate(directions: tuple[float, float], distances: tuple[float, float]) -
     return (directions[1] - directions[0]) / (distances[1] - distances[0])
 
 
-#: Peaks that stand out by less than this share of the top speed are ripples on their neighbours at first;
-#: strokes for those that deserve one are added where the refined residual is worst.
-_RIPPLE = 0.05
-#: Sigma of a speed profile whose shape says nothing: the middle of what is found in handwriting.
-TYPICAL_SIGMA = 0.2
-#: Peak speed times width over length of a speed profile, 1 / sqrt(2 pi), nearly for every sigma.
-_PEAK_WIDTH = 1.0 / math.sqrt(2.0 * math.pi)
-#: Largest arc angle that a first guess may have, rad.
-_MAX_FIRST_TURN = 2.5
-
-
-def salient_points(part: SmoothPart) -> NDArray[np.intp]:
-    """Indices (n_intervals + 1,) that divide a part: its first sample, the speed minima, its last sample."""
-    speed = part.speed
-    peaks, _ = find_peaks(speed, prominence=_RIPPLE * float(speed.max()))
-    minima = [a + int(np.argmin(speed[a:b])) for a, b in pairwise(peaks)]
-    return np.array([0, *minima, len(speed) - 1])
-
-
-def initial_chain(part: SmoothPart) -> Chain:
-    """One stroke for each interval."""
-    marks = salient_points(part)
-    speed = part.speed
-    path_length = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * part.step))
-    first = [_timing(part.t[a : b + 1], speed[a : b + 1]) for a, b in pairwise(marks)]
-    median, width, sigma = np.array(first).T
-    targets = part.p[marks]
-    dim = targets.shape[1]
-    arc_angles = [_arc_angle(part, path_length, a, b) for a, b in pairwise(marks)]
-    vectors = np.array(arc_angles)
-    chords = np.zeros((len(vectors), 3))
-    chords[:, :dim] = np.diff(targets, axis=0)
-    if dim == 2:
-        return Chain(
-            median, width, sigma, vectors[:, 2], np.tile([0.0, 0.0, 1.0], (len(vectors), 1)), targets
-        )
-    sizes = np.linalg.norm(vectors, axis=1)
-    normals = np.where(sizes[:, None] > 1e-6, vectors, [0.0, 0.0, 1.0])
-    return Chain(median, width, sigma, sizes, normals_across(chords, normals), targets)
-
-
-def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Median, width and sigma for a speed profile between two minima: the best of the candidates."""
-    candidates = [_by_area(t, speed), *_by_closed_forms(t, speed)]
-    errors = []
-    for median, width, sigma in candidates:
-        shape = evaluate_lognormals(t, median - width / sigma, math.log(width / sigma), sigma).rate
-        power = float(shape @ shape)
-        scale = float(shape @ speed) / power if power > 0.0 else 0.0
-        errors.append(float(np.sum((speed - scale * shape) ** 2)))
-    return candidates[int(np.argmin(errors))]
-
-
-def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
-    """The lognormal with the area and the peak of the measured speed profile; it always exists."""
-    top = int(np.argmax(speed))
-    area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
-    peak = float(speed[top])
-    width = _clipped(_PEAK_WIDTH * area / peak if peak > 0.0 else 0.0, Bounds().width)
-    return float(t[top]) + width * TYPICAL_SIGMA, width, TYPICAL_SIGMA
-
-
-def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list[tuple[float, float, float]]:
-    points = characteristic_points(t, speed)
-    if points is None:
-        return []
-    v2, v3, v4 = points.speeds
-    found = []
-    for sigma in (
-        sigma_from_peak_ratio(v2 / v3),
-        sigma_from_peak_ratio(v4 / v3),
-        sigma_from_slope_ratio(v4 / v2),
-    ):
-        lognormal = lognormal_from_points(points, _clipped(sigma, Bounds().sigma)).lognormal
-        width = _clipped(math.exp(lognormal.mu) * lognormal.sigma, Bounds().width)
-        found.append((lognormal.median, width, lognormal.sigma))
-    return found
-
-
 def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) -> CharacteristicPoints | None:
     """Inflections and peak of a speed profile, or None where one of them is not inside."""
     top = int(np.argmax(speed))
@@ -188,26 +211,3 @@ def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) ->
     if not (times[0] < times[1] < times[2] and 0.0 < speeds[0] < speeds[1] > speeds[2] > 0.0) or 0 in at:
         return None
     return CharacteristicPoints(times, speeds)
-
-
-def _arc_angle(part: SmoothPart, path_length: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
-    """Arc angle of the stroke between two salient points as a vector along its axis, (3,), rad."""
-    length = float(path_length[b] - path_length[a])
-    if length <= 0.0:
-        return np.zeros(3)
-    # A quarter and three quarters of the length stand for the inflections: they always exist.
-    i, k = np.searchsorted(path_length, (path_length[a] + 0.25 * length, path_length[a] + 0.75 * length))
-    v = np.zeros((2, 3))
-    v[:, : part.v.shape[1]] = part.v[[i, min(k, len(part.v) - 1)]]
-    axis = np.cross(v[0], v[1])
-    size = float(np.linalg.norm(axis))
-    if size == 0.0 or path_length[k] <= path_length[i]:
-        return np.zeros(3)
-    angle = math.atan2(size, float(v[0] @ v[1]))
-    total = turn_rate((0.0, angle), (float(path_length[i]), float(path_length[k]))) * length
-    turned: NDArray[np.float64] = min(total, _MAX_FIRST_TURN) * axis / size
-    return turned
-
-
-def _clipped(value: float, bounds: tuple[float, float]) -> float:
-    return min(max(value, bounds[0]), bounds[1])

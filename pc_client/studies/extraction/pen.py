@@ -208,7 +208,7 @@ def read_pen(path: str | Path, time_unit: str | None = None) -> PenRecording:
 
     Args:
         path: a text file.
-        time_unit: a key of `TIME_UNITS`; None: from the file.
+        time_unit: as of `parse_pen`.
 
     Raises:
         RecordingError: the file cannot be read or makes no sense; the message names file and line.

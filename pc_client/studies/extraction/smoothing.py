@@ -4,7 +4,7 @@ Three steps, in this order:
 
     1. interpolation onto a uniform grid of 200 Hz (finer first where the recording itself is finer),
     2. a zero-phase low-pass at 12 Hz: a Butterworth filter of order 4, run forwards and backwards,
-    3. the derivative of the cubic spline through the result: the velocity.
+    3. the derivative of the cubic spline through the result: the velocity (`signals.velocity`).
 
 The movement of a hand has little above 10 Hz; higher frequencies come from the recorder (quantised positions,
 late time stamps). The filter must not shift anything in time, hence forwards and backwards. At its ends a
@@ -17,27 +17,17 @@ Source: docs/extraction.md, section 3; 12 Hz as is usual for signatures.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
-from scipy.signal import butter, find_peaks, sosfiltfilt
+from scipy.signal import find_peaks
 
 from pc_client.movements.geometry import read_only
 from pc_client.studies.extraction.pen import PenPart
+from pc_client.studies.signals import Trace, low_passed, velocity
 
-__all__ = [
-    "CUTOFF_HZ",
-    "RATE_HZ",
-    "SmoothPart",
-    "low_passed",
-    "moves",
-    "smooth_part",
-    "speed_peaks",
-    "velocity",
-]
+__all__ = ["CUTOFF_HZ", "RATE_HZ", "less_noise", "moves", "smooth_part", "speed_peaks"]
 
 #: Uniform rate of the signal, Hz.
 RATE_HZ = 200.0
@@ -66,38 +56,12 @@ _ROUNDING = 1e-9
 _MAX_OVERSAMPLING = 16
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SmoothPart:
-    """A part on the uniform grid, low-passed.
-
-    Attributes:
-        t: times, (n,), s, uniform; first and last are those of the recorded part.
-        p: positions, (n, 2) or (n, 3).
-        v: velocities, the same shape, per second.
-    """
-
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
-
-    @property
-    def step(self) -> float:
-        """Distance of the grid's times, s."""
-        return float(self.t[1] - self.t[0])
-
-    @property
-    def speed(self) -> NDArray[np.float64]:
-        """Length of the velocity, (n,)."""
-        length: NDArray[np.float64] = np.sqrt(np.einsum("ij,ij->i", self.v, self.v))
-        return length
-
-
 def moves(part: PenPart) -> bool:
     """Whether a part holds a movement; a touch, a dot or a single sample does not."""
     return len(part.t) >= 2 and part.duration >= _MIN_DURATION_S and part.extent > _MIN_EXTENT
 
 
-def smooth_part(part: PenPart) -> SmoothPart:
+def smooth_part(part: PenPart) -> Trace:
     """The low-passed signal of a part that moves.
 
     The grid's step is stretched by the few per mille that let it end at the last sample.
@@ -106,12 +70,12 @@ def smooth_part(part: PenPart) -> SmoothPart:
     sample_rate = (len(part.t) - 1) / part.duration
     oversampling = min(_MAX_OVERSAMPLING, max(1, math.ceil(sample_rate / RATE_HZ)))
     fine = np.linspace(part.t[0], part.t[-1], n_steps * oversampling + 1)
-    filtered = low_passed(_interpolated(part, fine), RATE_HZ * oversampling)
+    filtered = less_noise(_interpolated(part, fine), RATE_HZ * oversampling)
     t, p = fine[::oversampling], filtered[::oversampling]
-    return SmoothPart(read_only(t), read_only(p), read_only(velocity(t, p)))
+    return Trace(read_only(t), read_only(p), read_only(velocity(t, p)))
 
 
-def speed_peaks(part: SmoothPart) -> NDArray[np.intp]:
+def speed_peaks(part: Trace) -> NDArray[np.intp]:
     """Indices of the local maxima of the speed inside a part, (n_peaks,).
 
     All of them count that rise by more than `_PROMINENCE` of the part's top speed above the higher of the two
@@ -121,12 +85,6 @@ def speed_peaks(part: SmoothPart) -> NDArray[np.intp]:
     peaks, _ = find_peaks(speed, prominence=_PROMINENCE * float(speed.max()))
     found: NDArray[np.intp] = peaks
     return found
-
-
-def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The derivative of the cubic spline through positions p (n, dim) at the times t (n,), (n, dim) per s."""
-    derivative: NDArray[np.float64] = CubicSpline(t, p)(t, 1)
-    return derivative
 
 
 def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -154,19 +112,13 @@ def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
     return points
 
 
-def low_passed(points: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-    """Positions (n, dim) at a uniform rate (Hz), low-passed at 12 Hz without a shift in time."""
+def less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Positions (n, dim) at a uniform rate (Hz), low-passed at 12 Hz."""
     # A straight line passes as it is; without it the filter starts and ends nearly at rest.
-    line = np.linspace(points[0], points[-1], len(points))
+    line = np.linspace(p[0], p[-1], len(p))
     # A part may be shorter than the filter takes to settle: then it is reflected again and again.
     padding = math.ceil(_SETTLED_S * rate)
-    continued = np.pad(points - line, ((padding, padding), (0, 0)), mode="reflect", reflect_type="odd")
-    filtered = sosfiltfilt(_filter(rate), continued, axis=0, padtype=None, padlen=0)
-    low: NDArray[np.float64] = line + filtered[padding:-padding]
+    low: NDArray[np.float64] = line + low_passed(
+        p - line, rate, cutoff=CUTOFF_HZ, order=_ORDER, padding=padding, ends="reflected"
+    )
     return low
-
-
-@lru_cache(maxsize=32)
-def _filter(rate: float) -> NDArray[np.float64]:
-    sections: NDArray[np.float64] = butter(_ORDER, CUTOFF_HZ, fs=rate, output="sos")
-    return sections

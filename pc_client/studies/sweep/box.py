@@ -42,7 +42,7 @@ _OFFSETS = range(-19_980, -400, 20)
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class SimulatedBox:
     """A box that is ready.
 
     Attributes:
@@ -57,7 +57,7 @@ class Box:
 
 
 @contextmanager
-def simulated_box(arm: SimulatedArm) -> Iterator[Box]:
+def simulated_box(arm: SimulatedArm) -> Iterator[SimulatedBox]:
     """Start a box and end it on leaving.
 
     Raises:
@@ -80,7 +80,7 @@ class _PortTakenError(SweepError):
 
 
 @contextmanager
-def _started(arm: SimulatedArm, offset: int) -> Iterator[Box]:
+def _started(arm: SimulatedArm, offset: int) -> Iterator[SimulatedBox]:
     folder = Path(tempfile.mkdtemp(prefix="ur-sweep-"))
     ready, log = folder / "ready.json", folder / "box.log"
     try:
@@ -104,7 +104,7 @@ def _started(arm: SimulatedArm, offset: int) -> Iterator[Box]:
     with guard:  # leaving it closes the guard's standard input and waits for it
         _wait_until_ready(ready, folder, guard)
         try:
-            yield Box(HOST, Ports.standard(offset), folder)
+            yield SimulatedBox(HOST, Ports.standard(offset), folder)
         except (ClientError, ProtocolError) as error:
             if not _has_ended(folder):
                 raise

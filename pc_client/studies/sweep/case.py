@@ -1,8 +1,7 @@
-"""One case of a sweep: a movement, an arm, a controller, some repetitions. Its identity is its content.
+"""A case of a sweep, what came of it, and the columns of the table that has both.
 
-What came of a case, as it travels from worker to folder.
-
-The columns of a sweep's table, in order: what was chosen, what came of it, what was measured.
+A case is one experiment: a movement, an arm, a controller, some repetitions. Its identity is its content.
+Cases and outcomes travel between the command and its workers.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""One recording as the figures of one row.
+"""The cases of a sweep: batch by batch, in turn or side by side, each from its content to its figures.
 
-One case, from its content to its figures. This is the job that workers do.
-
-Whatever goes wrong is part of the answer: a sweep is not ended by one case.
-
-All cases of a sweep, one after the other or side by side; outcomes come as they get ready.
+`Sweep` knows which cases are left, `in_turn` and `side_by_side` run them, and `run_case` is the job that
+workers do. Whatever goes wrong in a case is part of its outcome: a sweep is not ended by one case.
 """
 
 from __future__ import annotations
@@ -15,12 +12,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from pc_client.analysis.run import analyse_run
 from pc_client.driver.session import UrDriver
-from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import ClientError, GainMarginError, full_message
-from pc_client.experiment.experiment import Experiment, Plan, prepare_experiment
+from pc_client.experiment.experiment import Experiment, Plan, make_plan
 from pc_client.experiment.identification import Identification
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import NO_CELL, Cell
@@ -41,126 +38,18 @@ from pc_client.studies.sweep.case import (
     all_cases,
     failed,
 )
-from pc_client.studies.sweep.config import SweepConfig
-from pc_client.studies.sweep.store import ResultStore
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 
+if TYPE_CHECKING:  # both load polars, which workers do without
+    from pc_client.studies.sweep.config import SweepConfig
+    from pc_client.studies.sweep.store import ResultStore
 
-def _measure_run(path: Path, stream: StreamReport) -> Row:
-    """Measure one finished run.
+_Job = Callable[[Case], Outcome]
+"""Does one case."""
 
-    Args:
-        path: its recording.
-        stream: what happened on the wire.
-
-    Returns:
-        The figures by the names of `columns.FIGURES`, but for those of the loop.
-
-    Raises:
-        RecordingError: the recording cannot be judged.
-    """
-    run = analyse_run(load_recording(path))
-    figures = run.figures | {"late_frames": stream.late_frames, "lost_frames": stream.lost_frames}
-    return _finite({column.name: figures[column.name] for column in FIGURES if column.name in figures})
-
-
-def loop_figures(found: Identification) -> Row:
-    """Delay and gain margin of an identified loop."""
-    return _finite({"delay_ms": 1e3 * found.delay, "gain_margin": found.margins.gain})
-
-
-def _finite(figures: Row) -> Row:
-    """None for infinity (no error at all, no feedback): tables do not agree on how to write it."""
-    row: Row = finite(figures)
-    return row
-
-
-def run_case(case: Case, keep_recordings: bool) -> Outcome:
-    """Do one case.
-
-    Args:
-        case: what to do.
-        keep_recordings: True: the recordings are part of the answer.
-
-    Returns:
-        What came of it; errors of robot, plan or disk are in it, and the recordings of a case that failed.
-    """
-    incident: list[tuple[str, bytes]] = []
-    try:
-        if isinstance(case.arm, SimulatedArm):
-            with simulated_box(case.arm) as box:
-                return _run(case, box.host, box.ports, 0, box.folder, keep_recordings, incident)
-        with TemporaryDirectory(prefix="ur-sweep-") as folder:
-            arm, ports = case.arm, Ports.standard(case.arm.port_base)
-            return _run(case, arm.host, ports, arm.reverse_port, Path(folder), keep_recordings, incident)
-    except GainMarginError as error:
-        return Outcome(
-            "refused", full_message(error), ({"delay_ms": 1e3 * error.delay, "gain_margin": error.margin},)
-        )
-    except (ClientError, ProtocolError, OSError) as error:
-        return failed(full_message(error), tuple(incident))
-
-
-def plan_case(case: Case) -> Experiment:
-    """The experiment of a case, checked and planned; its folder is to be set.
-
-    Raises:
-        PlanningError: the arm cannot do the movement.
-        MovementError: the movement makes no sense.
-    """
-    cell = NO_CELL if isinstance(case.arm, SimulatedArm) else case.arm.cell
-    planned = _planned(case.movement, case.arm.robot, cell)
-    # A model of its own: it carries scratch data, and workers of a cluster may be threads.
-    return Experiment(robot_model(case.arm.robot, cell), (planned,), case.repeat, Path())
-
-
-def _run(
-    case: Case,
-    host: str,
-    ports: Ports,
-    reverse_port: int | None,
-    folder: Path,
-    keep_recordings: bool,
-    incident: list[tuple[str, bytes]],
-) -> Outcome:
-    planned = plan_case(case)
-    experiment = Experiment(planned.model, planned.planned, planned.repeat, folder / "recordings")
-    try:
-        with UrDriver(host, ports, reverse_port=reverse_port) as driver:
-            if isinstance(case.arm, GivenRobot):
-                driver.info.check_same(experiment.model.title, case.arm.serial)
-            report = ExperimentRunner(driver, experiment, case.controller).run()
-    except (ClientError, ProtocolError, OSError) as error:
-        incident += _contents(experiment.out.glob("*.mcap"))
-        notes = getattr(error, "__notes__", ())  # of a folder that will be gone
-        error.__notes__ = [note.replace(str(experiment.out), case.incidents) for note in notes]
-        raise
-    loop = loop_figures(report.delay)
-    rows = tuple(
-        {**_measure_run(path, stream), **loop}
-        for path, stream in zip(report.paths, report.streams, strict=True)
-    )
-    return Outcome("done", rows=rows, recordings=_contents(report.paths) if keep_recordings else ())
-
-
-def _contents(paths: Iterable[Path]) -> tuple[tuple[str, bytes], ...]:
-    return tuple((path.name, path.read_bytes()) for path in paths)
-
-
-@lru_cache(maxsize=64)
-def _planned(movement: MovementFile, robot: str, cell: Cell) -> Plan:
-    """Plan a movement, once for all cases of this worker; a plan is never changed."""
-    with TemporaryDirectory(prefix="ur-sweep-") as folder:
-        path = Path(folder) / movement.file_name
-        path.write_text(movement.text, encoding="utf-8")
-        loaded = load_movement(library_name_of(movement.text) or path)
-    return prepare_experiment([loaded], repeat=1, out=Path(), robot=robot, cell=cell).planned[0]
-
-
-Job = Callable[[Case], Outcome]
-_Outcomes = Iterator[tuple[Case, Outcome]]
-_Runner = Callable[[Sequence[Case]], _Outcomes]
+_Runner = Callable[[Sequence[Case]], Iterator[tuple[Case, Outcome]]]
+"""Does cases; outcomes come as they get ready, in any order."""
 
 
 class Sweep:
@@ -210,7 +99,7 @@ class Sweep:
             self._advance()
 
     def _advance(self) -> None:
-        """Go on to the next batch that has cases to run."""
+        """Go on to the next batch that has cases to run. A search makes it from the results of the last."""
         for cases in self._batches:
             self._cases = cases
             self.waiting = self._store.waiting(cases)
@@ -219,17 +108,18 @@ class Sweep:
         self.waiting = []
 
 
-def in_turn(job: Job) -> _Runner:
+def in_turn(job: _Job) -> _Runner:
     """One case after the other in this process, as one robot must."""
     return lambda cases: ((case, job(case)) for case in cases)
 
 
 @contextmanager
-def side_by_side(job: Job, *, workers: int | None, dask: str | None) -> Iterator[_Runner]:
+def side_by_side(job: _Job, *, workers: int | None, dask: str | None) -> Iterator[_Runner]:
     """Cases over processes of this machine or a Dask cluster, which are started with the first case.
 
-    When a worker process dies (out of memory, killed), the others are lost with it. Those cases that may have
-    been its are then run alone: one that kills its worker again has failed, the others go on.
+    When a worker process dies (out of memory, killed), the others are lost with it. The cases that may have
+    killed it, the first ones that got no outcome, are then run alone: one that kills its worker again has
+    failed, the others go on.
 
     Args:
         job: does one case; must be picklable and raise nothing for errors of the case.
@@ -238,33 +128,32 @@ def side_by_side(job: Job, *, workers: int | None, dask: str | None) -> Iterator
     """
     # The pool hands a job more than it has workers to its queue.
     n_begun = 1 + (usable_cores() if workers is None else workers)
-    executors: list[Executor] = []
+    executor: Executor | None = None
 
-    def run(cases: Sequence[Case]) -> _Outcomes:
+    def run(cases: Sequence[Case]) -> Iterator[tuple[Case, Outcome]]:
+        nonlocal executor
         waiting = list(cases)
         while waiting:
-            if not executors:
-                executors.append(opened.enter_context(open_executor(workers, dask)))
-            lost = yield from _round(executors[0], waiting, job)
+            if executor is None:
+                executor = opened.enter_context(open_executor(workers, dask))
+            lost = yield from _round(executor, waiting, job)
             if lost:
                 opened.close()
-                executors.clear()
+                executor = None
             suspects, waiting = lost[:n_begun], lost[n_begun:]
             for case in suspects:
                 with open_executor(1) as alone:
                     dies_again = yield from _round(alone, [case], job)
                 if dies_again:
-                    yield (
-                        case,
-                        failed("the worker process died, also when the case ran alone: is memory short?"),
-                    )
+                    why = "the worker process died, also when the case ran alone: is memory short?"
+                    yield case, failed(why)
 
     with ExitStack() as opened:
         yield run
 
 
 def _round(
-    executor: Executor, cases: Sequence[Case], job: Job
+    executor: Executor, cases: Sequence[Case], job: _Job
 ) -> Generator[tuple[Case, Outcome], None, list[Case]]:
     """Run cases; returns those that were lost with a worker process, in order."""
     lost: set[str] = set()
@@ -284,3 +173,93 @@ def _round(
             outcome = failed(f"{type(error).__name__}: {error}")
         yield case, outcome
     return [case for case in cases if case.identity in lost]
+
+
+def run_case(case: Case, keep_recordings: bool) -> Outcome:
+    """Do one case.
+
+    Args:
+        case: what to do.
+        keep_recordings: True: the recordings are part of the answer.
+
+    Returns:
+        What came of it; errors of robot, plan or disk are in it, and the recordings of a case that failed.
+    """
+    incident: tuple[tuple[str, bytes], ...] = ()
+    try:
+        with _robot_of(case.arm) as (host, ports, reverse_port, folder):
+            experiment = plan_case(case, folder / "recordings")
+            try:
+                with UrDriver(host, ports, reverse_port=reverse_port) as driver:
+                    if isinstance(case.arm, GivenRobot):
+                        driver.info.check_same(experiment.model.title, case.arm.serial)
+                    report = ExperimentRunner(driver, experiment, case.controller).run()
+                rows = tuple(_row(path, report.delay) for path in report.paths)
+            except (ClientError, ProtocolError, OSError) as error:
+                incident = _contents(experiment.out.glob("*.mcap"))
+                notes = getattr(error, "__notes__", ())  # of a folder that will be gone
+                error.__notes__ = [note.replace(str(experiment.out), case.incidents) for note in notes]
+                raise
+            return Outcome("done", rows=rows, recordings=_contents(report.paths) if keep_recordings else ())
+    except GainMarginError as error:
+        row = {"delay_ms": 1e3 * error.delay, "gain_margin": error.margin}
+        return Outcome("refused", full_message(error), (row,))
+    except (ClientError, ProtocolError, OSError) as error:
+        return failed(full_message(error), incident)
+
+
+def plan_case(case: Case, out: Path = Path()) -> Experiment:
+    """The experiment of a case, checked and planned.
+
+    Args:
+        case: what to do.
+        out: folder of its recordings.
+
+    Raises:
+        PlanningError: the arm cannot do the movement.
+        MovementError: the movement makes no sense.
+    """
+    cell = NO_CELL if isinstance(case.arm, SimulatedArm) else case.arm.cell
+    planned = _planned(case.movement, case.arm.robot, cell)
+    # A model of its own: it carries scratch data, and workers of a cluster may be threads.
+    return Experiment(robot_model(case.arm.robot, cell), (planned,), case.repeat, out)
+
+
+@lru_cache(maxsize=64)
+def _planned(movement: MovementFile, robot: str, cell: Cell) -> Plan:
+    """Plan a movement, once for all cases of this worker; a plan is never changed."""
+    with TemporaryDirectory(prefix="ur-sweep-") as folder:
+        path = Path(folder) / movement.file_name
+        path.write_text(movement.text, encoding="utf-8")
+        loaded = load_movement(library_name_of(movement.text) or path)
+    return make_plan(loaded, robot_model(robot, cell))
+
+
+@contextmanager
+def _robot_of(arm: SimulatedArm | GivenRobot) -> Iterator[tuple[str, Ports, int | None, Path]]:
+    """Host, ports and reverse port of a robot, a simulated one just started, and a scratch folder."""
+    if isinstance(arm, SimulatedArm):
+        with simulated_box(arm) as box:
+            yield box.host, box.ports, 0, box.folder
+    else:
+        with TemporaryDirectory(prefix="ur-sweep-") as folder:
+            yield arm.host, Ports.standard(arm.port_base), arm.reverse_port, Path(folder)
+
+
+def _row(path: Path, found: Identification) -> Row:
+    """The figures of a recording, and of the loop that was identified before.
+
+    Infinity (no error at all, no feedback) becomes None: tables do not agree on how to write it.
+
+    Raises:
+        RecordingError: the recording cannot be judged.
+    """
+    run = analyse_run(load_recording(path))
+    loop = {"delay_ms": 1e3 * found.delay, "gain_margin": found.margins.gain}
+    figures = {**run.figures, **run.recording.summary, **loop}  # the summary has late and lost frames
+    row: Row = finite({column.name: figures[column.name] for column in FIGURES})
+    return row
+
+
+def _contents(paths: Iterable[Path]) -> tuple[tuple[str, bytes], ...]:
+    return tuple((path.name, path.read_bytes()) for path in paths)

@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot
+from extraction_samples import DRAWINGS
 
 from pc_client.errors import RecordingError
 from pc_client.studies.extraction.pen import (
@@ -243,14 +243,3 @@ def test_the_drawings_of_the_tree_are_what_their_program_makes(monkeypatch):
     assert made == {
         path.name: path.read_text() for path in DRAWINGS.iterdir() if path.suffix in (".txt", ".csv")
     }
-
-
-@needs_omniglot
-def test_the_drawings_are_all_found_and_read():
-    sources = pen_sources([DRAWINGS_OF_PEOPLE])
-    assert len(sources) == 2720
-    for source, content in contents(sources[::97]):
-        recording = parse_pen(content, source.name)
-        marked = [part for part in content.decode().split("BREAK") if "," in part]
-        assert len(recording.parts) == len(marked)
-        assert recording.parts[0].p.shape[1] == 2

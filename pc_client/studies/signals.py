@@ -1,0 +1,96 @@
+"""What all studies use: a movement as samples, its velocity, the low-pass, and the decibel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+__all__ = ["Trace", "decibels", "low_passed", "velocity"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """A movement, or a part of it, as samples at equal steps of time.
+
+    Attributes:
+        t: times, (n,), s.
+        p: positions, (n, 2) or (n, 3).
+        v: velocities, the same shape, per second.
+    """
+
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+    @property
+    def step(self) -> float:
+        """Distance of the times, s."""
+        return float(self.t[1] - self.t[0])
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def speed(self) -> NDArray[np.float64]:
+        """Length of the velocity, (n,)."""
+        length: NDArray[np.float64] = np.sqrt(np.einsum("ij,ij->i", self.v, self.v))
+        return length
+
+
+def decibels(signal: float, noise: float) -> float:
+    """10 log10 of a signal's power over that of the noise, dB; nan where there is no signal.
+
+    The noise has a floor at the rounding of the signal: 300 dB is the most.
+    """
+    return 10.0 * math.log10(signal / max(noise, 1e-30 * signal)) if signal > 0.0 else math.nan
+
+
+def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The derivative of the cubic spline through positions p (n, dim) at the times t (n,), (n, dim) per s."""
+    derivative: NDArray[np.float64] = CubicSpline(t, p)(t, 1)
+    return derivative
+
+
+def low_passed(
+    p: NDArray[np.float64],
+    rate: float,
+    *,
+    cutoff: float,
+    order: int,
+    padding: int,
+    ends: Literal["rest", "reflected"],
+) -> NDArray[np.float64]:
+    """Low-pass positions by a Butterworth filter, run forwards and backwards so that nothing shifts in time.
+
+    Args:
+        p: positions at equal steps of time, (n, dim).
+        rate: samples a second, Hz.
+        cutoff: frequency that keeps half of its amplitude (-6 dB), Hz.
+        order: of the filter, before it is doubled by the way back.
+        padding: samples by which the positions are continued at both ends, so that the filter has settled.
+        ends: how they are continued: "rest" at the first and the last position, or "reflected" in these
+            points, as if the movement went on.
+    """
+    widths = ((padding, padding), (0, 0))
+    if ends == "rest":
+        continued = np.pad(p, widths, mode="edge")
+    else:
+        continued = np.pad(p, widths, mode="reflect", reflect_type="odd")
+    filtered = sosfiltfilt(_sections(order, cutoff, rate), continued, axis=0, padtype=None, padlen=0)
+    low: NDArray[np.float64] = filtered[padding : padding + len(p)]
+    return low
+
+
+@lru_cache(maxsize=32)
+def _sections(order: int, cutoff: float, rate: float) -> NDArray[np.float64]:
+    sections: NDArray[np.float64] = butter(order, cutoff, fs=rate, output="sos")
+    return sections
