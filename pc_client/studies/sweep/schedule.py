@@ -255,9 +255,11 @@ def _row(path: Path, found: Identification) -> Row:
         RecordingError: the recording cannot be judged.
     """
     run = analyse_run(load_recording(path))
+    measured = {**run.figures, **run.recording.summary}  # the summary has late and lost frames
     loop = {"delay_ms": 1e3 * found.delay, "gain_margin": found.margins.gain}
-    figures = {**run.figures, **run.recording.summary, **loop}  # the summary has late and lost frames
-    row: Row = finite({column.name: figures[column.name] for column in FIGURES})
+    row: Row = finite(
+        {column.name: measured[column.name] for column in FIGURES if column.name in measured} | loop
+    )
     return row
 
 
