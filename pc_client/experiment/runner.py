@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -37,50 +36,6 @@ from pc_client.recording.recorder import Recorder
 from protocol.realtime.layout import RealtimeFrame
 from ur_hil import tool_version
 
-
-class Observer(Protocol):
-    """Takes notes; raises nothing."""
-
-    def connected(self, info: RobotInfo) -> None:
-        """A session is open."""
-        ...
-
-    def approaching(self, approach: Approach) -> None:
-        """The arm begins to move to the start of a movement."""
-        ...
-
-    def identified(self, found: Identification) -> None:
-        """The loop is known."""
-        ...
-
-    def running(self, name: str, repetition: int) -> None:
-        """A run begins."""
-        ...
-
-    def finished(self, name: str, repetition: int, path: Path, report: StreamReport) -> None:
-        """A run is recorded."""
-        ...
-
-
-class Silent:
-    """Says nothing."""
-
-    def connected(self, info: RobotInfo) -> None:
-        """Say nothing."""
-
-    def approaching(self, approach: Approach) -> None:
-        """Say nothing."""
-
-    def identified(self, found: Identification) -> None:
-        """Say nothing."""
-
-    def running(self, name: str, repetition: int) -> None:
-        """Say nothing."""
-
-    def finished(self, name: str, repetition: int, path: Path, report: StreamReport) -> None:
-        """Say nothing."""
-
-
 _SETTLE = 0.8
 """Time at the end, position loop closed [s]: four time constants of the feedback."""
 
@@ -91,34 +46,23 @@ _NO_MOVE = 1e-4
 """An approach shorter than this [rad] is not run."""
 
 
-def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> None:
-    """Move the arm along a checked path and wait until it rests at its end.
+class Observer:
+    """Gets the progress of an experiment; this one ignores it. Its methods raise nothing."""
 
-    Args:
-        driver: a session; the arm rests where the approach begins.
-        approach: the checked path.
-        model: the nominal arm.
+    def connected(self, info: RobotInfo) -> None:
+        """A session is open."""
 
-    Raises:
-        RobotStoppedError: the robot stopped.
-        DriverError: the arm did not follow or arrive, or the connection broke; it has been stopped.
-    """
-    goal = approach.waypoints[-1]
-    if np.abs(approach.waypoints - approach.q_from).max() < _NO_MOVE:
-        return
-    table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
-    tracker = Tracker(table, APPROACH, model)
-    driver.stream(tracker, _ignore, acceleration=APPROACH.speedj_acceleration)
-    error = float(np.abs(driver.actual_q() - goal).max())
-    if not error <= _ARRIVAL_TOLERANCE:
-        raise DriverError(
-            f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
-            f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
-        )
+    def approaching(self, approach: Approach) -> None:
+        """The arm begins to move to the start of a movement."""
 
+    def identified(self, found: Identification) -> None:
+        """The loop is known."""
 
-def _ignore(frame: RealtimeFrame, step: TrackerStep) -> None:
-    """Nothing of an approach is kept."""
+    def running(self, name: str, repetition: int) -> None:
+        """A run begins."""
+
+    def finished(self, name: str, repetition: int, path: Path, report: StreamReport) -> None:
+        """A run is recorded."""
 
 
 @dataclass(slots=True)
@@ -161,7 +105,7 @@ class ExperimentRunner:
         self._driver = driver
         self._experiment = experiment
         self._config = config
-        self._observer = Silent() if observer is None else observer
+        self._observer = observer or Observer()
         self._arm = arm_tree(experiment.model.description)
         self._signals = [(column.name, column.count, column.unit) for column in driver.layout.columns]
 
@@ -323,3 +267,33 @@ def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame
             log.append(frame, step)
 
     return record
+
+
+def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> None:
+    """Move the arm along a checked path and wait until it rests at its end.
+
+    Args:
+        driver: a session; the arm rests where the approach begins.
+        approach: the checked path.
+        model: the nominal arm.
+
+    Raises:
+        RobotStoppedError: the robot stopped.
+        DriverError: the arm did not follow or arrive, or the connection broke; it has been stopped.
+    """
+    goal = approach.waypoints[-1]
+    if np.abs(approach.waypoints - approach.q_from).max() < _NO_MOVE:
+        return
+    table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
+    tracker = Tracker(table, APPROACH, model)
+    driver.stream(tracker, _ignore, acceleration=APPROACH.speedj_acceleration)
+    error = float(np.abs(driver.actual_q() - goal).max())
+    if not error <= _ARRIVAL_TOLERANCE:
+        raise DriverError(
+            f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
+            f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
+        )
+
+
+def _ignore(frame: RealtimeFrame, step: TrackerStep) -> None:
+    """Nothing of an approach is kept."""
