@@ -1,9 +1,4 @@
-"""Eq. 10 and its companions on signals whose figures are known beforehand.
-
-Position errors, joint errors, noise floor and error budget on faults that are known beforehand.
-
-The noise floor: from rest to Eq. 10, checked against perfect arms with known noise.
-"""
+"""Eq. 10 and its companions, errors, budget and noise floor on signals whose figures are known beforehand."""
 
 from __future__ import annotations
 

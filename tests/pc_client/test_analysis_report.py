@@ -1,7 +1,4 @@
-"""Table I in its three forms, and the report.
-
-Several experiments in one table and on one page.
-"""
+"""Table I in its three forms, the page of one experiment, and that of several."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A whole experiment on a robot in memory: order, files, provenance, refusal before motion, interruption.
 
-The streamed way to a start on a robot in memory: it arrives, or ends with one line and a stopped arm.
+Its approach arrives, or ends with one line and a stopped arm.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The file itself: valid MCAP, decodable with ROS 2 rules, equal for equal runs.
-
-Recordings as CSV and Parquet.
-"""
+"""The file itself: valid MCAP, decodable with ROS 2 rules, equal for equal runs; its rows as tables."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""One description of a figure, drawn by two libraries.
-
-A frame in all its forms: terminal, Markdown, cells of pages, CSV, JSON.
-"""
+"""One description of a figure, drawn by two libraries; one frame of a table, in all its forms."""
 
 from __future__ import annotations
 
