@@ -125,6 +125,14 @@ def test_a_reduced_robot_may_move():
         driver.check_ready()
 
 
+def test_a_robot_whose_ports_name_two_arms_is_refused_before_a_program_is_sent():
+    robot = FakeRobot(lockstep=False)
+    robot.state = encode_state([ConfigurationData(robot_type=RobotType.UR5)], robot.version)
+    with pytest.raises(DriverError, match=r"the robot's arm is UR3 \(dashboard\), UR5 \(port 30001\)"):
+        stream_nothing(robot)
+    assert robot.programs == []
+
+
 def test_program_that_does_not_start_is_reported_and_replaced():
     robot = FakeRobot()
     robot.refuses = True
