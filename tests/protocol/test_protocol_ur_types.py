@@ -51,7 +51,8 @@ def test_ports_move_together():
         with pytest.raises(LocalProtocolError, match="-29998 to 35515"):
             Ports.standard(offset)
     assert Ports.standard(35515).interpreter == 65535
-    assert Ports.standard(-29998).dashboard == 1
+    lowest = Ports.standard(-29998)
+    assert (lowest.dashboard, lowest.modbus, lowest.robot_api) == (1, 0, 0)
     assert (Ports.standard(-501).modbus, Ports.standard(-502).modbus) == (1, 0)
     assert (Ports.standard(-79).robot_api, Ports.standard(-80).robot_api) == (1, 0)
 
