@@ -8,7 +8,8 @@ from pathlib import Path
 import pc_client as ur
 from bench.box_process import box_process
 from bench.limit import measure_limit
-from pc_client.movements.files import library_names, load_motion
+from pc_client.movements.library_sets import library_names
+from pc_client.movements.movement import load_motion
 
 
 def measure_lockstep(robot: str = "ur3") -> dict[str, float]:

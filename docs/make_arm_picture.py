@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import pc_client as ur
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel
 from ur_emulator import ControlBox
 
 MOVEMENT = "lognorm_5_1"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pc_client.movements.files import load_movement
+from pc_client.movements.movement import load_movement
 from pc_client.studies.extraction.extract import extract
 from pc_client.studies.extraction.figures import draw_extraction
 from pc_client.studies.extraction.pen import PenRecording, on_one_axis, ordered_part

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pc_client.movements.files import library_names, load_movement
-from pc_client.movements.geometry import UR3_BOX
-from pc_client.movements.movement import Movement
+from pc_client.kinematics.arms import UR3_BOX
+from pc_client.movements.library_sets import library_names
+from pc_client.movements.movement import Movement, load_movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.results.matplotlib_figures import draw, image_bytes
 from pc_client.results.sheet import BLUE, PAPER_GREY, RED, Box, Curve, Panel, Range, Sheet, boxes

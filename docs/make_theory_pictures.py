@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
-from pc_client.movements.robotic import SmoothedSquareWave
+from pc_client.movements.uniform import SmoothedSquareWave
 from pc_client.results.matplotlib_figures import figure, svg_text
 from pc_client.results.sheet import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY
 

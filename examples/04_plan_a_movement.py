@@ -1,6 +1,7 @@
 """Make a human-like movement through random points, plan it for the UR3, see how near the limits are."""
 
-from pc_client.movements import describe, generate_movement
+from pc_client.movements.description import describe
+from pc_client.movements.generate import generate_movement
 from pc_client.planning.plan import plan_movement
 
 

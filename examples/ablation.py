@@ -21,7 +21,7 @@ import pc_client as ur
 from pc_client.analysis.measures import PARTS
 from pc_client.analysis.run import analyse_run
 from pc_client.analysis.table import build_table
-from pc_client.movements.files import library_names
+from pc_client.movements.library_sets import library_names
 from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
 

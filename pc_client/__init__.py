@@ -23,7 +23,6 @@ from ur_hil import check_packages
 if TYPE_CHECKING:
     from pc_client.analysis.run import Run as Run
     from pc_client.analysis.run import Signals as Signals
-    from pc_client.api.movement import Movement as Movement
     from pc_client.arm import Arm as Arm
     from pc_client.arm import connect as connect
     from pc_client.arm import plan as plan
@@ -31,12 +30,13 @@ if TYPE_CHECKING:
     from pc_client.errors import ClientError as ClientError
     from pc_client.errors import PlanningError as PlanningError
     from pc_client.errors import RobotStoppedError as RobotStoppedError
-    from pc_client.experiment.experiment import Plan as Plan
     from pc_client.kinematics.cell import Cell as Cell
     from pc_client.kinematics.cell import Solid as Solid
     from pc_client.kinematics.cell import Tool as Tool
     from pc_client.kinematics.cell import Wall as Wall
-    from pc_client.movements.movement import JointTrajectory as JointTrajectory
+    from pc_client.movements.movement import Movement as Movement
+    from pc_client.movements.samples import JointTrajectory as JointTrajectory
+    from pc_client.planning.plan import Plan as Plan
     from pc_client.studies.drawing.drawing import drawing as drawing
 
 check_packages()
@@ -46,9 +46,9 @@ _HOMES = {
     "Cell": "kinematics.cell",
     "ClientError": "errors",
     "Controller": "control.controller",
-    "JointTrajectory": "movements.movement",
-    "Movement": "api.movement",
-    "Plan": "experiment.experiment",
+    "JointTrajectory": "movements.samples",
+    "Movement": "movements.movement",
+    "Plan": "planning.plan",
     "PlanningError": "errors",
     "RobotStoppedError": "errors",
     "Run": "analysis.run",

@@ -26,24 +26,14 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.watchdog import conditions_text
 from pc_client.errors import ClientError, ControllerError, DriverError, PlanningError
-from pc_client.experiment.experiment import (
-    Experiment,
-    Motion,
-    Plan,
-    check_folder,
-    experiment_text,
-    make_plan,
-    scratch_folder,
-)
+from pc_client.experiment.experiment import Experiment, check_folder, experiment_text, scratch_folder
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
 from pc_client.experiment.preflight import model_of, preflight, require
 from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, Observer, run_approach
-from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.cell_file import load_cell
-from pc_client.kinematics.forward import tcp_pose
-from pc_client.kinematics.inverse import nearest_posture
-from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
+from pc_client.kinematics.model import RobotModel, nearest_posture, robot_model, tcp_pose
 from pc_client.planning.approach import approach_text, plan_approach
+from pc_client.planning.plan import Motion, Plan, make_plan
 from protocol.pose import T_to_pose, pose_to_T
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports

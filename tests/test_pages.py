@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from page_blocks import ROOT, PageReader, blocks_of
 
-from pc_client.movements import load_movement, save_movement
+from pc_client.movements.movement import load_movement
 
 PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))]
 
@@ -31,7 +31,7 @@ def drawings(path):
 STOCK = {
     "drawing.txt": drawing,
     "targets.csv": lambda path: path.write_text("x,y,z,t\n.3,-.1,.2,0\n.35,0,.25,2\n.3,.1,.2,3.5\n"),
-    "my_movement.toml": lambda path: save_movement(load_movement("uniform_4_1"), path),
+    "my_movement.toml": lambda path: load_movement("uniform_4_1").save(path),
     "letter.txt": drawing,
     "reaches/": lambda path: drawing(path / "reach.txt"),
     "others.zip": drawings,

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from pc_client.analysis.measures import decibels, rest_samples, speed_noise
 from pc_client.analysis.run import MeasuredRun
 from pc_client.analysis.track import speed, velocity
-from pc_client.control.loop_model import LoopModel, velocity_response
-from pc_client.kinematics.forward import tcp_jacobian
-from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
+from pc_client.control.loop import LoopModel, velocity_response
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import RobotModel, robot_model, tcp_jacobian
 
 Array = NDArray[np.float64]
 

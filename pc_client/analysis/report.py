@@ -21,9 +21,8 @@ from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column, movement_sheet
 from pc_client.analysis.table import FLOOR, LAG, MOVEMENT, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
-from pc_client.kinematics.cell import NO_CELL
-from pc_client.kinematics.cell_file import parse_cell
-from pc_client.kinematics.robot_model import ROBOTS
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.cell import NO_CELL, parse_cell
 from pc_client.recording.recording import load_recording
 from pc_client.results.pages import picture, render, require_report_libraries, write_files, zoomable
 from pc_client.results.tables import Column, to_html, to_json

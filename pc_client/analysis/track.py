@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pc_client.control.loop_model import SAMPLING_TIME
+from pc_client.control.loop import SAMPLING_TIME
 from pc_client.errors import RecordingError
 from pc_client.recording.recording import Recording
 from pc_client.recording.rows import Phase

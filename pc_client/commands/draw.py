@@ -104,9 +104,7 @@ def draw(
     recordings = [read_recording(file, None if time_unit == "auto" else time_unit) for file in files]
     drawings = _make(recordings, options, slower, robot, settings)
     if save is not None:
-        from pc_client.movements.files import save_movement
-
-        save_movement(drawings[0].movement, save)
+        drawings[0].movement.save(save)
         say(f"movement: {save}")
     for drawing in drawings:
         say(_summary(drawing))
@@ -147,12 +145,11 @@ def _make(
     """Extract the strokes of recordings and make them ready for the arm that answers."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from pc_client.movements.geometry import WORKING_BOXES
     from pc_client.studies.drawing.drawing import make_drawing
     from pc_client.studies.extraction.extract import extract
 
     model = reach(robot, settings.ports, settings.cell).model
-    options = replace(options, box=WORKING_BOXES[model.name])
+    options = replace(options, box=model.description.working_box)
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),

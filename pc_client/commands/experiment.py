@@ -24,7 +24,7 @@ from pc_client.errors import InterruptedByUserError
 
 if TYPE_CHECKING:
     from pc_client.analysis.run import MeasuredRun
-    from pc_client.experiment.experiment import Motion
+    from pc_client.planning.plan import Motion
 
 
 @takes_run_settings
@@ -40,7 +40,7 @@ def experiment(
     settings: RunSettings,
 ) -> None:
     """Run the paper's experiment: ten movements, three times each, Table I and a report."""
-    from pc_client.movements.files import DEFAULT_SET, library_names
+    from pc_client.movements.library_sets import DEFAULT_SET, library_names
 
     if movements and set_name is not None:
         raise typer.BadParameter("--movements and --set each say what to run: give only one")

@@ -34,7 +34,8 @@ _CornersOption = Annotated[
 def list_movements(set_name: SetOption = None) -> None:
     """List the movements that come with the package."""
     from pc_client.movements.description import describe
-    from pc_client.movements.files import LIBRARY_SETS, library_names, load_movement
+    from pc_client.movements.library_sets import LIBRARY_SETS, library_names
+    from pc_client.movements.movement import load_movement
     from pc_client.results.tables import Column, frame_of, to_rich
 
     columns = (
@@ -58,7 +59,7 @@ def show(
 ) -> None:
     """Show the figures of a movement, and how a UR3 would do it."""
     from pc_client.movements.description import describe
-    from pc_client.movements.files import load_movement
+    from pc_client.movements.movement import load_movement
     from pc_client.planning.approach import plan_text
     from pc_client.planning.plan import plan_movement
 
@@ -76,7 +77,7 @@ def show(
 @app.command("kinds", epilog=examples("ur-client movements kinds"))
 def kinds() -> None:
     """List the generators of movements."""
-    from pc_client.movements.twins import GENERATORS
+    from pc_client.movements.generate import GENERATORS
     from pc_client.results.tables import Column, frame_of, to_rich
 
     columns = [
@@ -140,14 +141,14 @@ def new(
     corners: _CornersOption = "stop",
 ) -> None:
     """Make a movement through your own target points, check that the arm can do it, and save it."""
-    from pc_client.movements.own_points import load_targets, through
+    from pc_client.movements.movement import Movement, load_targets
 
     points, times = load_targets(targets)
     if durations is not None:
         if times is not None:
             raise typer.BadParameter(f"--durations, but {targets} has a column t: give only one of them")
         times = _numbers(durations)
-    _check_and_save(through(points, style, times, name=out.stem, corners=corners), out)
+    _check_and_save(Movement.through(points, style, times, name=out.stem, corners=corners), out)
 
 
 @app.command(
@@ -166,7 +167,7 @@ def duplicate(
 
     Only the first target point stays: strokes of other lengths and directions lead to others.
     """
-    from pc_client.movements.files import load_movement
+    from pc_client.movements.movement import load_movement
     from pc_client.movements.variability import duplicate as vary
 
     _check_and_save(vary(load_movement(movement), seed, name=out.stem, share=share), out)
@@ -174,12 +175,11 @@ def duplicate(
 
 def _check_and_save(movement: Movement, out: Path) -> None:
     """Plan a movement for a UR3, save it and say what it would do; what cannot be planned is not saved."""
-    from pc_client.movements.files import save_movement
     from pc_client.planning.approach import plan_text
     from pc_client.planning.plan import plan_movement
 
     plan = plan_movement(movement)
-    save_movement(movement, out)
+    movement.save(out)
     say(plan_text(plan))
     say(f"saved: {out}")
 

@@ -137,7 +137,7 @@ def cell_of(path: Path | None) -> Cell:
     Raises:
         CellError: the file makes no sense.
     """
-    from pc_client.kinematics.cell_file import load_cell
+    from pc_client.kinematics.cell import load_cell
 
     return NO_CELL if path is None else load_cell(path)
 

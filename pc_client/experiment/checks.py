@@ -16,15 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
-from pc_client.control.loop_model import SAMPLING_TIME, LoopModel
+from pc_client.control.loop import LEAST_GAIN_MARGIN, SAMPLING_TIME, LoopModel, loop_margins
 from pc_client.control.reference import JointReference, ReferenceTable
-from pc_client.control.stability import LEAST_GAIN_MARGIN, loop_margins
-from pc_client.control.tool_guard import ToolGuard
-from pc_client.control.tracker import predict_run
+from pc_client.control.tracker import ToolGuard, predict_run
 from pc_client.driver.receiver import STOP_DECELERATION
 from pc_client.errors import DriverError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES

@@ -15,42 +15,17 @@ from pathlib import Path
 import numpy as np
 
 from pc_client.errors import ClientError, RecordingError
+from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
-from pc_client.movements.files import load_motion
-from pc_client.movements.geometry import LIBRARY_SHIFTS, Similarity
-from pc_client.movements.movement import JointTrajectory, Movement
-from pc_client.movements.movement_file import movement_text
-from pc_client.movements.samples import SampledTrajectory
+from pc_client.kinematics.model import RobotModel, robot_model
+from pc_client.movements.movement import load_motion
 from pc_client.planning.checks import PlanReport
-from pc_client.planning.plan import JointPlan, plan_joints, plan_movement
+from pc_client.planning.plan import Motion, Plan, make_plan
 from pc_client.recording.recording import load_recording
 from protocol.ur_types import JOINT_NAMES
 
-Motion = Movement | JointTrajectory
-"""What can be planned: a movement of the TCP, or joint angles over time."""
-
 _SHORTEST_HEAD = 1024
 """A recording that is shorter [bytes] has no rows."""
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What an arm shall do, checked against all limits.
-
-    Attributes:
-        movement: what the TCP shall do.
-        joints: what the joints shall do.
-        text: the movement as its file says it; empty for one made of samples.
-    """
-
-    movement: Movement
-    joints: JointPlan
-    text: str
-
-    def __repr__(self) -> str:
-        arm = ROBOTS[self.joints.report.robot].title
-        return f"<Plan of {self.movement.name!r} for a {arm}: {self.joints.duration:.2f} s>"
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,25 +113,6 @@ def prepare_experiment(
     return Experiment(model, planned, repeat, out)
 
 
-def make_plan(motion: Motion, model: RobotModel) -> Plan:
-    """Plan what the TCP, or what the joints shall do; one that may be moved where the arm can do it.
-
-    Args:
-        motion: a movement of the TCP, or joint angles over time.
-        model: nominal arm.
-
-    Raises:
-        PlanningError: the arm cannot do it.
-    """
-    if isinstance(motion, JointTrajectory):
-        joints = plan_joints(motion, model=model)
-        trajectory = SampledTrajectory(joints.t, joints.p)
-        return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
-    if motion.may_be_moved and (shift := LIBRARY_SHIFTS.get(model.name)):
-        motion = motion.transformed(Similarity(1.0, np.eye(3), np.array(shift)))
-    return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), _text_of(motion))
-
-
 def check_folder(experiment: Experiment) -> list[Path]:
     """Refuse a folder with recordings that this experiment must not replace; nothing is changed.
 
@@ -241,10 +197,6 @@ def _refuse_to_lose(path: Path, overwrite: bool) -> None:
         )
     if not overwrite:
         raise RecordingError(f"{path} exists: give another folder, or --overwrite (overwrite=True)")
-
-
-def _text_of(movement: Movement) -> str:
-    return "" if movement.kind == "samples" else movement_text(movement)
 
 
 def experiment_text(experiment: Experiment) -> str:

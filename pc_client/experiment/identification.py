@@ -13,20 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.control.controller import Controller
-from pc_client.control.delay import DelayEstimate, estimate_delay
-from pc_client.control.excitation import BRISK_PULSE, PULSE, Excitation
-from pc_client.control.lag import identify_loop
-from pc_client.control.learning_filter import LearningFilter, design_filter
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.identification import (
+    BRISK_PULSE,
+    PULSE,
+    DelayEstimate,
+    Excitation,
+    estimate_delay,
+    identify_loop,
+)
+from pc_client.control.learning import LearningFilter, design_filter
+from pc_client.control.loop import LEAST_GAIN_MARGIN, LoopMargins, LoopModel, loop_margins
 from pc_client.control.reference import ReferenceTable
-from pc_client.control.stability import LEAST_GAIN_MARGIN, LoopMargins, loop_margins
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError, GainMarginError
 from pc_client.experiment.checks import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import limits_of
 from protocol.realtime.layout import RealtimeFrame
 

@@ -16,8 +16,7 @@ from pc_client.control.tracker import six_velocities
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.forward import check_flange
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel, check_flange
 from pc_client.planning.limits import limits_of
 from protocol.realtime.layout import RealtimeFrame
 

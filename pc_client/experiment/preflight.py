@@ -23,9 +23,9 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import DriverError
+from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.forward import ROTATION_TOLERANCE, flange_difference
-from pc_client.kinematics.robot_model import ROBOTS, RobotModel, robot_model
+from pc_client.kinematics.model import ROTATION_TOLERANCE, RobotModel, flange_difference, robot_model
 from protocol.ur_types import JOINT_NAMES
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)

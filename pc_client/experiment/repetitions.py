@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from pc_client.control.controller import Controller
 from pc_client.control.gear import GearModel
-from pc_client.control.learning import LearningBounds, RunSignals, learn, learnable_power
-from pc_client.control.learning_filter import LearningFilter
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.learning import LearningBounds, LearningFilter, RunSignals, learn, learnable_power
+from pc_client.control.loop import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import TrackerStep
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.experiment.checks import broken_limit
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel
 from pc_client.planning.plan import JointPlan
 from protocol.realtime.layout import RealtimeFrame
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from pc_client.control.controller import APPROACH, Controller
 from pc_client.control.gear import GearObserver, MotorReference
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.loop import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import ControlLaw, Tracker, TrackerStep
 from pc_client.driver.report import RobotInfo
@@ -23,14 +23,14 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import LEAD, SETTLE, guarded, shortest_loop
-from pc_client.experiment.experiment import Experiment, Plan, clear_folder
+from pc_client.experiment.experiment import Experiment, clear_folder
 from pc_client.experiment.identification import Identification, check_excitation, identify
 from pc_client.experiment.preflight import preflight, require
 from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.kinematics.arm_tree import arm_tree
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel
 from pc_client.planning.approach import Approach, plan_approach
-from pc_client.planning.plan import JointPlan
+from pc_client.planning.plan import JointPlan, Plan
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
 from protocol.realtime.layout import RealtimeFrame

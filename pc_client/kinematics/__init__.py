@@ -2,4 +2,10 @@
 
 The model is the published one (example-robot-data through Pinocchio), never the truth of a box
 or of a calibrated arm: the difference between the two is part of what an experiment measures.
+
+arms       one row an arm: geometry, limits, reach, working box; needs no Pinocchio
+model      the arm in Pinocchio: forward, inverse, singularities, agreement with what a robot reports
+cell       what stands around an arm and what it carries; cell files
+clearance  distances of the links from themselves, the floor and the cell
+arm_tree   links and joints for viewers
 """

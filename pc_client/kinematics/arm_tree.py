@@ -19,7 +19,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pc_client.kinematics.robot_model import JointLimits, RobotDescription
+from pc_client.kinematics.arms import JointLimits, RobotDescription
 
 Three = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -1,16 +1,26 @@
-"""The bodies around the arm and its tool: the geometry of a cell, in metres and radians.
+"""The bodies around the arm and its tool: the geometry of a cell, in metres and radians, and its file.
 
 The TCP stays at the flange: the tool is a shape that must not touch anything, and a load, not a new TCP.
+
+A cell file is TOML, read strictly; `examples/cell.toml` shows every field, `docs/real-arm.md` explains them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from math import hypot, pi
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pc_client.errors import CellError
+from pc_client.files import FILE_KINDS
+from ur_hil.records import Finite, Items, checked, number, record
+from ur_hil.records import text as text_field
 
 Three = tuple[float, float, float]
 
 
-NOUNS = {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere", "capsules": "capsule"}
+_NOUNS = {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere", "capsules": "capsule"}
 """The kinds of solids by the name of their table in a cell file.
 
 Cylinders and capsules lie along their own z axis; the length of a capsule is that of its straight part,
@@ -24,7 +34,7 @@ class Solid:
 
     Attributes:
         name: for messages.
-        kind: a key of NOUNS.
+        kind: a key of _NOUNS.
         sizes: x, y, z of a box; the radius, and the length of a cylinder or capsule [m].
         centre: in `base`, or in the flange's frame for a part of a tool [m].
         rpy: roll, pitch, yaw: turns about the fixed x, y and z axis, in this order [rad].
@@ -39,7 +49,7 @@ class Solid:
     @property
     def title(self) -> str:
         """What it is and how it is called, e.g. `box 'press'`."""
-        return f"{NOUNS[self.kind]} '{self.name}'"
+        return f"{_NOUNS[self.kind]} '{self.name}'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,3 +117,155 @@ class Cell:
 
 NO_CELL = Cell()
 """Nothing is known: the bare arm on a plane z = 0."""
+
+
+MOST_BODIES = 100
+"""More walls and solids than this in one file is refused: plans would take minutes."""
+
+Name = Annotated[str, text_field(60)]
+# No size and no distance is longer than 100 m: the number was probably meant in millimetres.
+Length = Annotated[float, number(-100.0, 100.0, "m")]
+Size = Annotated[float, number(1e-6, 100.0, "m")]
+_Angle = Annotated[float, number(-2.0 * pi, 2.0 * pi, "rad")]
+Point = tuple[Length, Length, Length]
+
+
+@record
+class _Floor:
+    z: Length
+
+
+_SIDES: dict[str, Three] = {
+    "x_min": (1.0, 0.0, 0.0),
+    "x_max": (-1.0, 0.0, 0.0),
+    "y_min": (0.0, 1.0, 0.0),
+    "y_max": (0.0, -1.0, 0.0),
+    "z_min": (0.0, 0.0, 1.0),
+    "z_max": (0.0, 0.0, -1.0),
+}
+
+
+@record
+class _Wall:
+    name: Name
+    x_min: Length | None = None
+    x_max: Length | None = None
+    y_min: Length | None = None
+    y_max: Length | None = None
+    z_min: Length | None = None
+    z_max: Length | None = None
+    point: Point | None = None
+    normal: tuple[Finite, Finite, Finite] | None = None
+
+    def __post_init__(self) -> None:
+        self.wall()
+
+    def wall(self) -> Wall:
+        """The half space: of one of x_min ... z_max, or of a point of the wall and its normal."""
+        given = ((side, getattr(self, side)) for side in _SIDES)
+        planes = [(side, (x, x, x), _SIDES[side]) for side, x in given if x is not None]
+        if self.point is not None and self.normal is not None:
+            planes.append(("normal", self.point, self.normal))
+        if len(planes) != 1 or (self.point is None) != (self.normal is None):
+            raise ValueError("point", f"give one of {', '.join(_SIDES)}, or a point and a normal")
+        ((field, point, normal),) = planes
+        length = hypot(*normal)
+        if not 1e-6 <= length <= 1e6:
+            raise ValueError("normal", f"{list(normal)}; give a direction, such as [0, 1, 0]")
+        x, y, z = (component / length for component in normal)
+        offset = x * point[0] + y * point[1] + z * point[2]
+        if offset >= 0.0:
+            raise ValueError(
+                field, "the robot's base stands behind this wall; a normal points from the wall to the robot"
+            )
+        return Wall(self.name, (x, y, z), offset)
+
+
+@record
+class _Body:
+    name: Name
+    centre: Point
+    rpy: tuple[_Angle, _Angle, _Angle] = (0.0, 0.0, 0.0)
+
+
+@record
+class _Box(_Body):
+    size: tuple[Size, Size, Size]
+
+
+@record
+class _Sphere(_Body):
+    radius: Size
+
+
+@record
+class _Rod(_Sphere):
+    length: Size
+
+
+_Bodies = Items(0, MOST_BODIES)
+
+
+@record
+class _Solids:
+    boxes: Annotated[tuple[_Box, ...], _Bodies] = ()
+    cylinders: Annotated[tuple[_Rod, ...], _Bodies] = ()
+    spheres: Annotated[tuple[_Sphere, ...], _Bodies] = ()
+    capsules: Annotated[tuple[_Rod, ...], _Bodies] = ()
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """All bodies, kind by kind."""
+        return tuple(_solid(kind, body) for kind in _NOUNS for body in getattr(self, kind))
+
+
+def _solid(kind: str, body: _Body) -> Solid:
+    name, centre, rpy, *sizes = astuple(body)
+    return Solid(name, kind, sizes[0] if kind == "boxes" else tuple(sizes), centre, rpy)
+
+
+@record
+class _Tool(_Solids):
+    mass: Annotated[float, number(0.0, 100.0, "kg")] = 0.0
+    centre_of_gravity: Point = (0.0, 0.0, 0.0)
+
+
+@record
+class _Cell(_Solids):
+    format: Literal[1]
+    name: Name
+    floor: _Floor = _Floor(z=0.0)
+    walls: Annotated[tuple[_Wall, ...], _Bodies] = ()
+    tool: _Tool = _Tool()
+
+    def __post_init__(self) -> None:
+        names = [wall.name for wall in self.walls]
+        names += [solid.name for solid in (*self.solids, *self.tool.solids)]
+        if len(names) > MOST_BODIES:
+            raise ValueError(f"{len(names)} walls and solids; give at most {MOST_BODIES}")
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise ValueError(f"two bodies are called {twice!r}; give each a name of its own")
+
+
+def load_cell(path: str | Path) -> Cell:
+    """Read a cell file.
+
+    Raises:
+        CellError: unreachable file, or content that makes no sense, naming file and field.
+    """
+    return parse_cell(FILE_KINDS["cell"].read_text(Path(path)), str(path))
+
+
+def parse_cell(text: str, source: str) -> Cell:
+    """Make a cell of the text of its file.
+
+    Args:
+        text: TOML.
+        source: the file's name, for messages.
+
+    Raises:
+        CellError: the content makes no sense; names file and field.
+    """
+    file = checked(_Cell, FILE_KINDS["cell"].parse_toml(text, source), source, CellError)
+    tool = Tool(file.tool.solids, file.tool.mass, file.tool.centre_of_gravity)
+    return Cell(file.name, file.floor.z, tuple(wall.wall() for wall in file.walls), file.solids, tool, text)

@@ -1,7 +1,9 @@
 """How far the arm and its tool stay from themselves, from the surface under them and from what stands around.
 
-Convex hulls of the published collision meshes, or of the housings of an arm without meshes, moved by the
-nominal kinematics, against the bodies of a cell; distances by Pinocchio's collision library (coal).
+Convex hulls of the links, moved by the nominal kinematics, against the bodies of a cell; distances by
+Pinocchio's collision library (coal). The hulls are those of the published collision meshes. Of an arm without
+meshes they enclose the housings of its joints, which are cylinders about the axes of the joints; two links
+share the distance between their middle planes equally.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from math import cos, pi
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -16,15 +19,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from pc_client.kinematics.arms import DhArm, RobotDescription, find_robot_file, find_share_folder
 from pc_client.kinematics.cell import Solid, Three
-from pc_client.kinematics.dh_arm import DhArm, link_hulls
-from pc_client.kinematics.robot_model import (
-    RobotDescription,
-    RobotModel,
-    find_robot_file,
-    find_share_folder,
-    load_pinocchio_model,
-)
+from pc_client.kinematics.model import RobotModel, load_pinocchio_model
 
 Array = NDArray[np.float64]
 
@@ -234,3 +231,98 @@ def load_hulls(description: RobotDescription) -> tuple[Any, ...]:
         hull = mesh.geometry.convex
         hulls.append(pin.GeometryObject(mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, hull))
     return tuple(hulls)
+
+
+_CORNERS = 24
+"""Of the polygon around a circle."""
+
+_CAP = 1.45
+"""How far a wrist stands out on the side that carries nothing, in radii. Source: the meshes of UR3, UR5 and
+UR10 (1.24 to 1.46)."""
+
+
+def link_hulls(arm: DhArm, model: Any) -> tuple[Any, ...]:
+    """The hulls of the links.
+
+    Args:
+        arm: its lengths.
+        model: the Pinocchio model of its URDF; its frames place the links.
+
+    Returns:
+        One convex pin.GeometryObject a link, base to wrist 3.
+    """
+    hulls = []
+    for link, points in _housings(arm).items():
+        index = model.getFrameId(link)
+        frame = model.frames[index]
+        hulls.append(pin.GeometryObject(link, frame.parentJoint, index, frame.placement, _hull(points)))
+    return tuple(hulls)
+
+
+def _housings(arm: DhArm) -> dict[str, Array]:
+    """Points (n, 3) on the ends of the housings of each link, in the frame of the link [m]."""
+    shoulder, elbow, wrist = arm.radii
+    upper, half = arm.shoulder_offset / 2, arm.elbow_step / 2
+    end, side, cap = arm.wrist_step / 2, arm.d5 / 2, _CAP * wrist
+    rings: dict[str, tuple[Array, ...]] = {
+        "base_link": (_about_z(0.0, 0.0, arm.foot), _about_z(0.0, arm.d1 - upper, shoulder)),
+        "shoulder_link": (
+            _about_z(0.0, -upper, shoulder),
+            _about_z(0.0, upper, shoulder),
+            _about_y(upper, 0.0, shoulder),
+        ),
+        "upper_arm_link": (
+            _about_y(-upper, 0.0, shoulder),
+            _about_y(upper, 0.0, shoulder),
+            _about_y(-half, -arm.a2, elbow),
+            _about_y(half, -arm.a2, elbow),
+        ),
+        "forearm_link": (
+            _about_y(-half, 0.0, elbow),
+            _about_y(half, 0.0, elbow),
+            _about_y(-end, -arm.a3, wrist),
+            _about_y(end, -arm.a3, wrist),
+        ),
+        "wrist_1_link": (
+            _about_y(end, 0.0, wrist),
+            _about_y(arm.wrist_step + wrist, 0.0, wrist),
+            _about_z(arm.wrist_step, -cap, wrist),
+            _about_z(arm.wrist_step, side, wrist),
+        ),
+        "wrist_2_link": (
+            _about_z(0.0, side, wrist),
+            _about_z(0.0, arm.d5 + wrist, wrist),
+            _about_y(-cap, arm.d5, wrist),
+            _about_y(side, arm.d5, wrist),
+        ),
+        "wrist_3_link": (_about_y(side, 0.0, wrist), _about_y(arm.d6, 0.0, wrist)),
+    }
+    return {link: np.vstack(parts) for link, parts in rings.items()}
+
+
+def _about_y(y: float, z: float, radius: float) -> Array:
+    """Polygon (n, 3) around a circle about an axis along y."""
+    c, s = _polygon(radius)
+    return np.column_stack((c, np.full_like(c, y), s + z))
+
+
+def _about_z(y: float, z: float, radius: float) -> Array:
+    """Polygon (n, 3) around a circle about an axis along z."""
+    c, s = _polygon(radius)
+    return np.column_stack((c, s + y, np.full_like(c, z)))
+
+
+def _polygon(radius: float) -> tuple[Array, Array]:
+    angles = 2.0 * pi / _CORNERS * np.arange(_CORNERS)
+    outer = radius / cos(pi / _CORNERS)
+    return outer * np.cos(angles), outer * np.sin(angles)
+
+
+def _hull(points: Array) -> Any:
+    """The convex hull of points (n, 3), as Pinocchio's collision library has it."""
+    cloud = pin.coal.BVHModelOBBRSS()
+    cloud.beginModel(0, len(points))
+    cloud.addVertices(points)
+    cloud.endModel()
+    cloud.buildConvexHull(True, "Qt")  # Qt: triangles only, as coal needs
+    return cloud.convex

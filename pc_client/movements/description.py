@@ -13,8 +13,6 @@ from pc_client.errors import MovementError
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 
-__all__ = ["describe", "snr_of_delay", "speed_rms_frequency"]
-
 #: Loop delays (s) for which the expected SNR is given: command to motion alone, and the whole loop, of a CB3
 #: arm.
 _DELAYS = (0.022, 0.035)

@@ -10,24 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.lognormal import TwoSidedTiming
-from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
-
-__all__ = ["DurationRule", "Fitts", "Isochrony", "chained_windows", "leg_lengths", "retimed"]
-
-
-class DurationRule(Protocol):
-    """Anything that says how long a stroke lasts for its length."""
-
-    def durations(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Durations (n,), s, of strokes of these lengths (n,), m."""
-        ...
+from pc_client.movements.lognormal import LiteralTiming, TwoSidedTiming
+from pc_client.movements.sigma_lognormal import LEAD, SigmaLognormal, Stroke, leg_lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +81,8 @@ class Fitts:
         return durations
 
 
-def leg_lengths(target_points: ArrayLike) -> NDArray[np.float64]:
-    """Distances (n - 1,), m, between consecutive target points (n, 3), m."""
-    lengths: NDArray[np.float64] = np.linalg.norm(
-        np.diff(np.asarray(target_points, dtype=np.float64), axis=0), axis=1
-    )
-    return lengths
+DurationRule = Isochrony | Fitts
+"""How long a stroke lasts for its length."""
 
 
 def chained_windows(
@@ -147,3 +132,26 @@ def retimed(trajectory: SigmaLognormal, rule: DurationRule, *, overlap: float, r
         for begin, window, stroke in zip(begins.tolist(), windows.tolist(), trajectory.strokes, strict=True)
     )
     return SigmaLognormal(trajectory.target_points, strokes, trajectory.duration)
+
+
+#: Of the recipe: a stroke lasts in proportion to its length to this power, since people need hardly more time
+#: for longer strokes.
+ISOCHRONY = 0.3
+#: Largest speed of the tool, m/s: movel's default, and within what a UR3 can do in any direction in its box.
+TOP_SPEED = 0.25
+#: Least default duration of a stroke, s: very short strokes would need more acceleration than speed.
+_SHORTEST = 1.0
+
+
+def default_durations(points: ArrayLike) -> NDArray[np.float64]:
+    """How long the strokes between points (n, 3), m, last by themselves, (n - 1,), s.
+
+    In the proportions of the recipe (length to the power .3), as quick as its top speed allows the human-like
+    movement, but at least 1 s each; in whole milliseconds.
+    """
+    legs = leg_lengths(points)
+    proportions = Isochrony(ISOCHRONY).durations(legs)
+    speeds = LiteralTiming(0.0, 1.0, LEAD).lognormal.peak * legs / proportions
+    durations = np.ceil(1e3 * proportions * float(speeds.max()) / TOP_SPEED) / 1e3
+    longest: NDArray[np.float64] = np.maximum(durations, _SHORTEST)
+    return longest

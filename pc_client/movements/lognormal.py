@@ -15,29 +15,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 from scipy.special import ndtr
 
 from pc_client.errors import MovementError
-
-__all__ = [
-    "FULL_COVERAGE",
-    "Inflections",
-    "LiteralTiming",
-    "Lognormal",
-    "LognormalValues",
-    "Timing",
-    "TwoSidedTiming",
-    "evaluate_lognormals",
-    "lead_from_k",
-    "sigma_for_k",
-    "sigma_for_mode_fraction",
-]
-
 
 _SQRT_TWO_PI = math.sqrt(2.0 * math.pi)
 
@@ -181,19 +165,6 @@ class Lognormal:
 FULL_COVERAGE = 3.0 * math.sqrt(2.0)
 
 
-class Timing(Protocol):
-    """Anything that defines one lognormal and can be slowed down."""
-
-    @property
-    def lognormal(self) -> Lognormal:
-        """The lognormal itself."""
-        ...
-
-    def stretched(self, factor: float) -> Timing:
-        """The same timing, `factor` times as slow."""
-        ...
-
-
 def sigma_for_k(k: float) -> float:
     """The positive root of Eq. 9, sigma^2 + 3 sqrt2 sigma - ln k = 0.
 
@@ -299,25 +270,13 @@ class TwoSidedTiming:
     @property
     def mode_fraction(self) -> float:
         """Where in the window the peak is, 0 to 1/2."""
-        return _mode_fraction(self.sigma, self.coverage)
+        # exp(-s^2) - exp(-c s), by expm1: both terms tend to 1 for small sigma.
+        s, c = self.sigma, self.coverage
+        return (math.expm1(-s * s) - math.expm1(-c * s)) / (2.0 * math.sinh(c * s))
 
     def stretched(self, factor: float) -> TwoSidedTiming:
         """The same construction in a window `factor` times as long and as late."""
         return TwoSidedTiming(self.start * factor, self.duration * factor, self.sigma, self.coverage)
-
-
-def sigma_for_mode_fraction(fraction: float, coverage: float = FULL_COVERAGE) -> float:
-    """The sigma whose two-sided lognormal has its peak at this fraction of the window, in [.05, .5)."""
-    if not (0.05 <= fraction < 0.5):
-        raise MovementError(
-            f"mode fraction {fraction}: the peak of a lognormal lies in [0.05, 0.5) of its window"
-        )
-    return float(brentq(lambda sigma: _mode_fraction(sigma, coverage) - fraction, 1e-9, 2.0, xtol=1e-15))
-
-
-def _mode_fraction(sigma: float, coverage: float) -> float:
-    # exp(-s^2) - exp(-c s), by expm1: both terms tend to 1 for small sigma.
-    return (math.expm1(-sigma * sigma) - math.expm1(-coverage * sigma)) / (2.0 * math.sinh(coverage * sigma))
 
 
 def _check_window(start: float, duration: float) -> None:
@@ -325,3 +284,7 @@ def _check_window(start: float, duration: float) -> None:
         raise MovementError(
             f"stroke window at {start} s for {duration} s: give finite times, longer than 0 s"
         )
+
+
+Timing = Lognormal | LiteralTiming | TwoSidedTiming
+"""What gives a stroke its lognormal: the parameters themselves, or a construction from a window."""

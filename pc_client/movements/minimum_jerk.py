@@ -20,10 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.sigma_lognormal import Motion
-
-__all__ = ["MinimumJerk", "Passing", "StrokeShape", "stroke_shape"]
+from pc_client.movements.trajectory import Motion, Similarity, read_only
 
 #: What happens at the inner target points: come to rest there, or pass through them at their times.
 Passing = Literal["stop", "via"]

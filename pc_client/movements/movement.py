@@ -1,83 +1,58 @@
-"""`Movement`: a named trajectory of the TCP, made by any model; `JointTrajectory`: samples of joint angles.
+"""`Movement`: a named trajectory of the TCP; through points, from samples, from a file or from the library.
 
-Planning, running and analysis use a movement through this class only. Files are read and written by
-`files.py`; new ones are made by `generate.py`.
+Planning, running and analysis use a movement through this class only. Reading a file checks everything and
+names file and field (or line) of what is wrong; docs/movements.md describes the formats.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, NamedTuple, Protocol, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pc_client.errors import MovementError
-from pc_client.files import ALLOWED, MOST_BYTES, is_file_name
-from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.minimum_jerk import MinimumJerk
-from pc_client.movements.power_law import PowerLaw
-from pc_client.movements.robotic import RoboticTrajectory
-from pc_client.movements.samples import SampledTrajectory
-from pc_client.movements.sigma_lognormal import Motion, SigmaLognormal
-
-__all__ = [
-    "JOINT_COLUMNS",
-    "LONGEST_DURATION",
-    "MIN_SAMPLES",
-    "JointTrajectory",
-    "Kind",
-    "Movement",
-    "MovementSample",
-    "SampleColumns",
-    "Trajectory",
-    "export_samples",
-]
-
-
-#: Which model made a movement, as its file says it; "samples" are given.
-Kind = Literal["lognormal", "uniform", "minimum_jerk", "power_law", "samples"]
-
-_KINDS: Mapping[type, Kind] = MappingProxyType(
-    {
-        SigmaLognormal: "lognormal",
-        RoboticTrajectory: "uniform",
-        MinimumJerk: "minimum_jerk",
-        PowerLaw: "power_law",
-    }
+from pc_client.errors import MovementError, UnknownMovementError
+from pc_client.files import FILE_KINDS
+from pc_client.movements.durations import default_durations
+from pc_client.movements.library_sets import LIBRARY_SETS, library_path
+from pc_client.movements.movement_file import file_text, kind_of, read_record, trajectory_of
+from pc_client.movements.samples import (
+    FORMS,
+    JOINT_COLUMNS,
+    MIN_SAMPLES,
+    JointTrajectory,
+    SampledTrajectory,
+    rotations_of,
+    samples_of,
+    write_samples,
 )
+from pc_client.movements.sigma_lognormal import leg_lengths, literal_strokes
+from pc_client.movements.trajectory import (
+    Motion,
+    Similarity,
+    Trajectory,
+    check_duration,
+    check_name,
+    read_only,
+)
+from pc_client.movements.uniform import SETBACK, Corners, uniform_trajectory
+from pc_client.number_tables import parse_rows
+from ur_hil.records import nearest
 
+#: "human": straight strokes by the paper's recipe; "robot": a smoothed square wave on the same lines.
+Style = Literal["human", "robot"]
 
-LONGEST_DURATION = 1200.0
-"""No movement lasts longer [s]: its recording could not be read back (`pc_client.files`)."""
-
-
-def _check_name(name: str) -> None:
-    """Refuse a name that is no file name of the same folder on every system.
-
-    Raises:
-        MovementError: saying what is allowed.
-    """
-    if not is_file_name(name):
-        raise MovementError(
-            f"a movement is called {name[:MOST_BYTES]!r}: files are named after it, so give {ALLOWED}"
-        )
-
-
-def _check_duration(duration: float, whose: str) -> None:
-    """Refuse a duration outside the range of movements.
-
-    Raises:
-        MovementError: saying what is allowed.
-    """
-    if not 0.0 < duration <= LONGEST_DURATION:  # NaN is not
-        raise MovementError(
-            f"{whose} with a duration of {duration:g} s: it must last longer than 0 s, "
-            f"and {LONGEST_DURATION:g} s at most"
-        )
+#: A table of target points without times.
+_POINT_COLUMNS = ("x", "y", "z")
+#: Longest duration of a stroke, s, and farthest coordinate, m, that are taken for meant.
+_LONGEST_STROKE, _FARTHEST = 600.0, 10.0
+#: Points nearer than this (m) are one point.
+_APART = 1e-6
 
 
 class MovementSample(NamedTuple):
@@ -85,41 +60,6 @@ class MovementSample(NamedTuple):
 
     p: NDArray[np.float64]
     v: NDArray[np.float64]
-
-
-class SampleColumns(NamedTuple):
-    """A movement as columns, each (n,): time (s) and position (m)."""
-
-    t: NDArray[np.float64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    z: NDArray[np.float64]
-
-
-class Trajectory(Protocol):
-    """What makes a movement: a closed form of position, velocity and acceleration in time."""
-
-    @property
-    def duration(self) -> float:
-        """Total time, s."""
-        ...
-
-    @property
-    def target_points(self) -> NDArray[np.float64]:
-        """(n, 3), m."""
-        ...
-
-    def evaluate(self, t: ArrayLike) -> Motion:
-        """Position, velocity and acceleration at the times t (n,), s."""
-        ...
-
-    def transformed(self, similarity: Similarity) -> Trajectory:
-        """The same movement elsewhere."""
-        ...
-
-    def stretched(self, factor: float) -> Trajectory:
-        """The same movement, slower."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,8 +84,8 @@ class Movement:
 
     def __post_init__(self) -> None:
         durations = read_only(self.stroke_durations)
-        _check_name(self.name)
-        _check_duration(self.duration, f"movement {self.name}")
+        check_name(self.name)
+        check_duration(self.duration, f"movement {self.name}")
         if durations.ndim != 1 or not len(durations) or not np.all(durations > 0.0):
             raise MovementError(
                 f"movement {self.name} with stroke durations {durations.tolist()} s: give times above 0 s"
@@ -158,13 +98,139 @@ class Movement:
         object.__setattr__(self, "stroke_durations", durations)
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
 
+    @classmethod
+    def through(
+        cls,
+        points: ArrayLike,
+        style: Style = "human",
+        durations: ArrayLike | None = None,
+        *,
+        name: str = "through",
+        corners: Corners = "stop",
+        setback: float = SETBACK,
+    ) -> Movement:
+        """A movement that begins at the first point, rests at each of the others and ends at the last.
+
+        The two styles of the same points and durations are twins: same lines, same stroke durations.
+
+        Args:
+            points: (n, 3) [m]; at least two, consecutive ones apart.
+            style: "human", straight lognormal strokes by the paper's recipe; "robot", a smoothed trapezoid of
+                speed on the same lines.
+            durations: of the strokes between the points, (n - 1,) [s]; chosen from their lengths if None.
+            name: as in recordings and tables.
+            corners: of "robot" only: "stop" at inner points, or "blend" them.
+            setback: of blended corners [m].
+
+        Raises:
+            MovementError: points, durations or options are not valid.
+        """
+        targets = _checked(points, "points", 2)
+        if len(targets) < 2:
+            raise MovementError(f"{len(targets)} target points: a movement needs at least 2")
+        for index, fault in _faults(targets):
+            raise MovementError(f"target point {index + 1} {fault}")
+        if style not in ("human", "robot"):
+            raise MovementError(f'style "{style}": give "human" or "robot"')
+        if corners != "stop" and style == "human":
+            raise MovementError(
+                f'corners "{corners}" of a human-like movement: corners go with style "robot"'
+            )
+        times = default_durations(targets) if durations is None else _checked(durations, "durations", 1)
+        if not np.all((times > 0.0) & (times <= _LONGEST_STROKE)):
+            raise MovementError(
+                f"durations {times.tolist()} s: give times above 0, at most {_LONGEST_STROKE:g} s"
+            )
+        human = style == "human"
+        trajectory = (
+            literal_strokes(targets, times) if human else uniform_trajectory(targets, times, corners, setback)
+        )
+        return cls(name, trajectory, times, {"generator": "pc_client.movements.own_points"})
+
+    @classmethod
+    def from_samples(
+        cls, t: ArrayLike, points: ArrayLike, rotations: ArrayLike | None = None, *, name: str = "samples"
+    ) -> Movement:
+        """A movement given as samples; a spline interpolates them, nothing is smoothed.
+
+        Args:
+            t: (n,) increasing times [s], n >= 4.
+            points: (n, 3) positions [m].
+            rotations: orientation of the TCP at each sample: rotation vectors (n, 3) [rad] or quaternions
+                (n, 4) x, y, z, w. None: the experiment's fixed orientation, tool forward and 45 degrees down.
+            name: as in recordings and tables.
+
+        Raises:
+            MovementError: shapes or values are not valid.
+        """
+        turns = None if rotations is None else rotations_of(rotations)
+        trajectory = SampledTrajectory(
+            np.asarray(t, dtype=np.float64), np.asarray(points, dtype=np.float64), turns
+        )
+        return cls(name, trajectory, np.array([trajectory.duration]))
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | Path,
+        style: Style | None = None,
+        durations: ArrayLike | None = None,
+        *,
+        corners: Corners = "stop",
+    ) -> Movement:
+        """A movement from a table, by the name of its file; see docs/movements.md.
+
+        Args:
+            path: x, y, z, t, or with orientations: samples. x, y, z alone: target points.
+            style: "human" or "robot": the rows are target points, t when each is reached, as those of
+                `ur-client movements new`; None: samples, if they have t.
+            durations: of the strokes between target points without t, (n - 1,) [s]; as of `through` if None.
+            corners: of "robot" only, as of `through`.
+
+        Raises:
+            MovementError: the file cannot be read or is not valid; names the line.
+        """
+        path = Path(path)
+        if style is None and durations is None:
+            return load_movement(path)
+        points, times = load_targets(path)
+        if times is not None and durations is not None:
+            raise MovementError(f"durations, but {path} has a column t: give only one of them")
+        given = times if durations is None else durations
+        return cls.through(points, style or "human", given, name=path.stem, corners=corners)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Movement:
+        """A movement from a file of its parameters.
+
+        Raises:
+            MovementError: the file cannot be read or is not valid; names the field.
+        """
+        return load_movement(Path(path))
+
+    @classmethod
+    def library(cls, name: str) -> Movement:
+        """A movement of the library, such as "lognorm_4_1"; `ur-client movements list` names all.
+
+        Raises:
+            MovementError: no movement has that name.
+        """
+        return load_movement(name)
+
     def __repr__(self) -> str:
         return f"<Movement {self.name!r}: {self.kind}, {self.duration:.2f} s>"
 
     @property
-    def kind(self) -> Kind:
-        """Which model made it."""
-        return _KINDS.get(type(self.trajectory), "samples")
+    def kind(self) -> str:
+        """Which model made it, as its file says it; "samples" are given."""
+        return kind_of(self.trajectory)
+
+    @property
+    def text(self) -> str:
+        """Its TOML file, complete and readable; empty for one made of samples."""
+        if isinstance(self.trajectory, SampledTrajectory):
+            return ""
+        return file_text(self.name, self.trajectory, self.stroke_durations, self.provenance)
 
     @property
     def duration(self) -> float:
@@ -226,71 +292,137 @@ class Movement:
         """The same movement under another name."""
         return replace(self, name=name)
 
+    def save(self, path: str | Path) -> None:
+        """Write a movement file: .toml for a closed form, .csv for samples.
 
-def export_samples(movement: Movement, dt: float) -> SampleColumns:
-    """The movement as columns t, x, y, z at 0, dt, 2 dt ... and at its end.
+        Raises:
+            MovementError: wrong suffix for the kind of movement, or the file cannot be written.
+        """
+        path = Path(path)
+        wanted = ".csv" if isinstance(self.trajectory, SampledTrajectory) else ".toml"
+        if path.suffix.lower() != wanted:
+            raise MovementError(f"{path}: a movement of kind {self.kind} is saved as a {wanted} file")
+        try:
+            if isinstance(self.trajectory, SampledTrajectory):
+                write_samples(path, self.trajectory)
+            else:
+                path.write_text(self.text, encoding="utf-8")
+        except OSError as error:
+            raise MovementError(
+                f"{path}: cannot be written ({error.strerror or error}); give a place that can be"
+            ) from error
+
+
+def load_movement(name_or_path: str | Path) -> Movement:
+    """A movement of the library by its name, or one from a .toml or .csv file by its path.
 
     Args:
-        movement: what to sample.
-        dt: sampling time, s, > 0.
-    """
-    if not (math.isfinite(dt) and dt > 0.0):
-        raise MovementError(f"sampling time of {dt} s: give a number greater than 0")
-    if movement.duration / dt > 1e7:
-        raise MovementError(f"sampling time of {dt} s gives more than 10 million samples: give a longer one")
-    t = dt * np.arange(math.floor(movement.duration / dt + 1e-9) + 1, dtype=np.float64)
-    t = np.append(t[t < movement.duration - 1e-9 * dt], movement.duration)
-    x, y, z = movement.sample(t).p.T
-    return SampleColumns(t, x, y, z)
-
-
-#: Columns of a file; angles in rad, base to wrist 3.
-JOINT_COLUMNS = ("t", "q0", "q1", "q2", "q3", "q4", "q5")
-
-#: Fewest samples: a cubic has four coefficients.
-MIN_SAMPLES = 4
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointTrajectory:
-    """Joint angles over time, from rest to rest.
-
-    Attributes:
-        t: (n,) times [s], increasing; shifted so that the first is 0.
-        q: (n, 6) joint angles [rad], base to wrist 3.
-        name: as in tables and file names.
+        name_or_path: "lognorm_4_1" (set "paper"), "arcs/lognorm_4_1" (set "arcs"), "mine.toml".
 
     Raises:
-        MovementError: shapes, times or values make no sense, or there are fewer than 4 samples.
+        MovementError: unknown name, unreachable file, or content that makes no sense, naming file and field
+            or line.
     """
+    motion = load_motion(name_or_path)
+    if isinstance(motion, JointTrajectory):
+        raise MovementError(f"{name_or_path} holds joint angles; give a movement of the TCP here")
+    return motion
 
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
-    name: str = "joints"
 
-    def __post_init__(self) -> None:
-        t, q = read_only(self.t), read_only(self.q)
-        _check_name(self.name)
-        if t.ndim != 1 or q.shape != (len(t), 6):
-            raise MovementError(
-                f"{self.name}: t {t.shape} and q {q.shape}: give n times and n rows of six angles in rad"
-            )
-        if len(t) < MIN_SAMPLES:
-            raise MovementError(f"{self.name}: {len(t)} samples; give at least {MIN_SAMPLES}")
-        bad = np.flatnonzero(~(np.isfinite(t) & np.isfinite(q).all(axis=1)))
-        if len(bad):
-            raise MovementError(f"{self.name}: sample {bad[0]} is not finite; give finite numbers")
-        stalled = np.flatnonzero(np.diff(t) <= 0.0)
-        if len(stalled):
-            k = int(stalled[0]) + 1
-            raise MovementError(
-                f"{self.name}: sample {k} is at t = {t[k]:g} s after {t[k - 1]:g} s: times must increase"
-            )
-        object.__setattr__(self, "t", read_only(t - t[0]))
-        object.__setattr__(self, "q", q)
-        _check_duration(self.duration, self.name)
+def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
+    """What an arm can be sent along: as `load_movement`, or a .csv file of joint angles.
 
-    @property
-    def duration(self) -> float:
-        """Time of the last sample [s]."""
-        return float(self.t[-1])
+    Raises:
+        MovementError: as `load_movement`.
+    """
+    found = library_path(name_or_path) if isinstance(name_or_path, str) else None
+    if found:
+        movement = _read(found)
+        return replace(movement, may_be_moved=True) if isinstance(movement, Movement) else movement
+    path = Path(name_or_path)
+    if not path.suffix and not path.exists():
+        known = [name for names in LIBRARY_SETS.values() for name in names]
+        raise UnknownMovementError(
+            f'no movement "{name_or_path}": {nearest(str(name_or_path), known)}; '
+            "give one of the library, or the path of a .toml or .csv file"
+        )
+    return _read(path)
+
+
+def load_targets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Target points from a text file: columns x, y, z in m, base frame; and optionally t in s.
+
+    t is when a point is reached; the times between are the durations of the strokes. The form is that of
+    `number_tables`.
+
+    Raises:
+        MovementError: unreachable file, or content that makes no sense, naming file and line.
+    """
+    rows = parse_rows(
+        FILE_KINDS["samples"].read_text(Path(path)),
+        str(path),
+        [_POINT_COLUMNS, (*_POINT_COLUMNS, "t")],
+        "x, y, z in m, and optionally t in s",
+    )
+    if len(rows.values) < 2:
+        raise MovementError(f"{path}: {len(rows.values)} target points; a movement needs at least 2")
+    points = rows.values[:, :3]
+    for index, fault in _faults(points):
+        raise MovementError(f"{path}, line {rows.lines[index]}: target point {index + 1} {fault}")
+    return points, np.diff(rows.values[:, 3]) if "t" in rows.columns else None
+
+
+def _read(path: Path) -> Movement | JointTrajectory:
+    suffix = path.suffix.lower()
+    if suffix not in (".toml", ".csv"):
+        raise MovementError(f"{path}: movement files are .toml (parameters) or .csv (samples)")
+    if suffix == ".csv":
+        return _parse_samples(FILE_KINDS["samples"].read_text(path), path)
+    file = read_record(FILE_KINDS["movement"].read_toml(path), str(path))
+    try:
+        return Movement(file.name, *trajectory_of(file), file.provenance)
+    except MovementError as error:
+        raise MovementError(f"{path}: {error}") from error
+
+
+def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
+    """What a table of samples or target points holds; without a line of names, x, y, z and perhaps t."""
+    wanted = "x, y, z in m and t in s, target points x, y, z, or what docs/movements.md names beside them"
+    rows = parse_rows(text, str(path), (*FORMS, JOINT_COLUMNS, _POINT_COLUMNS), wanted)
+    if rows.columns != _POINT_COLUMNS and len(rows.values) < MIN_SAMPLES:
+        raise MovementError(
+            f"{path}: {len(rows.values)} samples; a movement needs at least {MIN_SAMPLES} "
+            "(target points with times: `ur-client movements new`, or Movement.from_csv with a style)"
+        )
+    try:
+        if rows.columns == _POINT_COLUMNS:
+            return Movement.through(rows.values, name=path.stem)
+        if rows.columns == JOINT_COLUMNS:
+            return JointTrajectory(rows.values[:, 0], rows.values[:, 1:], path.stem)
+        trajectory = samples_of(rows)
+        return Movement(path.stem, trajectory, np.array([trajectory.duration]), {"file": path.name})
+    except MovementError as error:
+        raise MovementError(f"{path}: {error}") from error
+
+
+def _faults(points: NDArray[np.float64]) -> Iterator[tuple[int, str]]:
+    """What is wrong with points (n, 3), m: which of them, and what."""
+    for index in np.flatnonzero(np.abs(points).max(axis=1) > _FARTHEST).tolist():
+        yield index, f"is {points[index].tolist()} m: that is beyond any arm; give metres, robot base frame"
+    for index in np.flatnonzero(leg_lengths(points) < _APART).tolist():
+        yield index + 1, f"is the same as target point {index + 1}: consecutive ones must be apart"
+
+
+def _checked(values: ArrayLike, what: str, dimensions: Literal[1, 2]) -> NDArray[np.float64]:
+    """Finite numbers (n,) or (n, 3), or an error that says what is needed."""
+    wanted = "a list of [x, y, z] in m" if dimensions == 2 else "a list of times in s, one a stroke"
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise MovementError(f"{what} that are not a table of numbers: give {wanted}") from error
+    if array.ndim != dimensions or (dimensions == 2 and array.shape[1] != 3):
+        raise MovementError(f"{what} of shape {array.shape}: give {wanted}")
+    bad = [value for value in array.ravel().tolist() if not math.isfinite(value)]
+    if bad:
+        raise MovementError(f"{what} with {bad[0]}: give finite numbers, {wanted}")
+    return read_only(array)

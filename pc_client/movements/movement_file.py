@@ -9,7 +9,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, field, fields, is_dataclass
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,11 @@ from pc_client.movements.lognormal import (
     lead_from_k,
 )
 from pc_client.movements.minimum_jerk import MinimumJerk, Passing
-from pc_client.movements.movement import LONGEST_DURATION, Movement, Trajectory
 from pc_client.movements.power_law import TWO_THIRDS, PowerLaw
-from pc_client.movements.robotic import Corners, RoboticTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
+from pc_client.movements.trajectory import LONGEST_DURATION, Trajectory
+from pc_client.movements.uniform import Corners, Uniform
 from ur_hil.records import Field, Finite, Items, checked, fields_of, number, record, text, word
-
-__all__ = ["movement_text", "parse_movement", "toml_value"]
 
 _MOST_POINTS = 1000
 """Most target points of a file: a page of handwriting has some 500."""
@@ -46,7 +44,9 @@ _Fact = Annotated[Any, Field("a text or a number", object, {"type": "union", "ch
 
 
 @record
-class _File:
+class MovementFile:
+    """What the files of all kinds have in common."""
+
     format: Literal[1]
     name: Annotated[str, text()]
     kind: str
@@ -71,7 +71,7 @@ class _Stroke:
 
 
 @record
-class _LognormalFile(_File):
+class _LognormalFile(MovementFile):
     strokes: Annotated[tuple[_Stroke, ...], Items(1, _MOST_POINTS)]
 
 
@@ -84,7 +84,7 @@ class _PowerLawProfile:
 
 
 @record
-class _PowerLawFile(_File):
+class _PowerLawFile(MovementFile):
     profile: _PowerLawProfile
 
 
@@ -96,7 +96,7 @@ class _UniformProfile:
 
 
 @record
-class _UniformFile(_File):
+class _UniformFile(MovementFile):
     stroke_durations: _Durations
     profile: _UniformProfile
 
@@ -107,17 +107,24 @@ class _MinimumJerkProfile:
 
 
 @record
-class _MinimumJerkFile(_File):
+class _MinimumJerkFile(MovementFile):
     stroke_durations: _Durations
     profile: _MinimumJerkProfile
 
 
-#: What a file says of its kind of movement, and its record.
-_KINDS: Mapping[str, tuple[str, type[_File]]] = {
-    "lognormal": ("human-like: lognormal strokes", _LognormalFile),
-    "uniform": ("robot-like: constant speed with ramps", _UniformFile),
-    "minimum_jerk": ("human-like: least jerk", _MinimumJerkFile),
-    "power_law": ("human-like: the two-thirds power law", _PowerLawFile),
+class _Made(NamedTuple):
+    """What a file says of a kind of movement, the trajectory that it makes, and its record."""
+
+    words: str
+    trajectory: type[Trajectory]
+    record: type[MovementFile]
+
+
+_KINDS: Mapping[str, _Made] = {
+    "lognormal": _Made("human-like: lognormal strokes", SigmaLognormal, _LognormalFile),
+    "uniform": _Made("robot-like: constant speed with ramps", Uniform, _UniformFile),
+    "minimum_jerk": _Made("human-like: least jerk", MinimumJerk, _MinimumJerkFile),
+    "power_law": _Made("human-like: the two-thirds power law", PowerLaw, _PowerLawFile),
 }
 _KIND = word(_KINDS)
 
@@ -133,47 +140,52 @@ _TIMINGS: Mapping[frozenset[str], Callable[..., Timing]] = {
 }
 
 
-def parse_movement(values: Mapping[str, Any], source: str) -> Movement:
-    """The movement of a file.
+def kind_of(trajectory: Trajectory) -> str:
+    """Which model made a trajectory, as its file says it; "samples" are given."""
+    return next((kind for kind, made in _KINDS.items() if isinstance(trajectory, made.trajectory)), "samples")
+
+
+def read_record(values: Mapping[str, Any], source: str) -> MovementFile:
+    """The record of a file.
 
     Args:
         values: as `tomllib` gives them.
         source: the file's name, for messages.
 
     Raises:
-        MovementError: a field is wrong, or the numbers make no movement.
+        MovementError: a field is wrong.
     """
     kind = checked(_KIND, values.get("kind"), f"{source}: kind", MovementError)
-    file = checked(_KINDS[kind][1], values, source, MovementError)
-    try:
-        trajectory, durations = _trajectory(file)
-        return Movement(file.name, trajectory, durations, file.provenance)
-    except MovementError as error:
-        raise MovementError(f"{source}: {error}") from error
+    return checked(_KINDS[kind].record, values, source, MovementError)
 
 
-def movement_text(movement: Movement) -> str:
+def file_text(
+    name: str,
+    trajectory: Trajectory,
+    stroke_durations: NDArray[np.float64],
+    provenance: Mapping[str, str | int | float],
+) -> str:
     """The TOML file of a movement in closed form, complete and readable."""
-    if movement.kind not in _KINDS:
-        raise MovementError(f"movement {movement.name} is made of samples: save it as a .csv file")
-    words, made = _KINDS[movement.kind]
-    trajectory = movement.trajectory
+    kind = kind_of(trajectory)
+    made = _KINDS[kind]
     if isinstance(trajectory, SigmaLognormal):
         shape: dict[str, Any] = {"strokes": tuple(map(_stroke_table, trajectory.strokes))}
     else:
-        profile = get_type_hints(made)["profile"]
+        profile = get_type_hints(made.record)["profile"]
         shape = {"profile": profile(**{row.name: getattr(trajectory, row.name) for row in fields(profile)})}
-    file = made(
+    file = made.record(
         format=1,
-        name=movement.name,
-        kind=movement.kind,
-        duration=movement.duration,
-        stroke_durations=tuple(movement.stroke_durations.tolist()),
-        target_points=tuple(movement.target_points.tolist()),
-        provenance=movement.provenance,
+        name=name,
+        kind=kind,
+        duration=trajectory.duration,
+        stroke_durations=tuple(stroke_durations.tolist()),
+        target_points=tuple(trajectory.target_points.tolist()),
+        provenance=provenance,
         **shape,
     )
-    comment = f"A movement of the TCP, {words}.\n# x, y, z over t derive from it; docs/movements.md explains"
+    comment = (
+        f"A movement of the TCP, {made.words}.\n# x, y, z over t derive from it; docs/movements.md explains"
+    )
     return "\n".join((f"# {comment} the fields.", *_lines(file), ""))
 
 
@@ -189,8 +201,12 @@ def toml_value(value: Any) -> str:
     return repr(value)
 
 
-def _trajectory(file: _File) -> tuple[Trajectory, NDArray[np.float64]]:
-    """The trajectory of a file and the durations of its strokes, (n,), s."""
+def trajectory_of(file: MovementFile) -> tuple[Trajectory, NDArray[np.float64]]:
+    """The trajectory of a file and the durations of its strokes, (n,), s.
+
+    Raises:
+        MovementError: the numbers make no movement.
+    """
     points, durations = np.array(file.target_points), np.array(file.stroke_durations or ())
     if isinstance(file, _LognormalFile):
         lognormal = SigmaLognormal(points, tuple(map(_stroke, file.strokes)), file.duration)
@@ -203,7 +219,7 @@ def _trajectory(file: _File) -> tuple[Trajectory, NDArray[np.float64]]:
     if abs(total - file.duration) > 1e-6:
         raise MovementError(f"duration: {file.duration} s; the stroke durations add up to {total:.6f} s")
     if isinstance(file, _UniformFile):
-        return RoboticTrajectory(points, durations, **_given(file.profile)), durations
+        return Uniform(points, durations, **_given(file.profile)), durations
     assert isinstance(file, _MinimumJerkFile)
     return MinimumJerk(points, durations, file.profile.passing), durations
 

@@ -33,11 +33,8 @@ from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 from scipy.optimize import brentq
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.robotic import SmoothedSquareWave, check_ramps
-from pc_client.movements.sigma_lognormal import Motion
-
-__all__ = ["TORSION_EXPONENT", "TWO_THIRDS", "PathBend", "PowerLaw", "SmoothPath"]
+from pc_client.movements.trajectory import Motion, Similarity, read_only
+from pc_client.movements.uniform import SmoothedSquareWave, check_ramps
 
 #: A path that is slower than this in its own parameter, against its mean, turns on the spot.
 _CUSP = 1e-3

@@ -25,32 +25,15 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
-from pc_client.movements.durations import Isochrony, leg_lengths
-from pc_client.movements.geometry import UR3_BOX, Box, Similarity
-from pc_client.movements.lognormal import LiteralTiming, TwoSidedTiming
+from pc_client.kinematics.arms import UR3_BOX, Box
+from pc_client.movements.durations import ISOCHRONY, TOP_SPEED, Isochrony
+from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.movement import Movement
-from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke, lift_strokes
-
-__all__ = [
-    "ARC_RULES",
-    "HAND",
-    "LEAD",
-    "TOP_SPEED",
-    "ArcRules",
-    "Fit",
-    "HandRules",
-    "TargetRules",
-    "arcs_movement",
-    "arcs_twin",
-    "fit_movement",
-    "literal_strokes",
-    "random_targets",
-    "recipe_movement",
-]
-
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, leg_lengths, literal_strokes
+from pc_client.movements.trajectory import Similarity
 
 #: Which rotations may be used: none, about the vertical, or any.
 _Rotate = Literal["none", "yaw", "any"]
@@ -232,13 +215,6 @@ def _follows_rules(points: list[NDArray[np.float64]], point: NDArray[np.float64]
     return rules.min_turn <= turn <= rules.max_turn
 
 
-#: Lead of the command before the window of its stroke, in windows. Eq. 9 needs k = (lead + 1) / (lead + 1/2),
-#: and the paper states neither. At 1, k is 4/3, sigma .0668, the skewness .20 and the kurtosis 3.07: "close
-#: to zero but positive" and "around 3". A stroke of .1 s then has mu = -1.89, which a hand's mu (-2.2 to
-#: -1.6) allows; a lead of 1/2 gives -2.29, a lead of 2 gives -1.38.
-LEAD = 1.0
-#: Largest speed of the tool, m/s: movel's default, and within what a UR3 can do in any direction in its box.
-TOP_SPEED = 0.25
 #: What the movement keeps from the faces of the robot's box, m: its twins with bent paths stay inside, too.
 _MARGIN = 0.015
 
@@ -271,32 +247,9 @@ HAND = HandRules(
     targets=TargetRules(min_leg=0.025, max_leg=0.05, min_apart=0.0125),
     stroke=0.1,
     leg=0.0375,
-    isochrony=0.3,
+    isochrony=ISOCHRONY,
     variability=(0.92, 1.08),
 )
-
-
-def literal_strokes(target_points: ArrayLike, durations: ArrayLike) -> SigmaLognormal:
-    """Straight strokes by Eq. 6 to 9 between target points, one after the other.
-
-    The window of a stroke begins where the one before ends, the first at 0; its peak is in the middle, and
-    all of its length is done at its end. So the movement all but rests at every target point and reaches it.
-
-    Args:
-        target_points: (n, 3), m.
-        durations: windows of the strokes, (n - 1,), s.
-    """
-    legs, windows = leg_lengths(target_points), np.asarray(durations, dtype=np.float64)
-    if windows.shape != legs.shape:
-        raise MovementError(
-            f"{windows.size} stroke durations for {len(legs) + 1} target points: give {len(legs)}"
-        )
-    edges = np.round(np.concatenate(([0.0], np.cumsum(windows))), 9).tolist()
-    planar = [
-        PlanarStroke(LiteralTiming(begin, window, LEAD * window), leg, 0.0, 0.0)
-        for begin, window, leg in zip(edges[:-1], windows.tolist(), legs.tolist(), strict=True)
-    ]
-    return SigmaLognormal(np.asarray(target_points, dtype=np.float64), lift_strokes(planar), edges[-1])
 
 
 def recipe_movement(n_targets: int, seed: int, name: str, box: Box = UR3_BOX) -> Movement:
@@ -354,7 +307,7 @@ class ArcRules:
 
     reference_leg: float = 0.15
     reference_window: float = 2.7
-    isochrony: float = 0.3
+    isochrony: float = ISOCHRONY
     variability: tuple[float, float] = (0.92, 1.08)
     sigma: tuple[float, float] = (0.10, 0.20)
     overlap: tuple[float, float] = (0.35, 0.50)

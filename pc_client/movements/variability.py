@@ -39,8 +39,6 @@ from pc_client.movements.lognormal import FULL_COVERAGE, Lognormal
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, arc_frame, sinc, tilt_of_normal
 
-__all__ = ["HUMAN_STROKE", "PUBLISHED", "VariabilityRanges", "duplicate"]
-
 #: Time (s) between speed minima that a hand takes for a stroke. Source: the median of five public signatures.
 HUMAN_STROKE = 0.15
 #: An arc angle is less than a whole turn; varied arc angles are held below this, rad.

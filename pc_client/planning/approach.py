@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
-from pc_client.kinematics.robot_model import RobotModel
+from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pc_client.kinematics.arms import JointLimits
 from pc_client.kinematics.cell import Cell
 from pc_client.kinematics.clearance import Distances, Nearest, clearance_model
-from pc_client.kinematics.forward import tcp_positions
-from pc_client.kinematics.robot_model import JointLimits, RobotModel
+from pc_client.kinematics.model import RobotModel, tcp_positions
 from pc_client.planning.joint_path import JointPath
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits

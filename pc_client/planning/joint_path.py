@@ -15,15 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.forward import (
+from pc_client.kinematics.model import (
     SINGULARITIES,
+    IkSolution,
+    RobotModel,
     SingularityMeasure,
     measure_singularity,
+    solve_ik_se3,
     tcp_jacobian,
     tcp_pose,
 )
-from pc_client.kinematics.inverse import IkSolution, solve_ik_se3
-from pc_client.kinematics.robot_model import RobotModel
 from pc_client.planning.limits import PathNames, PlanLimits
 
 _TCP_RPY = (0.0, 0.75 * pi, 0.0)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.robot_model import RobotModel, Six
+from pc_client.kinematics.arms import Six
+from pc_client.kinematics.model import RobotModel
 from protocol.ur_types import JOINT_NAMES
 
 

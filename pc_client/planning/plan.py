@@ -12,8 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.forward import measure_singularity, tcp_jacobian, tcp_positions
-from pc_client.kinematics.robot_model import RobotModel, robot_model
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import (
+    RobotModel,
+    measure_singularity,
+    robot_model,
+    tcp_jacobian,
+    tcp_positions,
+)
+from pc_client.movements.movement import Movement
+from pc_client.movements.samples import JointTrajectory, SampledTrajectory
+from pc_client.movements.trajectory import Similarity
 from pc_client.planning.checks import (
     CartesianSamples,
     PlanReport,
@@ -35,8 +44,12 @@ _Rotations = Callable[[Array], Array | None]
 """R_base_tcp (n, 3, 3) at times (n,) [s]; None: fixed."""
 
 
+Motion = Movement | JointTrajectory
+"""What can be planned: a movement of the TCP, or joint angles over time."""
+
+
 class PlannableMovement(Protocol):
-    """What planning needs of a movement; `movements.Movement` is one."""
+    """What planning needs of a movement; a `Movement` is one."""
 
     @property
     def name(self) -> str:
@@ -50,25 +63,6 @@ class PlannableMovement(Protocol):
 
     def sample(self, t: Array, /) -> tuple[Array, Array]:
         """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,) in [0, duration]."""
-        ...
-
-
-class PlannableJoints(Protocol):
-    """What planning needs of a motion in joint angles; `movements.JointTrajectory` is one."""
-
-    @property
-    def name(self) -> str:
-        """For messages and file names."""
-        ...
-
-    @property
-    def t(self) -> Array:
-        """(n,) times, the first 0 [s]."""
-        ...
-
-    @property
-    def q(self) -> Array:
-        """(n, 6) joint angles [rad]."""
         ...
 
 
@@ -138,6 +132,44 @@ class JointPlan:
         return replace(self, q=_frozen(q), spline=self.spline.shifted(offset), report=report)
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What an arm shall do, checked against all limits.
+
+    Attributes:
+        movement: what the TCP shall do.
+        joints: what the joints shall do.
+        text: the movement as its file says it; empty for one made of samples.
+    """
+
+    movement: Movement
+    joints: JointPlan
+    text: str
+
+    def __repr__(self) -> str:
+        arm = ROBOTS[self.joints.report.robot].title
+        return f"<Plan of {self.movement.name!r} for a {arm}: {self.joints.duration:.2f} s>"
+
+
+def make_plan(motion: Motion, model: RobotModel) -> Plan:
+    """Plan what the TCP, or what the joints shall do; one that may be moved where the arm can do it.
+
+    Args:
+        motion: a movement of the TCP, or joint angles over time.
+        model: nominal arm.
+
+    Raises:
+        PlanningError: the arm cannot do it.
+    """
+    if isinstance(motion, JointTrajectory):
+        joints = plan_joints(motion, model=model)
+        trajectory = SampledTrajectory(joints.t, joints.p)
+        return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
+    if motion.may_be_moved and any(shift := model.description.library_shift):
+        motion = motion.transformed(Similarity(1.0, np.eye(3), np.array(shift)))
+    return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), motion.text)
+
+
 def plan_movement(
     movement: PlannableMovement,
     *,
@@ -179,7 +211,7 @@ def plan_movement(
 
 
 def plan_joints(
-    trajectory: PlannableJoints,
+    trajectory: JointTrajectory,
     *,
     model: RobotModel,
     dt: float = _DEFAULT_DT,

@@ -33,12 +33,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pc_client.analysis.run import MeasuredRun
-from pc_client.control.loop_model import SAMPLING_TIME
+from pc_client.control.loop import SAMPLING_TIME
 from pc_client.errors import ClientError
-from pc_client.movements.files import save_movement
-from pc_client.movements.generate import generate_movement
+from pc_client.movements.generate import GENERATORS, generate_movement
 from pc_client.movements.movement import Movement
-from pc_client.movements.twins import GENERATORS
 from pc_client.results.sheet import BLUE, REFERENCE_GREY, Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.tables import Column, finite, to_markdown, to_rich
 from pc_client.studies.likeness import (
@@ -108,7 +106,7 @@ def save_sets(sets: Sequence[MovementSet], folder: Path) -> None:
         raise ClientError(f"cannot use the folder {folder}: {error.strerror or error}") from error
     for movements in sets:
         for movement in movements.values():
-            save_movement(movement, folder / f"{movement.name}.toml")
+            movement.save(folder / f"{movement.name}.toml")
 
 
 #: Frequency (Hz) at which the filter halves an amplitude. One number for all movements and robots.

@@ -30,8 +30,9 @@ from pc_client.control.controller import Controller
 from pc_client.errors import ClientError, MovementError, RecordingError, one_line
 from pc_client.experiment.experiment import _refuse_to_lose
 from pc_client.files import FILE_KINDS, MOST_BYTES, as_file_name, is_file_name
-from pc_client.kinematics.cell_file import load_cell
-from pc_client.movements.files import LIBRARY_FOLDER, load_movement
+from pc_client.kinematics.cell import load_cell
+from pc_client.movements.library_sets import LIBRARY_FOLDER
+from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import row_topics, schema_text
 from pc_client.studies.extraction.pen import MOST_SAMPLES, contents, parse_pen, pen_sources

@@ -31,7 +31,7 @@ from pc_client.errors import DriverError, one_line
 from pc_client.experiment.identification import identify
 from pc_client.experiment.preflight import model_of, preflight, refusal
 from pc_client.kinematics.cell import NO_CELL
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.messages import TextMessage, encode_message
 from protocol.realtime.layout import layout_for_version

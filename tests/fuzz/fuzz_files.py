@@ -18,8 +18,9 @@ from urp_samples import SAMPLES as NODES
 from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
 from pc_client.errors import ClientError
-from pc_client.kinematics.cell_file import load_cell
-from pc_client.movements.files import LIBRARY_FOLDER, load_movement
+from pc_client.kinematics.cell import load_cell
+from pc_client.movements.library_sets import LIBRARY_FOLDER
+from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.studies.extraction.pen import contents, parse_pen, pen_sources
 from pc_client.studies.sweep.config import read_config

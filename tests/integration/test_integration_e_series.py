@@ -10,7 +10,7 @@ from pc_client.analysis.run import Run, analyse_run
 from pc_client.analysis.track import speed
 from pc_client.driver.report import probe
 from pc_client.driver.transport import TcpNetwork
-from pc_client.movements.files import load_movement
+from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
 

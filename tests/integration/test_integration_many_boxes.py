@@ -28,7 +28,7 @@ from pc_client.control.controller import APPROACH
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.driver.session import UrDriver
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.planning.approach import JointLines
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import BoxRack, ControlBox

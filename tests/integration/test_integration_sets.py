@@ -6,7 +6,7 @@ from statistics import fmean
 import pytest
 from integration_support import at
 
-from pc_client.movements import library_names
+from pc_client.movements.library_sets import library_names
 
 pytestmark = [pytest.mark.usefixtures("without_page"), pytest.mark.timeout(360)]  # on a busy machine
 

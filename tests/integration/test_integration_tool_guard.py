@@ -7,14 +7,14 @@ import pytest
 
 import pc_client as ur
 from pc_client.control.controller import CONTROLLERS
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.loop import LoopModel
 from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import guarded
 from pc_client.experiment.experiment import load_movements, prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.recording.recording import load_recording
 from protocol.ur_types import SafetyMode
 

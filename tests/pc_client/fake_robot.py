@@ -13,8 +13,8 @@ from types import SimpleNamespace
 
 from pc_client.driver.transport import PortTakenError
 from pc_client.errors import DriverError
-from pc_client.kinematics.forward import tcp_pose
-from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import robot_model, tcp_pose
 from protocol.pose import T_to_pose, pose_trans
 from protocol.primary.layout import CartesianInfo, ConfigurationData, RobotModeData
 from protocol.primary.messages import (

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from pc_client.control.controller import CONTROLLERS
 from pc_client.errors import GainMarginError
-from pc_client.movements.files import library_path
+from pc_client.movements.library_sets import library_path
 from pc_client.studies.sweep.case import Case, MovementFile, Outcome, SimulatedArm, failed
 from pc_client.studies.sweep.store import ResultStore
 

@@ -18,10 +18,9 @@ from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatab
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.table import build_table
 from pc_client.analysis.track import speed, track_of
-from pc_client.control.loop_model import LoopModel, velocity_response
+from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.errors import RecordingError
-from pc_client.kinematics.forward import tcp_positions
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model, tcp_positions
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase

@@ -15,8 +15,8 @@ from pc_client.errors import PlanningError
 from pc_client.experiment.experiment import prepare_experiment
 from pc_client.kinematics.cell import NO_CELL, Cell, Solid, Tool, Wall
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.files import load_movement
+from pc_client.kinematics.model import robot_model
+from pc_client.movements.movement import load_movement
 from pc_client.planning.approach import approach_text, plan_approach, plan_text
 from pc_client.planning.plan import plan_movement
 

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pc_client.errors import CellError
-from pc_client.kinematics.cell import NO_CELL, Solid, Wall
-from pc_client.kinematics.cell_file import MOST_BODIES, load_cell, parse_cell
+from pc_client.kinematics.cell import MOST_BODIES, NO_CELL, Solid, Wall, load_cell, parse_cell
 from pc_client.movements.movement_file import toml_value
 
 SIZES = {"boxes": 3, "cylinders": 2, "spheres": 1, "capsules": 2}

@@ -20,9 +20,9 @@ import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli
 from pc_client.errors import ClientError
-from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.files import load_movement
-from pc_client.movements.geometry import WORKING_BOXES
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import robot_model
+from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 
 LETTER = Path(__file__).parents[2] / "examples" / "drawings" / "letter_i.txt"
@@ -196,6 +196,6 @@ def test_a_drawing_is_placed_in_the_box_of_the_arm_that_answers(robot, file, tmp
     assert cli.run(["draw", str(file), "--robot", "x", "--out", str(tmp_path / "o"), "--size", "max"]) == 1
     (movement,) = drawings
     p = movement.sample(np.linspace(0.0, movement.duration, 500)).p
-    box = WORKING_BOXES["ur10"]
+    box = ROBOTS["ur10"].working_box
     assert box.contains(p, 1e-3)
     assert np.isclose(np.ptp(p, axis=0) / box.size, 1.0, atol=0.02).any()

@@ -6,8 +6,8 @@ from closed_form_ik import DH, closed_form_ik, dh_pose, frames, wrap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client.kinematics.forward import measure_singularity, tcp_jacobian, tcp_pose, tcp_positions
-from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import measure_singularity, robot_model, tcp_jacobian, tcp_pose, tcp_positions
 
 ANGLES = st.lists(st.floats(-2 * np.pi, 2 * np.pi), min_size=6, max_size=6).map(np.array)
 UR3 = robot_model("ur3")

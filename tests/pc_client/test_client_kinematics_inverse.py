@@ -5,9 +5,14 @@ import pytest
 from closed_form_ik import DH, branch_error, closed_form_ik, dh_pose
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.forward import measure_singularity, tcp_jacobian
-from pc_client.kinematics.inverse import nearest_posture, solve_ik
-from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import (
+    measure_singularity,
+    nearest_posture,
+    robot_model,
+    solve_ik,
+    tcp_jacobian,
+)
 
 UR3 = robot_model("ur3")
 

@@ -10,18 +10,16 @@ import pytest
 from closed_form_ik import DH
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.clearance import clearance_model, load_hulls
-from pc_client.kinematics.dh_arm import DhArm, link_hulls, urdf_text
-from pc_client.kinematics.forward import tcp_jacobian, tcp_pose
-from pc_client.kinematics.inverse import solve_ik
-from pc_client.kinematics.robot_model import (
+from pc_client.kinematics.arms import (
     ROBOTS,
     SHARE_VARIABLE,
+    DhArm,
     find_robot_file,
     find_share_folder,
-    robot_model,
+    urdf_text,
 )
-from pc_client.movements.geometry import WORKING_BOXES
+from pc_client.kinematics.clearance import clearance_model, link_hulls, load_hulls
+from pc_client.kinematics.model import robot_model, solve_ik, tcp_jacobian, tcp_pose
 from pc_client.planning.joint_path import fixed_tcp_rotation
 
 UR3 = robot_model("ur3")
@@ -36,7 +34,7 @@ def test_speeds_can_be_stopped_in_time_and_limits_are_not_the_urdfs():
 
 @pytest.mark.parametrize("name", sorted(ROBOTS))
 def test_in_its_working_box_an_arm_does_350_mm_a_second_in_every_direction(name):
-    model, box = robot_model(name), WORKING_BOXES[name]
+    model, box = robot_model(name), ROBOTS[name].working_box
     corners = list(product(*zip(box.low, box.high, strict=True)))
     inside = np.random.default_rng(3).uniform(box.low, box.high, (60, 3))
     hulls, T = clearance_model(model), np.eye(4)
@@ -55,10 +53,6 @@ def test_in_its_working_box_an_arm_does_350_mm_a_second_in_every_direction(name)
         clearance = hulls.along(q)
         assert clearance.own.least[0] > 0.01
         assert clearance.floor.least[0] > 0.03
-
-
-def test_every_arm_has_a_working_box():
-    assert WORKING_BOXES.keys() == ROBOTS.keys()
 
 
 def test_the_large_joints_of_large_arms_accelerate_less():

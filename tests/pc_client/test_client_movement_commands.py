@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from pc_client import cli
-from pc_client.movements import library_names, load_movement
-from pc_client.movements.twins import GENERATORS
+from pc_client.movements.generate import GENERATORS
+from pc_client.movements.library_sets import library_names
+from pc_client.movements.movement import load_movement
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from planning_paths import INSIDE_THE_BOX, StraightStrokes
 
 from pc_client.errors import PlanningError
+from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.geometry import WORKING_BOXES
+from pc_client.kinematics.model import robot_model
 from pc_client.planning.approach import _raised, approach_text, plan_approach
 from pc_client.planning.plan import plan_movement
 
@@ -164,7 +164,7 @@ def test_five_joints_are_not_an_arm():
 @pytest.mark.parametrize(("name", "reach"), [("ur3", 0.5), ("ur5", 0.85), ("ur10", 1.3)])
 def test_during_the_approach_the_flange_of_any_arm_is_slow(name, reach):
     model = robot_model(name)
-    centre = WORKING_BOXES[name].centre
+    centre = ROBOTS[name].working_box.centre
     plan = plan_movement(StraightStrokes([centre, centre + np.array((0.0, 0.1, 0.0))], 2.0), model=model)
     approach = plan_approach(plan, HOME, model=model)
     assert approach.v * reach == pytest.approx(0.25)

@@ -8,7 +8,8 @@ from closed_form_ik import dh_pose
 from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.robot_model import JointLimits, RobotModel, robot_model
+from pc_client.kinematics.arms import JointLimits
+from pc_client.kinematics.model import RobotModel, robot_model
 from pc_client.planning.approach import plan_text
 from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import plan_movement
@@ -212,7 +213,7 @@ def test_the_plan_in_words_holds_what_the_arm_will_do():
 @pytest.mark.parametrize("name", ["ur5", "ur10"])
 def test_the_larger_arms_plan_the_same_kind_of_movement(name):
     model = robot_model(name)
-    from pc_client.kinematics.forward import tcp_pose
+    from pc_client.kinematics.model import tcp_pose
 
     centre = tcp_pose(model, model.description.q_branch)[:3, 3]
     plan = plan_movement(Arc(centre, 0.08, duration=4.0), model=model)

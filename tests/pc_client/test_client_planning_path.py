@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.planning.joint_path import fixed_tcp_rotation, rotation_from_rpy
 from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import plan_movement

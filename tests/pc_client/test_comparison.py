@@ -17,8 +17,8 @@ import pc_client.driver.session as ur_driver_module
 import pc_client.driver.transport as transport
 from pc_client import cli
 from pc_client.errors import ClientError
-from pc_client.movements import load_movement
-from pc_client.movements.twins import GENERATORS
+from pc_client.movements.generate import GENERATORS
+from pc_client.movements.movement import load_movement
 from pc_client.results.matplotlib_figures import draw, svg_text
 from pc_client.studies.comparison import (
     COLUMNS,

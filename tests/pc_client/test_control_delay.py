@@ -8,8 +8,7 @@ from control_loop import PERIOD, DelayedArm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client.control.delay import estimate_delay
-from pc_client.control.excitation import BRISK_PULSE, DISPLACEMENT, PULSE, Excitation
+from pc_client.control.identification import BRISK_PULSE, DISPLACEMENT, PULSE, Excitation, estimate_delay
 from pc_client.control.reference import ReferenceTable
 from pc_client.errors import DriverError
 

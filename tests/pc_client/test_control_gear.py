@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from control_loop import PERIOD
 
-from pc_client.control.excitation import Excitation
-from pc_client.control.gear import GearModel, GearObserver, MotorReference
-from pc_client.control.gear_waves import LARGEST_SLOPE, ORDERS, find_waves
-from pc_client.control.loop_model import LoopModel, velocity_response
+from pc_client.control.gear import LARGEST_SLOPE, ORDERS, GearModel, GearObserver, MotorReference, find_waves
+from pc_client.control.identification import Excitation
+from pc_client.control.loop import LoopModel, velocity_response
 
 LOOP = LoopModel(0.022, 0.010, 0.0, 0.0)
 TURNS = np.array([101.0, 80.0, 120.0, 50.0, 101.0, 160.0])  # of each motor in a turn of its joint

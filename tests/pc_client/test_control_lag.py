@@ -8,9 +8,8 @@ from control_loop import PERIOD, DelayedArm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client.control.excitation import BRISK_PULSE, Excitation
-from pc_client.control.lag import identify_loop
-from pc_client.control.loop_model import LoopModel, frequency_response, lagged_displacement, velocity_response
+from pc_client.control.identification import BRISK_PULSE, Excitation, identify_loop
+from pc_client.control.loop import LoopModel, frequency_response, lagged_displacement, velocity_response
 from pc_client.control.reference import ReferenceTable
 from pc_client.errors import DriverError
 

@@ -8,10 +8,16 @@ from control_loop import PERIOD, DelayedArm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client.control.learning import LearningBounds, RunSignals, bounded, learn
-from pc_client.control.learning_filter import LearningFilter, design_filter, noise_share_below
-from pc_client.control.loop_model import LoopModel, frequency_response
-from pc_client.control.stability import sensitivity
+from pc_client.control.learning import (
+    LearningBounds,
+    LearningFilter,
+    RunSignals,
+    bounded,
+    design_filter,
+    learn,
+    noise_share_below,
+)
+from pc_client.control.loop import LoopModel, frequency_response, sensitivity
 
 LOOP = LoopModel(0.022, 0.010, 0.002, 0.0)
 GAINS = {"learning_gain": 0.8, "gain_p": 5.0, "gain_i": 3.0}

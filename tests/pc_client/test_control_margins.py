@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from pc_client.control.controller import CONTROLLERS
-from pc_client.control.loop_model import LoopModel, velocity_response
-from pc_client.control.pi_feedforward import PiState, step_pi
-from pc_client.control.stability import LEAST_GAIN_MARGIN, loop_margins, sensitivity
+from pc_client.control.loop import LEAST_GAIN_MARGIN, LoopModel, loop_margins, sensitivity, velocity_response
+from pc_client.control.tracker import PiState, step_pi
 
 BEST = CONTROLLERS["best"]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pc_client.control.controller import CONTROLLERS
-from pc_client.control.pi_feedforward import PiState, step_pi
+from pc_client.control.tracker import PiState, step_pi
 
 PLAIN = replace(
     CONTROLLERS["paper"], gain_p=10.0, gain_i=5.0, slew_limit=1e9, integral_limit=1.0, speed_share=1.0

@@ -10,12 +10,11 @@ from control_loop import PERIOD, Ramp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pc_client.control.excitation import Excitation
+from pc_client.control.identification import Excitation
 from pc_client.control.reference import ReferenceTable
-from pc_client.control.tool_guard import AHEAD, BEHIND, ToolGuard
+from pc_client.control.tracker import AHEAD, BEHIND, ToolGuard
 from pc_client.errors import DriverError
-from pc_client.kinematics.forward import tcp_jacobian
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model, tcp_jacobian
 
 UR3 = robot_model("ur3")
 POSTURE = np.array([0.4, -1.77, -2.1, -0.1, 1.3, 1.86])

@@ -12,7 +12,7 @@ from pc_client.control.controller import CONTROLLERS
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker
 from pc_client.errors import DriverError
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.recording.rows import Phase
 

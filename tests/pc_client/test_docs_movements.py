@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pc_client.movements import describe, library_names, load_movement, robotic_twin
-from pc_client.movements.description import snr_of_delay
+from pc_client.movements.description import describe, snr_of_delay
+from pc_client.movements.generate import GENERATORS, uniform_twin
+from pc_client.movements.library_sets import library_names
 from pc_client.movements.lognormal import FULL_COVERAGE, Lognormal, sigma_for_k
-from pc_client.movements.twins import GENERATORS
+from pc_client.movements.movement import load_movement
 from pc_client.planning.plan import plan_movement
 
 PAGE = (Path(__file__).parents[2] / "docs" / "movements.md").read_text(encoding="utf-8")
@@ -77,7 +78,7 @@ def test_k_decides_skewness_and_kurtosis() -> None:
 def test_what_corners_cost(label: str, setback: float) -> None:
     ((_, acceleration, joint, missed, snr),) = rows(label)
     twins = [
-        robotic_twin(load_movement(name), "twin", "blend" if setback else "stop", setback)
+        uniform_twin(load_movement(name), "twin", "blend" if setback else "stop", setback)
         for name in library_names("paper")[5:]
     ]
     assert float(acceleration.split()[0]) == pytest.approx(

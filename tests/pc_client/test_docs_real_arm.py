@@ -25,8 +25,8 @@ from pc_client.driver.watchdog import (
 from pc_client.errors import CellError
 from pc_client.experiment.experiment import experiment_text, load_movements, prepare_experiment
 from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
-from pc_client.kinematics.cell_file import load_cell, parse_cell
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.cell import load_cell, parse_cell
+from pc_client.kinematics.model import robot_model
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.limits import limits_of
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion

@@ -13,13 +13,13 @@ from scipy.special import erf, ndtr
 from test_likeness import REFERENCE
 
 from pc_client.movements.durations import Fitts, Isochrony
+from pc_client.movements.generate import GENERATORS
 from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS
-from pc_client.movements.recipes import ARC_RULES, HAND, LEAD
-from pc_client.movements.robotic import SmoothedSquareWave
-from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke
-from pc_client.movements.twins import GENERATORS
+from pc_client.movements.recipes import ARC_RULES, HAND
+from pc_client.movements.sigma_lognormal import LEAD, SigmaLognormal, Stroke, sinc
+from pc_client.movements.uniform import SmoothedSquareWave
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED
 from pc_client.studies.comparison import COLUMNS, EXECUTED_COLUMNS, build_comparison, make_sets
 
@@ -167,7 +167,7 @@ def check_figures() -> dict[tuple[str, str], float]:
             (case, "mu"): lognormal.mu,
             (case, "share of D in the window"): float(lognormal.evaluate(0.1).done),
         }
-    end = PlanarStroke(b, 0.2, 0.3, 1.5).evaluate(50.0).p[0]
+    end = 0.2 * float(sinc(0.6)) * np.array([math.cos(0.9), math.sin(0.9)])
     start, goal = (0.25, -0.1, 0.2), (0.35, 0.1, 0.3)
     return figures | {
         ("E", "end in the plane, x"): float(end[0]),

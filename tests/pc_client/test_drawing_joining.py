@@ -10,9 +10,9 @@ import pytest
 from drawing_samples import one_part, two_parts_and_a_dot
 
 from pc_client.errors import MovementError, PlanningError
-from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.files import load_movement, save_movement
-from pc_client.movements.geometry import Box
+from pc_client.kinematics.arms import Box
+from pc_client.kinematics.model import robot_model
+from pc_client.movements.movement import load_movement
 from pc_client.planning.plan import plan_movement
 from pc_client.studies.drawing.drawing import make_drawing
 from pc_client.studies.drawing.joining import (
@@ -185,7 +185,7 @@ def test_what_is_refused_at_any_speed_is_refused(large):
 
 def test_the_movement_is_one_file_that_runs_again(large, tmp_path):
     path = tmp_path / "large.toml"
-    save_movement(large.movement, path)
+    large.movement.save(path)
     loaded = load_movement(path)
     t = np.linspace(0.0, large.movement.duration, 300)
     np.testing.assert_allclose(loaded.sample(t).p, large.movement.sample(t).p, atol=1e-9)

@@ -15,7 +15,7 @@ from page_support import check_needs_nothing
 from recording_samples import provenance
 
 from pc_client.errors import RecordingError
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.results.matplotlib_figures import draw, svg_text
 from pc_client.results.tables import cells
 from pc_client.studies.drawing.drawing import make_drawing

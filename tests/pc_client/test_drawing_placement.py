@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import UR3_BOX
+from pc_client.kinematics.arms import UR3_BOX
 from pc_client.studies.drawing.drawing import spatial
 from pc_client.studies.drawing.placement import (
     PLANES,

@@ -15,7 +15,7 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import check_command
 from pc_client.errors import ClientError, DriverError, RobotStoppedError
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.recording.rows import Phase
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from protocol.velocity_stream import VelocityMode

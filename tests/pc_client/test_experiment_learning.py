@@ -12,8 +12,8 @@ from fake_robot import PERIOD, FakeRobot
 
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.gear import GearModel
-from pc_client.control.learning_filter import design_filter
-from pc_client.control.loop_model import LoopModel
+from pc_client.control.learning import design_filter
+from pc_client.control.loop import LoopModel
 from pc_client.control.reference import ReferenceTable
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport

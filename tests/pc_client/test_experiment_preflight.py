@@ -17,7 +17,7 @@ from pc_client.driver.watchdog import conditions_text
 from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
 from pc_client.kinematics.cell import NO_CELL
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.primary.messages import encode_message, version_message
 from protocol.primary.packages import encode_state

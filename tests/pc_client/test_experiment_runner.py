@@ -15,8 +15,7 @@ from recording_samples import SIGNALS, provenance
 
 from pc_client.analysis.run import Run
 from pc_client.control.controller import CONTROLLERS
-from pc_client.control.loop_model import LoopModel
-from pc_client.control.stability import loop_margins
+from pc_client.control.loop import LoopModel, loop_margins
 from pc_client.driver.session import UrDriver
 from pc_client.errors import (
     ClientError,
@@ -37,7 +36,7 @@ from pc_client.experiment.experiment import (
 from pc_client.experiment.identification import identify
 from pc_client.experiment.runner import ExperimentRunner, run_approach
 from pc_client.kinematics.cell import Cell, Wall
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from pc_client.planning.approach import Approach
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording

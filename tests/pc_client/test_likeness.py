@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pc_client.errors import ClientError
 from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
-from pc_client.movements.robotic import SmoothedSquareWave
+from pc_client.movements.uniform import SmoothedSquareWave
 from pc_client.studies.likeness import (
     between_peaks,
     curvature_of,

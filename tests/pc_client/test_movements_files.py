@@ -8,23 +8,14 @@ import numpy as np
 import pytest
 
 from pc_client.errors import MovementError
-from pc_client.movements import (
-    Movement,
-    describe,
-    export_samples,
-    generate_library,
-    generate_movement,
-    library_names,
-    load_movement,
-    save_movement,
-)
-from pc_client.movements.files import LIBRARY_FOLDER, LIBRARY_SETS
-from pc_client.movements.generate import write_library
+from pc_client.movements.description import describe
+from pc_client.movements.generate import generate_library, generate_movement, write_library
+from pc_client.movements.library_sets import LIBRARY_FOLDER, LIBRARY_SETS, library_names
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
-from pc_client.movements.movement_file import movement_text
-from pc_client.movements.robotic import RoboticTrajectory
+from pc_client.movements.movement import Movement, load_movement
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
+from pc_client.movements.uniform import Uniform
 
 NAMES = [
     f"{kind}_{number}" for kind in ("uniform", "lognorm") for number in ("4_1", "4_2", "5_1", "5_2", "5_3")
@@ -65,7 +56,7 @@ def test_another_seed_gives_other_movements() -> None:
 @pytest.mark.parametrize("name", library_names("paper") + library_names("arcs"))
 def test_library_movement_survives_saving(name: str, tmp_path: Path) -> None:
     movement = load_movement(name)
-    save_movement(movement, tmp_path / "copy.toml")
+    movement.save(tmp_path / "copy.toml")
     copy = load_movement(tmp_path / "copy.toml")
     assert_equal(copy, movement)
     assert copy.name == name.replace("/", "_")
@@ -88,10 +79,10 @@ def test_every_timing_and_corner_survives_saving(tmp_path: Path) -> None:
     human = Movement(
         "odd name, ü", trajectory, np.array([1.0, 1.0, 2.0]), {"a key": 'x "y"', "n": 3, "f": 0.1}
     )
-    trajectory = RoboticTrajectory(points, human.stroke_durations, (0.15,), "blend", 0.02)
+    trajectory = Uniform(points, human.stroke_durations, (0.15,), "blend", 0.02)
     blended = Movement("blended", trajectory, human.stroke_durations)
     for movement in (human, blended):
-        save_movement(movement, tmp_path / "copy.toml")
+        movement.save(tmp_path / "copy.toml")
         copy = load_movement(tmp_path / "copy.toml")
         assert copy.name == movement.name
         assert dict(copy.provenance) == dict(movement.provenance)
@@ -100,9 +91,9 @@ def test_every_timing_and_corner_survives_saving(tmp_path: Path) -> None:
 
 def test_samples_survive_saving(tmp_path: Path) -> None:
     movement = load_movement("lognorm_4_1")
-    columns = export_samples(movement, 0.01)
-    trajectory = SampledTrajectory(columns.t, np.column_stack(columns[1:]))
-    save_movement(Movement("mine", trajectory, np.array([trajectory.duration])), tmp_path / "mine.csv")
+    at = np.linspace(0.0, movement.duration, round(movement.duration / 0.01) + 1)
+    trajectory = SampledTrajectory(at, movement.sample(at).p)
+    Movement("mine", trajectory, np.array([trajectory.duration])).save(tmp_path / "mine.csv")
     copy = load_movement(tmp_path / "mine.csv")
     assert (copy.kind, copy.name) == ("samples", "mine")
     np.testing.assert_array_equal(copy.trajectory.points, trajectory.points)
@@ -147,8 +138,8 @@ def test_bad_samples_are_named_by_line(text: str, complaint: str, tmp_path: Path
     assert "\n" not in str(caught.value)
 
 
-HUMAN = movement_text(load_movement("arcs/lognorm_4_1"))
-ROBOT = movement_text(load_movement("arcs/uniform_4_1"))
+HUMAN = load_movement("arcs/lognorm_4_1").text
+ROBOT = load_movement("arcs/uniform_4_1").text
 
 
 @pytest.mark.parametrize(
@@ -260,23 +251,9 @@ def test_folders_binaries_and_wrong_suffixes(tmp_path: Path) -> None:
             load_movement(tmp_path / name)
     movement = load_movement("uniform_5_1")
     with pytest.raises(MovementError, match=r"saved as a \.toml file"):
-        save_movement(movement, tmp_path / "movement.csv")
+        movement.save(tmp_path / "movement.csv")
     with pytest.raises(MovementError, match="cannot be written"):
-        save_movement(movement, tmp_path / "no" / "movement.toml")
-
-
-def test_export_has_both_ends() -> None:
-    movement = load_movement("lognorm_4_1")
-    columns = export_samples(movement, 0.008)
-    assert columns.t[0] == 0.0
-    assert columns.t[-1] == movement.duration
-    assert np.diff(columns.t).min() > 0.0
-    assert np.diff(columns.t).max() < 0.008 + 1e-12
-    np.testing.assert_array_equal(np.column_stack(columns[1:]), movement.sample(columns.t).p)
-    assert len(export_samples(movement, movement.duration / 7.0).t) == 8
-    for dt in (0.0, -1.0, np.nan, 1e-12):
-        with pytest.raises(MovementError):
-            export_samples(movement, dt)
+        movement.save(tmp_path / "no" / "movement.toml")
 
 
 def test_rest_outside_of_the_movement() -> None:

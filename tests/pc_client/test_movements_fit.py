@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import MovementError
-from pc_client.movements import Movement, fit_movement, load_movement
-from pc_client.movements.geometry import UR3_BOX, Box, Similarity
+from pc_client.kinematics.arms import UR3_BOX, Box
+from pc_client.movements.movement import Movement, load_movement
+from pc_client.movements.recipes import fit_movement
 from pc_client.movements.samples import SampledTrajectory
+from pc_client.movements.trajectory import Similarity
 
 T = np.linspace(0.0, 1.0, 1501)
 

@@ -11,12 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pc_client.errors import MovementError
-from pc_client.movements import Movement, generate_movement, load_movement, save_movement
-from pc_client.movements.durations import Fitts, Isochrony, chained_windows, leg_lengths, retimed
+from pc_client.movements.durations import Fitts, Isochrony, chained_windows, retimed
+from pc_client.movements.generate import GENERATORS, generate_movement, retimed_twin
 from pc_client.movements.lognormal import FULL_COVERAGE, TwoSidedTiming
-from pc_client.movements.movement_file import movement_text
-from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
-from pc_client.movements.twins import GENERATORS, retimed_twin
+from pc_client.movements.movement import Movement, load_movement
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, leg_lengths
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED, VariabilityRanges, duplicate
 
 HUMAN = load_movement("arcs/lognorm_5_1")
@@ -36,7 +35,7 @@ def test_every_kind_keeps_targets_and_time_and_survives_saving(kind: str, tmp_pa
     ends = made.motion([0.0, made.duration])
     np.testing.assert_allclose(ends.p, made.target_points[[0, -1]], atol=1e-5)
     assert np.linalg.norm(ends.v, axis=1).max() < 1e-4
-    save_movement(made, tmp_path / "made.toml")
+    made.save(tmp_path / "made.toml")
     copy = load_movement(tmp_path / "made.toml")
     assert (copy.name, copy.kind, dict(copy.provenance)) == ("made", made.kind, dict(made.provenance))
     t = np.linspace(0.0, made.duration, 301)
@@ -82,8 +81,8 @@ def test_names_say_kind_points_and_seed() -> None:
     assert generate_movement("power_law", 4, 9, name="mine").provenance["twin"] == "lognorm_4_seed9"
 
 
-JERK = movement_text(generate_movement("minimum_jerk", 4, 1))
-POWER = movement_text(generate_movement("power_law", 4, 1))
+JERK = generate_movement("minimum_jerk", 4, 1).text
+POWER = generate_movement("power_law", 4, 1).text
 
 
 @pytest.mark.parametrize(
@@ -221,7 +220,7 @@ def test_a_duplicate_of_no_share_is_the_movement_itself() -> None:
 
 def test_duplicates_differ_by_seed_and_are_reproducible() -> None:
     one, same, other = (duplicate(HUMAN, seed) for seed in (1, 1, 2))
-    assert movement_text(one) == movement_text(same)
+    assert one.text == same.text
     assert one.name == "arcs_lognorm_5_1_v1"
     assert not np.allclose(one.target_points, other.target_points)
     assert dict(one.provenance)["variation_seed"] == 1

@@ -12,15 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pc_client.errors import MovementError, PlanningError
-from pc_client.experiment.experiment import make_plan
-from pc_client.kinematics.robot_model import ROBOTS, robot_model
-from pc_client.movements import Movement, generate_movement, library_names, load_movement
+from pc_client.kinematics.arms import ROBOTS, UR3_BOX, Box
+from pc_client.kinematics.model import robot_model
 from pc_client.movements.description import snr_of_delay, speed_rms_frequency
-from pc_client.movements.geometry import UR3_BOX, WORKING_BOXES, Box
+from pc_client.movements.generate import generate_movement
+from pc_client.movements.library_sets import library_names
 from pc_client.movements.lognormal import TwoSidedTiming
+from pc_client.movements.movement import Movement, load_movement
 from pc_client.movements.recipes import TargetRules, random_targets
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
-from pc_client.planning.plan import plan_movement
+from pc_client.planning.plan import make_plan, plan_movement
 
 PAPER, ARCS = library_names("paper"), library_names("arcs")
 
@@ -59,7 +60,7 @@ def test_a_ur3_can_do_it(name: str) -> None:
 @pytest.mark.parametrize("arm", [name for name in ROBOTS if name != "ur10"])
 def test_every_other_arm_can_do_one_that_comes_near_the_base(arm: str) -> None:
     planned = make_plan(load_movement("lognorm_4_1"), robot_model(arm)).movement
-    assert WORKING_BOXES[arm].contains(planned.target_points, 0.025)  # a UR5 does it where a UR3 does
+    assert ROBOTS[arm].working_box.contains(planned.target_points, 0.025)  # a UR5 does it where a UR3 does
 
 
 def test_a_movement_of_a_user_stays_where_it_is() -> None:

@@ -19,7 +19,6 @@ from pc_client.movements.lognormal import (
     TwoSidedTiming,
     lead_from_k,
     sigma_for_k,
-    sigma_for_mode_fraction,
 )
 
 CASE_A = Lognormal(0.0, -1.6, 0.25)
@@ -212,8 +211,8 @@ def test_table_of_the_two_sided_construction(row: tuple[float, ...]) -> None:
         (0.35, 0.130979),
     ],
 )
-def test_sigma_from_the_mode_fraction(fraction: float, sigma: float) -> None:
-    assert sigma_for_mode_fraction(fraction) == pytest.approx(sigma, abs=6e-7)
+def test_the_peak_of_a_two_sided_window(fraction: float, sigma: float) -> None:
+    assert TwoSidedTiming(0.0, 1.0, sigma).mode_fraction == pytest.approx(fraction, abs=6e-7)
 
 
 def test_window_ends_carry_the_tails_asked_for() -> None:
@@ -282,7 +281,6 @@ def test_power_as_a_signal_of_known_frequency() -> None:
         lambda: TwoSidedTiming(0.0, -1.0, 0.1),
         lambda: TwoSidedTiming(0.0, 1.0, math.inf),
         lambda: TwoSidedTiming(0.0, 1.0, 0.1, 0.0),
-        lambda: sigma_for_mode_fraction(0.5),
     ],
 )
 def test_nonsense_is_refused(make: object) -> None:

@@ -12,8 +12,8 @@ from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity
 from pc_client.movements.minimum_jerk import MinimumJerk, stroke_shape
+from pc_client.movements.trajectory import Similarity
 
 POINTS = np.array([[0.30, 0.0, 0.2], [0.40, 0.1, 0.3], [0.30, 0.15, 0.2], [0.35, -0.05, 0.25]])
 DURATIONS = np.array([1.7, 1.3, 2.2])

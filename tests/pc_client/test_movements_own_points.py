@@ -11,16 +11,15 @@ from hypothesis import strategies as st
 
 from pc_client import Movement, cli
 from pc_client.errors import MovementError
-from pc_client.movements import load_movement, load_targets, through
-from pc_client.movements.own_points import Style, default_durations
-from pc_client.movements.recipes import TOP_SPEED
+from pc_client.movements.durations import TOP_SPEED, default_durations
+from pc_client.movements.movement import Style, load_movement, load_targets
 
 POINTS = [[0.3, -0.1, 0.2], [0.35, 0.0, 0.25], [0.3, 0.1, 0.2]]
 
 
 @pytest.mark.parametrize(("style", "kind"), [("human", "lognormal"), ("robot", "uniform")])
 def test_goes_through_the_points_in_the_time_given(style: str, kind: str) -> None:
-    movement = through(POINTS, style, [2.0, 1.5], name="mine")
+    movement = Movement.through(POINTS, style, [2.0, 1.5], name="mine")
     assert (movement.name, movement.kind, movement.duration) == ("mine", kind, 3.5)
     np.testing.assert_array_equal(movement.stroke_durations, [2.0, 1.5])
     np.testing.assert_allclose(movement.sample([0.0, 2.0, 3.5]).p, POINTS, atol=1e-5)
@@ -28,7 +27,7 @@ def test_goes_through_the_points_in_the_time_given(style: str, kind: str) -> Non
 
 
 def test_both_styles_have_the_same_strokes_by_default() -> None:
-    human, robot = through(POINTS), through(POINTS, "robot")
+    human, robot = Movement.through(POINTS), Movement.through(POINTS, "robot")
     np.testing.assert_array_equal(human.stroke_durations, robot.stroke_durations)
     np.testing.assert_array_equal(human.stroke_durations, default_durations(POINTS))
 
@@ -41,7 +40,7 @@ def test_default_durations_keep_the_top_speed_and_are_never_short(
     legs = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if legs.min() < 1e-3:
         return
-    movement = through(points)
+    movement = Movement.through(points)
     assert movement.stroke_durations.min() >= 1.0
     top = movement.speed(np.linspace(0.0, movement.duration, 8001)).max()
     assert top <= TOP_SPEED * (1.0 + 1e-3)
@@ -53,7 +52,7 @@ def test_default_durations_keep_the_top_speed_and_are_never_short(
 
 
 def test_corners_of_a_robot_are_blended_when_asked() -> None:
-    blended = through(POINTS, "robot", corners="blend", setback=0.02)
+    blended = Movement.through(POINTS, "robot", corners="blend", setback=0.02)
     assert blended.speed(blended.stroke_durations[0]).min() > 0.03
     assert 1e-3 < np.linalg.norm(blended.sample(blended.stroke_durations[0]).p[0] - POINTS[1]) < 0.02
 
@@ -83,14 +82,14 @@ def test_corners_of_a_robot_are_blended_when_asked() -> None:
 )
 def test_nonsense_is_refused_in_one_line(arguments: tuple[object, ...], complaint: str) -> None:
     with pytest.raises(MovementError) as caught:
-        through(*arguments)
+        Movement.through(*arguments)
     assert complaint in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_blends_are_for_robots() -> None:
     with pytest.raises(MovementError, match='corners go with style "robot"'):
-        through(POINTS, corners="blend")
+        Movement.through(POINTS, corners="blend")
 
 
 @pytest.mark.parametrize(
@@ -194,7 +193,10 @@ def test_the_command_does_what_the_call_does_and_checks_it_on_the_arm(
     table.write_text("".join(f"{x},{y},{z}\n" for x, y, z in POINTS))
     assert cli.run(["movements", "new", "--targets", str(table), "--out", str(out), *options]) == 0
     assert "top joint speed" in capsys.readouterr().out
-    made, wanted = load_movement(out), through(POINTS, style, durations, name="mine", corners=corners)
+    made, wanted = (
+        load_movement(out),
+        Movement.through(POINTS, style, durations, name="mine", corners=corners),
+    )
     assert (made.name, made.kind) == ("mine", wanted.kind)
     t = np.linspace(0.0, wanted.duration, 201)
     for got, expected in zip(made.motion(t), wanted.motion(t), strict=True):

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from pc_client import JointTrajectory, Movement
 from pc_client.errors import MovementError
-from pc_client.movements.files import load_motion, load_movement, save_movement
-from pc_client.movements.geometry import Similarity
+from pc_client.movements.movement import load_motion, load_movement
+from pc_client.movements.trajectory import Similarity
 
 T = np.linspace(0.0, 2.0, 9)
 POINTS = np.column_stack((0.3 + 0.01 * T, 0.1 * T, 0.3 + 0.0 * T))
@@ -43,7 +43,7 @@ def test_a_file_of_poses_turns_the_tool(tmp_path, header, columns):
 
 def test_poses_are_written_and_read_back(tmp_path):
     movement = Movement.from_samples(T, POINTS, TURNS.as_quat(), name="turn")
-    save_movement(movement, tmp_path / "turn.csv")
+    movement.save(tmp_path / "turn.csv")
     again = load_movement(tmp_path / "turn.csv")
     np.testing.assert_array_equal(again.sample(T).p, movement.sample(T).p)
     np.testing.assert_allclose(again.rotations(T), movement.rotations(T), atol=1e-12)

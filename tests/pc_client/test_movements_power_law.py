@@ -10,8 +10,8 @@ from scipy.integrate import cumulative_simpson
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS, PowerLaw, SmoothPath
+from pc_client.movements.trajectory import Similarity
 from pc_client.studies.likeness import fit_power_law
 
 POINTS = np.array(

@@ -15,26 +15,16 @@ from numpy.typing import NDArray
 
 from pc_client import cli
 from pc_client.errors import MovementError
-from pc_client.movements import (
-    Movement,
-    describe,
-    generate_movement,
-    library_names,
-    load_movement,
-    robotic_twin,
-)
-from pc_client.movements.durations import leg_lengths
-from pc_client.movements.geometry import UR3_BOX
+from pc_client.kinematics.arms import UR3_BOX
+from pc_client.movements.description import describe
+from pc_client.movements.durations import TOP_SPEED
+from pc_client.movements.generate import generate_movement, uniform_twin
+from pc_client.movements.library_sets import library_names
 from pc_client.movements.lognormal import LiteralTiming, sigma_for_k
-from pc_client.movements.recipes import (
-    HAND,
-    LEAD,
-    TOP_SPEED,
-    literal_strokes,
-    random_targets,
-    recipe_movement,
-)
-from pc_client.movements.twins import SETBACK
+from pc_client.movements.movement import Movement, load_movement
+from pc_client.movements.recipes import HAND, random_targets, recipe_movement
+from pc_client.movements.sigma_lognormal import LEAD, leg_lengths, literal_strokes
+from pc_client.movements.uniform import SETBACK
 
 HUMANS = library_names("paper")[5:]
 #: With the seed that each was made by, in order.
@@ -149,8 +139,8 @@ def test_durations_must_go_with_the_points() -> None:
 
 def test_corners_are_stops_or_blends_with_a_stated_setback() -> None:
     human = load_movement("lognorm_4_1")
-    stop, blend = robotic_twin(human, "stop"), robotic_twin(human, "blend", "blend")
-    wide = robotic_twin(human, "wide", "blend", 0.04)
+    stop, blend = uniform_twin(human, "stop"), uniform_twin(human, "blend", "blend")
+    wide = uniform_twin(human, "wide", "blend", 0.04)
     made = generate_movement("uniform", 4, 1, corners="blend")
     passages = np.cumsum(human.stroke_durations)[:-1]
 

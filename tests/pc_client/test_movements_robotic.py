@@ -12,21 +12,21 @@ from scipy.integrate import cumulative_simpson
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity
-from pc_client.movements.robotic import CornerPath, RoboticTrajectory, SmoothedSquareWave
+from pc_client.movements.trajectory import Similarity
+from pc_client.movements.uniform import CornerPath, SmoothedSquareWave, Uniform
 
 POINTS = np.array([[0.30, 0.0, 0.2], [0.40, 0.1, 0.3], [0.30, 0.15, 0.2], [0.35, -0.05, 0.25]])
 DURATIONS = np.array([1.7, 1.3, 2.2])
 TRAJECTORIES = [
-    RoboticTrajectory(POINTS, DURATIONS, (0.2,)),
-    RoboticTrajectory(POINTS, DURATIONS, (0.2, 0.1)),
-    RoboticTrajectory(POINTS, DURATIONS, (0.1, 0.2), "blend", 0.03),
-    RoboticTrajectory(POINTS, DURATIONS, (0.25,), "blend", 0.02),
+    Uniform(POINTS, DURATIONS, (0.2,)),
+    Uniform(POINTS, DURATIONS, (0.2, 0.1)),
+    Uniform(POINTS, DURATIONS, (0.1, 0.2), "blend", 0.03),
+    Uniform(POINTS, DURATIONS, (0.25,), "blend", 0.02),
 ]
 
 
 @pytest.mark.parametrize("trajectory", TRAJECTORIES)
-def test_length_and_time_are_kept(trajectory: RoboticTrajectory) -> None:
+def test_length_and_time_are_kept(trajectory: Uniform) -> None:
     assert trajectory.duration == math.fsum(DURATIONS)
     along = trajectory.wave.evaluate([0.0, trajectory.duration, trajectory.duration + 100.0])
     np.testing.assert_allclose(along.s, [0.0, trajectory.path.length, trajectory.path.length], atol=1e-12)
@@ -35,7 +35,7 @@ def test_length_and_time_are_kept(trajectory: RoboticTrajectory) -> None:
 
 
 @pytest.mark.parametrize("trajectory", TRAJECTORIES[:2])
-def test_stops_are_at_the_targets_at_the_twins_times(trajectory: RoboticTrajectory) -> None:
+def test_stops_are_at_the_targets_at_the_twins_times(trajectory: Uniform) -> None:
     edges = np.concatenate(([0.0], np.cumsum(DURATIONS)))
     at = trajectory.evaluate(edges)
     np.testing.assert_allclose(at.p, POINTS, atol=1e-12)
@@ -46,7 +46,7 @@ def test_stops_are_at_the_targets_at_the_twins_times(trajectory: RoboticTrajecto
 
 
 @pytest.mark.parametrize("trajectory", TRAJECTORIES)
-def test_length_speed_and_acceleration_belong_together(trajectory: RoboticTrajectory) -> None:
+def test_length_speed_and_acceleration_belong_together(trajectory: Uniform) -> None:
     t = np.linspace(0.0, trajectory.duration, 52_001)
     along = trajectory.wave.evaluate(t)
     assert along.v.min() > -1e-12
@@ -55,7 +55,7 @@ def test_length_speed_and_acceleration_belong_together(trajectory: RoboticTrajec
 
 
 @pytest.mark.parametrize("trajectory", TRAJECTORIES)
-def test_velocity_is_the_derivative_of_position(trajectory: RoboticTrajectory) -> None:
+def test_velocity_is_the_derivative_of_position(trajectory: Uniform) -> None:
     t, h = np.linspace(0.0011, trajectory.duration - 0.0011, 2000), 1e-6
     before, at, after = (trajectory.evaluate(t + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((after.p - before.p) / (2 * h), at.v, atol=2e-6)
@@ -156,7 +156,7 @@ def test_straight_corner_needs_no_blend() -> None:
 
 
 @pytest.mark.parametrize("trajectory", TRAJECTORIES)
-def test_similarities_and_time_stretch_commute_with_evaluation(trajectory: RoboticTrajectory) -> None:
+def test_similarities_and_time_stretch_commute_with_evaluation(trajectory: Uniform) -> None:
     similarity = Similarity(
         0.4, Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), np.array([1.0, 2.0, 3.0])
     )
@@ -169,14 +169,14 @@ def test_similarities_and_time_stretch_commute_with_evaluation(trajectory: Robot
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: RoboticTrajectory(POINTS, DURATIONS[:2], (0.2,)),
-        lambda: RoboticTrajectory(POINTS, DURATIONS, ()),
-        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2, 0.0)),
-        lambda: RoboticTrajectory(POINTS, DURATIONS, (1.0, 0.4)),
-        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2,), "stop", 0.01),
-        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2,), "blend"),
-        lambda: RoboticTrajectory(POINTS, DURATIONS, (0.2,), "round", 0.01),
-        lambda: RoboticTrajectory(POINTS, np.array([1.7, math.nan, 2.2]), (0.2,)),
+        lambda: Uniform(POINTS, DURATIONS[:2], (0.2,)),
+        lambda: Uniform(POINTS, DURATIONS, ()),
+        lambda: Uniform(POINTS, DURATIONS, (0.2, 0.0)),
+        lambda: Uniform(POINTS, DURATIONS, (1.0, 0.4)),
+        lambda: Uniform(POINTS, DURATIONS, (0.2,), "stop", 0.01),
+        lambda: Uniform(POINTS, DURATIONS, (0.2,), "blend"),
+        lambda: Uniform(POINTS, DURATIONS, (0.2,), "round", 0.01),
+        lambda: Uniform(POINTS, np.array([1.7, math.nan, 2.2]), (0.2,)),
         lambda: CornerPath(POINTS, -0.1),
         lambda: CornerPath(POINTS[:1]),
         lambda: CornerPath(POINTS[[0, 0, 1]]),

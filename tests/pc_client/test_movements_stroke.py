@@ -12,21 +12,20 @@ from scipy.integrate import cumulative_simpson
 from scipy.spatial.transform import Rotation
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
-from pc_client.movements.sigma_lognormal import PlanarStroke, SigmaLognormal, Stroke, lift_strokes, planar_sum
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, sinc
+from pc_client.movements.trajectory import Similarity
 
 A, B = (0.25, -0.1, 0.2), (0.35, 0.1, 0.3)
 LOGNORMAL = Lognormal(0.1, -1.6, 0.25)
 
 
-def test_case_e_planar_arc() -> None:
-    stroke = PlanarStroke(LOGNORMAL, 0.2, 0.3, 1.5)
-    end = stroke.evaluate(50.0).p[0]
-    assert end == pytest.approx([0.116996, 0.147433], abs=5e-7)
-    assert float(np.hypot(*end)) == pytest.approx(0.188214, abs=5e-7)
-    expected = 0.2 * math.sin(0.6) / 0.6 * np.array([math.cos(0.9), math.sin(0.9)])
-    np.testing.assert_allclose(end, expected, atol=1e-15)
+def flat_arc(length: float, theta_start: float, theta_end: float) -> SigmaLognormal:
+    """A stroke in the plane z = 0 by the variables of the paper: D, and the directions at both ends."""
+    turn, along = theta_end - theta_start, 0.5 * (theta_start + theta_end)
+    end = length * float(sinc(0.5 * turn)) * np.array([math.cos(along), math.sin(along), 0.0])
+    # The reference normal points up, c x up points to the right: the left is at -pi / 2.
+    return SigmaLognormal(np.array([np.zeros(3), end]), (Stroke(LOGNORMAL, turn, -math.pi / 2),), 60.0)
 
 
 def test_case_e_arc_in_space() -> None:
@@ -40,20 +39,22 @@ def test_case_e_arc_in_space() -> None:
     )
 
 
-def test_planar_position_is_the_integral_of_velocity() -> None:
+def test_an_arc_in_the_plane_is_eq_3_and_its_position_the_integral() -> None:
     """Simpson's rule with 1e-4 s, as in the notes: D = .2, sigma = .25, turn 1.2 rad."""
     t = np.arange(0.1, 1.2, 1e-4)
-    motion = PlanarStroke(LOGNORMAL, 0.2, 0.3, 1.5).evaluate(t)
-    integral = cumulative_simpson(motion.v, x=t, axis=0, initial=0.0)
+    lognormal, motion = LOGNORMAL.evaluate(t), flat_arc(0.2, 0.3, 1.5).evaluate(t)
+    phi = 0.3 + 1.2 * lognormal.done
+    wanted = 0.2 * lognormal.rate[:, None] * np.column_stack((np.cos(phi), np.sin(phi), np.zeros_like(phi)))
+    np.testing.assert_allclose(motion.v, wanted, atol=1e-14)
+    integral = cumulative_simpson(wanted, x=t, axis=0, initial=0.0)
     np.testing.assert_allclose(motion.p, integral, atol=1e-11)
 
 
 @pytest.mark.parametrize("arc_angle", [0.0, 1e-300, 1e-12, 1e-9, 1e-4, 1.2, -2.5, 6.0])
 def test_any_bending_is_stable(arc_angle: float) -> None:
     """Against the textbook form where it is exact, against its Taylor series for small bending."""
-    stroke = PlanarStroke(LOGNORMAL, 0.2, 0.3, 0.3 + arc_angle)
     done = LOGNORMAL.evaluate(0.33).done
-    p = stroke.evaluate(0.33).p[0]
+    p = flat_arc(0.2, 0.3, 0.3 + arc_angle).evaluate(0.33).p[0, :2]
     if abs(arc_angle) < 1e-3:
         x, y = 1.0 - (arc_angle * done) ** 2 / 6.0, arc_angle * done / 2.0
     else:
@@ -76,37 +77,6 @@ def test_derivatives_in_space(arc_angle: float) -> None:
     before, at, after = (movement.evaluate(t + shift) for shift in (-h, 0.0, h))
     np.testing.assert_allclose((after.p - before.p) / (2 * h), at.v, atol=1e-8)
     np.testing.assert_allclose((after.v - before.v) / (2 * h), at.a, atol=1e-7)
-
-
-def test_planar_derivatives() -> None:
-    strokes = [
-        PlanarStroke.between((0.0, 0.0), (0.2, 0.1), LOGNORMAL, 0.8),
-        PlanarStroke(Lognormal(0.2, -1.2, 0.2), 0.1, 2.0, 0.5),
-    ]
-    t, h = np.linspace(0.12, 1.0, 300), 1e-6
-    before, at, after = (planar_sum(strokes, t + shift) for shift in (-h, 0.0, h))
-    np.testing.assert_allclose((after.p - before.p) / (2 * h), at.v, atol=1e-8)
-    np.testing.assert_allclose((after.v - before.v) / (2 * h), at.a, atol=1e-6)
-
-
-def test_planar_arcs_are_arcs_in_space_that_lie_flat() -> None:
-    """Two codes for one theory: a left turn in the plane z = 0 has its normal on the left."""
-    points = np.array([[0.0, 0.0, 0.0], [0.2, 0.05, 0.0], [0.1, 0.2, 0.0]])
-    timings = [TwoSidedTiming(0.1, 1.0, 0.15), TwoSidedTiming(0.7, 1.1, 0.2)]
-    arc_angles = [0.8, -0.5]
-    planar = [
-        PlanarStroke.between(a[:2], b[:2], timing, arc_angle)
-        for a, b, timing, arc_angle in zip(points[:-1], points[1:], timings, arc_angles, strict=True)
-    ]
-    # The reference normal points up, c x up points to the right: the left is at -pi / 2.
-    spatial = tuple(
-        Stroke(timing, arc_angle, -math.pi / 2) for timing, arc_angle in zip(timings, arc_angles, strict=True)
-    )
-    t = np.linspace(0.0, 2.0, 100)
-    flat, lifted = planar_sum(planar, t), SigmaLognormal(points, spatial, 2.0).evaluate(t)
-    for two, three in zip(flat, lifted, strict=True):
-        np.testing.assert_allclose(three[:, :2], two, atol=1e-14)
-        np.testing.assert_allclose(three[:, 2], 0.0, atol=1e-14)
 
 
 # Overlap -> corner miss (mm) for sigma .10 and .25, and speed at the junction over the peak.
@@ -140,22 +110,14 @@ def test_table_of_overlaps(
             assert np.linalg.norm(least) / speed.max() == pytest.approx(junctions[index], abs=6e-4)
 
 
-def test_paper_scheme_without_overlap_is_the_polyline_with_the_planar_speed() -> None:
-    planar = [
-        PlanarStroke.between((0.0, 0.0), (0.1, 0.0), TwoSidedTiming(0.0, 1.0, 0.1), 0.5),
-        PlanarStroke.between((0.1, 0.0), (0.1, 0.1), TwoSidedTiming(1.0, 1.0, 0.1), 0.5),
-    ]
+def test_strokes_without_overlap_run_along_the_polyline() -> None:
     points = np.array([A, B, (0.3, 0.05, 0.2)])
-    movement = SigmaLognormal(points, lift_strokes(planar), 2.0)
-    t = np.linspace(0.0, 1.0, 101)
-    p = movement.evaluate(t).p
+    strokes = tuple(Stroke(TwoSidedTiming(begin, 1.0, 0.1)) for begin in (0.0, 1.0))
+    movement = SigmaLognormal(points, strokes, 2.0)
+    p = movement.evaluate(np.linspace(0.0, 1.0, 101)).p
     along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
     off_line = (p - points[0]) - ((p - points[0]) @ along)[:, None] * along
     assert np.abs(off_line).max() < 1e-5  # the two tails of 1.1e-5 D
-    flat_speed = np.linalg.norm(planar_sum(planar, t).v, axis=1) / planar[0].length
-    np.testing.assert_allclose(
-        np.linalg.norm(movement.evaluate(t).v, axis=1) / movement.lengths[0], flat_speed, atol=1e-3
-    )
     np.testing.assert_allclose(movement.evaluate(20.0).p[0], points[-1], atol=1e-15)
 
 
@@ -238,7 +200,6 @@ def test_vertical_chords_have_a_plane_too() -> None:
         lambda: SigmaLognormal(np.array([A, A]), (Stroke(LOGNORMAL),), 1.0),
         lambda: SigmaLognormal(np.array([A, B]), (), 1.0),
         lambda: SigmaLognormal(np.array([A[:2], B[:2]]), (Stroke(LOGNORMAL),), 1.0),
-        lambda: planar_sum([], 0.0),
         lambda: Similarity(0.0, np.eye(3), np.zeros(3)),
         lambda: Similarity(1.0, -np.eye(3), np.zeros(3)),
         lambda: Similarity(1.0, 2 * np.eye(3), np.zeros(3)),

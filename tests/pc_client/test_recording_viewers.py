@@ -19,8 +19,8 @@ from rosbags.interfaces import QosDurability
 from scipy.spatial.transform import Rotation
 
 from pc_client.kinematics.arm_tree import arm_tree
-from pc_client.kinematics.forward import tcp_pose
-from pc_client.kinematics.robot_model import ROBOTS, robot_model
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import robot_model, tcp_pose
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase

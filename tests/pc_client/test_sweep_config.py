@@ -18,7 +18,7 @@ from sweep_samples import PREVIEW, case, invented, table_with, write
 from pc_client import cli
 from pc_client.control.controller import CONTROLLERS
 from pc_client.errors import ClientError
-from pc_client.movements.files import library_path
+from pc_client.movements.library_sets import library_path
 from pc_client.studies.sweep.case import Case, GivenRobot, SimulatedArm, all_cases, failed
 from pc_client.studies.sweep.config import FIDELITIES, SweepFile, read_config
 from pc_client.studies.sweep.schedule import plan_case

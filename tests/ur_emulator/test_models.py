@@ -17,7 +17,7 @@ import pytest
 from box_support import FakeNetwork, connect
 from public_arms import MENAGERIE, ROS, Body, menagerie_model, ros_model
 
-from pc_client.kinematics.robot_model import robot_model
+from pc_client.kinematics.model import robot_model
 from protocol.primary.layout import calibration_hash
 from protocol.serial_numbers import parse_serial
 from protocol.ur_types import RobotType

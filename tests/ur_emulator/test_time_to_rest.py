@@ -10,7 +10,7 @@ from box_support import Bench
 
 from pc_client.driver.receiver import MISSED_ALLOWED, STOP_DECELERATION, receiver_script
 from pc_client.driver.watchdog import REST_SPEED
-from pc_client.kinematics.robot_model import ROBOTS
+from pc_client.kinematics.arms import ROBOTS
 from protocol.ur_types import ProgramState, SafetyMode
 from protocol.velocity_stream import VelocityMode, encode_velocity
 from ur_emulator.commands.programs import ResumeProgram, SetSpeedSlider

@@ -17,10 +17,10 @@ from scipy.signal import find_peaks
 
 from pc_client.arm import Arm
 from pc_client.errors import MovementError, RecordingError
-from pc_client.kinematics.robot_model import RobotModel
-from pc_client.movements.geometry import WORKING_BOXES
+from pc_client.kinematics.model import RobotModel
 from pc_client.movements.movement import Movement
-from pc_client.movements.sigma_lognormal import Motion, SigmaLognormal
+from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.trajectory import Motion
 from pc_client.studies.drawing.joining import Joined, factor_needed, least_factor, least_gaps, paced
 from pc_client.studies.drawing.placement import Mark, Placement, PlacementOptions, inverse, marks_of, place
 from pc_client.studies.extraction.extract import Extraction, extract
@@ -56,7 +56,7 @@ def drawing(
         ClientError: the file or the samples are not valid, or the arm cannot execute it.
     """
     recording = read_recording(source) if isinstance(source, str | Path) else _recording(name, source)
-    options = PlacementOptions(plane=plane, size=size, box=WORKING_BOXES[arm.model.name])
+    options = PlacementOptions(plane=plane, size=size, box=arm.model.description.working_box)
     return make_drawing(extract(recording), name, arm.model, options, slower)
 
 

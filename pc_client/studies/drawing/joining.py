@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from pc_client.errors import PlanningError
-from pc_client.kinematics.robot_model import RobotModel
-from pc_client.movements.geometry import read_only
+from pc_client.kinematics.model import RobotModel
 from pc_client.movements.lognormal import Lognormal, TwoSidedTiming
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
+from pc_client.movements.trajectory import read_only
 from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import JointPlan, PlannableMovement, plan_movement
 from pc_client.studies.drawing.placement import Mark

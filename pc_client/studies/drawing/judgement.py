@@ -29,7 +29,7 @@ from scipy.interpolate import CubicSpline
 
 from pc_client.analysis.run import MeasuredRun
 from pc_client.errors import RecordingError
-from pc_client.movements.geometry import read_only
+from pc_client.movements.trajectory import read_only
 from pc_client.studies.drawing.drawing import Drawing, spatial
 from pc_client.studies.extraction.smoothing import CUTOFF_HZ, RATE_HZ
 from pc_client.studies.likeness import Likeness, fit_power_law, log_dimensionless_jerk, sparc, speed_peaks

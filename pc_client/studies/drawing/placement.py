@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 from scipy.optimize import bisect
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import UR3_BOX, Box, Similarity, read_only
+from pc_client.kinematics.arms import UR3_BOX, Box
 from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.trajectory import Similarity, read_only
 from pc_client.studies.extraction.extract import Extraction
 from pc_client.studies.extraction.pen import PenPart
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.errors import printable
-from pc_client.movements.sigma_lognormal import Motion
+from pc_client.movements.trajectory import Motion
 from pc_client.results.matplotlib_figures import draw, figure, image_bytes
 from pc_client.results.sheet import BLUE, RED, REFERENCE_GREY, SKY, Curve, Panel, Sheet, boxes, cube_around
 from pc_client.studies.extraction.extract import Extraction, PartExtraction

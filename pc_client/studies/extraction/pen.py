@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.errors import RecordingError
 from pc_client.files import FILE_KINDS
-from pc_client.movements.geometry import read_only
+from pc_client.movements.trajectory import read_only
 from ur_hil.input_files import MIB
 
 __all__ = [

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.signal import find_peaks
 
-from pc_client.movements.geometry import read_only
+from pc_client.movements.trajectory import read_only
 from pc_client.studies.extraction.pen import PenPart
 from pc_client.studies.signals import Trace, low_passed, velocity
 

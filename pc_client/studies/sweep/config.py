@@ -17,10 +17,10 @@ import polars as pl
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller
 from pc_client.errors import MovementError, SweepError
 from pc_client.files import FILE_KINDS
-from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.cell_file import load_cell
-from pc_client.kinematics.robot_model import ROBOTS
-from pc_client.movements.files import library_names, library_path, load_movement
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
+from pc_client.movements.library_sets import library_names, library_path
+from pc_client.movements.movement import load_movement
 from pc_client.studies.sweep.case import MovementFile, SimulatedArm
 from pc_client.studies.sweep.settings import Axis, Range, Search, grid, read_axes, repeated, searched
 from ur_hil.records import Flag, Items, checked, nearest, record, text, whole, word

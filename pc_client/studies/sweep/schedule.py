@@ -17,12 +17,14 @@ from typing import TYPE_CHECKING
 from pc_client.analysis.run import analyse_run
 from pc_client.driver.session import UrDriver
 from pc_client.errors import ClientError, GainMarginError, full_message
-from pc_client.experiment.experiment import Experiment, Plan, make_plan
+from pc_client.experiment.experiment import Experiment
 from pc_client.experiment.identification import Identification
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.robot_model import robot_model
-from pc_client.movements.files import library_name_of, load_movement
+from pc_client.kinematics.model import robot_model
+from pc_client.movements.library_sets import library_name_of
+from pc_client.movements.movement import load_movement
+from pc_client.planning.plan import Plan, make_plan
 from pc_client.recording.recording import load_recording
 from pc_client.results.tables import finite
 from pc_client.studies.executors import open_executor, usable_cores

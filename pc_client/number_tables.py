@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from pc_client.errors import MovementError
 
-__all__ = ["Rows", "parse_rows"]
-
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
 
 

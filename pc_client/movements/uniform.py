@@ -23,10 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import fresnel
 
 from pc_client.errors import MovementError
-from pc_client.movements.geometry import Similarity, read_only
-from pc_client.movements.sigma_lognormal import Motion
-
-__all__ = ["CornerPath", "Corners", "PathMotion", "PathPoints", "RoboticTrajectory", "SmoothedSquareWave"]
+from pc_client.movements.trajectory import Motion, Similarity, read_only
 
 #: Below this turn (rad) two lines are one: no blend is built.
 _STRAIGHT = 1e-6
@@ -243,7 +240,7 @@ class SmoothedSquareWave:
 
 
 @dataclass(frozen=True, slots=True)
-class RoboticTrajectory:
+class Uniform:
     """The robot-like movement along target points with given stroke durations.
 
     Attributes:
@@ -303,9 +300,9 @@ class RoboticTrajectory:
         acceleration = along.a[:, None] * at.tangent + (along.v**2)[:, None] * at.curvature
         return Motion(at.p, velocity, acceleration)
 
-    def transformed(self, similarity: Similarity) -> RoboticTrajectory:
+    def transformed(self, similarity: Similarity) -> Uniform:
         """The movement moved, scaled and rotated; its timing is untouched."""
-        return RoboticTrajectory(
+        return Uniform(
             similarity.points(self.target_points),
             self.stroke_durations,
             self.ramps,
@@ -313,12 +310,10 @@ class RoboticTrajectory:
             self.blend * similarity.scale,
         )
 
-    def stretched(self, factor: float) -> RoboticTrajectory:
+    def stretched(self, factor: float) -> Uniform:
         """The movement `factor` times as slow, ramps included."""
         ramps = tuple(ramp * factor for ramp in self.ramps)
-        return RoboticTrajectory(
-            self.target_points, self.stroke_durations * factor, ramps, self.corners, self.blend
-        )
+        return Uniform(self.target_points, self.stroke_durations * factor, ramps, self.corners, self.blend)
 
 
 def check_ramps(ramps: tuple[float, ...]) -> None:
@@ -371,3 +366,28 @@ def _smoothed_step(t: NDArray[np.float64], ramps: tuple[float, ...]) -> PathMoti
     over = t >= half
     ramping = np.abs(t) < half
     return PathMotion(np.where(over, t, s), np.where(over, 1.0, v), np.where(ramping, a, 0.0))
+
+
+#: The two boxcars (s) that smooth the square wave of a robot-like movement: together they last as long as the
+#: ramp that a UR makes by itself, movel's default speed over its default acceleration, .25 m/s / 1.2 m/s^2 =
+#: .21 s (Source: URScript manual, movel). Most of it bounds the acceleration, the rest the jerk.
+RAMPS = (0.16, 0.05)
+#: How far (m) a blended corner keeps from its target point along the lines.
+SETBACK = 0.03
+
+
+def uniform_trajectory(
+    target_points: ArrayLike, stroke_durations: ArrayLike, corners: Corners = "stop", setback: float = SETBACK
+) -> Uniform:
+    """A constant speed a stroke, smoothed to ramps, on the straight lines between target points.
+
+    Args:
+        target_points: (n, 3), m.
+        stroke_durations: (n - 1,), s.
+        corners: come to rest at the inner target points, or blend them.
+        setback: of blended corners, m: how far before and after a target point the path leaves the lines.
+
+    Source: section II.C.
+    """
+    points, durations = (np.asarray(values, dtype=np.float64) for values in (target_points, stroke_durations))
+    return Uniform(points, durations, RAMPS, corners, setback if corners == "blend" else 0.0)

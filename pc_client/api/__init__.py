@@ -1,1 +1,0 @@
-"""`Movement`, as programs that import `pc_client` use them."""
