@@ -23,7 +23,7 @@ MAY_IMPORT = {
 EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "asyncio"}
 MAY_HAVE_EFFECTS = {
     "protocol": {"__main__.py"},
-    "ur_emulator": {"realtime", "servers", "control_api"}
+    "ur_emulator": {"loop", "outgoing", "polyscope", "ports", "control_api"}
     | {f"{part}.py" for part in ("box", "rack", "box_process", "cli", "pytest_plugin")},
     "pc_client": {
         "driver",
@@ -49,8 +49,10 @@ BOX_ORDER = (
     {"box_log"},
     {"commands"},
     {"program_files"},
-    {"realtime"},
-    {"servers"},
+    {"loop"},
+    {"outgoing"},
+    {"polyscope"},
+    {"ports"},
     {"box_options"},
     {"control_api"},
     {"box"},
@@ -219,11 +221,11 @@ def test_effects_stay_at_the_rim(package):
                 "mcap",
                 "asyncio",
                 "pydantic",
-                "ur_emulator.servers.http.port",
+                "ur_emulator.ports.http",
             },
         ),
         ("ur_emulator.emulator", {"mujoco", "numpy", "lark"}),
-        ("ur_emulator.realtime.worker", {"mujoco"}),
+        ("ur_emulator.loop.worker", {"mujoco"}),
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
     ],
 )

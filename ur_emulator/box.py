@@ -19,23 +19,20 @@ from ur_emulator.control_api.step_operations import Context
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, NotRunningError
+from ur_emulator.loop.event_loop import WAKE_UP, EventLoop
+from ur_emulator.loop.memory import MemoryWatch
+from ur_emulator.loop.pacing import Pace, make_pacer
+from ur_emulator.loop.processes import Role, prepare_children
+from ur_emulator.loop.served_box import BoxIdentity, ServedBox
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.outgoing.addresses import close_to_scripts, give_back
+from ur_emulator.outgoing.loop_network import LoopNetwork
+from ur_emulator.polyscope.player import ProgramPlayer, start_up
+from ur_emulator.polyscope.report_writer import ReportWriter
+from ur_emulator.ports.port_set import CONTROL, PortSet, SendingPorts, answering_ports
+from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
-from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
-from ur_emulator.realtime.memory import MemoryWatch
-from ur_emulator.realtime.pacing import Pace, make_pacer
-from ur_emulator.realtime.processes import Role, prepare_children
-from ur_emulator.realtime.served_box import ServedBox
 from ur_emulator.scripting.robot_host import robot_hosts
-from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
-from ur_emulator.servers.box_ports import SendingPorts, answering_ports
-from ur_emulator.servers.port_set import CONTROL, PortSet
-from ur_emulator.servers.programs.intake import ProgramIntake
-from ur_emulator.servers.programs.player import ProgramPlayer
-from ur_emulator.servers.programs.start_up import start_up
-from ur_emulator.servers.reports.report_writer import ReportWriter
-from ur_emulator.servers.scripts.closed_ports import close_to_scripts, give_back
-from ur_emulator.servers.scripts.loop_network import LoopNetwork
 
 
 class Box:
@@ -93,26 +90,23 @@ class Box:
             version=(asked.major, asked.minor),
         )
         controller.state.pendant.set_remote_control(options.remote_control)
-        self._box = ServedBox(
-            controller,
-            make_pacer(pace, controller.period_s, options.speed, phase, lead),
-            self._loop.expect_soon,
-            self._fail,
-        )
-        self._intake = ProgramIntake(self._loop.tasks, software.catalogue, self._box, controller.period_s)
         wire_model = RobotType(model.robot_type).name
         masterboard = LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD
         identity = BoxIdentity(software, model.title, wire_model, serial_number, masterboard)
-        self._access = BoxAccess(identity, self._box, self._loop, self._network)
+        pacer = make_pacer(pace, controller.period_s, options.speed, phase, lead)
+        self._box = ServedBox(controller, identity, pacer, self._loop, self._fail)
+        self._intake = ProgramIntake(self._loop.tasks, self._box)
         folder = ProgramFolder(None if options.programs is None else Path(options.programs))
-        self._player = player = ProgramPlayer(self._access, folder, skip_unknown=options.skip_unknown_nodes)
-        self._reports = ReportWriter(self._access, player)
-        sending = SendingPorts.make(self._access, self._intake)
+        self._player = player = ProgramPlayer(
+            self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
+        )
+        self._reports = ReportWriter(self._box, player)
+        sending = SendingPorts.make(self._box, self._intake)
         self._box.attach(
-            (*sending.in_order, self._intake, self._access.steps),
+            (*sending.in_order, self._intake, self._box.steps),
             [port.send_message for port in sending.messengers],
         )
-        ports = sending.by_name | answering_ports(self._access, player, self._reports, self._shut_down, host)
+        ports = sending.by_name | answering_ports(self._box, player, self._reports, self._shut_down, host)
         standard = standard_ports(options.port_base or 0)
         self.served_at = ServedAt(
             title=f"{model.title} {generation.name} {asked}",
@@ -130,15 +124,15 @@ class Box:
             "seed": seed,
             "fidelity": options.fidelity,
         }
-        context = Context(self._access, player, self._identity_now, make)
+        context = Context(self._box, player, self._identity_now, make)
         self.operations = OperationRunner(self._loop, context)
         self._wanted_control_port = options.control_port
         if options.control_port is not None:
             from ur_emulator.control_api.http_answers import ControlAnswers
-            from ur_emulator.servers.http.port import HttpPort
+            from ur_emulator.ports.http import HttpPort
 
             answers = ControlAnswers(self.operations, host, options.control_token)
-            ports[CONTROL] = HttpPort(self._access, answers)
+            ports[CONTROL] = HttpPort(self._box, answers)
         self._port_set = PortSet(self._loop, host, self._box, ports)
         if closed:
             self._port_set.notices.append(
@@ -199,8 +193,8 @@ class Box:
         self._loop.keep_pace(self._box.controller.period_s)
         self._loop.add(self._box)
         self._loop.tasks.start()
-        begin = start_up(self._access, self._player)
-        self._loop.call_soon_threadsafe(lambda: self._access.start_alone(begin), self._fail)
+        begin = start_up(self._box, self._player)
+        self._loop.call_soon_threadsafe(lambda: self._box.start_alone(begin), self._fail)
 
     def _wanted_numbers(self) -> dict[str, int]:
         """Numbers of the ports to open by name; 0 takes a free one."""
@@ -221,7 +215,7 @@ class Box:
         """End the box because of an error in a cycle."""
         self.failure = error
         text = f"the box has ended: {type(error).__name__}: {error}"
-        self._box.log.write(self._access.snapshot.tick, "Controller", text, ReportLevel.FAULT)
+        self._box.log.write(self._box.snapshot.tick, "Controller", text, ReportLevel.FAULT)
         self.on_end()
 
     def _report(self, what: str, error: Exception) -> None:
@@ -230,7 +224,7 @@ class Box:
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
-        self._access.close(NotRunningError())
+        self._box.close(NotRunningError())
         self.operations.close()
         self._intake.close()
         self._reports.close()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 from ur_emulator.errors import EmulatorError
-from ur_emulator.realtime.pacing import Pace
+from ur_emulator.loop.pacing import Pace
 
 if TYPE_CHECKING:
     from ur_emulator.models.robot_generation import RobotGeneration

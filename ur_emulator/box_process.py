@@ -26,7 +26,7 @@ from ur_emulator.box_log import MAX_ENTRIES, LogEntry
 from ur_emulator.box_options import BoxOptions, ServedAt
 from ur_emulator.control_api.operations import make
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
-from ur_emulator.realtime.processes import Child, Pipe, Role, framed, read_message, start_child
+from ur_emulator.loop.processes import Child, Pipe, Role, framed, read_message, start_child
 
 if TYPE_CHECKING:
     from ur_emulator.controller.command import Command, Done
@@ -264,14 +264,14 @@ def _tell(done: Done, future: Future[Any]) -> None:
 def prepare() -> None:
     """Load what boxes and workers need."""
     from ur_emulator import rack  # noqa: F401
-    from ur_emulator.realtime import worker
+    from ur_emulator.loop import worker
 
     worker.prepare()
 
 
 def clean_up() -> None:
     """Remove what boxes have left behind that were killed."""
-    from ur_emulator.servers.reports.temporary_folder import remove_left_folders
+    from ur_emulator.polyscope.report_files import remove_left_folders
 
     remove_left_folders()
 

@@ -25,7 +25,7 @@ from ur_hil.command_line import ExitCode, examples, new_app, run_app
 if TYPE_CHECKING:
     from ur_emulator.box_log import LogEntry
     from ur_emulator.box_options import ServedAt
-    from ur_emulator.realtime.line_writer import LineWriter
+    from ur_emulator.loop.line_writer import LineWriter
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Enough for hundreds of boxes with hundreds of clients, and a number that every system grants.
@@ -128,15 +128,15 @@ def serve(
     except ImportError as error:
         _complain(str(error))
         raise typer.Exit(ExitCode.FAILED) from None
-    from ur_emulator.realtime.processes import Role, prepare_children
+    from ur_emulator.loop.processes import Role, prepare_children
 
     raise_descriptor_limit()
     prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
     from ur_emulator.box_options import BoxOptions, counted_up
     from ur_emulator.errors import EmulatorError
+    from ur_emulator.loop.line_writer import LineWriter
     from ur_emulator.rack import LoopRack
-    from ur_emulator.realtime.line_writer import LineWriter
 
     try:
         first = BoxOptions(

@@ -26,8 +26,8 @@ from ur_emulator.errors import EmulatorError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.command import Command, Done
+    from ur_emulator.loop.pacing import Pace
     from ur_emulator.models.robot_generation import RobotGeneration
-    from ur_emulator.realtime.pacing import Pace
 
 
 class Rack(Protocol):

@@ -16,9 +16,9 @@ from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import BoxOptions, ServedAt
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.errors import ControlError, EmulatorError
-from ur_emulator.realtime.event_loop import WAKE_UP, EventLoop
-from ur_emulator.realtime.memory import MemoryWatch, own_process
-from ur_emulator.realtime.pacing import Pace
+from ur_emulator.loop.event_loop import WAKE_UP, EventLoop
+from ur_emulator.loop.memory import MemoryWatch, own_process
+from ur_emulator.loop.pacing import Pace
 
 _LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
 _JOIN_TIMEOUT = 10.0  # s

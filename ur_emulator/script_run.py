@@ -19,11 +19,11 @@ from ur_emulator.controller import events as ev
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ArgumentError
+from ur_emulator.loop.event_loop import EventLoop
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.move import Move
-from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.outgoing.loop_network import LoopNetwork
 from ur_emulator.scripting.robot_host import robot_hosts
-from ur_emulator.servers.scripts.loop_network import LoopNetwork
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.robots import ROBOTS
-from ur_emulator.servers.primary.robot_state import setup_records
+from ur_emulator.ports.primary.robot_state import setup_records
 
 # Software, and the size of its realtime frames.
 SOFTWARE = {"5.3.0": 1108, "5.8.0": 1116, "5.9.4": 1140, "5.12.2": 1220, "5.15.0": 1220, "5.25.1": 1220}

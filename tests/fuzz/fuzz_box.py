@@ -73,7 +73,7 @@ _NEVER = 60.0  # s; no service is due
 # Memory of this process beyond what it had at the beginning, and of the worker process [bytes].
 _MOST_GROWTH = 120 << 20
 _MOST_OF_WORKER = 300 << 20
-# How the box reports an error of its own (ur_emulator/realtime/barrier.py).
+# How the box reports an error of its own (ur_emulator/loop/barrier.py).
 _DEFECT = re.compile(r" line \d+ of \w+\.py$")
 QUESTIONS = {
     "dashboard": b"robotmode\n",

@@ -25,7 +25,7 @@ from integration_support import (
     send,
 )
 
-import ur_emulator.realtime.pacing as pacing
+import ur_emulator.loop.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork

@@ -19,7 +19,7 @@ from integration_support import (
     serving,
 )
 
-import ur_emulator.realtime.pacing as pacing
+import ur_emulator.loop.pacing as pacing
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import ControlBox

@@ -34,7 +34,7 @@ from protocol.ur_types import Ports, ProgramState
 from ur_emulator import BoxRack, ControlBox
 from ur_emulator.box_options import MAX_BOXES
 from ur_emulator.errors import EmulatorError, PortError
-from ur_emulator.realtime import event_loop
+from ur_emulator.loop import event_loop
 
 own_addresses = pytest.mark.skipif(
     sys.platform == "darwin", reason="only 127.0.0.1 is an address of a Mac unless others are added"
@@ -171,8 +171,8 @@ def test_an_error_ends_its_own_box_only_and_is_raised_at_the_end():
 def test_a_box_that_compiles_is_closed_without_waiting_for_it():
     """Another box of the loop would miss its cycles meanwhile; its programs wait no longer either."""
     with ControlBox.many(2, in_process=True, pace="lockstep", port_base=None) as (one, two):
-        endless = inside(one)._access.in_worker(signal.pause)
-        inside(one)._loop.call_soon_threadsafe(lambda: inside(one)._access.start_alone(endless), pytest.fail)
+        endless = inside(one)._box.in_worker(signal.pause)
+        inside(one)._loop.call_soon_threadsafe(lambda: inside(one)._box.start_alone(endless), pytest.fail)
         inside(one)._loop.call_soon_threadsafe(inside(one).close, pytest.fail)
         with Frames(two) as frames:
             frames.raw()

@@ -18,7 +18,7 @@ from integration_support import (
     serving,
 )
 
-import ur_emulator.realtime.pacing as pacing
+import ur_emulator.loop.pacing as pacing
 from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from integration_support import HELLO_PROGRAM, Messages, VelocitySession, is_closed, send
 
-import ur_emulator.realtime.pacing as pacing
+import ur_emulator.loop.pacing as pacing
 from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,

@@ -5,7 +5,6 @@ import struct
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -15,10 +14,11 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.command import Submitted
 from ur_emulator.controller.controller import Controller
+from ur_emulator.loop.pacing import RealtimePacer
+from ur_emulator.loop.served_box import BoxIdentity, ServedBox
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.robot_host import robot_hosts
-from ur_emulator.servers.box_access import BoxAccess, BoxIdentity
 from urscript import compile_program
 
 VERSION = SoftwareVersion(3, 15, 8)
@@ -153,23 +153,19 @@ class Bench:
         return [event.text for event in self.events[first:] if type(event).__name__ == "TextPrinted"]
 
 
-def bare_access(software, controller, commands):
-    """Return the access of a port to a controller; what it submits is appended to `commands`."""
+class BareBox(ServedBox):
+    """A box without a loop, for its ports; what they submit is appended to `submitted`."""
 
-    def submit(command, done=None):
-        commands.append(command if done is None else Submitted(command, done))
+    def __init__(self, software, controller, submitted):
+        self.submitted = submitted
+        identity = BoxIdentity(software, "UR3", "UR3", "20993000007")
+        super().__init__(controller, identity, RealtimePacer(controller.period_s), None, None)
 
-    def report(what, error):
+    def submit(self, command, done=None, *, in_place_of=""):
+        self.submitted.append(command if done is None else Submitted(command, done))
+
+    def report(self, what, error):
         raise error
-
-    box = SimpleNamespace(
-        controller=controller,
-        submit=submit,
-        takes_commands=True,
-        announce=lambda event: None,
-        report=report,
-    )
-    return BoxAccess(BoxIdentity(software, "UR3", "UR3", "20993000007"), box, None, None)
 
 
 def connect(box, port):

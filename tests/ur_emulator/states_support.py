@@ -24,7 +24,7 @@ from ur_emulator.commands.safety import (
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.controller.modbus_map import read_coil, read_register
 from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.servers.primary.robot_state import state_records
+from ur_emulator.ports.primary.robot_state import state_records
 
 ENDLESS = (
     "def endless():\n  q = get_actual_joint_positions()\n  while True:\n"

@@ -21,7 +21,7 @@ from ur_emulator.errors import (
     RefusedError,
     WaitTimeoutError,
 )
-from ur_emulator.realtime import processes
+from ur_emulator.loop import processes
 
 LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
 TOKEN = "secret"

@@ -15,7 +15,7 @@ from ur_emulator.box_options import MAX_TOKEN
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.control_api.operations import OPERATIONS
 from ur_emulator.errors import EmulatorError
-from ur_emulator.servers.http.messages import MAX_HEADER
+from ur_emulator.ports.http import MAX_HEADER
 
 JSON = "Content-Type: application/json"
 
@@ -396,7 +396,7 @@ def test_who_goes_while_it_waits_is_forgotten(box):
     with Http(box) as http:
         for _ in range(1000):
             assert http.ask("GET", "/v1/state")[0] == 200
-            if not inside(box)._access.steps._under_way:
+            if not inside(box)._box.steps._under_way:
                 return
     raise AssertionError("they are waited for still")
 

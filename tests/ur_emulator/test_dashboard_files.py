@@ -8,7 +8,7 @@ import pytest
 from dashboard_support import Dashboard, write_programs
 
 from ur_emulator.emulator import ControlBox
-from ur_emulator.servers.reports.report_files import BoxFacts
+from ur_emulator.polyscope.report_files import BoxFacts
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.safety_limits import ArmLimits
+from ur_emulator.ports.primary.robot_state import safety_checksum
 from ur_emulator.program_files.installation import (
     DeclaredPayload,
     DeclaredSignal,
@@ -31,7 +32,6 @@ from ur_emulator.program_files.installation import (
     OutputRule,
 )
 from ur_emulator.program_files.script_writer import header_lines, setup_script
-from ur_emulator.servers.primary.robot_state import safety_checksum
 from urscript import compile_program
 
 LAMP = DeclaredSignal("LAMP", "10.0.0.9", 255, 7, SignalType.DIGITAL_OUTPUT, 5.0, RunState.LOW_WHEN_STOPPED)
@@ -295,12 +295,12 @@ def test_what_is_loaded_stays_when_a_program_begins_while_another_is_read(tmp_pa
     (tmp_path / "next.urp").write_bytes(urp(script_line("x = 1")))
     (tmp_path / "default.installation").write_bytes(installation())
     with ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box:
-        access, player = inside(box)._access, inside(box)._player
+        served, player = inside(box)._box, inside(box)._player
         runs = StartProgram(compile_program("def p():\n  while True:\n    sync()\n  end\nend\n"))
 
         def both():
-            access.start_alone(player.load("next.urp"))
-            access.submit(runs)
+            served.start_alone(player.load("next.urp"))
+            served.submit(runs)
 
         inside(box)._loop.call_soon_threadsafe(both, lambda error: None)
         box.wait_until(log="load next.urp failed: a program runs")

@@ -19,7 +19,7 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.box_log import MAX_TEXT
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
-from ur_emulator.servers.http.messages import MAX_HEADER
+from ur_emulator.ports.http import MAX_HEADER
 from urscript.dialect import LONGEST_LABEL, LONGEST_NAME, LONGEST_STRING
 from urscript.values import TEXT_LIMIT
 

@@ -13,11 +13,9 @@ from rtde_support import RtdeClient, input_package
 
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.realtime import served_box
-from ur_emulator.servers.dashboard.answers import DashboardAnswers
-from ur_emulator.servers.tcp import client_lines, listener
-from ur_emulator.servers.tcp.client_lines import ClientLines
-from ur_emulator.servers.tcp.listener import Places
+from ur_emulator.loop import listener, served_box
+from ur_emulator.loop.listener import ClientLines, Places
+from ur_emulator.ports.dashboard import DashboardAnswers
 
 REGISTER = "input_double_register_0"
 
@@ -111,7 +109,7 @@ def test_an_address_cannot_take_all_places_and_nobody_can_take_more_than_there_a
 
 
 def test_a_storm_of_clients_leaves_room_in_the_log(monkeypatch):
-    monkeypatch.setattr(client_lines, "BUDGETS", replace(BUDGETS, client_lines=3))
+    monkeypatch.setattr(listener, "BUDGETS", replace(BUDGETS, client_lines=3))
     now, written = 100.0, []
     lines = ClientLines(written.append, lambda: now)
     for k in range(1000):
@@ -127,7 +125,7 @@ def test_a_storm_of_clients_leaves_room_in_the_log(monkeypatch):
 
 
 def test_a_storm_of_clients_writes_few_lines(box, monkeypatch):
-    monkeypatch.setattr(client_lines, "BUDGETS", replace(BUDGETS, client_lines=4))
+    monkeypatch.setattr(listener, "BUDGETS", replace(BUDGETS, client_lines=4))
     for _ in range(50):
         with connect(box, "dashboard") as sock:
             read_lines(sock, 1)

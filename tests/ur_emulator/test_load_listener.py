@@ -10,9 +10,9 @@ from box_support import TIMEOUT
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError
-from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.tcp import listener
-from ur_emulator.servers.tcp.listener import PAUSE, Listener, Places, SpareDescriptor
+from ur_emulator.loop import listener
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.listener import PAUSE, Listener, Places, SpareDescriptor
 
 
 class Clients:

@@ -22,7 +22,7 @@ from modbus_support import (
 
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator.emulator import ControlBox
-from ur_emulator.servers.modbus import link as modbus_link
+from ur_emulator.outgoing import modbus_units
 
 
 @pytest.fixture(scope="module", params=["lockstep", "realtime"])
@@ -126,7 +126,7 @@ def test_a_value_that_changes_is_seen(box):
 
 
 def test_a_unit_that_comes_back_is_found_again(box, monkeypatch):
-    monkeypatch.setattr(modbus_link, "TOLERANCE", TIMEOUT)
+    monkeypatch.setattr(modbus_units, "TOLERANCE", TIMEOUT)
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
         with good_unit() as unit:
@@ -147,7 +147,7 @@ def test_a_unit_that_comes_back_is_found_again(box, monkeypatch):
 
 
 def test_an_exception_of_the_unit_is_named(box, monkeypatch):
-    monkeypatch.setattr(modbus_link, "TOLERANCE", TIMEOUT)
+    monkeypatch.setattr(modbus_units, "TOLERANCE", TIMEOUT)
     with good_unit() as unit, connect(box, "primary") as sock:
         reader = MessageReader(sock)
         send(
@@ -161,7 +161,7 @@ def test_an_exception_of_the_unit_is_named(box, monkeypatch):
             unit.set(INPUT_REGISTERS, 4, i)
             assert reader.message(TextMessage).text == str(i)
         # Between the two texts both signals had their turn.
-        monkeypatch.setattr(modbus_link, "TOLERANCE", 0.0)
+        monkeypatch.setattr(modbus_units, "TOLERANCE", 0.0)
         text = reader.message(RuntimeExceptionMessage).text
     assert text.endswith(
         f'signal "bad" is lost: 127.0.0.1:{unit.port} answers with exception E2 (illegal data address)'
@@ -169,7 +169,7 @@ def test_an_exception_of_the_unit_is_named(box, monkeypatch):
 
 
 def test_a_unit_that_is_not_there_ends_the_program_that_uses_it(box, monkeypatch):
-    monkeypatch.setattr(modbus_link, "TOLERANCE", 0.05)
+    monkeypatch.setattr(modbus_units, "TOLERANCE", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     with connect(box, "primary") as sock:
@@ -304,8 +304,8 @@ BAD = [
 
 @pytest.mark.parametrize("bad", BAD, ids=lambda bad: bad.__name__)
 def test_a_unit_that_misbehaves_harms_nobody(box, bad, monkeypatch):
-    monkeypatch.setattr(modbus_link, "TOLERANCE", TIMEOUT)
-    monkeypatch.setattr(modbus_link, "ANSWER_TIMEOUT", 0.2)
+    monkeypatch.setattr(modbus_units, "TOLERANCE", TIMEOUT)
+    monkeypatch.setattr(modbus_units, "ANSWER_TIMEOUT", 0.2)
     with good_unit() as good, peer(bad, answers_42) as port:
         good.set(INPUT_REGISTERS, 4, 5)
         texts = run(

@@ -14,7 +14,7 @@ from ur_emulator.controller.io.modbus_signals import (
     SignalType,
     UnitAddress,
 )
-from ur_emulator.servers.modbus.link import (
+from ur_emulator.outgoing.modbus_units import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,
     FIRST_RETRY,

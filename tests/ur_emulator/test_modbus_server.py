@@ -4,7 +4,7 @@ import socket
 import struct
 
 import pytest
-from box_support import TIMEOUT, Bench, MessageReader, bare_access, connect, inside
+from box_support import TIMEOUT, BareBox, Bench, MessageReader, connect, inside
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
@@ -14,10 +14,10 @@ from ur_emulator import ControlBox, cli, rack
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.modbus_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError
-from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.modbus.server import ModbusPort
-from ur_emulator.servers.tcp import listener
-from ur_emulator.servers.tcp.listener import Listener, Places
+from ur_emulator.loop import listener
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.listener import Listener, Places
+from ur_emulator.ports.modbus import ModbusPort
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
@@ -374,8 +374,8 @@ class FakeConnection:
 def bare_port():
     bench = Bench()
     commands = []
-    access = bare_access(None, bench.controller, commands)
-    return bench, ModbusPort(access), access.steps, commands
+    box = BareBox(None, bench.controller, commands)
+    return bench, ModbusPort(box), box.steps, commands
 
 
 def test_a_write_is_answered_after_a_cycle_and_not_when_the_last_one_is_shown_again():

@@ -18,8 +18,8 @@ from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
 from ur_emulator.models.generations import CB3
-from ur_emulator.servers.primary.port import PrimaryPort
-from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.ports.primary.port import PrimaryPort
+from ur_emulator.ports.primary.robot_state import StateEncoder
 
 BUDGET = (
     "The program used too much time without instructing the robot what to do. "

@@ -13,9 +13,8 @@ from ur_emulator.commands.programs import PauseProgram, SetSpeedSlider, StartPro
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.errors import WorkerError
 from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.servers.programs import intake as module
-from ur_emulator.servers.programs.intake import ProgramIntake
-from ur_emulator.servers.programs.sender import Sender
+from ur_emulator.ports import script_intake as module
+from ur_emulator.ports.script_intake import ProgramIntake, Sender
 
 
 class Tasks:
@@ -48,6 +47,8 @@ class Box:
         self.stops = 0
         self.remote_period = 1
         self.newest = 0.0
+        self.controller = SimpleNamespace(period_s=CB3.period_s)
+        self.identity = SimpleNamespace(software=SimpleNamespace(catalogue=None))
         self.done = []
 
     def submit(self, command, *, in_place_of=""):
@@ -76,7 +77,7 @@ def box():
 
 @pytest.fixture
 def intake(tasks, box):
-    return ProgramIntake(tasks, None, box, CB3.period_s)
+    return ProgramIntake(tasks, box)
 
 
 @pytest.fixture
@@ -249,7 +250,8 @@ def test_only_so_many_programs_start_in_a_cycle_and_the_others_wait(intake, task
 
 
 def test_a_shorter_cycle_starts_fewer_programs(tasks, box, one):
-    intake = ProgramIntake(tasks, None, box, E_SERIES.period_s)
+    box.controller.period_s = E_SERIES.period_s
+    intake = ProgramIntake(tasks, box)
     intake.received(one, b"a()\n" * 3)
     for _ in range(3):
         tasks.finish()

@@ -26,7 +26,7 @@ from ur_emulator.controller.events import (
     SafetyModeChanged,
     ScriptFailed,
 )
-from ur_emulator.servers.primary.robot_state import state_records
+from ur_emulator.ports.primary.robot_state import state_records
 from urscript import compile_program
 
 COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_integer_register(0, n)\n    sync()\n  end\nend\n"

@@ -16,13 +16,19 @@ from dashboard_support import Dashboard, script_line, urp, write_programs
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.polyscope import report_files
+from ur_emulator.polyscope.report_files import (
+    BoxFacts,
+    TemporaryFolder,
+    flight_report,
+    remove_left_folders,
+    save_log,
+    support_file,
+)
+from ur_emulator.ports import robot_api_files
+from ur_emulator.ports.robot_api_files import KINDS, Outcome, write_program
 from ur_emulator.program_files.folder import PART_NAME, FoundFile, ProgramFolder
 from ur_emulator.program_files.loading import load_program
-from ur_emulator.servers.reports import report_files
-from ur_emulator.servers.reports.report_files import BoxFacts, flight_report, save_log, support_file
-from ur_emulator.servers.reports.temporary_folder import TemporaryFolder, remove_left_folders
-from ur_emulator.servers.robot_api import program_files
-from ur_emulator.servers.robot_api.program_files import KINDS, Outcome, write_program
 
 SECRET = 'def secret():\n  textmsg("secret of another user")\nend\n'
 FACTS = BoxFacts("20193000007", {"software": "3.15"}, 12.0, {"actual_q": [0.0]}, "the log\n")
@@ -213,7 +219,7 @@ def test_uploads_have_one_total_with_the_programs_that_are_there(folder, monkeyp
 
     n_programs = len([path for path in folder.rglob("*") if path.suffix in KINDS])
     total = (n_programs + 3) * 4_096
-    monkeypatch.setattr(program_files, "BUDGETS", replace(BUDGETS, uploads_bytes=total))
+    monkeypatch.setattr(robot_api_files, "BUDGETS", replace(BUDGETS, uploads_bytes=total))
     assert upload("one.script", 1) is upload("two.script", 8_192) is Outcome.WRITTEN
     with pytest.raises(ProgramFileError, match=f"three.script has 1 bytes, .* {total} are allowed, remove"):
         upload("three.script", 1)
@@ -278,7 +284,7 @@ def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
 def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     code = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}\n" + (
-        "import os, signal\nfrom ur_emulator.servers.reports.temporary_folder import TemporaryFolder\n"
+        "import os, signal\nfrom ur_emulator.polyscope.report_files import TemporaryFolder\n"
         "folder = TemporaryFolder()\n(folder.path / 'log_history.txt').touch()\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], check=False)

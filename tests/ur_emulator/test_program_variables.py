@@ -27,9 +27,9 @@ from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.models.generations import CB3
-from ur_emulator.servers.primary import program_reports
-from ur_emulator.servers.primary.port import PrimaryPort
-from ur_emulator.servers.primary.program_reports import (
+from ur_emulator.ports.primary import program_reports
+from ur_emulator.ports.primary.port import PrimaryPort
+from ur_emulator.ports.primary.program_reports import (
     MAX_BODY,
     MAX_THREADS,
     MAX_VALUE,
@@ -38,7 +38,7 @@ from ur_emulator.servers.primary.program_reports import (
     size_of,
     typed_value,
 )
-from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.ports.primary.robot_state import StateEncoder
 from urscript import Matrix, Pose, RunningProgram
 
 FOREVER = "  while True:\n    sync()\n  end\nend\n"

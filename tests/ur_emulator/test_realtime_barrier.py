@@ -12,10 +12,10 @@ from dashboard_support import Dashboard
 from protocol.primary.messages import LONGEST_TITLE, PopupMessage, ReportLevel
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.control_api.step_operations import ReadState
-from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.scripts.sockets import ScriptConnection
-from ur_emulator.servers.session import Session
-from ur_emulator.servers.tcp import listener
+from ur_emulator.loop import listener
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.outgoing.sockets import ScriptConnection
+from ur_emulator.ports.session import Session
 
 DEFECT = "KeyError('defect') in fail, line "
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.box_log import LogEntry, printable
-from ur_emulator.realtime import line_writer
-from ur_emulator.realtime.line_writer import LineWriter
+from ur_emulator.loop import line_writer
+from ur_emulator.loop.line_writer import LineWriter
 
 _LOST = ["lines", "of", "the", "log", "were", "lost:", "they", "were", "not", "read", "in", "time"]
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from ur_emulator import rack
-from ur_emulator.realtime.event_loop import EventLoop
+from ur_emulator.loop.event_loop import EventLoop
 
 
 @pytest.fixture

@@ -8,9 +8,7 @@ from ur_emulator.commands.programs import SetSpeedSlider
 from ur_emulator.commands.safety import TriggerFault
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import SafetyModeChanged
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.realtime.pacing import (
+from ur_emulator.loop.pacing import (
     HANG_LIMIT,
     MAX_BACKLOG,
     READER_LIMIT,
@@ -19,7 +17,9 @@ from ur_emulator.realtime.pacing import (
     RealtimePacer,
     make_pacer,
 )
-from ur_emulator.realtime.served_box import ServedBox
+from ur_emulator.loop.served_box import ServedBox
+from ur_emulator.models.generations import CB3
+from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.robot_host import robot_hosts
 
 PERIOD = 0.008
@@ -96,7 +96,7 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
     controller = Controller(
         robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(robot_hosts, network=None)
     )
-    box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
+    box = ServedBox(controller, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
     seen = []
     box.attach([SimpleNamespace(publish=seen.append)])
     assert box.advance(10.0) == pytest.approx(10.0 + PERIOD)
@@ -116,7 +116,7 @@ def test_messages_of_a_cycle_that_was_computed_early_are_sent_before_anybody_can
     controller = Controller(
         robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(robot_hosts, network=None)
     )
-    box = ServedBox(controller, RealtimePacer(PERIOD, lead=0.0004), lambda: None, pytest.fail)
+    box = ServedBox(controller, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
     seen = []
     box.attach([SimpleNamespace(publish=lambda snapshot: seen.append("state"))], [seen.append])
     box.advance(10.0)

@@ -14,11 +14,11 @@ from box_support import TIMEOUT
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
+from ur_emulator.loop import processes
+from ur_emulator.loop import worker as module
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.worker import Place
 from ur_emulator.program_files.compiling import compile_text
-from ur_emulator.realtime import processes
-from ur_emulator.realtime import tasks as module
-from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.realtime.tasks import Place
 from urscript.catalogue import catalogue_for
 from urscript.program import ProgramStatus, compile_program
 from urscript.recording_host import RecordingHost

@@ -15,7 +15,7 @@ from box_support import TIMEOUT, MessageReader, connect, inside, listening_socke
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
-from ur_emulator.servers.scripts import xmlrpc_client, xmlrpc_exchange
+from ur_emulator.outgoing import xmlrpc as module
 
 
 class Handler(SimpleXMLRPCRequestHandler):
@@ -212,7 +212,7 @@ def test_an_answer_without_end_is_a_run_time_error(box, answer, then):
 
 
 def test_an_answer_that_comes_too_slowly_is_a_run_time_error(box, monkeypatch):
-    monkeypatch.setattr(xmlrpc_exchange, "BUDGETS", replace(BUDGETS, remote_answer_time=0.05))
+    monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, remote_answer_time=0.05))
     with answering(http(value(""))[:-4], closes=False) as (port, _):
         assert "takes longer than 0.05 s" in fail(box, port).text
 
@@ -255,7 +255,7 @@ def test_an_answer_that_nobody_asked_for_is_not_taken_for_that_of_the_next_call(
 
 
 def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
-    monkeypatch.setattr(xmlrpc_client, "BUDGETS", replace(BUDGETS, remote_connections=3))
+    monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, remote_connections=3))
     with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:
         most = 0
         loop = (
@@ -273,7 +273,7 @@ def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
 
 
 def test_more_calls_at_the_same_time_than_connections_fail(box, monkeypatch):
-    monkeypatch.setattr(xmlrpc_client, "BUDGETS", replace(BUDGETS, remote_connections=2))
+    monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, remote_connections=2))
     with listening_socket() as server, connect(box, "primary") as sock:
         url = f"http://127.0.0.1:{server.getsockname()[1]}/RPC2"
         threads = [

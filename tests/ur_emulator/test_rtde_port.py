@@ -1,7 +1,7 @@
 """The RTDE port without sockets: rates, repeats while time stands still, owners, clients that misbehave."""
 
 import pytest
-from box_support import Bench, bare_access
+from box_support import BareBox, Bench
 from rtde_support import input_package
 
 from protocol.rtde import codec as M
@@ -9,7 +9,7 @@ from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.models.generations import CB3
-from ur_emulator.servers.rtde_port import RtdePort
+from ur_emulator.ports.rtde import RtdePort
 
 V3_15 = SoftwareVersion(3, 15, 8)
 
@@ -76,8 +76,8 @@ class PortBench(Bench):
     def __init__(self):
         super().__init__(fidelity="ideal")
         self.commands = []
-        self.access = bare_access(CB3.software(V3_15), self.controller, self.commands)
-        self.port = RtdePort(self.access)
+        self.box = BareBox(CB3.software(V3_15), self.controller, self.commands)
+        self.port = RtdePort(self.box)
 
     def tick(self, n=1, *commands):
         for _ in range(n):
@@ -93,7 +93,7 @@ class PortBench(Bench):
 
     def _publish(self):
         self.port.publish(self.now)
-        self.access.steps.publish(self.now)
+        self.box.steps.publish(self.now)
 
     def client(self, *names, frequency=125.0):
         client = FakeConnection(self.port)

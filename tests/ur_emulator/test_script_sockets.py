@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.outgoing import addresses, loop_network, sockets
+from ur_emulator.outgoing.addresses import LookUp, LookUps
 from ur_emulator.scripting import socket_builtins
 from ur_emulator.scripting.socket_builtins import SocketReader, TextSearch
-from ur_emulator.servers.scripts import buffers, look_ups, loop_network, sockets
-from ur_emulator.servers.scripts.look_ups import LookUp, LookUps
 
-USERS = (buffers, look_ups, loop_network, sockets, socket_builtins)
+USERS = (addresses, loop_network, sockets, socket_builtins)
 
 
 def lower(monkeypatch, **budgets):
@@ -77,7 +77,9 @@ class Resolver:
         self.asked = []
         self.threads = set()
         self._begun = threading.Semaphore(0)
-        monkeypatch.setattr(look_ups, "socket", SimpleNamespace(**{**vars(socket), "getaddrinfo": self._ask}))
+        monkeypatch.setattr(
+            addresses, "socket", SimpleNamespace(**{**vars(socket), "getaddrinfo": self._ask})
+        )
 
     def wait_for(self, n):
         """Wait until n more names are being looked up."""
@@ -113,7 +115,7 @@ def test_a_box_has_a_share_of_the_look_ups_and_forgets_those_whose_script_is_gon
 
 
 def test_a_thousand_names_wait_in_a_few_threads_and_none_is_lost(monkeypatch):
-    monkeypatch.setattr(look_ups, "BUDGETS", replace(BUDGETS, look_ups_waiting=100))
+    monkeypatch.setattr(addresses, "BUDGETS", replace(BUDGETS, look_ups_waiting=100))
     resolver = Resolver(monkeypatch)
     names = LookUps()
     done = threading.Semaphore(0)

@@ -14,7 +14,7 @@ from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
 from ur_emulator.models.generations import CB3
-from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.ports.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
 FIELDS = tuple(output_fields(V3_15).values())

@@ -11,7 +11,7 @@ from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ValueOrigin, wire_fields
 from ur_emulator.models.generations import CB3
-from ur_emulator.servers.primary.robot_state import StateEncoder
+from ur_emulator.ports.primary.robot_state import StateEncoder
 
 V3_15 = SoftwareVersion(3, 15, 8)
 ALIVE = (ValueOrigin.MEASURED, ValueOrigin.MODELLED)

@@ -29,10 +29,9 @@ from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.models.calibration import calibrated_dh
 from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.servers.primary.port import PrimaryPort, message_for
-from ur_emulator.servers.primary.robot_state import StateEncoder, dexterity, setup_records
-from ur_emulator.servers.programs.sender import Sender
-from ur_emulator.servers.programs.words import SPEED_WORD, WORDS
+from ur_emulator.ports.primary.port import PrimaryPort, message_for
+from ur_emulator.ports.primary.robot_state import StateEncoder, dexterity, setup_records
+from ur_emulator.ports.script_intake import SPEED_WORD, WORDS, Sender
 
 V3_15 = SoftwareVersion(3, 15, 8)
 E_SERIES_VERSIONS = [

@@ -14,9 +14,9 @@ from ur_emulator.commands.operation import Operation
 from ur_emulator.control_api.operations import OPERATIONS, describe
 from ur_emulator.control_api.runner import OperationRunner
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError, WaitTimeoutError
-from ur_emulator.servers.http.messages import HttpAnswer, HttpError, HttpRequest, check_origin
-from ur_emulator.servers.steps import Steps
-from ur_emulator.servers.tcp.connection import Connection
+from ur_emulator.loop.connection import Connection
+from ur_emulator.loop.steps import Steps
+from ur_emulator.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
 
 PREFIX = "/v1/"
 LIST = "operations"

@@ -15,8 +15,8 @@ from ur_emulator.control_api.step_operations import Context, StepOperation
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.errors import ControlError, NotRunningError
-from ur_emulator.realtime.event_loop import EventLoop
-from ur_emulator.servers.steps import Finished, Steps, settle
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.steps import Finished, Steps, settle
 
 # Longest value of an argument in the log, in characters.
 _MAX_SHOWN = 60
@@ -66,7 +66,7 @@ class OperationRunner:
 
     def begin(self, name: str, arguments: Mapping[str, Any], finished: Finished) -> None:
         """Begin with an operation, in the thread of the loop; `finished` gets its result or its error."""
-        self._context.access.steps.start(self.steps(name, arguments), finished)
+        self._context.box.steps.start(self.steps(name, arguments), finished)
 
     def steps(self, name: str, arguments: Mapping[str, Any]) -> Steps[Any]:
         """Check the arguments of an operation, write it into the log, do it, and return its result.
@@ -74,16 +74,16 @@ class OperationRunner:
         Raises:
             EmulatorError: it was not done.
         """
-        access = self._context.access
+        box = self._context.box
         operation = make(name, arguments)
         if operation.is_logged and not operation.only_reads:
             given = {key: getattr(operation, key) for key in arguments}
-            access.announce(LogAdded("Control", _shown(name, given)))
+            box.announce(LogAdded("Control", _shown(name, given)))
         if isinstance(operation, StepOperation):
             return (yield from operation.steps(self._context))
         assert isinstance(operation, Command)
-        result = yield from access.apply(operation)
-        return {**(result or {}), "tick": access.snapshot.tick}
+        result = yield from box.apply(operation)
+        return {**(result or {}), "tick": box.snapshot.tick}
 
     def close(self) -> None:
         """Inform all threads that wait, after the steps have ended, that the box has ended."""

@@ -1,4 +1,4 @@
-"""Operations that take no cycle or several, done in steps (see `servers.steps`).
+"""Operations that take no cycle or several, done in steps (see `loop.steps`).
 
 They read the box, wait for it, do something at a time, run a program. The command line loads this module for
 their parameters: nothing heavy at its top.
@@ -25,9 +25,9 @@ from ur_emulator.errors import ArgumentError, RefusedError, WaitTimeoutError
 if TYPE_CHECKING:
     from ur_emulator.controller.command import Result
     from ur_emulator.controller.controller import Controller
-    from ur_emulator.servers.box_access import BoxAccess
-    from ur_emulator.servers.programs.player import ProgramPlayer
-    from ur_emulator.servers.steps import Steps
+    from ur_emulator.loop.served_box import ServedBox
+    from ur_emulator.loop.steps import Steps
+    from ur_emulator.polyscope.player import ProgramPlayer
 
 
 @dataclass(slots=True)
@@ -35,13 +35,13 @@ class Context:
     """What the steps of operations need.
 
     Attributes:
-        access: to the box.
+        box: what operations act on.
         player: loads and plays program files.
         identity: returns the result of `identity`.
         make: makes an operation of the table from its name and arguments; raises ArgumentError.
     """
 
-    access: BoxAccess
+    box: ServedBox
     player: ProgramPlayer
     identity: Callable[[], dict[str, Any]]
     make: Callable[[str, Mapping[str, Any]], Operation[Any]]
@@ -76,7 +76,7 @@ class ReadState(StepOperation[BoxState]):
     def steps(self, context: Context) -> Steps[Any]:
         """Take the state."""
         yield from ()
-        return take_state(context.access.controller)
+        return take_state(context.box.controller)
 
 
 class ReadLog(StepOperation[tuple[LogEntry, ...]]):
@@ -95,7 +95,7 @@ class ReadLog(StepOperation[tuple[LogEntry, ...]]):
     def steps(self, context: Context) -> Steps[Any]:
         """Pick the entries."""
         yield from ()
-        log, least = context.access.log, ReportLevel[self.level]
+        log, least = context.box.log, ReportLevel[self.level]
         new = log.since(self.after)
         entries, seen = list[LogEntry](), log.count - len(new)
         for entry in new:
@@ -128,8 +128,8 @@ class AddToLog(StepOperation[int]):
     def steps(self, context: Context) -> Steps[Any]:
         """Write it; that needs no cycle."""
         yield from ()
-        context.access.announce(LogAdded("Control", self.text))
-        return {"tick": context.access.snapshot.tick}
+        context.box.announce(LogAdded("Control", self.text))
+        return {"tick": context.box.snapshot.tick}
 
 
 # --- `wait_until`, and its conditions: each parameter with the present value in the box
@@ -190,11 +190,11 @@ class WaitUntil(StepOperation[BoxState]):
         wanted = {name: value for name in CONDITIONS if (value := getattr(self, name)) is not None}
         if not wanted and self.log is None and self.time is None:
             raise ArgumentError("wait_until needs a condition, such as program_state STOPPED or steady true")
-        log, controller = context.access.log, context.access.controller
+        log, controller = context.box.log, context.box.controller
         end = monotonic() + self.timeout
         after, seen = self.after, self.log is None
         begin = 0 if self.time is None else controller.generation.tick_at(self.time)
-        context.access.wake_until(begin)
+        context.box.wake_until(begin)
         while True:
             if not seen:
                 seen = any(str(self.log) in entry.text for entry in log.since(after))
@@ -239,17 +239,17 @@ class At(StepOperation[int]):
     def steps(self, context: Context) -> Steps[Any]:
         """Hand it to the box for its cycle."""
         yield from ()
-        access, name = context.access, self.operation
+        box, name = context.box, self.operation
         operation = context.make(name, dict(self.arguments or {}))
         if not isinstance(operation, CommandOperation):
             raise ArgumentError(f"{name} cannot be done at a time: it does not act within one cycle")
 
         def done(result: Result, error: Exception | None) -> None:
             end = "done" if error is None else f"refused: {error}"
-            access.announce(LogAdded("Control", f"{name} at {self.time:g} s: {end}"))
+            box.announce(LogAdded("Control", f"{name} at {self.time:g} s: {end}"))
 
-        tick = access.controller.generation.tick_at(self.time)
-        access.schedule(tick, operation, done)
+        tick = box.controller.generation.tick_at(self.time)
+        box.schedule(tick, operation, done)
         return {"tick": tick}
 
 
@@ -291,8 +291,8 @@ class RunProgram(StepOperation[int]):
 
     def steps(self, context: Context) -> Steps[Any]:
         """Compile and start a text, or play a file as the dashboard does; what runs is stopped before."""
-        access, player, asked = context.access, context.player, monotonic()
-        programs = access.controller.programs
+        box, player, asked = context.box, context.player, monotonic()
+        programs = box.controller.programs
         if (self.script is None) == (self.file is None):
             raise ArgumentError("run_program needs either script, the text, or file, a name")
         if self.file is not None:
@@ -303,15 +303,15 @@ class RunProgram(StepOperation[int]):
         else:
             from ur_emulator.program_files.compiling import compile_text
 
-            catalogue = access.identity.software.catalogue
-            outcome = yield from access.in_worker(compile_text, str(self.script), catalogue)
+            catalogue = box.identity.software.catalogue
+            outcome = yield from box.in_worker(compile_text, str(self.script), catalogue)
             if isinstance(outcome, ScriptFailed):
                 raise ArgumentError(f"the program does not compile: {outcome.log_text or outcome.text}")
             program = outcome
-            yield from access.start(program, asked)
-        name, tick, run = program.name, access.snapshot.tick, programs.latest
+            yield from box.start(program, asked)
+        name, tick, run = program.name, box.snapshot.tick, programs.latest
         if self.wait and run is not None and run.program is program:  # a `sec` has ended already
-            while programs.latest is run and access.snapshot.runtime_state != ProgramState.STOPPED:
+            while programs.latest is run and box.snapshot.runtime_state != ProgramState.STOPPED:
                 yield
             if run.error is not None:
                 raise RefusedError(f"program {name} ended with an error: {run.error}")

@@ -1,0 +1,1 @@
+"""What a box dials: sockets, XML-RPC servers and Modbus units of running programs."""

@@ -1,0 +1,59 @@
+"""The network of one box: the only place from which it connects to others."""
+
+from __future__ import annotations
+
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.io.modbus_signals import UnitAddress
+from ur_emulator.loop.barrier import Report
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.outgoing.modbus_units import ModbusClient, ModbusLink
+from ur_emulator.outgoing.sockets import Buffers, ScriptConnection
+from ur_emulator.outgoing.xmlrpc import XmlRpcClient, XmlRpcServer
+
+
+class LoopNetwork:
+    """Opens connections in a loop (see `scripting.network.Network`)."""
+
+    def __init__(self, loop: EventLoop, period_s: float, report: Report, own_address: str = "") -> None:
+        """Prepare; nothing is opened.
+
+        Args:
+            loop: watches the sockets.
+            period_s: control cycle [s].
+            report: called with an error of ours and what it has ended.
+            own_address: of the box. A robot calls from the address at which it is called, and clients that
+                listen for it check that.
+        """
+        self._loop = loop
+        self._report = report
+        self._own_address = own_address
+        self._buffers = Buffers(loop, report)
+        self._modbus = ModbusClient(loop, self.open, period_s, report)
+        self._remotes = XmlRpcClient(loop, self.open, report)
+
+    def open(self, host: str, port: int) -> ScriptConnection:
+        """Begin to connect to `host`:`port`."""
+        connection = ScriptConnection(self._loop, self._buffers, self._report, self._own_address)
+        if len(host) > BUDGETS.host_length:
+            connection.refuse(f"{len(host)} characters given: a host has up to {BUDGETS.host_length}")
+        elif len(self._buffers.connections) < BUDGETS.outgoing_connections:
+            connection.begin(host, port)
+        else:
+            connection.refuse(f"the box has {BUDGETS.outgoing_connections} connections, close one first")
+        return connection
+
+    def remote_server(self, url: str) -> XmlRpcServer:
+        """Return an XML-RPC server; nothing is connected before its first call."""
+        return XmlRpcServer(self._remotes, url)
+
+    def modbus_unit(self, address: UnitAddress) -> ModbusLink:
+        """Return the connection to a Modbus unit."""
+        return self._modbus.unit(address)
+
+    def close(self) -> None:
+        """Close everything, whatever the programs are doing."""
+        self._modbus.close()
+        self._remotes.close()
+        self._buffers.close()
+        for connection in tuple(self._buffers.connections):
+            connection.close()

@@ -1,0 +1,1 @@
+"""What the screen of a box does: the loaded program, start-up, reports for people."""

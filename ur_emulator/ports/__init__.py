@@ -1,0 +1,1 @@
+"""What clients call: a module for each port, and the set of them that a box opens."""

@@ -1,0 +1,96 @@
+"""Port 502: the robot's Modbus map for Modbus TCP clients.
+
+Reads are answered at once, from the state at the end of the last cycle. Writes are commands, answered after
+the cycle in which they act; the next request of that client follows then, so that it reads what it has
+written. The unit number is not used. A request with an address that does not exist, or a write to one that
+can only be read, is refused as a whole with exception 2.
+Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus application protocol.
+"""
+
+from __future__ import annotations
+
+from protocol.errors import RemoteProtocolError
+from protocol.modbus import (
+    ExceptionCode,
+    ModbusRequest,
+    ModbusRequestError,
+    decode_request,
+    encode_answer,
+    encode_exception,
+    encode_frame,
+    take_frame,
+)
+from ur_emulator.commands.client_writes import WriteModbus
+from ur_emulator.controller.modbus_map import MapAddressError, can_write, read_coil, read_register
+from ur_emulator.loop.connection import Connection
+from ur_emulator.loop.served_box import ServedBox
+from ur_emulator.loop.steps import Steps
+from ur_emulator.ports.session import Session
+
+# Units of work for a request, and how many values cost another one.
+_REQUEST_COST, _VALUES_PER_UNIT = 4, 4
+
+
+class ModbusPort:
+    """Answers Modbus requests."""
+
+    def __init__(self, box: ServedBox) -> None:
+        self._box = box
+        self._sessions: dict[Connection, _ModbusSession] = {}
+
+    def opened(self, connection: Connection) -> None:
+        """The client speaks first."""
+        self._sessions[connection] = _ModbusSession(connection, self._box)
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Answer requests in order."""
+        self._sessions[connection].receive(data)
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client."""
+        self._sessions.pop(connection, None)
+
+
+class _ModbusSession(Session):
+    """A client."""
+
+    def __init__(self, connection: Connection, box: ServedBox) -> None:
+        super().__init__(connection, box)
+        self._inbox = bytearray()
+
+    def _take(self, data: bytes) -> None:
+        self._inbox += data
+
+    def _answer_next(self) -> Steps[int]:
+        try:
+            frame = take_frame(self._inbox)
+        except RemoteProtocolError:
+            self.connection.close()
+            return 0
+        if frame is None:
+            return 0
+        pdu = yield from self._answer(frame.pdu)
+        if not self.connection.send(encode_frame(frame.transaction, frame.unit, pdu)):
+            self.connection.close()  # without its answer, a client takes the next one for it
+        return _REQUEST_COST + len(pdu) // (2 * _VALUES_PER_UNIT)
+
+    def _answer(self, pdu: bytes) -> Steps[bytes]:
+        """Return the answer to a request; that to a write after the cycle in which it acts."""
+        try:
+            request = decode_request(pdu)
+            if request.function.is_read:
+                return encode_answer(request, self._read(request))
+            is_bits, first = request.function.is_bits, request.address
+            if not all(can_write(is_bits, first + i) for i in range(request.count)):
+                raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+            yield from self._box.apply(WriteModbus(is_bits, first, request.values))
+            return encode_answer(request)
+        except MapAddressError:
+            return encode_exception(pdu[0], ExceptionCode.ILLEGAL_DATA_ADDRESS)
+        except ModbusRequestError as error:
+            return encode_exception(pdu[0], error.code)
+
+    def _read(self, request: ModbusRequest) -> list[int]:
+        state = self._box.controller.state
+        read = read_coil if request.function.is_bits else read_register
+        return [int(read(state, request.address + i)) for i in range(request.count)]

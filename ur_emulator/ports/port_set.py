@@ -1,0 +1,191 @@
+"""All ports of one box: which there are, opened together, closed together with their connections."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.errors import PortPermissionError
+from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.listener import ClientLines, Listener, Places, Port, SpareDescriptor
+from ur_emulator.loop.served_box import ServedBox
+from ur_emulator.polyscope.player import ProgramPlayer
+from ur_emulator.polyscope.report_writer import ReportWriter
+from ur_emulator.ports.dashboard import DashboardAnswers, DashboardPort
+from ur_emulator.ports.interpreter import InterpreterIntake, InterpreterPort
+from ur_emulator.ports.modbus import ModbusPort
+from ur_emulator.ports.primary.port import PrimaryPort
+from ur_emulator.ports.primary.robot_state import StateEncoder
+from ur_emulator.ports.realtime import RealtimePort
+from ur_emulator.ports.rtde import RtdePort
+from ur_emulator.ports.script_intake import ProgramIntake
+
+CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
+# Ports whose numbers need privileges, and what the box lacks without them.
+_PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
+# Ports of web servers.
+_WEB = frozenset({CONTROL, ROBOT_API})
+
+
+class PortSet:
+    """The ports of a box by name.
+
+    Args:
+        loop: watches their sockets.
+        host: address to listen on.
+        box: what they belong to.
+        ports: by name.
+
+    Attributes:
+        notices: warnings for the user, one line each; the box runs all the same.
+    """
+
+    def __init__(self, loop: EventLoop, host: str, box: ServedBox, ports: Mapping[str, Port]) -> None:
+        self._loop = loop
+        self._host = host
+        self._box = box
+        self._ports = dict(ports)
+        self._listeners: dict[str, Listener] = {}
+        self._spare = SpareDescriptor()
+        self._places = Places()
+        self._lines = ClientLines(box.notice)
+        self.notices: list[str] = []
+
+    @property
+    def is_open(self) -> bool:
+        """True once the ports listen."""
+        return bool(self._listeners)
+
+    def open(self, wanted: Mapping[str, int]) -> dict[str, int]:
+        """Listen on all wanted ports.
+
+        Args:
+            wanted: numbers by name; 0 takes a free one, a port that is not named stays closed.
+
+        Returns:
+            The numbers. Those that need privileges may be missing.
+
+        Raises:
+            PortError: one of them cannot be opened; `close` closes the others.
+        """
+        self._spare.take()
+        for name, port in self._ports.items():
+            if name not in wanted:
+                continue
+            try:
+                self._listeners[name] = self._listener(name, port, wanted[name])
+            except PortPermissionError as error:
+                if name not in _PRIVILEGED:
+                    raise
+                self.notices.append(f"no {_PRIVILEGED[name]}: {error}")
+        return {name: listener.number for name, listener in self._listeners.items()}
+
+    def close(self) -> None:
+        """Close all ports and connections; harmless if closed already."""
+        self._spare.close()
+        for listener in self._listeners.values():
+            listener.close()
+
+    def _listener(self, name: str, port: Port, number: int) -> Listener:
+        """Listen; lockstep does not wait for clients of the control API, and they do not fill the log.
+
+        They have places of their own: a box whose other ports are full can still be controlled.
+        """
+        box, places, backlog, notice = self._box, self._places, self._box.backlog, self._lines.write
+        if name == CONTROL:
+            places, backlog, notice = Places(), set(), _no_line
+        return Listener(
+            self._loop,
+            self._host,
+            number,
+            port,
+            backlog,
+            notice,
+            box.report,
+            name,
+            places,
+            self._spare,
+            speaks_http=name in _WEB,
+        )
+
+
+def _no_line(text: str) -> None:
+    """Leave out a line."""
+
+
+@dataclass(frozen=True, slots=True)
+class SendingPorts:
+    """The ports that send in cycles, also to clients that ask for nothing.
+
+    Attributes:
+        realtime: frames, then the same without scripts.
+        rtde: what clients have subscribed to.
+        messengers: primary and secondary port, then the same without scripts.
+    """
+
+    realtime: tuple[RealtimePort, RealtimePort]
+    rtde: RtdePort
+    messengers: tuple[PrimaryPort, ...]
+
+    @classmethod
+    def make(cls, box: ServedBox, intake: ProgramIntake) -> SendingPorts:
+        """Make the ports; scripts that clients send go to the intake."""
+        software, controller = box.identity.software, box.controller
+        states = StateEncoder(
+            software, controller.state.arm, controller.state.safety, box.identity.masterboard
+        )
+        return cls(
+            (RealtimePort(software.realtime, intake), RealtimePort(software.realtime, None)),
+            RtdePort(box),
+            tuple(
+                PrimaryPort(software, controller, takes, states, all_messages=all_messages)
+                for takes in (intake, None)
+                for all_messages in (True, False)
+            ),
+        )
+
+    @property
+    def in_order(self) -> tuple[RealtimePort | RtdePort | PrimaryPort, ...]:
+        """All of them, first those whose clients act on a cycle."""
+        realtime, realtime_ro = self.realtime
+        primary, secondary, *read_only = self.messengers
+        return (realtime, self.rtde, primary, secondary, realtime_ro, *read_only)
+
+    @property
+    def by_name(self) -> dict[str, Port]:
+        """All of them by their names in `Ports`."""
+        names = ("realtime", "rtde", "primary", "secondary", "realtime_ro", "primary_ro", "secondary_ro")
+        return dict(zip(names, self.in_order, strict=True))
+
+
+def answering_ports(
+    box: ServedBox,
+    player: ProgramPlayer,
+    reports: ReportWriter,
+    shut_down: Callable[[], None],
+    host: str,
+) -> dict[str, Port]:
+    """Make the ports that answer requests, by their names in `Ports`: those that the software has.
+
+    Args:
+        box: whose port it is.
+        player: holds the loaded program.
+        reports: writes the log and reports.
+        shut_down: closes the box.
+        host: address that the box is bound to.
+    """
+    software = box.identity.software
+    ports: dict[str, Port] = {"modbus": ModbusPort(box)}
+    if software.dashboard:
+        ports["dashboard"] = DashboardPort(box, DashboardAnswers(box, player, reports, shut_down))
+    if software.has_interpreter:
+        ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
+    if software.robot_api:
+        # A box without HTTP does not load it.
+        from ur_emulator.ports.http import HttpPort
+        from ur_emulator.ports.robot_api import RobotApiAnswers
+
+        answers = RobotApiAnswers(box, player, reports, shut_down, host)
+        ports[ROBOT_API] = HttpPort(box, answers, BUDGETS.upload_bytes)
+    return ports

@@ -1,1 +1,0 @@
-"""Ports that speak HTTP: the control API, and the Robot API of PolyScope X."""

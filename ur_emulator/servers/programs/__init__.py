@@ -1,1 +1,0 @@
-"""How programs come to the box: as text on a script port, from a file, from a PC by External Control."""

@@ -1,1 +1,0 @@
-"""What running scripts reach outside the box: TCP sockets and XML-RPC servers."""
