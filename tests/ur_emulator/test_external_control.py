@@ -5,7 +5,7 @@ from box_support import FakeNetwork
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.polyscope.player import request_program
+from ur_emulator.polyscope.external_control import request_program
 from ur_emulator.program_files.installation import ExternalControlPc
 
 PC = ExternalControlPc("10.0.0.9", 50002)

@@ -14,7 +14,7 @@ from rtde_support import RtdeClient, input_package
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.loop import listener, served_box
-from ur_emulator.loop.listener import ClientLines, Places
+from ur_emulator.loop.listener import ClientLimits, ClientLines
 from ur_emulator.ports.dashboard import DashboardAnswers
 
 REGISTER = "input_double_register_0"
@@ -90,7 +90,7 @@ def test_an_address_cannot_take_all_places_and_nobody_can_take_more_than_there_a
     monkeypatch.setattr(
         listener, "BUDGETS", replace(BUDGETS, clients_of_port=2, clients_of_address=3, clients=5)
     )
-    taken, refused = Places(), Counter()
+    taken, refused = ClientLimits(), Counter()
     for address in ("a", "b", "c"):
         for port in (1, 1, 1, 2, 2):
             refused[taken.take(address, port)] += 1

@@ -12,7 +12,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError
 from ur_emulator.loop import listener
 from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.listener import PAUSE, Listener, Places, SpareDescriptor
+from ur_emulator.loop.listener import PAUSE, ClientLimits, Listener, SpareDescriptor
 
 
 class Clients:
@@ -52,8 +52,8 @@ def loop():
     made.close()
 
 
-class ForAll(Places):
-    """Places without limits."""
+class ForAll(ClientLimits):
+    """Nobody is refused."""
 
     def take(self, host, port):
         return ""
@@ -64,9 +64,9 @@ class ForAll(Places):
 
 def listen(loop, clients, notices=None, **options):
     notices = [] if notices is None else notices
-    places = options.pop("places", None) or Places()
+    limits = options.pop("limits", None) or ClientLimits()
     return Listener(
-        loop, "127.0.0.1", 0, clients, set(), notices.append, pytest.fail, "dashboard", places, **options
+        loop, "127.0.0.1", 0, clients, set(), notices.append, pytest.fail, "dashboard", limits, **options
     )
 
 
@@ -92,7 +92,7 @@ def test_a_crowd_is_let_in_a_few_at_a_time(loop):
 def test_two_hundred_clients_may_wait_to_be_let_in(loop):
     """Those beyond the backlog would wait for a second and more before they try again."""
     clients = Clients()
-    port = listen(loop, clients, places=ForAll())
+    port = listen(loop, clients, limits=ForAll())
     n = min(200, socket.SOMAXCONN)
     socks = [socket.socket() for _ in range(n)]
     for sock in socks:
@@ -193,4 +193,4 @@ def test_silent_clients_are_asked_whether_they_are_still_there(loop):
 
 def test_an_address_of_another_machine_is_distinguished_from_a_taken_port(loop):
     with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
-        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard", Places())
+        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard", ClientLimits())

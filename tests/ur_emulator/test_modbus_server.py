@@ -16,7 +16,7 @@ from ur_emulator.controller.modbus_map import COILS, REGISTERS, read_coil, read_
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.loop import listener
 from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.listener import Listener, Places
+from ur_emulator.loop.listener import ClientLimits, Listener
 from ur_emulator.ports.modbus import ModbusPort
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
@@ -431,12 +431,20 @@ def test_a_forbidden_port_is_distinguished_from_a_taken_one(monkeypatch):
     loop = EventLoop()
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(PortError) as error:
         Listener(
-            loop, "127.0.0.1", taken.getsockname()[1], None, set(), print, pytest.fail, "modbus", Places()
+            loop,
+            "127.0.0.1",
+            taken.getsockname()[1],
+            None,
+            set(),
+            print,
+            pytest.fail,
+            "modbus",
+            ClientLimits(),
         )
     assert not isinstance(error.value, PortPermissionError)
     forbid_low_ports(monkeypatch)
     with pytest.raises(PortPermissionError, match=r"port 502 on 127\.0\.0\.1 needs privileges"):
-        Listener(loop, "127.0.0.1", 502, None, set(), print, pytest.fail, "modbus", Places())
+        Listener(loop, "127.0.0.1", 502, None, set(), print, pytest.fail, "modbus", ClientLimits())
     loop.close()
 
 

@@ -18,13 +18,13 @@ from ur_emulator.ports.script_intake import ProgramIntake, Sender
 
 
 class Tasks:
-    """Tasks that end when the test says so, in the order of their places."""
+    """Tasks that end when the test says so, in the order of their tickets."""
 
     def __init__(self):
         self.begun = []
 
-    def submit(self, done, failed, place, function, text, *arguments):
-        task = SimpleNamespace(done=done, place=place, text=text)
+    def submit(self, done, failed, ticket, function, text, *arguments):
+        task = SimpleNamespace(done=done, ticket=ticket, text=text)
         self.begun.append(task)
         return task
 
@@ -34,7 +34,7 @@ class Tasks:
 
     def finish(self, n_tasks=1, error=None):
         for _ in range(n_tasks):
-            task = min(self.begun, key=lambda task: (task.place.turn, task.place.arrived))
+            task = min(self.begun, key=lambda task: (task.ticket.turn, task.ticket.arrived))
             self.begun.remove(task)
             name = task.text.split("(")[0].split()[-1]
             task.done(SimpleNamespace(name=name), error)

@@ -26,7 +26,7 @@ from ur_emulator.polyscope.report_files import (
     support_file,
 )
 from ur_emulator.ports import robot_api_files
-from ur_emulator.ports.robot_api_files import KINDS, Outcome, write_program
+from ur_emulator.ports.robot_api_files import KINDS, StoreResult, write_program
 from ur_emulator.program_files.folder import PART_NAME, FoundFile, ProgramFolder
 from ur_emulator.program_files.loading import load_program
 
@@ -220,11 +220,11 @@ def test_uploads_have_one_total_with_the_programs_that_are_there(folder, monkeyp
     n_programs = len([path for path in folder.rglob("*") if path.suffix in KINDS])
     total = (n_programs + 3) * 4_096
     monkeypatch.setattr(robot_api_files, "BUDGETS", replace(BUDGETS, uploads_bytes=total))
-    assert upload("one.script", 1) is upload("two.script", 8_192) is Outcome.WRITTEN
+    assert upload("one.script", 1) is upload("two.script", 8_192) is StoreResult.WRITTEN
     with pytest.raises(ProgramFileError, match=f"three.script has 1 bytes, .* {total} are allowed, remove"):
         upload("three.script", 1)
-    assert upload("two.script", 4_096, is_new=False) is Outcome.WRITTEN
-    assert upload("three.script", 1) is Outcome.WRITTEN
+    assert upload("two.script", 4_096, is_new=False) is StoreResult.WRITTEN
+    assert upload("three.script", 1) is StoreResult.WRITTEN
 
 
 def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):

@@ -17,7 +17,7 @@ from ur_emulator.errors import WorkerError
 from ur_emulator.loop import processes
 from ur_emulator.loop import worker as module
 from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.worker import Place
+from ur_emulator.loop.worker import Ticket
 from ur_emulator.program_files.compiling import compile_text
 from urscript.catalogue import catalogue_for
 from urscript.program import ProgramStatus, compile_program
@@ -33,7 +33,7 @@ class Bench:
         self.n_wanted = None
 
     def submit(self, function, *arguments):
-        return self.submit_at(Place(object()), function, *arguments)
+        return self.submit_at(Ticket(object()), function, *arguments)
 
     def submit_at(self, place, function, *arguments):
         return self.loop.tasks.submit(lambda *it: self._note(*it), pytest.fail, place, function, *arguments)
@@ -175,14 +175,14 @@ def test_a_task_may_need_so_much_memory_and_no_more(bench):
 
 def test_tasks_are_done_by_their_turns_then_in_the_order_of_arrival(bench):
     for name, turn, arrived in (("a", 0, 9), ("b", 1, 3), ("c", 0, 5), ("d", 1, 2), ("e", 0, 4)):
-        bench.submit_at(Place(name, turn, arrived), str.lower, name)
+        bench.submit_at(Ticket(name, turn, arrived), str.lower, name)
     assert bench.run() == ["a", "e", "c", "d", "b"]
 
 
 def test_a_task_that_takes_long_does_not_hold_up_the_next_of_others(bench):
     pid = bench.ask(os.getpid)
-    long = bench.submit_at(Place("a"), time.sleep, 1e6)
-    bench.submit_at(Place("a"), operator.add, 1, 2)
+    long = bench.submit_at(Ticket("a"), time.sleep, 1e6)
+    bench.submit_at(Ticket("a"), operator.add, 1, 2)
     for function, *arguments in ((os.getpid,), (os.getpid,), (time.sleep, 1e6)):
         bench.submit(function, *arguments)
     first, second, too_many = bench.run(3)

@@ -25,10 +25,10 @@ def guarded(failed: Failed, call: Callable[..., Any], *arguments: Any) -> None:
         failed(error)
 
 
-def place_of(error: Exception) -> str:
+def describe_error(error: Exception) -> str:
     """Return an error and where it was raised, in one line for a log."""
     frames = traceback.extract_tb(error.__traceback__, limit=-1)
-    place = "".join(
+    where = "".join(
         f" in {frame.name}, line {frame.lineno} of {Path(frame.filename).name}" for frame in frames
     )
-    return f"{error!r}{place}"
+    return f"{error!r}{where}"

@@ -3,7 +3,7 @@
 A page in a browser may send a request to any port of its machine, and lines of its choice after the head: on
 a port that does not speak HTTP such a client is closed before anything of it is read.
 
-Clients beyond the limits of a box (`places`), and those for whom the process has no descriptor left, are
+Clients beyond the limits of a box (`ClientLimits`), and those for whom the process has no descriptor left are
 accepted and closed at once, so that they notice it; connected clients are not disturbed. The limits of a real
 controller are not known.
 """
@@ -72,14 +72,14 @@ class SpareDescriptor:
 # --- How many clients a box has, by their addresses and ports: who comes on top of the limits is refused
 
 
-class Places:
-    """The places of a box that are taken."""
+class ClientLimits:
+    """Counts the clients of a box, and refuses those beyond its limits."""
 
     def __init__(self) -> None:
         self._taken: Counter[tuple[str | int, ...]] = Counter()
 
     def take(self, host: str, port: int) -> str:
-        """Take a place for a client; return "", or which limit stands against it.
+        """Count a client that has connected; return "", or which limit stands against it.
 
         Args:
             host: address of the client.
@@ -92,7 +92,7 @@ class Places:
         return ""
 
     def release(self, host: str, port: int) -> None:
-        """Give back the place of a client that is gone."""
+        """Forget a client that is gone."""
         for key, _, _ in _limits(host, port):
             self._taken[key] -= 1
             if not self._taken[key]:
@@ -151,7 +151,7 @@ class Listener:
         notice: Callable[[str], None],
         report: Report,
         name: str,
-        places: Places,
+        limits: ClientLimits,
         spare: SpareDescriptor | None = None,
         *,
         speaks_http: bool = False,
@@ -167,7 +167,7 @@ class Listener:
             notice: called with a text when a client connects or disconnects.
             report: called with an error of ours and what it has ended.
             name: of the port, for notices.
-            places: of the box, for its clients.
+            limits: of the box, for its clients.
             spare: refuses clients when no descriptor is left; without one they wait.
             speaks_http: requests of browsers are for this port.
 
@@ -181,7 +181,7 @@ class Listener:
         self._notice = notice
         self._report = report
         self._name = name
-        self._places = places
+        self._limits = limits
         self._spare = spare
         self._speaks_http = speaks_http
         self._refuses = False
@@ -226,7 +226,7 @@ class Listener:
                     continue  # this client has closed its end already
                 self._refuse_next(error)
                 return
-            why_not = self._places.take(address[0], self.number)
+            why_not = self._limits.take(address[0], self.number)
             if why_not:
                 client.close()
                 self._refused(why_not)
@@ -243,7 +243,7 @@ class Listener:
                 )
             except OSError:
                 client.close()  # closed by the client; some systems report it only now
-                self._places.release(address[0], self.number)
+                self._limits.release(address[0], self.number)
                 continue
             self.connections[connection] = None
             self._notice(f"{connection.peer} connected to {self._name} port {self.number}")
@@ -282,7 +282,7 @@ class Listener:
 
     def _closed(self, host: str, connection: Connection) -> None:
         del self.connections[connection]
-        self._places.release(host, self.number)
+        self._limits.release(host, self.number)
         self._port.closed(connection)
         self._notice(f"{connection.peer} disconnected from {self._name} port {self.number}")
 

@@ -27,12 +27,12 @@ from ur_emulator.controller.events import Event, LogAdded
 from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ControlError, RefusedError
-from ur_emulator.loop.barrier import Failed, guarded, place_of
+from ur_emulator.loop.barrier import Failed, describe_error, guarded
 from ur_emulator.loop.event_loop import EventLoop
 from ur_emulator.loop.memory import MemoryWatch
 from ur_emulator.loop.pacing import Pacer, RealtimePacer
 from ur_emulator.loop.steps import StepRunner, Steps, settle
-from ur_emulator.loop.worker import Place
+from ur_emulator.loop.worker import Ticket
 from ur_emulator.models.robot_generation import Software
 from urscript import CompiledProgram
 
@@ -216,7 +216,7 @@ class ServedBox:
 
     def report(self, what: str, error: Exception) -> None:
         """Write into the log what an error of ours has ended."""
-        text = f"{what}: {place_of(error)}"
+        text = f"{what}: {describe_error(error)}"
         self.log.write(self.snapshot.tick, "Controller", text, ReportLevel.FAULT)
 
     def _report_error(self, result: Result, error: Exception | None) -> None:
@@ -279,7 +279,7 @@ class ServedBox:
             self.steps.advance()
 
         failed = partial(self.report, "an answer is lost")
-        task = self._loop.tasks.submit(done, failed, Place(done), function, *arguments)
+        task = self._loop.tasks.submit(done, failed, Ticket(done), function, *arguments)
         try:
             while not outcome.done():
                 yield

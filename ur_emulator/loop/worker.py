@@ -27,7 +27,7 @@ from typing import Any, Final, Protocol
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import EmulatorError, WorkerError
-from ur_emulator.loop.barrier import Failed, guarded, place_of
+from ur_emulator.loop.barrier import Failed, describe_error, guarded
 from ur_emulator.loop.memory import is_stopped, resident
 from ur_emulator.loop.processes import OUT_OF_MEMORY, Child, Pipe, Role, framed, read_message, start_child
 
@@ -103,7 +103,7 @@ def _answer(task: bytes) -> bytes:
     except MemoryError:
         error = WorkerError(out_of_memory())
     except Exception as problem:
-        error = WorkerError(place_of(problem))
+        error = WorkerError(describe_error(problem))
     gc.collect()  # what the task has left behind in circles; the next one has the same memory
     return pickle.dumps((None, error))
 
@@ -139,8 +139,8 @@ class Loop(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
-    """A place among the tasks that wait.
+class Ticket:
+    """What decides when a task that waits has its turn.
 
     Attributes:
         sender: whose task it is; those of one sender never run at the same time.
@@ -158,7 +158,7 @@ class Task:
     """A task.
 
     Attributes:
-        place: among those that wait.
+        ticket: decides when it begins.
         request: the pickled function with its arguments.
         done: called at its end, unless it is dropped.
         failed: called with an error in `done`.
@@ -166,7 +166,7 @@ class Task:
         began: when a process got it, or began itself [s, monotonic].
     """
 
-    place: Place
+    ticket: Ticket
     request: bytes
     done: TaskDone
     failed: Failed
@@ -200,7 +200,7 @@ class _Process:
 
 
 class TaskQueue:
-    """Tasks in the order of their places; used in the loop's thread."""
+    """Tasks in the order of their tickets; used in the loop's thread."""
 
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
@@ -222,18 +222,18 @@ class TaskQueue:
             self._start()
 
     def submit(
-        self, done: TaskDone, failed: Failed, place: Place, function: Callable[..., Any], *arguments: Any
+        self, done: TaskDone, failed: Failed, ticket: Ticket, function: Callable[..., Any], *arguments: Any
     ) -> Task:
         """Submit a task that takes longer than a cycle.
 
         Args:
             done: called in the loop with its result, never before this returns.
             failed: called with an error in `done`.
-            place: among those that wait.
+            ticket: decides when it begins.
             function: one that can be imported; it shares no memory with this process.
             arguments: of the function; what can be pickled.
         """
-        task = Task(place, pickle.dumps((function, arguments)), done, failed)
+        task = Task(ticket, pickle.dumps((function, arguments)), done, failed)
         self._waiting.append(task)
         self._begin_next()
         return task
@@ -302,11 +302,11 @@ class TaskQueue:
             self._look_later()
 
     def _take_next(self) -> Task | None:
-        busy = {task.place.sender for task in self._under_way.values()}
-        free = [task for task in self._waiting if task.place.sender not in busy]
+        busy = {task.ticket.sender for task in self._under_way.values()}
+        free = [task for task in self._waiting if task.ticket.sender not in busy]
         if not free:
             return None
-        task = min(free, key=lambda task: (task.place.turn, task.place.arrived))
+        task = min(free, key=lambda task: (task.ticket.turn, task.ticket.arrived))
         self._waiting.remove(task)
         return task
 

@@ -7,7 +7,7 @@ import selectors
 import socket
 import time
 from functools import partial
-from typing import Final, Protocol
+from typing import Final
 from weakref import WeakSet
 
 from ur_emulator.budgets import BUDGETS, CYCLE, KIB
@@ -18,18 +18,6 @@ from ur_emulator.outgoing.addresses import LOOK_UPS, LookUp, is_closed
 
 # A connection with no more than this can always send: one that is stuck does not stop the others.
 _SHARE: Final = 4 * KIB
-
-
-class Buffered(Protocol):
-    """A connection as its buffers are counted."""
-
-    def read_on(self) -> None:
-        """Read from the peer, or stop reading, as the budgets say now."""
-        ...
-
-    def close(self) -> None:
-        """Close the connection."""
-        ...
 
 
 class Buffers:
@@ -46,7 +34,7 @@ class Buffers:
         self._window_end = 0.0
         self._in_window = 0
         self._has_read_enough = False
-        self.connections: WeakSet[Buffered] = WeakSet()
+        self.connections: WeakSet[ScriptConnection] = WeakSet()
         self.unsent = 0
 
     def received(self, n_bytes: int) -> None:

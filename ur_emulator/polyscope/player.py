@@ -13,9 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from protocol.script_channel import MAX_PROGRAM
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import PROGRAM_RUNS, PauseProgram, ResumeProgram, SetUp, StopProgram
 from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.controller.io.configuration import IoConfiguration
@@ -26,8 +24,9 @@ from ur_emulator.controller.snapshot import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
+from ur_emulator.polyscope.external_control import request_program
 from ur_emulator.program_files.compiling import (
-    Outcome,
+    CompileResult,
     compile_loaded,
     load_and_compile,
     load_installation_and_compile,
@@ -35,80 +34,11 @@ from ur_emulator.program_files.compiling import (
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import ExternalControlPc, Installation, StartUp
 from ur_emulator.program_files.installation_reader import DEFAULT_NAME, NEW_BOX
-from ur_emulator.program_files.script_writer import one_line
 from ur_emulator.program_files.variables_file import literal, write_variables
 from ur_emulator.scripting.network import Network
 
 if TYPE_CHECKING:
     from ur_emulator.program_files.loading import LoadedProgram
-
-# --- External Control: when a program is played, the box asks a PC for a part of it
-#
-#     box -> PC    request_program\n
-#     PC -> box    lines of URScript, the last one ended
-#
-# Source: source text of the URCap and of the public client library.
-
-
-REQUEST = b"request_program\n"
-# For so long the box waits for a connection and for the first line [real s]; the first is the URCap's.
-CONNECT_LIMIT = 5.0
-ANSWER_LIMIT = 5.0
-# A PC that keeps the connection open has sent all when nothing has come for this long after a line's end.
-QUIET = 0.1
-
-
-def request_program(
-    network: Network, pc: ExternalControlPc, clock: Callable[[], float] = time.monotonic
-) -> Steps[str]:
-    """Ask a PC for its program, in steps.
-
-    Args:
-        network: connects.
-        pc: whom to ask.
-        clock: real time [s].
-
-    Returns:
-        What it has sent, one character a byte; or, as the URCap does it, a program that shows what went wrong
-        and waits for somebody to close the popup.
-    """
-    problem = ""
-    received = bytearray()
-    connection = network.open(pc.host, pc.port)
-    try:
-        since = clock()
-        while connection.is_connecting and clock() - since < CONNECT_LIMIT:
-            yield
-        if not connection.send(REQUEST):
-            problem = connection.problem or "it cannot be reached"
-        begin = since = clock()
-        while not problem:
-            inbox = connection.inbox
-            if inbox:
-                received += inbox
-                inbox.clear()
-                since = clock()
-            elif not connection.is_open:
-                break
-            silence = clock() - since
-            if silence > (QUIET if received.endswith(b"\n") else ANSWER_LIMIT):
-                break
-            if len(received) > MAX_PROGRAM:
-                problem = f"it sends more than {MAX_PROGRAM} bytes"
-            elif clock() - begin > BUDGETS.external_control_time:
-                problem = f"it has not sent all of it within {BUDGETS.external_control_time:g} s"
-            yield
-    finally:
-        connection.close()
-    if not problem and not received.strip():
-        problem = "it sends nothing"
-    return _apology(pc, problem) if problem else received.decode("latin-1")
-
-
-def _apology(pc: ExternalControlPc, problem: str) -> str:
-    text = one_line(f"No program from the remote PC at {pc.host}:{pc.port}: {problem}")
-    return f'popup("{text}", "External Control", False, True, blocking=True)\nsync()\n'
-
 
 # --- Inputs that start, pause and stop programs, as an installation sets them up
 #
@@ -241,7 +171,7 @@ class ProgramPlayer:
         self.folder = folder
         self.loaded: LoadedProgram | None = None
         self.installation = NEW_BOX
-        self._ready: Outcome | None = None
+        self._ready: CompileResult | None = None
         self._loading: list[Steps[Any]] = []
         self._catalogue = box.identity.software.catalogue
 
@@ -388,7 +318,7 @@ class ProgramPlayer:
         finally:
             self._loading.remove(work)
 
-    def _set_up(self, what: str, installation: Installation, set_up: Outcome | None) -> Steps[None]:
+    def _set_up(self, what: str, installation: Installation, set_up: CompileResult | None) -> Steps[None]:
         """Make an installation effective, and end when it is; not while a program runs."""
         self._must_be_stopped(what)  # the file has taken a while
         if set_up is not None and not isinstance(set_up, ScriptFailed):
@@ -398,7 +328,7 @@ class ProgramPlayer:
             except RefusedError as error:
                 self._refuse(what, error)
 
-    def _use(self, installation: Installation, set_up: Outcome | None) -> None:
+    def _use(self, installation: Installation, set_up: CompileResult | None) -> None:
         """Take an installation that is effective; the log says what of it is not."""
         if installation is not self.installation:
             self._declare(installation)
@@ -461,7 +391,7 @@ class ProgramPlayer:
         if why:
             self._refuse("play", why)
 
-    def _prepare(self, client: str) -> Steps[Outcome]:
+    def _prepare(self, client: str) -> Steps[CompileResult]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""
         loaded = self.loaded
         assert loaded is not None

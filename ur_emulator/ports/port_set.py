@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.listener import ClientLines, Listener, Places, Port, SpareDescriptor
+from ur_emulator.loop.listener import ClientLimits, ClientLines, Listener, Port, SpareDescriptor
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.polyscope.player import ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
@@ -48,7 +48,7 @@ class PortSet:
         self._ports = dict(ports)
         self._listeners: dict[str, Listener] = {}
         self._spare = SpareDescriptor()
-        self._places = Places()
+        self._limits = ClientLimits()
         self._lines = ClientLines(box.notice)
         self.notices: list[str] = []
 
@@ -90,11 +90,11 @@ class PortSet:
     def _listener(self, name: str, port: Port, number: int) -> Listener:
         """Listen; lockstep does not wait for clients of the control API, and they do not fill the log.
 
-        They have places of their own: a box whose other ports are full can still be controlled.
+        They are counted apart: a box whose other ports are full can still be controlled.
         """
-        box, places, backlog, notice = self._box, self._places, self._box.backlog, self._lines.write
+        box, limits, backlog, notice = self._box, self._limits, self._box.backlog, self._lines.write
         if name == CONTROL:
-            places, backlog, notice = Places(), set(), _no_line
+            limits, backlog, notice = ClientLimits(), set(), _no_line
         return Listener(
             self._loop,
             self._host,
@@ -104,7 +104,7 @@ class PortSet:
             notice,
             box.report,
             name,
-            places,
+            limits,
             self._spare,
             speaks_http=name in _WEB,
         )

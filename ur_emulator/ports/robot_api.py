@@ -35,7 +35,7 @@ from ur_emulator.polyscope.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
 from ur_emulator.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.ports.robot_api_files import (
-    Outcome,
+    StoreResult,
     find_program,
     list_programs,
     read_program,
@@ -153,11 +153,11 @@ class ProgramCalls:
             in_use,
         )
         match outcome:
-            case Outcome.EXISTS:
+            case StoreResult.EXISTS:
                 raise HttpError(400, f"there is a program {name!r} already: PUT replaces it")
-            case Outcome.MISSING:
+            case StoreResult.MISSING:
                 raise HttpError(404, f"there is no program {name!r} yet: POST makes it")
-            case Outcome.IN_USE:
+            case StoreResult.IN_USE:
                 raise RefusedError(f"{name} is loaded and plays: stop it first")
         return HttpAnswer(200, {"programName": name})
 

@@ -24,7 +24,7 @@ from ur_emulator.program_files.reader import ProgramReader
 from ur_emulator.program_files.urpx import Information, information_of, read_urpx
 
 
-class Outcome(Enum):
+class StoreResult(Enum):
     """What came of a program that a client has sent."""
 
     WRITTEN = auto()
@@ -79,7 +79,7 @@ def read_program(folder: ProgramFolder, name: str) -> bytes:
 
 def write_program(
     folder: ProgramFolder, content_type: str, body: bytes, is_new: bool, in_use: str
-) -> tuple[str, Outcome]:
+) -> tuple[str, StoreResult]:
     """Write the file of a program, a new one or one that exists.
 
     A `.urpx` program says itself what it is called; clients send it under any file name. Programs of other
@@ -109,9 +109,9 @@ def write_program(
             f"{PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
         )
     if inside.stem == in_use:
-        return inside.stem, Outcome.IN_USE
+        return inside.stem, StoreResult.IN_USE
     if folder.has(str(inside)) is is_new:
-        return inside.stem, Outcome.EXISTS if is_new else Outcome.MISSING
+        return inside.stem, StoreResult.EXISTS if is_new else StoreResult.MISSING
     others = (size for path, size in folder.sizes() if path.suffix in KINDS and path != inside)
     held = sum(max(size, _BLOCK) for size in others)
     if held + max(len(data), _BLOCK) > BUDGETS.uploads_bytes:
@@ -120,7 +120,7 @@ def write_program(
             f"{BUDGETS.uploads_bytes} are allowed, remove some"
         )
     folder.write(inside, data)
-    return inside.stem, Outcome.WRITTEN
+    return inside.stem, StoreResult.WRITTEN
 
 
 def _form_file(content_type: str, body: bytes) -> tuple[str, bytes]:

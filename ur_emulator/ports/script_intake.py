@@ -31,11 +31,11 @@ from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ArgumentError
-from ur_emulator.loop.barrier import place_of
+from ur_emulator.loop.barrier import describe_error
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
-from ur_emulator.loop.worker import Place, Task, TaskQueue
-from ur_emulator.program_files.compiling import Outcome, compile_text
+from ur_emulator.loop.worker import Task, TaskQueue, Ticket
+from ur_emulator.program_files.compiling import CompileResult, compile_text
 
 # Words that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.script_channel).
@@ -107,7 +107,7 @@ class Program:
     Attributes:
         sender: who has sent it.
         text: of it.
-        place: among all that wait for the compiler.
+        ticket: decides when it is compiled.
         stops: how often the program had been stopped when it arrived.
         is_secondary: it is a `sec` program; it cannot be stopped.
         task: compiles it.
@@ -116,11 +116,11 @@ class Program:
 
     sender: Sender
     text: str
-    place: Place
+    ticket: Ticket
     stops: int
     is_secondary: bool
     task: Task | None = None
-    outcome: Outcome | None = None
+    outcome: CompileResult | None = None
 
     @property
     def cost(self) -> int:
@@ -208,8 +208,8 @@ class ProgramIntake:
     def _take_program(self, sender: Sender, item: ProgramText) -> None:
         sender.n_sent += 1
         turn = sender.n_sent // _PROGRAMS_A_TURN + len(item.text) // _BYTES_A_TURN
-        place = Place(sender, turn)
-        program = Program(sender, item.text, place, self._box.stops, item.kind == "sec")
+        ticket = Ticket(sender, turn)
+        program = Program(sender, item.text, ticket, self._box.stops, item.kind == "sec")
         self._hold(sender, program.cost)
         if self._holds_too_much(sender):
             self._hold(sender, -program.cost)
@@ -265,7 +265,7 @@ class ProgramIntake:
             program.task = self._tasks.submit(
                 partial(self._compiled, program),
                 partial(self._failed, program),
-                program.place if sender.is_open else replace(program.place, sender=self),
+                program.ticket if sender.is_open else replace(program.ticket, sender=self),
                 compile_text,
                 program.text,
                 self._box.identity.software.catalogue,
@@ -282,7 +282,7 @@ class ProgramIntake:
 
     def _failed(self, program: Program, error: Exception) -> None:
         self._drop(program)
-        self._warn(f"a program is lost: {place_of(error)}")
+        self._warn(f"a program is lost: {describe_error(error)}")
 
     def _hand_over(self) -> None:
         """Hand over what is compiled, as much as a cycle takes, and go on with compiling."""
@@ -292,7 +292,7 @@ class ProgramIntake:
             self._start(program)
             self._drop(program)
         idle = [sender for sender in self._senders if sender.waiting and sender.compiling is None]
-        for sender in sorted(idle, key=lambda sender: sender.waiting[0].place.arrived):
+        for sender in sorted(idle, key=lambda sender: sender.waiting[0].ticket.arrived):
             self._begin(sender)
 
     def _start(self, program: Program) -> None:
@@ -304,11 +304,11 @@ class ProgramIntake:
             self._box.submit(StartProgram(outcome))
         elif program.stops != self._box.stops:
             self._warn(f"program {outcome.name} was stopped before it began")
-        elif program.place.arrived < self._box.newest:
+        elif program.ticket.arrived < self._box.newest:
             self._warn(f"program {outcome.name} does not begin: a newer one was compiled before it")
         else:
-            self._box.newest = program.place.arrived
-            self._box.submit(StartProgram(outcome, program.place.arrived < self._paused))
+            self._box.newest = program.ticket.arrived
+            self._box.submit(StartProgram(outcome, program.ticket.arrived < self._paused))
 
     def _drop_gone(self) -> None:
         """Drop programs of clients that have gone until the rest keeps its budget, the longest one aside.
@@ -319,7 +319,7 @@ class ProgramIntake:
         programs = [program for other in gone for program in other.programs]
         if not programs:
             return
-        longest = max(programs, key=lambda program: (program.cost, -program.place.arrived))
+        longest = max(programs, key=lambda program: (program.cost, -program.ticket.arrived))
         while self._held_gone - longest.cost > BUDGETS.script_bytes_gone:
             greediest = max(gone, key=lambda other: other.held - (other is longest.sender) * longest.cost)
             self._tell(greediest)

@@ -23,12 +23,12 @@ from urscript.compile.interpreter_mode import CompiledStatements, compile_statem
 from urscript.errors import ScriptError, ScriptTypeError
 
 # A program that can be started, or why it cannot.
-Outcome = CompiledProgram | ScriptFailed
+CompileResult = CompiledProgram | ScriptFailed
 
 
 def compile_text(
     text: str, catalogue: Catalogue, name: str = "<program>", is_secondary: bool = False
-) -> Outcome:
+) -> CompileResult:
     """Compile a program.
 
     Args:
@@ -73,7 +73,7 @@ def compile_line(
 
 def compile_loaded(
     loaded: LoadedProgram, received: Mapping[ExternalControlPc, str], catalogue: Catalogue
-) -> Outcome:
+) -> CompileResult:
     """Compile a program from a file, with the parts that PCs have sent."""
     try:
         text = loaded.script(received.__getitem__)
@@ -87,7 +87,7 @@ def compile_loaded(
 
 def load_and_compile(
     folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue, skip_unknown: bool = False
-) -> tuple[LoadedProgram, Outcome | None, Outcome | None]:
+) -> tuple[LoadedProgram, CompileResult | None, CompileResult | None]:
     """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
 
     Args:
@@ -110,13 +110,13 @@ def load_and_compile(
 
 def load_installation_and_compile(
     folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue
-) -> tuple[Installation, Outcome | None]:
+) -> tuple[Installation, CompileResult | None]:
     """Read an installation; arguments, result and errors are those of `load_and_compile`."""
     installation = load_installation(folder, name)
     return installation, _set_up(installation, before, catalogue)
 
 
-def _set_up(installation: Installation, before: Installation, catalogue: Catalogue) -> Outcome | None:
+def _set_up(installation: Installation, before: Installation, catalogue: Catalogue) -> CompileResult | None:
     if installation == before:
         return None
     return compile_text(setup_script(installation, before), catalogue, "installation", is_secondary=True)
