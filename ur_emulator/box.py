@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from protocol.primary.messages import ReportLevel
 from protocol.serial_numbers import simulated_serial
-from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotMode, RobotType
+from protocol.ur_types import (
+    LOCKSTEP_MASTERBOARD,
+    SIMULATED_MASTERBOARD,
+    Ports,
+    RobotMode,
+    RobotType,
+    SoftwareVersion,
+)
 from ur_emulator.box_log import BoxLog
 from ur_emulator.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
 from ur_emulator.control_api.operations import make
@@ -20,10 +27,13 @@ from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, NotRunningError
 from ur_emulator.loop.event_loop import WAKE_UP, EventLoop
+from ur_emulator.loop.listener import Port
 from ur_emulator.loop.memory import MemoryWatch
 from ur_emulator.loop.pacing import Pace, make_pacer
 from ur_emulator.loop.processes import Role, prepare_children
 from ur_emulator.loop.served_box import BoxIdentity, ServedBox
+from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.outgoing.addresses import close_to_scripts, give_back
 from ur_emulator.outgoing.loop_network import LoopNetwork
@@ -32,7 +42,99 @@ from ur_emulator.polyscope.report_writer import ReportWriter
 from ur_emulator.ports.port_set import CONTROL, PortSet, SendingPorts, answering_ports
 from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import robot_hosts
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Choice:
+    """What the arguments of a box amount to.
+
+    Attributes:
+        model: the arm, with its generation.
+        version: software that is asked for.
+        fidelity: imperfections of the arm.
+        pace: lockstep or real time.
+        closed: names of the ports that stay closed.
+        identity: names and numbers by which clients know the box.
+    """
+
+    model: RobotModel
+    version: SoftwareVersion
+    fidelity: Fidelity
+    pace: Pace
+    closed: Collection[str]
+    identity: BoxIdentity
+
+    @classmethod
+    def of(cls, options: BoxOptions) -> _Choice:
+        """Check the arguments, and look up what they name.
+
+        Raises:
+            EmulatorError: an argument is not among the allowed ones.
+        """
+        model = robot_by_name(str(options.robot), options.version)
+        if options.generation is not None:
+            model = dataclasses.replace(model, generation=options.generation)
+        generation = model.generation
+        version = model.software_version(options.version)
+        software = generation.software(version)
+        fidelity = generation.fidelity(options.fidelity)
+        closed = generation.closed_ports(options.services)
+        pace = parse_pace(options.pace)
+        options.check()
+        if not (options.remote_control or generation.has_remote_control):
+            raise EmulatorError(
+                f"local control given: a box of the {generation.name} has none, "
+                "its clients may always command it"
+            )
+        identity = BoxIdentity(
+            software,
+            model=model.title,
+            wire_model=RobotType(model.robot_type).name,
+            serial_number=simulated_serial(model.robot_type, options.seed),
+            masterboard=LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
+        )
+        return cls(model, version, fidelity, pace, closed, identity)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Warnings for the user, one line each."""
+        if not self.closed:
+            return ()
+        generation = self.model.generation
+        return (
+            f"{len(self.closed)} ports stay closed, as on a new {generation.name} box: "
+            f"--services {','.join(generation.services)} enables them",
+        )
+
+    def make_controller(self, options: BoxOptions, network: Network) -> Controller:
+        """Return the box without its ports; `network` is for its programs."""
+        controller = Controller(
+            self.model,
+            self.fidelity,
+            options.seed,
+            partial(robot_hosts, network=network),
+            mode=RobotMode.RUNNING,
+            version=(self.version.major, self.version.minor),
+        )
+        controller.state.pendant.set_remote_control(options.remote_control)
+        return controller
+
+    def served_at(self, options: BoxOptions, ports: Collection[str]) -> ServedAt:
+        """Return where a box with these ports is to be found; they are not open yet.
+
+        Raises:
+            EmulatorError: the numbers of its ports are not all numbers of TCP.
+        """
+        standard, without = standard_ports(options.port_base or 0), {CONTROL, *self.closed}
+        return ServedAt(
+            title=f"{self.model.title} {self.model.generation.name} {self.version}",
+            serial_number=self.identity.serial_number,
+            host=options.host,
+            ports=Ports.of({name: getattr(standard, name) for name in ports if name not in without}),
+            port_base=options.port_base or 0,
+        )
 
 
 class Box:
@@ -61,84 +163,39 @@ class Box:
         Raises:
             EmulatorError: an argument is not among the allowed ones.
         """
-        model = robot_by_name(str(options.robot), options.version)
-        if options.generation is not None:
-            model = dataclasses.replace(model, generation=options.generation)
-        generation = model.generation
-        asked = model.software_version(options.version)
-        software = generation.software(asked)
-        imperfections = generation.fidelity(options.fidelity)
-        closed = generation.closed_ports(options.services)
-        pace, seed, host = parse_pace(options.pace), options.seed, options.host
-        options.check()
-        if not (options.remote_control or generation.has_remote_control):
-            raise EmulatorError(
-                f"local control given: a box of the {generation.name} has none, "
-                "its clients may always command it"
-            )
+        choice = _Choice.of(options)
         prepare_children(Role.WORKER)  # the compiler is loaded while the box is assembled
-        serial_number = simulated_serial(model.robot_type, seed)
-        self._free_ports = options.port_base is None
-        self._loop = loop
-        self._network = LoopNetwork(self._loop, generation.period_s, self._report, host)
-        controller = Controller(
-            model,
-            imperfections,
-            seed,
-            partial(robot_hosts, network=self._network),
-            mode=RobotMode.RUNNING,
-            version=(asked.major, asked.minor),
-        )
-        controller.state.pendant.set_remote_control(options.remote_control)
-        wire_model = RobotType(model.robot_type).name
-        masterboard = LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD
-        identity = BoxIdentity(software, model.title, wire_model, serial_number, masterboard)
-        pacer = make_pacer(pace, controller.period_s, options.speed, phase, lead)
-        self._box = ServedBox(controller, identity, pacer, self._loop, self._fail)
-        self._intake = ProgramIntake(self._loop.tasks, self._box)
+        period = choice.model.generation.period_s
         folder = ProgramFolder(None if options.programs is None else Path(options.programs))
-        self._player = player = ProgramPlayer(
+        self._options = options
+        self._choice = choice
+        self._loop = loop
+        self._network = LoopNetwork(loop, period, self._report, options.host)
+        self._box = ServedBox(
+            choice.make_controller(options, self._network),
+            choice.identity,
+            make_pacer(choice.pace, period, options.speed, phase, lead),
+            loop,
+            self._fail,
+        )
+        self._intake = ProgramIntake(loop.tasks, self._box)
+        self._player = ProgramPlayer(
             self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
         )
-        self._reports = ReportWriter(self._box, player)
+        self._reports = ReportWriter(self._box, self._player)
+        self.operations = OperationRunner(loop, Context(self._box, self._player, self._identity_now, make))
         sending = SendingPorts.make(self._box, self._intake)
+        ports = (
+            sending.by_name
+            | answering_ports(self._box, self._player, self._reports, self._shut_down, options.host)
+            | self._control_port()
+        )
+        self._port_set = PortSet(loop, options.host, self._box, ports)
         self._box.attach(
             (*sending.in_order, self._intake, self._box.steps),
             [port.send_message for port in sending.messengers],
         )
-        ports = sending.by_name | answering_ports(self._box, player, self._reports, self._shut_down, host)
-        standard = standard_ports(options.port_base or 0)
-        self.served_at = ServedAt(
-            title=f"{model.title} {generation.name} {asked}",
-            serial_number=serial_number,
-            host=host,
-            ports=Ports.of({name: getattr(standard, name) for name in ports if name not in closed}),
-            port_base=options.port_base or 0,
-        )
-        self._facts = {
-            "software": str(asked),
-            "robot": identity.model,
-            "serial_number": identity.serial_number,
-            "pace": pace.value,
-            "speed": options.speed,
-            "seed": seed,
-            "fidelity": options.fidelity,
-        }
-        context = Context(self._box, player, self._identity_now, make)
-        self.operations = OperationRunner(self._loop, context)
-        self._wanted_control_port = options.control_port
-        if options.control_port is not None:
-            from ur_emulator.control_api.http_answers import ControlAnswers
-            from ur_emulator.ports.http import HttpPort
-
-            answers = ControlAnswers(self.operations, host, options.control_token)
-            ports[CONTROL] = HttpPort(self._box, answers)
-        self._port_set = PortSet(self._loop, host, self._box, ports)
-        if closed:
-            self._port_set.notices.append(
-                f"{len(closed)} ports stay closed, as on a new {generation.name} box: "
-                f"--services {','.join(generation.services)} enables them"
-            )
+        self.served_at = choice.served_at(options, ports)
         self.is_shut_down = False
         self.failure: Exception | None = None
         self.on_end: Callable[[], None] = self.close
@@ -163,9 +220,29 @@ class Box:
         self._box.watch = watch
 
     def _identity_now(self) -> dict[str, Any]:
-        at = self.served_at
+        options, identity, at = self._options, self._choice.identity, self.served_at
         ports = {**dataclasses.asdict(at.ports), "control": at.control_port}
-        return {**self._facts, "host": at.host, "ports": {name: n for name, n in ports.items() if n}}
+        return {
+            "software": str(self._choice.version),
+            "robot": identity.model,
+            "serial_number": identity.serial_number,
+            "pace": self._choice.pace.value,
+            "speed": options.speed,
+            "seed": options.seed,
+            "fidelity": options.fidelity,
+            "host": at.host,
+            "ports": {name: n for name, n in ports.items() if n},
+        }
+
+    def _control_port(self) -> dict[str, Port]:
+        """Make the port for the control API, if it is wanted; a box without HTTP does not load it."""
+        if self._options.control_port is None:
+            return {}
+        from ur_emulator.control_api.http_answers import ControlAnswers
+        from ur_emulator.ports.http import HttpPort
+
+        answers = ControlAnswers(self.operations, self._options.host, self._options.control_token)
+        return {CONTROL: HttpPort(self._box, answers)}
 
     # --- life
 
@@ -188,7 +265,7 @@ class Box:
             self.served_at,
             ports=Ports.of(numbers),
             control_port=control_port,
-            notices=tuple(self._port_set.notices),
+            notices=(*self._choice.notices, *self._port_set.notices),
         )
         self._loop.keep_pace(self._box.controller.period_s)
         self._loop.add(self._box)
@@ -200,10 +277,10 @@ class Box:
         """Numbers of the ports to open by name; 0 takes a free one."""
         ports = dataclasses.asdict(self.served_at.ports)
         numbers = {name: number for name, number in ports.items() if number}
-        if self._free_ports:
+        if self._options.port_base is None:
             numbers = dict.fromkeys(numbers, 0)
-        if self._wanted_control_port is not None:
-            numbers[CONTROL] = self._wanted_control_port
+        if self._options.control_port is not None:
+            numbers[CONTROL] = self._options.control_port
         return numbers
 
     def _shut_down(self) -> None:
