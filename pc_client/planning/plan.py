@@ -162,7 +162,7 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
         PlanningError: the arm cannot do it.
     """
     if isinstance(motion, JointTrajectory):
-        joints = plan_joints(motion, model=model)
+        joints = _plan_joints(motion, model=model)
         trajectory = SampledTrajectory(joints.t, joints.p)
         return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
     if motion.may_be_moved and any(shift := model.description.library_shift):
@@ -210,7 +210,7 @@ def plan_movement(
     return JointPlan(movement.name, _frozen(samples.t), _frozen(samples.p), _frozen(path.q), spline, report)
 
 
-def plan_joints(
+def _plan_joints(
     trajectory: JointTrajectory,
     *,
     model: RobotModel,
