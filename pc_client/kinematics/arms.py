@@ -193,7 +193,7 @@ _UR8LONG = replace(_UR15, a2=-0.8989, a3=-0.7149)
 
 _STOPPABLE_SPEED = 180.0
 """No joint is asked for more than this [deg/s], which only a UR3's wrists could do: from it the arm is at
-rest within 0.3 s of the client's last command (the figures are those of `driver.receiver_script`)."""
+rest within 0.3 s of the client's last command (the figures are those of `driver.receiver`)."""
 
 
 def _speeds(*rated: float) -> Six:

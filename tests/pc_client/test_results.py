@@ -245,7 +245,7 @@ def test_json_rounds_and_knows_no_infinity() -> None:
 def test_polars_is_loaded_only_for_a_table() -> None:
     """Not by what moves an arm, nor by what worker processes run."""
     code = (
-        "import sys, pc_client.api.arm, pc_client.api.signals, pc_client.studies.extraction.batch\n"
+        "import sys, pc_client.arm, pc_client.analysis.run, pc_client.studies.extraction.batch\n"
         "import pc_client.studies.sweep.schedule, pc_client.commands.movements, pc_client.results.tables\n"
         "sys.exit('polars' in sys.modules)"
     )
