@@ -105,7 +105,7 @@ class ExperimentRunner:
         self._driver = driver
         self._experiment = experiment
         self._config = config
-        self._observer = observer or Observer()
+        self._observer = Observer() if observer is None else observer
         self._arm = arm_tree(experiment.model.description)
         self._signals = [(column.name, column.count, column.unit) for column in driver.layout.columns]
 
