@@ -11,12 +11,22 @@ Results: out/draw/report.html, draw.json and one recording a run.
 import argparse
 import subprocess
 import sys
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from ur_emulator import ControlBox
+from ur_emulator.errors import PortError
 
 DRAWINGS = Path(__file__).parent / "drawings"
 SHOWN = ("letter_i.txt", "elle.txt", "signature.csv")
+
+
+def open_box(stack: ExitStack, **settings) -> ControlBox:
+    """Return a box that runs as long as the stack: on the standard ports, or moved up if they are taken."""
+    for base in range(0, 20_000, 1000):
+        with suppress(PortError):
+            return stack.enter_context(ControlBox(port_base=base, **settings))
+    sys.exit("draw: no free ports found; stop what listens on 29999 to 30013")
 
 
 def main() -> int:
@@ -30,7 +40,8 @@ def main() -> int:
     parser.add_argument("--repeat", type=int, default=3)
     options = parser.parse_args()
     files = options.files or [str(DRAWINGS / name) for name in SHOWN]
-    with ControlBox(port_base=None, pace=options.pace, fidelity=options.fidelity, seed=options.seed) as box:
+    with ExitStack() as stack:
+        box = open_box(stack, seed=options.seed, pace=options.pace, fidelity=options.fidelity)
         client = [sys.executable, "-m", "pc_client", "draw", *files, "--robot", box.host]
         client += ["--port-base", str(box.port_base), "--out", str(options.out), "--overwrite"]
         client += ["--repeat", str(options.repeat), "--controller", options.controller]

@@ -195,7 +195,8 @@ def measured(signal: Sampled) -> dict[str, float]:
 
     The power law is fitted from the first to the last peak of the speed.
     """
-    speed, rate = signal.speed, 1.0 / signal.step
+    # Not `signal.speed`, which rounds otherwise: the first of equal samples is where a plateau has its peak.
+    speed, rate = np.linalg.norm(signal.v, axis=1), 1.0 / signal.step
     inner = between_peaks(speed)
     law = fit_power_law(signal.v[inner], signal.a[inner])
     likeness = Likeness(

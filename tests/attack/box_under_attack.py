@@ -30,7 +30,7 @@ from protocol.realtime.layout import RealtimeLayout, layout_for_version
 from protocol.ur_types import Ports
 from ur_emulator.models.robots import robot_by_name
 
-PATIENCE = 20.0  # s; a box that has not answered by then does not answer
+PATIENCE = 60.0  # s; a box that has not answered by then does not answer
 MOST_MEMORY = 300.0  # MB; of the box and its worker processes together
 # Clients of attacks have these in turn; the innocent one has 127.0.0.1.
 ADDRESSES = ("127.0.0.2", "127.0.0.3", "127.0.0.4", "127.0.0.5")

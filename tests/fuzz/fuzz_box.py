@@ -152,7 +152,6 @@ class FuzzBox:
         self.generation = self.controller.state.robot.generation
         self.period = self.generation.period_s
         self.served._pacer = self.pacer = _Pacer(self.period)
-        inside(box).operations._context.clock = lambda: self.now
         self.defects = []
         box.follow_log(self._look_at_log)
         inside(box).listen()

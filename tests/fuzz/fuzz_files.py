@@ -203,7 +203,7 @@ class _Answers:
             pass
         finally:
             answering.close()
-            remotes.close_all()
+            remotes.end()
         assert not self._defects, self._defects
 
     def _answer(self, data):

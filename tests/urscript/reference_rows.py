@@ -211,7 +211,7 @@ ELSEWHERE = {
     "1.5 a float where socket_send_int wants an int": "tests/ur_emulator/chunks/sockets.script",
     "1.7 socket_send_string of a number": "tests/ur_emulator/chunks/sockets.script",
     "2.1-2.4, 2.7, 2.8 every builtin that needs a robot": "tests/ur_emulator/chunks",
-    "2.13 how many builtins each version has": "tests/urscript/test_urscript_catalogue_names.py",
+    "2.13 how many builtins each version has": "tests/urscript/test_urscript_catalogue.py",
     "3 motion": "tests/ur_emulator/chunks/motion_moves.script",
     "3.4 ownership of the arm": "tests/ur_emulator/chunks/motion_moves.script",
     "4 values are constant within a frame": "tests/ur_emulator/chunks/internals_state.script",
