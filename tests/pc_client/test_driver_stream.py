@@ -372,6 +372,19 @@ def test_a_row_sink_that_fails_ends_the_run():
     assert robot.at_rest
 
 
+def test_a_safety_stop_that_comes_with_another_error_is_named_before_it():
+    robot = FakeRobot()
+
+    def sink(frame, step):
+        if step.t > 0.1:
+            robot.safety_mode = 3
+            raise DriverError("the tool is off its path")
+
+    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP.*; before that: the tool is off its path"):
+        stream(robot, rows=sink)
+    assert robot.at_rest
+
+
 def test_time_that_stands_still_for_ever_is_an_error():
     robot = FakeRobot()
     take = robot.took
