@@ -47,9 +47,7 @@ def _watch(
     Args:
         interface: one of `_INTERFACES`.
         address: host, or host:port for another port than the standard one.
-        decoder: for that interface.
         count: packages to wait for, after the replies of the set-up on RTDE.
-        names: variables to ask RTDE for.
 
     Raises:
         LocalProtocolError: not an address, or the box does not have a variable.

@@ -43,9 +43,6 @@ class StreamDecoder:
 
     Args:
         version: software of the controller, until its version message arrives.
-
-    Attributes:
-        count: complete packages so far.
     """
 
     def __init__(self, version: SoftwareVersion) -> None:
@@ -115,7 +112,6 @@ class RtdeDecoder:
             ones get numbers.
 
     Attributes:
-        count: whole packages so far.
         refused: refusals that the robot sent instead of types, by name.
     """
 

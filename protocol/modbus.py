@@ -136,7 +136,6 @@ class ModbusRequest:
     """A request to read or write neighbouring addresses.
 
     Attributes:
-        function: what to do.
         address: the lowest one.
         count: how many addresses, at least one; none is above 65535.
         values: what to write, 0 or 1 for a bit; empty for a read.

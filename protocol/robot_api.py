@@ -135,7 +135,6 @@ def match_call(method: str, path: str, known: Iterable[ApiCall]) -> tuple[ApiCal
     """The call that a request is, and its argument.
 
     Args:
-        method: of the request.
         path: of the request, without the query; a slash at its end has no meaning.
         known: the calls of the software.
 

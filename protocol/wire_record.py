@@ -93,7 +93,6 @@ class WireField:
     """One row of a record's table.
 
     Attributes:
-        name: attribute of the record.
         code: `struct` letter, `p`, `t` or `s` for text, `*` for records.
         count: 1 for a scalar, else the value is a tuple of so many.
         interleaved: fields that follow one another with the same name here share their elements' places:
@@ -101,7 +100,6 @@ class WireField:
         only_if: name of an earlier field that must be true, or the field is absent.
         since: first versions that have the field.
         unit: SI unit, "enum", or "".
-        note: meaning.
         record: table of the records of a `*`.
         origin: where the emulated box takes it from; None for fields of messages.
     """
@@ -171,7 +169,6 @@ class Codec(Generic[R]):
     """Encoder and decoder of one record class for one set of its fields.
 
     Attributes:
-        record: the class.
         fields: the rows that are on the wire.
         size: bytes of the fixed part; the whole record unless it has text.
     """

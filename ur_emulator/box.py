@@ -51,9 +51,7 @@ class _Choice:
     """What the arguments of a box amount to.
 
     Attributes:
-        model: the arm, with its generation.
         version: software that is asked for.
-        fidelity: imperfections of the arm.
         pace: lockstep or real time.
         closed: names of the ports that stay closed.
         identity: names and numbers by which clients know the box.
@@ -155,7 +153,6 @@ class Box:
         """Assemble the box; nothing listens before `listen`.
 
         Args:
-            options: its arguments.
             loop: perhaps shared with other boxes.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).

@@ -210,7 +210,6 @@ class ControlBox(_Running, BoxControl):
     Args:
         robot: type of the arm, such as "ur3" or "ur5e", or a file of one (docs/fidelity.md).
         version: software, such as "3.4.0"; None is the usual one of the arm's generation.
-        host: address to listen on.
         pace: "realtime", or "lockstep": as fast as the processor allows, and repeatable.
         speed: times as fast as real time, in pace "realtime" only.
         seed: which specimen of the arm: calibration, gear phases, delays, noise.
@@ -291,8 +290,6 @@ class ControlBox(_Running, BoxControl):
         It goes on when this process ends. Operations are asked for over the control API (docs/control.md).
 
         Args:
-            host: its address.
-            port: its control port.
             token: of that port, None if it has none.
 
         Raises:

@@ -29,7 +29,6 @@ class LoopRack:
 
     Attributes:
         boxes: in the order of their options.
-        loop: runs them.
     """
 
     def __init__(self, options: Sequence[BoxOptions]) -> None:

@@ -48,7 +48,6 @@ class ScriptBox:
     """A box for one program (see urscript.robot.ScriptRobot).
 
     Attributes:
-        title: what it is, in words.
         step_time: control cycle [s].
     """
 
@@ -58,9 +57,7 @@ class ScriptBox:
         """Assemble the box.
 
         Args:
-            robot: name of the arm.
             fidelity: how far it is from a perfect one.
-            seed: of everything random in it.
             software: version that it runs, (major, minor).
             answers: what the operator answers, in order.
 

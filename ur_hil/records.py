@@ -62,7 +62,6 @@ class Field(Generic[T]):
 
     Attributes:
         text: what is allowed, for messages and documentation.
-        kind: the type of the values.
         schema: pydantic's core schema.
         unit: of the values; empty without one.
     """

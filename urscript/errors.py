@@ -111,7 +111,6 @@ class ScriptSyntaxError(ScriptCompileError):
 
     Attributes:
         unexpected: Terminal of the grammar that was found; empty if none was.
-        accepted: Terminals that were expected.
     """
 
     kind = "Syntax error"

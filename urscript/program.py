@@ -111,9 +111,6 @@ class CompiledProgram:
     Attributes:
         name: The `def` name; of a one-line program the function it calls.
         kind: "def" (primary), "sec" (secondary), or "statement".
-        compiled: Its functions.
-        builtins: Builtin functions it uses.
-        globals: Its global variables.
         declared_globals: Those that are declared with `global`, in the order of the text.
         depth: Calls inside one another that its functions allow, recursive ones aside.
         living_scopes: The names that statements of interpreter mode find, pickled, by the Python name of the
@@ -136,7 +133,6 @@ class CompiledProgram:
         """A new run on `host`; it begins with its first `step`.
 
         Args:
-            host: The robot.
             work: What it may do in a cycle; its owner renews it. Without one there is no such limit.
         """
         return RunningProgram(self, host, work)

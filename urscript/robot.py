@@ -123,7 +123,6 @@ class RobotMaker(Protocol):
         Args:
             name: One of `robots`, or a file that `software_of` has read.
             fidelity: One of `fidelities`.
-            seed: Of all random numbers.
             software: Software version of the generation of that robot, e.g. (3, 15).
             answers: Answers of the operator to the questions of the program, in order.
         """

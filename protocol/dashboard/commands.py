@@ -49,7 +49,6 @@ class DashboardCommand:
         name: the fixed words, spelled as on the wire.
         argument: description of the argument; "" if there is none.
         since: first software of each generation.
-        does: description.
         replies: templates by key; "ok" is always there. Braces name what the box fills in.
         done_since: first software whose reply comes when the command is carried out; None for commands whose
             reply has always come at once. e-Series software is newer than all of them.

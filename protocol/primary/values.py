@@ -80,7 +80,6 @@ class TypedValue:
     """One value.
 
     Attributes:
-        type: what it is.
         value: None, bool, int, float or str; six floats (m, rad) for a pose; a tuple of TypedValue for a
             list; a tuple of such tuples, all equally long, for a matrix.
     """

@@ -30,7 +30,6 @@ class RtdeField:
 
     Attributes:
         name: as on the wire.
-        type: its data type.
         unit: SI unit, "enum", "bits" or "-".
         since: first software of each generation that has it.
         origin: how the emulated box fills an output; None for an input.

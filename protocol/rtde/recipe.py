@@ -24,7 +24,6 @@ class Recipe:
 
     Attributes:
         names: of the variables, as on the wire.
-        types: of the variables.
         size: bytes of all values.
     """
 

@@ -67,14 +67,11 @@ class Parameter:
 
     Attributes:
         name: as in Python, JSON and on the command line.
-        kind: its type.
         meaning: what it is, as a phrase.
         default: taken when it is not given; None where leaving it out means something of its own, MISSING
             where it must be given.
-        unit: of numbers.
         low: least number.
         high: greatest number; of a vector, its greatest length.
-        choices: of a CHOICE.
         lengths: of a VECTOR: least and greatest number of numbers.
     """
 
@@ -211,7 +208,6 @@ def parameter(
 
     Args:
         meaning: what it is, as a phrase.
-        unit: of numbers.
         low: least number.
         high: greatest number; of a vector, its greatest length.
         default: taken when it is not given; without it the parameter is required.
@@ -278,8 +274,6 @@ class Operation(Generic[R_co]):
     """What is common to all operations; `R_co` is what the method of `ControlBox` returns.
 
     Attributes:
-        parameters: its fields.
-        meaning: its sentence.
         result: what the JSON object that it returns holds.
         only_reads: it changes nothing: a property in Python, GET in HTTP.
         is_logged: the box's log shows that it was asked for.

@@ -31,7 +31,6 @@ class StartProgram:
 
     Attributes:
         program: compiled.
-        pauses: it begins with a pause.
         loaded: it was loaded from a file and played; otherwise it came through a socket.
     """
 
@@ -56,7 +55,6 @@ class SetUp:
 
     Attributes:
         program: a `sec`.
-        limits: of the arm.
         inputs: pairs of configurable inputs that e-Series boxes have, in place of those of the one before.
     """
 

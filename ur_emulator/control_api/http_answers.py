@@ -27,7 +27,6 @@ class ControlAnswers:
     """Does the operations that requests name.
 
     Args:
-        runner: does the operations.
         own_host: address that the port is bound to.
         token: what each request must show; None: nothing.
     """

@@ -35,8 +35,6 @@ class ControlClient:
         """Ask a box.
 
         Args:
-            host: its address.
-            port: its control port.
             token: of that port, None if it has none.
         """
         self.host = host

@@ -59,7 +59,6 @@ class ReadProperty(Generic[R]):
     """The property for an operation that only reads.
 
     Args:
-        operation: the operation.
         read: how it is asked for in Python, if not through the loop.
     """
 

@@ -23,12 +23,7 @@ _MAX_SHOWN = 60
 
 
 class OperationRunner:
-    """Runs operations on one box.
-
-    Args:
-        loop: of the box.
-        context: what their steps need.
-    """
+    """Runs operations on one box."""
 
     def __init__(self, loop: EventLoop, context: Context) -> None:
         self._loop = loop

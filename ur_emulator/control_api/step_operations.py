@@ -35,8 +35,6 @@ class Context:
     """What the steps of operations need.
 
     Attributes:
-        box: what operations act on.
-        player: loads and plays program files.
         identity: returns the result of `identity`.
         make: makes an operation of the table from its name and arguments; raises ArgumentError.
     """

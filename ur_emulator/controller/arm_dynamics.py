@@ -29,13 +29,7 @@ _LEAST_DECELERATION = 1.0
 
 
 class ArmDynamics:
-    """Answers about the arm's dynamics; the model is built at the first question.
-
-    Args:
-        robot: type of the arm.
-        calibration: that the controller knows.
-        tool: has the payload.
-    """
+    """Answers about the arm's dynamics; the model is built at the first question."""
 
     def __init__(self, robot: RobotModel, calibration: Calibration, tool: ToolSettings) -> None:
         self._robot = robot

@@ -29,15 +29,7 @@ _REGISTERS: dict[str, tuple[str, int, int]] = {
 
 
 class ClientInputs:
-    """Writes variables into the parts of the box that they are for, and keeps the values of the others.
-
-    Args:
-        io: the lines that they switch.
-        registers: the input registers.
-        speed: the speed slider.
-        watchdogs: of programs over these variables.
-        clock: time of a write.
-    """
+    """Writes variables into the parts of the box that they are for, and keeps the values of the others."""
 
     def __init__(
         self, io: InputOutput, registers: Registers, speed: SpeedScaling, watchdogs: Watchdogs, clock: Clock

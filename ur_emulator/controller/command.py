@@ -31,8 +31,6 @@ class BoxParts(Protocol):
     Attributes:
         state: modes, inputs and outputs, questions, events.
         plant: the arm and what surrounds it.
-        push: what pushes the flange.
-        programs: what runs.
         safety: safety events, and their effects on arm, program and power.
     """
 

@@ -37,7 +37,6 @@ class Compliance:
     """Requests for freedrive and force mode.
 
     Attributes:
-        mode: control mode of this cycle.
         by_program: a program has requested freedrive.
         by_client: `set robotmode freedrive` has.
         by_input: an input or the teach button has, and it acts.
@@ -63,7 +62,6 @@ class Compliance:
             mode: compliance ends when it is not RUNNING.
             safety: compliance ends when it stops the arm.
             operational: decides whether people may guide the arm.
-            inputs: may request freedrive.
             past: measured positions.
         """
         self._motion = motion
@@ -200,11 +198,7 @@ class Compliance:
         return TorqueCommand(self._hold.torque(sensed.actual_q, sensed.actual_qd), ZERO6, ZERO6)
 
     def find_violation(self, sensed: PlantState) -> Violation | None:
-        """Return a violation by a compliant arm in this cycle, or None.
-
-        Args:
-            sensed: of this cycle.
-        """
+        """Return a violation by a compliant arm in this cycle, or None."""
         if self.mode is ControlMode.TEACH and self._is_refused:
             self._is_refused = False
             return WRONG_PAYLOAD

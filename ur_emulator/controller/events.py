@@ -17,7 +17,6 @@ class ProgramStarted:
 
     Attributes:
         name: of its `def`, or of the function called by a one-line program.
-        run: gives access to its variables.
     """
 
     name: str
@@ -59,7 +58,6 @@ class ScriptFailed:
     Attributes:
         line: 1-based line in the text as sent, the `def` line being 1.
         column: 1-based column.
-        text: as the controller sends it.
         secondary: the program was a `sec`: only logged, the primary program goes on.
         log_text: as its log has it; "" if it is the same.
     """
@@ -126,8 +124,6 @@ class ValueRequested:
 
     Attributes:
         request_id: number of the question, see `Pendant`.
-        kind: type of the value.
-        text: the question.
     """
 
     request_id: int

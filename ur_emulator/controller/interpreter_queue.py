@@ -80,7 +80,6 @@ class InterpreterQueue:
         is_ending: the mode ends when the present line has ended.
         is_clearing: all is cleared when the present line has ended.
         clears_on_end: all is cleared when the mode ends.
-        log: its log files.
     """
 
     def __init__(self) -> None:

@@ -42,7 +42,6 @@ class PendantRequest:
     Attributes:
         request_id: number of it, from 1.
         kind: type of the answer; NONE is a popup, which is to be closed.
-        text: of the question.
         answer: what was answered; None so far.
         is_answered: it was answered, or the popup closed.
     """

@@ -35,7 +35,6 @@ class SafetySystem:
     """Applies safety events to the safety state, and its effects to arm, program and power.
 
     Attributes:
-        inputs: safety buttons and inputs.
         is_busy: `step` and `find_violation` must be called in every cycle.
     """
 

@@ -40,7 +40,6 @@ class ControllerState:
     """The parts of one controller.
 
     Attributes:
-        robot: numbers of the arm.
         arm: kinematics of the arm, with the calibration that the controller knows.
         seed: of everything random in the box.
         clock: control cycles, and those of programs.
@@ -51,20 +50,14 @@ class ControllerState:
         operational: who has chosen which operational mode, and what it allows.
         enabling_device: the three-position enabling device.
         speed: speed slider, and the limits of a safety mode that has some.
-        tool: TCP, payload and gravity.
-        energy: what the arm has taken.
         dynamics: the model of the arm with that payload.
         planning: how programs want their moves to be planned.
         world: named frames.
-        io: digital and analogue lines.
-        registers: general purpose registers.
         io_configuration: which inputs act, which outputs follow the program.
         client_inputs: last values of the RTDE inputs that are no registers.
         watchdogs: of the running program over RTDE inputs.
-        encoders: of conveyors.
         modbus: signals of other units that programs have added.
         modbus_map: words of the robot's own Modbus map.
-        compliance: force mode, and hand guiding.
         force_sense: zero and history of the wrench.
         pendant: what programs ask of the operator, and the buttons that are pressed.
         interpreter: statements that arrive for the running program.

@@ -46,7 +46,6 @@ class WorldModel:
 
     Args:
         flange_pose: the pose of the flange in the base.
-        tool: has the TCP.
     """
 
     def __init__(self, flange_pose: Callable[[], Pose], tool: ToolSettings) -> None:

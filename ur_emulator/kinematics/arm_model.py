@@ -30,7 +30,6 @@ def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> V
     Args:
         wrench: [N, Nm].
         of: point that its moment refers to, (3,) or the pose of it [m].
-        to: the other point.
     """
     rx, ry, rz = (b - a for a, b in zip(of[:3], to[:3], strict=True))
     fx, fy, fz, mx, my, mz = wrench
@@ -86,7 +85,6 @@ class ArmModel:
     Not to be shared between threads: evaluation uses one scratch state.
 
     Args:
-        robot: type of the arm.
         calibration: differences of this arm from the nominal one.
 
     Attributes:

@@ -27,7 +27,6 @@ class BufferedSocket(ABC):
         """Prepare; there is no socket yet.
 
         Args:
-            loop: watches the socket.
             outbox_limit: bytes that may wait for a peer that does not read.
             read_size: bytes taken from the peer in a turn of the loop.
         """
@@ -178,7 +177,6 @@ class Connection(BufferedSocket):
         """Take over a connected socket.
 
         Args:
-            loop: watches the socket.
             sock: connected; becomes non-blocking and belongs to this object.
             on_data: called with what has come.
             on_close: called once when the connection is gone, for whatever reason.

@@ -82,7 +82,6 @@ class ClientLimits:
         """Count a client that has connected; return "", or which limit stands against it.
 
         Args:
-            host: address of the client.
             port: number of the port that it has connected to.
         """
         for key, limit, what in _limits(host, port):
@@ -137,7 +136,6 @@ class Listener:
     """Accepts the clients of one port.
 
     Attributes:
-        number: of the TCP port.
         connections: to the clients that are connected.
     """
 
@@ -159,14 +157,11 @@ class Listener:
         """Listen.
 
         Args:
-            loop: watches the sockets.
-            host: address to bind to.
             number: TCP port; 0 takes a free one.
             port: gets the clients.
             backlog: shared by all connections of a box, see Connection.
             notice: called with a text when a client connects or disconnects.
             report: called with an error of ours and what it has ended.
-            name: of the port, for notices.
             limits: of the box, for its clients.
             spare: refuses clients when no descriptor is left; without one they wait.
             speaks_http: requests of browsers are for this port.

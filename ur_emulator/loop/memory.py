@@ -116,11 +116,7 @@ class Tasks(Protocol):
 
 
 class MemoryWatch:
-    """Watches the memory of a process that only serves boxes.
-
-    Args:
-        tasks: those of its loop.
-    """
+    """Watches the memory of a process that only serves boxes."""
 
     def __init__(self, tasks: Tasks) -> None:
         self._tasks = tasks

@@ -90,11 +90,7 @@ def _read(pipe: socket.socket, size: int) -> bytes:
 
 
 class Pipe:
-    """A pipe as a loop uses it: nothing waits.
-
-    Attributes:
-        sock: its socket, non-blocking.
-    """
+    """A pipe as a loop uses it: nothing waits."""
 
     def __init__(self, sock: socket.socket) -> None:
         sock.setblocking(False)

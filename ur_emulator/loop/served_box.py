@@ -50,7 +50,6 @@ class BoxIdentity:
     """Names and numbers by which clients know the box.
 
     Attributes:
-        software: four numbers and a date.
         model: as people write it, "UR5e".
         wire_model: as the dashboard server writes it: "UR5" for a UR5e.
         serial_number: digits; see protocol.serial_numbers.simulated_serial.
@@ -99,7 +98,6 @@ class ServedBox:
         Args:
             controller: the box without its ports.
             identity: names and numbers by which clients know the box.
-            pacer: decides when it ticks.
             loop: expects bytes that a script waits for, and has the worker process.
             on_failure: called with the error that has ended a cycle; there will be no further one.
         """
@@ -159,7 +157,6 @@ class ServedBox:
         """Take a command for the next cycle.
 
         Args:
-            command: acts as the cycle begins.
             done: called then with the result or the error.
             in_place_of: a name; one of the same name that waits for the cycle does not act any more.
         """

@@ -158,7 +158,6 @@ class Task:
     """A task.
 
     Attributes:
-        ticket: decides when it begins.
         request: the pickled function with its arguments.
         done: called at its end, unless it is dropped.
         failed: called with an error in `done`.
@@ -178,8 +177,6 @@ class _Process:
     """A worker process.
 
     Attributes:
-        child: its life.
-        pipe: takes tasks, gives answers.
         memory_at_rest: what it held when it began [bytes].
     """
 
@@ -229,7 +226,6 @@ class TaskQueue:
         Args:
             done: called in the loop with its result, never before this returns.
             failed: called with an error in `done`.
-            ticket: decides when it begins.
             function: one that can be imported; it shares no memory with this process.
             arguments: of the function; what can be pickled.
         """

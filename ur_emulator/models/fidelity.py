@@ -91,7 +91,6 @@ class Fidelity:
         speed_dead_band: below this joint speed the filter's input is gated to zero [rad/s].
         speed_sigma: sd of the white noise of the reported speed while moving [rad/s].
         current_sigma: sd of the reported current, (6,) [A].
-        ripples: waves of the gears.
         backlash: play of each gear [rad]; within it the joint stands still while the motor turns.
         friction_presliding: angle over which the friction of a joint follows a reversal [rad]: it depends on
             the path then, with hysteresis (`plant/friction.py`). 0: it depends on the speed alone.

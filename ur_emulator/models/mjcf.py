@@ -31,7 +31,6 @@ def arm_spec(robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float]
     """Build the bare mechanism.
 
     Args:
-        robot: the type of arm.
         dh: six rows, nominal or calibrated.
         mass_scale: six factors on the link masses (and inertias).
 

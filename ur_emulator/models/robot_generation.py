@@ -47,7 +47,6 @@ class RobotGeneration:
         major: first number of its software versions.
         default_version: what a box runs if the user names none.
         builds: which version has which build.
-        limits: of the safety system.
         electrics: of the box and its arms.
         force_sensing: how its arms know the wrench at the flange.
         execution_time: run time of a control cycle without programs, as the box reports it [ms]; 0: it is
@@ -67,7 +66,6 @@ class RobotGeneration:
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
         rtde_outputs: variables that a client can subscribe to.
         rtde_inputs: variables that a client can write.
-        builtins: of URScript.
         interpreter_since: first version with the port for interpreter mode; None if there is none.
 
     Raises:
@@ -274,7 +272,6 @@ class Software:
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
         rtde_outputs: variables that a client can subscribe to, by name.
         rtde_inputs: variables that a client can write, by name.
-        catalogue: the builtins of URScript.
         has_interpreter: statements can be sent to a program in interpreter mode.
     """
 

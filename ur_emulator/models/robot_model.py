@@ -153,7 +153,6 @@ class RobotModel:
         generation: which one it is of: control cycle, software.
         dh: six nominal rows.
         links: six moving links.
-        outline: of its housings.
         tau_max: largest joint torque [Nm].
         qd_max: rated joint speed, which moves are planned with [rad/s].
         q_min: lower end of the joint range of the safety system [rad].

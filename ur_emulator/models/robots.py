@@ -116,7 +116,6 @@ class RobotFile:
 
     Attributes:
         based_on: arm of the table that has all other numbers.
-        dh: lengths of the geometry.
         links: masses, centres and inertias.
     """
 

@@ -50,7 +50,6 @@ class TimeScaling:
 
     Attributes:
         paused: the factor goes to 0, else to 1.
-        factor: in this cycle.
         slowing: its rate of change to 0 [1/s].
     """
 
@@ -83,7 +82,6 @@ class Suspended(NamedTuple):
 
     Attributes:
         generator: a move, or a stream if it is renewed.
-        owner: of the arm.
         q: where the move left its path [rad].
     """
 
@@ -96,8 +94,6 @@ class ReturnToPath:
     """The return to where a move left its path; then the move continues.
 
     Attributes:
-        done: back on the path.
-        move: that continues then.
         back_to: joint angles on the path [rad].
     """
 

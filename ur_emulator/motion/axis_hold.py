@@ -27,7 +27,6 @@ class AxisHold:
     """Holds the tool along some axes.
 
     Args:
-        tool: that is held.
         axes: rotation vector of the feature in the base [rad].
         blocked: by axis: x, y, z and the rotations about them.
         q: joint angles where it is held [rad].

@@ -68,7 +68,6 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
 
     Args:
         first: the move that leads to the waypoint.
-        second: the move that begins there.
         r: radius [m]; reduced where it covers more than half of the second move.
         most: how much of the end of the first move it may replace.
 

@@ -188,9 +188,7 @@ class ForceMode:
     """The overlay; it begins without displacement and speed.
 
     Args:
-        tool: that is moved.
         frame: its axes are compliant or stiff.
-        settings: arguments of force_mode.
         sensing: how the wrench is measured, which says how fast the mode may act.
         stiffness: of the joint servos (6,) [Nm/rad].
         measure: gives the present measurement.

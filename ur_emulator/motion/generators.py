@@ -409,7 +409,6 @@ class DirectTorque(Streamed):
     """Follow the measured arm while the drives give a torque.
 
     Args:
-        command: for the drives.
         measure: gives the measured angles and speeds.
     """
 

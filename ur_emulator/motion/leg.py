@@ -101,7 +101,6 @@ class Leg:
 
         Args:
             q: joint angles at the start [rad].
-            pose: of the tool there.
 
         Returns:
             None for an arc, since its circle depends on its start, and if the arm would arrive with other
@@ -180,9 +179,7 @@ def move_tool(
     """Return a move of the tool along a path. Source: URScript manual CB3 3.15, movel, movep, movec.
 
     Args:
-        path: to follow.
         near: joint angles at its beginning [rad], (6,).
-        tool: kinematics.
         a: tool acceleration [m/s^2].
         v: tool speed [m/s].
         t: duration [s]; above 0 it has priority over `a` and `v`.

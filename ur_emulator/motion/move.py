@@ -39,7 +39,6 @@ class PathSegment:
         begin, end: of the part [unit].
         scale: units of the chain per unit of the path.
         leg: the move whose waypoint it leads to.
-        limits: of the whole path.
         intervals: the limits within the segment, in units of the chain.
     """
 

@@ -76,11 +76,7 @@ _NO_SHIFT: tuple[Pose, Pose, float] = (ZERO6, ZERO6, 1.0)
 
 
 class OverlayChain:
-    """The active overlays in order, and how the last cycle displaced the tool.
-
-    Attributes:
-        overlays: active ones.
-    """
+    """The active overlays in order, and how the last cycle displaced the tool."""
 
     def __init__(self) -> None:
         self.overlays: list[Overlay] = []
@@ -247,11 +243,7 @@ class CircularBelt:
 
 
 class Conveyor:
-    """The overlay.
-
-    Attributes:
-        tool: in force when tracking began.
-    """
+    """The overlay."""
 
     def __init__(
         self,
@@ -263,8 +255,6 @@ class Conveyor:
         """Begin to track.
 
         Args:
-            belt: that moves the tool.
-            tool: that moves with the belt.
             count: gives the ticks of the belt so far, without overflows.
             clock: gives the time [s].
         """
@@ -325,7 +315,6 @@ class PathOffset:
     """The overlay; offset, filter and limits stay when it is taken away and added again.
 
     Attributes:
-        tool: that is displaced.
         alpha: share of the offset that a cycle takes over; 1 without a filter.
         limits: greatest displacement and rotation along an axis [m, rad].
     """

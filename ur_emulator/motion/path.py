@@ -263,7 +263,6 @@ class JointPath(Protocol):
         """Return joint angles [rad] and their derivative [rad per unit of s].
 
         Args:
-            s: length travelled.
             near: joint angles close to those at s, for the inverse kinematics [rad].
 
         Raises:

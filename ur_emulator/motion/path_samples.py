@@ -71,8 +71,6 @@ def sample_path(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tupl
     """Sample a path up to the first point that the arm cannot reach.
 
     Args:
-        path: of the tool.
-        tool: its kinematics.
         near: joint angles at the beginning [rad].
         speed: of the tool [m/s].
     """

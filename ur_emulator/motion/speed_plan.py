@@ -69,8 +69,6 @@ class SpeedPlan:
     Attributes:
         phases: in order.
         times: when each begins; the first at 0.
-        duration: when the end is reached.
-        length: of the whole path.
     """
 
     phases: tuple[Phase, ...]
@@ -177,8 +175,6 @@ def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tupl
     """Return the corners (length, z) of a plan within one interval: rising, at the cap, falling.
 
     Args:
-        interval: in question.
-        z: at its beginning.
         z_end: greatest z at its end.
         down: greatest slope towards it.
     """
@@ -206,11 +202,7 @@ class SmoothPlan:
     """See the module; times as in SpeedPlan.
 
     Args:
-        plan: from rest to rest.
         window: duration of the mean, in which the acceleration changes [s], above 0.
-
-    Attributes:
-        duration: when the end is reached.
     """
 
     def __init__(self, plan: SpeedPlan, window: float) -> None:

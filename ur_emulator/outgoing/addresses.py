@@ -28,7 +28,6 @@ class LookUp:
 
     Attributes:
         box: who asks; a box has a share of the threads and of the queue.
-        host: the name.
         found: called in the thread, with an IPv4 address; "" if there is none.
     """
 

@@ -18,7 +18,6 @@ class LoopNetwork:
         """Prepare; nothing is opened.
 
         Args:
-            loop: watches the sockets.
             period_s: control cycle [s].
             report: called with an error of ours and what it has ended.
             own_address: of the box. A robot calls from the address at which it is called, and clients that

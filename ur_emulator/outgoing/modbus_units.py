@@ -63,7 +63,6 @@ class SentRequest:
 
     Attributes:
         signal: for which it was sent; None if its answer is not used.
-        pdu: function code and data.
         sent_at: monotonic time [s].
     """
 
@@ -131,7 +130,6 @@ class ModbusLink:
 
         Args:
             name: address for messages.
-            connect: begins to connect.
             period_s: control cycle [s]; a unit that does not answer gets the next request after one.
         """
         self._name = name
@@ -376,7 +374,6 @@ class ModbusClient:
         """Prepare; nothing is connected before there is a unit.
 
         Args:
-            loop: advances the connections.
             connect: begins to connect to a host and port.
             period_s: control cycle [s].
             report: called with an error of ours and what it has ended.

@@ -97,7 +97,6 @@ class ScriptConnection(BufferedSocket):
         """Prepare; nothing is connected.
 
         Args:
-            loop: watches the socket.
             buffers: counts the bytes of all connections of the box.
             report: called with an error of ours in what the peer has caused; it ends the connection.
             own_address: where to call from, if the peer can be reached from there; "" leaves it open.

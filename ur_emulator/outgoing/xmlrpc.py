@@ -45,7 +45,6 @@ class ServerAddress:
         host: name or address.
         port: number.
         netloc: both, as the URL has them.
-        target: path and query.
     """
 
     def __init__(self, url: str) -> None:

@@ -48,24 +48,19 @@ class ArmPhysics:
     """The moving arm.
 
     Args:
-        robot: the type of arm.
         dh: its six true rows.
         mass_scale: six factors on the link masses.
-        gains: of the joint servos.
         substep: physics time step [s].
         presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
             memory of the path.
 
     Attributes:
-        model: of MuJoCo.
-        data: its state.
         q: motor positions (6,) [rad].
         qd: motor speeds (6,) [rad/s].
         torque: of the drives in the last sub-step (6,) [Nm].
         flange_position: (3,) in the base frame [m], at the start of the last sub-step.
         flange_rotation: (3, 3), likewise.
         loads: payload and push at the flange.
-        obstacles: around the arm.
         bias: torque of the servos beside their law (6,) [Nm].
     """
 
@@ -172,7 +167,6 @@ class ArmPhysics:
         """Advance by the sub-steps of a cycle.
 
         Args:
-            drives: of the joints.
             capture_at: number of the sub-step whose raw sensors are wanted, which they are at its beginning;
                 the number of sub-steps: those of the last one, with positions and speeds at its end.
             captured: takes them, see `sensors.REC_SIMULATED`.
@@ -219,10 +213,8 @@ def build_physics(
     """Compile the plant's model; see `arm_spec` for the mechanism.
 
     Args:
-        robot: the type of arm.
         dh: its six true rows.
         mass_scale: six factors on the link masses.
-        gains: of the joint servos.
         substep: physics time step [s].
     """
     spec = arm_spec(robot, dh, mass_scale)

@@ -50,7 +50,6 @@ class CommandPath:
     `newest_acts_later`.
 
     Args:
-        n_substeps: sub-steps in a control cycle.
         substep: length of a sub-step [s].
         dead_substeps: dead time in sub-steps; several values take turns, one a cycle.
         lag: of the set-point filter: by how much a ramp trails [s].
@@ -218,7 +217,6 @@ def trace_cycle(
         filtered: filter state at the start of the cycle: q, qd, deflection, then of a filter of second order
             their changes [1/s].
         knots: targets (n, 3), newest first; the newest is for the end of this cycle.
-        n_substeps: sub-steps in a cycle.
         substep: [s].
         dead_substeps: dead time in sub-steps.
         lag: of the filter [s].

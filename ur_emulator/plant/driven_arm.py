@@ -53,8 +53,6 @@ def draw_dead_time(fidelity: Fidelity, seed: int, generation: RobotGeneration) -
     """Draw the dead time of a box.
 
     Args:
-        fidelity: its range.
-        seed: of the box.
         generation: has the cycle and the physics step.
     """
     substep = generation.substep_us * 1e-6
@@ -79,7 +77,6 @@ class ArmCommand(NamedTuple):
     Attributes:
         cycle: number of the cycle, for errors.
         target: set-point for its end; None puts or keeps the brakes on.
-        mode: control mode.
         torque: of free joints.
     """
 
@@ -92,17 +89,8 @@ class ArmCommand(NamedTuple):
 class DrivenArm:
     """The arm of a plant.
 
-    Args:
-        robot: type of the arm.
-        calibration: of this arm.
-        fidelity: its imperfections.
-        seed: of the box.
-        dead_time: of its drives.
-
     Attributes:
         physics: masses, joints and contacts.
-        drives: of the joints.
-        feedback: gears and sensors.
         moves_later: targets act within their own cycle, and measurements are a cycle old when they are
             reported: what is reported of a cycle does not need its motion.
         control_current: what the drives ask for at the end of the cycle (6,) [A].

@@ -133,10 +133,6 @@ class Drives:
     `command` is followed by `evaluate_friction` then, for `target_current`.
 
     Args:
-        robot: type of the arm.
-        calibration: of this arm.
-        fidelity: its imperfections.
-        seed: of the box.
         gains: of the servos, as in the actuators.
         dead_substeps: dead time of the command path in sub-steps, or its values cycle by cycle.
         substep: [s].

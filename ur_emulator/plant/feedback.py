@@ -26,12 +26,7 @@ from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
 
 
 class GearRipple:
-    """q_joint = q_motor + e(q_motor), both counted at the joint [rad].
-
-    Args:
-        fidelity: gives the waves.
-        seed: gives the phases.
-    """
+    """q_joint = q_motor + e(q_motor), both counted at the joint [rad]."""
 
     def __init__(self, fidelity: Fidelity, seed: int) -> None:
         ripples = fidelity.ripples
@@ -130,15 +125,11 @@ class Feedback:
     A cycle is `take` or `take_rest`, then `keep`. Before `keep` a cycle may be taken again, after `undo`.
 
     Args:
-        robot: type of the arm.
-        fidelity: its imperfections.
-        seed: of the box.
         age_substeps: from the measured moment to the end of the cycle's physics.
 
     Attributes:
         capture_at: number of the sub-step whose beginning is the measured moment; after the last sub-step:
             its end.
-        gear: between motors and joints.
         reading: what the sensors say of the last cycle.
     """
 

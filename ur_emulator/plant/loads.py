@@ -34,7 +34,6 @@ def set_payload_body(model: mujoco.MjModel, mass: float, cog: Vector3, inertia: 
     """Set mass, centre of gravity and inertia of the payload body.
 
     Args:
-        model: of the arm.
         mass: [kg].
         cog: centre of gravity in the flange frame [m].
         inertia: Ixx Iyy Izz Ixy Ixz Iyz about it, axes of the flange [kg m²]; zero for that of a solid ball.
@@ -59,7 +58,6 @@ class Loads:
 
     Args:
         model: the plant's model.
-        data: its state.
 
     Attributes:
         is_unexpected: something acts that the controller does not expect: see `wrench`.

@@ -32,7 +32,6 @@ class ForceDrift:
 
     Args:
         fidelity: gives the bounds of drift and offset.
-        seed: of the box.
         block_time: time from knot to knot [s].
     """
 
@@ -115,8 +114,6 @@ class Sensors:
 
     Args:
         robot: gives the torque constants and the supply.
-        fidelity: gives noise, grain, filters.
-        seed: of the box.
         period: control cycle [s].
     """
 

@@ -32,8 +32,6 @@ def request_program(
     """Ask a PC for its program, in steps.
 
     Args:
-        network: connects.
-        pc: whom to ask.
         clock: real time [s].
 
     Returns:

@@ -55,7 +55,6 @@ def follow_inputs(
     """Do what inputs ask for.
 
     Args:
-        lines: has their levels.
         declared: (group of inputs as in the names of builtins, index, action).
         acts: begins an action.
         is_effective: the installation with these inputs is still loaded.
@@ -78,7 +77,6 @@ def values_at_end(programs: ProgramRunner, variables: Mapping[str, str]) -> Step
     """Wait for the end of the program that runs; return the values that the variables have then.
 
     Args:
-        programs: of the box.
         variables: name and value, as a literal; one that the program does not declare keeps it.
     """
     run = programs.latest
@@ -111,10 +109,6 @@ def is_paused(box: ServedBox) -> bool:
 
 def obstacle_to_playing(box: ServedBox, *, has_program: bool) -> str:
     """Return what stands against playing, "" if nothing does.
-
-    Args:
-        box: that it is about.
-        has_program: a program is loaded.
     """
     state, mode = box.controller.state, box.snapshot.robot_mode
     if not state.safety.lets_programs_run:
@@ -149,7 +143,6 @@ class ProgramPlayer:
     Every action raises `RefusedError` when it cannot be done.
 
     Attributes:
-        folder: of all programs.
         loaded: the program, as it was in its file when it was loaded.
         installation: the one that was loaded last.
     """
@@ -160,8 +153,6 @@ class ProgramPlayer:
         """Begin with no program.
 
         Args:
-            box: that it is about.
-            folder: of all programs.
             network: connects to the PCs of External Control.
             skip_unknown: nodes that are not known are left out.
         """
@@ -198,7 +189,6 @@ class ProgramPlayer:
         """Load a program and its installation; what was loaded, and runs, stays if that fails.
 
         Args:
-            name: of the file.
             stops: a program that runs is stopped once the file is read.
         """
         yield from self._in_turn(self._load(name, stops=stops))
@@ -418,10 +408,6 @@ def start_up(box: ServedBox, player: ProgramPlayer) -> Steps[None]:
     """Load the default installation and the program that it names, and start that when its line changes.
 
     What cannot be done is in the log. That the line starts the program once: chosen.
-
-    Args:
-        box: that it is about.
-        player: loads and plays.
     """
     if not player.folder.exists or not player.folder.has(DEFAULT_NAME):
         return

@@ -36,11 +36,7 @@ _MODE = 0o700
 
 
 class TemporaryFolder:
-    """A folder for one box.
-
-    Attributes:
-        path: where it is.
-    """
+    """A folder for one box."""
 
     def __init__(self) -> None:
         """Make it.
@@ -103,13 +99,11 @@ class BoxFacts:
     """Contents of a report; taken in the loop, written in the worker process.
 
     Attributes:
-        serial_number: of the box.
         versions: of its software and what it rests on.
         timestamp: of the last cycle [s].
         state: snapshot of that cycle, by name.
         log: all entries, a line each.
         programs: names of what is loaded.
-        script: of the loaded program.
         interpreter: log files of interpreter mode, by name.
     """
 
@@ -172,9 +166,7 @@ def flight_report(folder: ProgramFolder, kind: str, facts: BoxFacts) -> str:
     """Write a flight report; return its number.
 
     Args:
-        folder: of the reports.
         kind: one of `REPORT_KINDS`, or "" for the last of them.
-        facts: its contents.
 
     Raises:
         ProgramFileError: there is no such kind, the report is one too many, or it cannot be written.
@@ -195,9 +187,7 @@ def support_file(folder: ProgramFolder, directory: str, facts: BoxFacts) -> str:
     """Write a support file, which holds all flight reports and a new one; return its name.
 
     Args:
-        folder: of the reports.
         directory: in the folder of programs, as a client names it.
-        facts: contents of the new report.
 
     Raises:
         ProgramFileError: there is no such directory, the file is one too many, or it cannot be written.

@@ -40,14 +40,7 @@ class DashboardAnswers:
     def __init__(
         self, box: ServedBox, player: ProgramPlayer, reports: ReportWriter, shut_down: Callable[[], None]
     ) -> None:
-        """Bind the commands to a box.
-
-        Args:
-            box: whose port it is.
-            player: holds the loaded program.
-            reports: writes the log and reports.
-            shut_down: closes the box.
-        """
+        """Bind the commands to a box."""
         self._box = box
         self._player = player
         self._shut_down = shut_down
@@ -237,12 +230,7 @@ class DashboardPort:
     """Answers dashboard lines."""
 
     def __init__(self, box: ServedBox, answers: DashboardAnswers) -> None:
-        """Serve a box.
-
-        Args:
-            box: whose port it is.
-            answers: to the commands.
-        """
+        """Serve a box."""
         self._box = box
         self._answers = answers
         self._sessions: dict[Connection, _DashboardSession] = {}

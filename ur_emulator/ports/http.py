@@ -37,7 +37,6 @@ class HttpError(Exception):
     """A request that is answered with an error.
 
     Attributes:
-        status: code of the answer.
         headers: what the answer says beside its text.
     """
 
@@ -56,7 +55,6 @@ class HttpRequest:
         path: without the query.
         query: behind the question mark, not decoded.
         headers: by name in lower case.
-        body: all of it.
     """
 
     method: str
@@ -124,7 +122,6 @@ class HttpAnswer:
     """An answer.
 
     Attributes:
-        status: code.
         result: sent as JSON; bytes are sent as they are, and nothing with status 204.
         headers: beside the usual ones.
         content_type: of bytes.
@@ -160,7 +157,6 @@ def check_origin(headers: Mapping[str, str], own_host: str) -> None:
     refused), and must not come from a page of another origin.
 
     Args:
-        headers: of the request.
         own_host: address that the port is bound to.
 
     Raises:
@@ -212,12 +208,7 @@ class Answers(Protocol):
 
 
 class HttpPort:
-    """Answers HTTP requests.
-
-    Args:
-        answers: to requests.
-        most_bytes: of a body.
-    """
+    """Answers HTTP requests."""
 
     def __init__(self, box: ServedBox, answers: Answers, most_bytes: int = BUDGETS.body_bytes) -> None:
         self._box = box
@@ -254,11 +245,7 @@ class HttpPort:
 
 
 class _HttpSession(Session):
-    """A client: its HTTP state, and the request that is read or answered.
-
-    Attributes:
-        http: reads requests, writes answers.
-    """
+    """A client: its HTTP state, and the request that is read or answered."""
 
     def __init__(
         self,

@@ -45,7 +45,6 @@ class _Line:
 
     Attributes:
         client: who has sent it.
-        text: of it.
         number: in the order of arrival.
         run: number of the program that ran then.
         n_cleanups: how often that queue had been cleaned up.

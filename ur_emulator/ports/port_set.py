@@ -31,12 +31,6 @@ _WEB = frozenset({CONTROL, ROBOT_API})
 class PortSet:
     """The ports of a box by name.
 
-    Args:
-        loop: watches their sockets.
-        host: address to listen on.
-        box: what they belong to.
-        ports: by name.
-
     Attributes:
         notices: warnings for the user, one line each; the box runs all the same.
     """
@@ -120,7 +114,6 @@ class SendingPorts:
 
     Attributes:
         realtime: frames, then the same without scripts.
-        rtde: what clients have subscribed to.
         messengers: primary and secondary port, then the same without scripts.
     """
 
@@ -169,10 +162,6 @@ def answering_ports(
     """Make the ports that answer requests, by their names in `Ports`: those that the software has.
 
     Args:
-        box: whose port it is.
-        player: holds the loaded program.
-        reports: writes the log and reports.
-        shut_down: closes the box.
         host: address that the box is bound to.
     """
     software = box.identity.software

@@ -82,11 +82,7 @@ DEFAULT_PROGRAM = "Default program"
 
 
 class ProgramCalls:
-    """Answers these calls.
-
-    Args:
-        player: holds the loaded program.
-    """
+    """Answers these calls."""
 
     def __init__(self, box: ServedBox, player: ProgramPlayer) -> None:
         self._box = box
@@ -180,9 +176,6 @@ class RobotApiAnswers:
     """Finds the answer to a request.
 
     Args:
-        player: holds the loaded program.
-        reports: writes flight reports.
-        shut_down: closes the box.
         own_host: address that the port is bound to.
     """
 

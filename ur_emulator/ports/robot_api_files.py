@@ -86,8 +86,6 @@ def write_program(
     kinds have the name of their file.
 
     Args:
-        folder: of all programs.
-        content_type: of the body.
         body: of a form with the field `file`.
         is_new: it must be one that does not exist, otherwise one that exists.
         in_use: name of a program that must stay as it is.

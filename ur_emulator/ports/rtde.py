@@ -105,8 +105,6 @@ class _RtdeSession(Session):
         """Prepare.
 
         Args:
-            connection: to the client.
-            box: whose port it is.
             answer: replies to a request for recipes, start, pause and the like.
         """
         super().__init__(connection, box)

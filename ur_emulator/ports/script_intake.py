@@ -106,12 +106,9 @@ class Program:
 
     Attributes:
         sender: who has sent it.
-        text: of it.
         ticket: decides when it is compiled.
         stops: how often the program had been stopped when it arrived.
         is_secondary: it is a `sec` program; it cannot be stopped.
-        task: compiles it.
-        outcome: what has come of it.
     """
 
     sender: Sender

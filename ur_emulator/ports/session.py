@@ -20,17 +20,11 @@ class Session(ABC):
     sends ahead is not read meanwhile: what it sends waits in the buffers of the system, not in the box.
 
     Attributes:
-        connection: to the client.
         is_busy: its requests are being answered.
     """
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
-        """Prepare; nothing has arrived yet.
-
-        Args:
-            connection: to the client.
-            box: whose port it is.
-        """
+        """Prepare; nothing has arrived yet."""
         self.connection = connection
         self.is_busy = False
         self._box = box

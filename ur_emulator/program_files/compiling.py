@@ -33,8 +33,6 @@ def compile_text(
 
     Args:
         text: of the program, one character a byte.
-        catalogue: the builtins of the software.
-        name: what people know it by.
         is_secondary: it is a `sec` program.
     """
     try:
@@ -91,10 +89,7 @@ def load_and_compile(
     """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
 
     Args:
-        folder: of all programs.
-        name: as a client gives it.
         before: installation that is effective.
-        catalogue: the builtins of the software.
         skip_unknown: leaves out nodes that are not known.
 
     Returns:

@@ -72,7 +72,6 @@ class OutputRule:
         group: as in the names of builtins: "standard_digital", "configurable_digital", "tool_digital",
             "standard_analog", "gp_boolean", "gp_integer", "gp_float".
         index: of the output in its group.
-        state: what it does.
     """
 
     group: str
@@ -85,11 +84,9 @@ class DeclaredSignal:
     """A Modbus signal of another unit.
 
     Attributes:
-        name: as programs call it.
         host: address of its unit.
         slave: number of the unit behind that address.
         address: of the coil or register.
-        type: what it is.
         frequency: how often it is refreshed [Hz]; None: not given.
         rule: what an output does when programs start and stop.
         sequential: the unit takes one request at a time.
@@ -130,20 +127,17 @@ class Installation:
         pc_name: name of that PC, as the labels of its nodes show it.
         tcps: name of each TCP -> its pose in the flange frame [m, rotation vector in rad].
         active_tcp: name of the TCP that is active when a program starts.
-        payload: active when a program starts.
         gravity: direction that is up, times the acceleration of gravity, in the base frame [m/s^2].
         tool_voltage: supply of the tool [V].
         analog_in_domains: of the standard inputs 0 and 1 and the tool's 0 and 1: 0 current, 1 voltage.
         analog_out_domains: of the standard outputs 0 and 1.
         input_actions: (group of inputs as in the names of builtins, index, action).
-        output_rules: outputs that follow the program.
         transition_hardness: of safety transitions: 0 hard, 1 soft.
         lines: name that somebody gave a line -> its own name, such as `digital_out[2]`.
         features: by name, in the order of the file; base and tool are not among them.
         variables: name -> value as a literal of URScript, in the order of the file.
         modbus: signals of other units.
         safe_home: joint angles [rad].
-        safety: limits of the safety configuration.
         start_up: what the box does when it is switched on.
     """
 

@@ -146,7 +146,6 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
     """Return what an installation file declares; its variables stand in another file.
 
     Args:
-        tree: of the file.
         wire_path: its name on the wire.
 
     Raises:
@@ -208,7 +207,6 @@ class _Values:
     """Values of one file.
 
     Attributes:
-        tree: of the file.
         first: the first element of each kind.
     """
 

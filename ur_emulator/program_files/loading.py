@@ -50,7 +50,6 @@ class LoadedProgram:
         wire_path: how the box calls its file, `/programs/sub/x.urp`.
         installation: of the program; a script file has none.
         parts: its script, and places for what is known when it is played.
-        notes: for the log.
         origin: where the script comes from if not from the file itself.
     """
 
@@ -140,8 +139,6 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
     saved, only if a node is not known.
 
     Args:
-        folder: of all programs.
-        name: as a client gives it.
         skip_unknown: leaves out nodes that are not known.
 
     Raises:

@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 
 class ProgramReader:
-    """Reads the files of one program.
-
-    Attributes:
-        folder: where they lie.
-    """
+    """Reads the files of one program."""
 
     def __init__(self, folder: ProgramFolder) -> None:
         self.folder = folder
@@ -94,15 +90,10 @@ class XmlTree:
 
     Attributes:
         name: of the file, for messages.
-        root: of the tree.
     """
 
     def __init__(self, name: str, root: Element) -> None:
         """Take a tree.
-
-        Args:
-            name: of the file.
-            root: of the tree.
 
         Raises:
             ProgramFileError: the elements are nested too deep.

@@ -58,10 +58,6 @@ _SECTION = re.compile(r"\[(.*)\]")
 def safety_settings(file_name: str, texts: Iterable[str]) -> SafetySettings:
     """Return the limits in a text; those that it does not give are None.
 
-    Args:
-        file_name: for messages.
-        texts: the text, in parts.
-
     Raises:
         ProgramFileError: a limit is not a number or a list of six, or a speed or a force is not above 0.
     """

@@ -239,8 +239,6 @@ class ScriptWriter:
         """Write the label of a node, with the number, the name and the mark that PolyScope shows.
 
         Args:
-            number: of the node.
-            text: its name.
             mark: "breakAfter", "noBreak" or nothing.
         """
         name = " ".join(text.splitlines()).replace('"', "'")

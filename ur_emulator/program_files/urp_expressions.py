@@ -36,12 +36,7 @@ _WORDS = {"HI": "True", "LO": "False"}
 
 
 class Expression(NamedTuple):
-    """An expression.
-
-    Attributes:
-        script: its text in a script.
-        label: its text in a label.
-    """
+    """An expression."""
 
     script: str
     label: str
@@ -51,8 +46,6 @@ def expression_of(maker: UrpMaker, node: Node, element: Element | None = None) -
     """Return the expression of a node.
 
     Args:
-        maker: writes the program.
-        node: that the expression belongs to.
         element: the expression; if it is not given, that of the node.
 
     Raises:
@@ -124,12 +117,6 @@ class TaughtWaypoint(NamedTuple):
 def taught_waypoint(maker: UrpMaker, node: Node, element: Element | None, name: str) -> TaughtWaypoint:
     """Return a position that was taught: globals of its name, or in programs of CB3 the values themselves.
 
-    Args:
-        maker: writes the program.
-        node: that names the position.
-        element: the position.
-        name: of the waypoint.
-
     Raises:
         ProgramFileError: there are no joint angles, or numbers are damaged.
     """
@@ -158,7 +145,6 @@ class LineKind:
 
     Attributes:
         label: how labels call a line without a name of its own, `{n}` being its number.
-        read: call that reads it.
         write: call that sets it, `{value}` being its level; "" for an input.
     """
 
@@ -204,7 +190,6 @@ class Line:
     """A line.
 
     Attributes:
-        kind: what reads and sets it.
         n: its number, or the name of a Modbus signal.
         label: how labels call it.
     """

@@ -39,12 +39,8 @@ class UrpMaker:
     """Writes the nodes of a program.
 
     Attributes:
-        program: all its nodes.
-        installation: of the program.
-        reader: reads files that nodes name.
         writers: what writes each kind of node.
         skip_unknown: leaves out what is not known, instead of an error.
-        writer: takes the script.
         declarations: lines that stand before all nodes, by what they declare, in the order of first use.
         timers: names, in the order of first use.
         last_motions: numbers of the motions at which a path of MoveP ends.

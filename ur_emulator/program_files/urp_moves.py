@@ -115,11 +115,8 @@ def _write_until(maker: UrpMaker, node: Node, n: int, acceleration: str, around:
     """Write the part of a loop that looks whether the motion has to end.
 
     Args:
-        maker: writes the program.
         node: the `<Until>`.
         n: number of the direction's label.
-        acceleration: of its motion.
-        around: the direction.
     """
     writer, kind = maker.writer, node.get("type")
     label = f"Until ({kind.lower()})"
@@ -353,8 +350,6 @@ def frame_of(maker: UrpMaker, node: Node, name: str, tool: str) -> str:
     """Return the pose of the feature of that name in the base frame, as a script has it.
 
     Args:
-        maker: writes the program.
-        node: that names it.
         name: of the feature; "" is the base.
         tool: what a script has for the tool.
 
@@ -402,10 +397,7 @@ def _motion_parameters(maker: UrpMaker, motion: Node, waypoint: Node, move: Node
     """Return acceleration, speed and blend of a motion, or its time.
 
     Args:
-        maker: writes the program.
         motion: the waypoint, or the circle that ends there.
-        waypoint: where it ends.
-        move: around it.
     """
     tree = waypoint.source.tree
     kind = _motion(maker, move)

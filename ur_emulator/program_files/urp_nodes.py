@@ -29,8 +29,6 @@ class Source:
     """A file that nodes are in.
 
     Attributes:
-        file: where it lies.
-        tree: its content.
         series: first number of the software that saved it.
     """
 
@@ -56,9 +54,6 @@ class Node:
     """A node of a program.
 
     Attributes:
-        kind: its tag.
-        number: of its label.
-        element: its content, with references followed.
         source: the file that it is in.
         children: the nodes inside it, without suppressed ones; branches stand with their `<If>`.
         branches: of an `<If>`: the `ElseIf` and `Else` behind it.
@@ -90,7 +85,6 @@ class SubProgram:
     """A sub-program.
 
     Attributes:
-        name: of its function.
         node: its label's number and its nodes.
     """
 
@@ -103,14 +97,11 @@ class ProgramNodes:
     """All nodes of a program.
 
     Attributes:
-        source: the file of the program.
         variables: the element with the first values of variables, if there is one.
         before_start: the sequence before the start, if there is one.
-        main: the main program.
         others: threads, events, and what has no name here.
         sub_programs: in the order of their numbers.
         functions: names of the functions of sub-programs by the element that defines each.
-        names: of functions, threads and variables.
     """
 
     source: Source
@@ -136,11 +127,6 @@ _VARIABLES = frozenset({"variable", "ProgramVariable"})
 
 def read_nodes(file: FoundFile, tree: XmlTree, reader: ProgramReader) -> ProgramNodes:
     """Return the nodes of a program.
-
-    Args:
-        file: of the program.
-        tree: its content.
-        reader: reads files of sub-programs.
 
     Raises:
         ProgramFileError: there is no main program, or a limit is exceeded.

@@ -35,7 +35,6 @@ class NodeKind:
     """A kind of nodes that stand in programs.
 
     Attributes:
-        tag: of its elements.
         becomes: what it is in the script.
         write: writes a node of the kind.
     """
@@ -176,10 +175,7 @@ def make_script(
     """Return the script of a program.
 
     Args:
-        file: of the program.
-        tree: its content.
         reader: reads files that it refers to.
-        installation: of the program.
         skip_unknown: leaves out nodes that are not known, instead of an error.
 
     Raises:

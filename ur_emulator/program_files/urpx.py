@@ -46,10 +46,6 @@ class UrpxProgram:
 def read_urpx(file_name: str, data: bytes) -> UrpxProgram:
     """Read a program.
 
-    Args:
-        file_name: for messages.
-        data: contents of the file.
-
     Raises:
         ProgramFileError: it has another form.
     """

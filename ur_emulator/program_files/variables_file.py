@@ -57,7 +57,6 @@ def write_variables(folder: ProgramFolder, installation: str, values: Mapping[st
     """Write values into the file beside an installation; its form and its other content stay.
 
     Args:
-        folder: of all programs.
         installation: its name on the wire.
         values: name -> literal.
 

@@ -62,10 +62,7 @@ class ScriptArm:
     """The parts of the controller that move an arm.
 
     Attributes:
-        robot: numbers of the arm.
-        model: kinematics of the arm.
         motion: targets of the joints, and the thread that moves them.
-        settings: TCP and payload.
         safety: has the ranges of the joints.
     """
 

@@ -36,14 +36,7 @@ class ForceBuiltins(BuiltinGroup):
     def __init__(
         self, arm: ScriptArm, compliance: Compliance, force_sense: ForceSense, past: PastCycles
     ) -> None:
-        """Bind the builtins.
-
-        Args:
-            arm: that they act on.
-            compliance: gets their requests.
-            force_sense: the measured wrench.
-            past: measured positions.
-        """
+        """Bind the builtins."""
         self._arm = arm
         self._compliance = compliance
         self._force_sense = force_sense

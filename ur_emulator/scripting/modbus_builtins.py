@@ -58,9 +58,7 @@ class ModbusBuiltins(BuiltinGroup):
         """Bind the builtins.
 
         Args:
-            modbus: the signals.
             configuration: says whether a program runs.
-            clock: when a signal is due.
             network: connects to units.
         """
         self._modbus = modbus

@@ -55,7 +55,6 @@ class MoveBuiltins(BuiltinGroup):
         """Bind the builtins.
 
         Args:
-            arm: that they move.
             place_arm: puts it at joint angles [rad]; False where it would touch something.
             events: get warnings of overlapping blends.
             planner: of moves whose limits follow from the arm.
@@ -164,7 +163,6 @@ class MoveBuiltins(BuiltinGroup):
         """Follow a leg; from rest, or out of a blend.
 
         Args:
-            thread: that moves.
             make: makes the leg for joint angles and tool pose at its start.
             may_overlap: no warning about a waypoint that is left out.
         """

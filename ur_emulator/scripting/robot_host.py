@@ -30,7 +30,6 @@ def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotH
 
     Args:
         state: the parts of the controller; each group of builtins gets those that it acts on.
-        network: opens the sockets of programs.
     """
     arm = ScriptArm(state.robot, state.arm, state.motion, state.tool, state.safety)
     step_time, past = state.clock.period_s, state.past
@@ -74,9 +73,7 @@ class RobotHost:
         """Bind the builtins that keep something for one program.
 
         Args:
-            state: the parts of the controller.
             network: opens the program's sockets.
-            arm: that it moves.
             shared: the builtins of all programs of the box.
         """
         random = pure_builtins(state.seed)["random"]

@@ -36,10 +36,6 @@ class RtdeBuiltins(BuiltinGroup):
 
         Args:
             past: snapshot of the last cycle.
-            outputs: that the box can send.
-            watchdogs: of inputs.
-            force_sense: uses the external sensor.
-            clock: when a watchdog begins.
         """
         self._past = past
         self._outputs = {field.name: field for field in outputs if field.origin is not None}

@@ -40,7 +40,6 @@ class SettingBuiltins(BuiltinGroup):
 
         Args:
             robot: has the greatest payload.
-            tool: what they set.
             force_sense: a sensor is zeroed with the payload.
             step_time: duration of a cycle [s].
         """

@@ -25,12 +25,7 @@ from urscript.values import log_form
 
 
 class SocketReader:
-    """A socket that a program has opened.
-
-    Attributes:
-        socket: the connection.
-        n_taken: bytes that were read.
-    """
+    """A socket that a program has opened."""
 
     def __init__(self, socket: ScriptSocket) -> None:
         self.socket = socket
@@ -240,7 +235,6 @@ class SocketBuiltins(BuiltinGroup):
         """Wait for big-endian numbers; a stream of commands passes here every cycle.
 
         Args:
-            name: of the socket.
             timeout: [s]; not above 0: none.
             number: how many.
             code: of one of them for `struct`.

@@ -31,9 +31,7 @@ class StateBuiltins(BuiltinGroup):
         """Bind the builtins.
 
         Args:
-            arm: with its settings.
             past: end of the last cycle, and positions before it.
-            clock: of the controller.
         """
         self._arm = arm
         self._model = arm.model
@@ -172,13 +170,7 @@ class DynamicsBuiltins(BuiltinGroup):
     """
 
     def __init__(self, arm: ScriptArm, dynamics: ArmDynamics, past: PastCycles) -> None:
-        """Bind the builtins.
-
-        Args:
-            arm: kinematics, and the active TCP.
-            dynamics: masses.
-            past: measured angles and speeds.
-        """
+        """Bind the builtins."""
         self._arm = arm
         self._dynamics = dynamics
         self._past = past

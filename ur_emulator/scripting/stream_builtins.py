@@ -42,7 +42,6 @@ class StreamBuiltins(BuiltinGroup):
         """Bind the builtins.
 
         Args:
-            arm: that they move.
             step_time: duration of a cycle [s].
         """
         self._arm = arm

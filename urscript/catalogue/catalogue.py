@@ -198,7 +198,6 @@ class Catalogue:
 
     Args:
         version: the release whose names are visible.
-        rows: rows to select from.
         extra: names to make visible although this version does not know them, in their newest form.
 
     Raises:
@@ -314,7 +313,6 @@ def catalogue_for(
         version: "3.15", "5.11.4", or a version tuple.
         extra: names to accept beside those of the version, e.g. `["set_tool_communication"]` for a program
             that was exported on an e-Series.
-        rows: the builtins of all versions.
 
     Raises:
         ValueError: for a version of no known generation, or an extra name in no table.

@@ -185,7 +185,6 @@ class Param:
 
     Args:
         name: as in keyword calls.
-        type: what the argument must be.
         default: the value when the argument is omitted; None means "the controller fills it
             in" (the active TCP, the present joint positions, another parameter's value), see `shown`.
         unit: SI unit or the meaning of the codes.
@@ -229,12 +228,10 @@ class Builtin:
     """One function that URScript programs can call.
 
     Args:
-        name: URScript name.
         params: in positional order.
         returns: type of the result, then after a comma its unit; "None" where there is none. The compiler
             reads the type, so it must hold for every call ("int or list" where it varies).
         time: what a call means for the thread.
-        module: chapter of the script manual.
         since: first release of each generation that knows this form.
         until: first release that no longer has this form.
         support: how well this box models it.

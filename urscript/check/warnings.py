@@ -16,7 +16,6 @@ class Rule(NamedTuple):
 
     Attributes:
         code: For `--ignore`.
-        meaning: What the program does.
         reason: Why this is probably a mistake.
     """
 

@@ -15,7 +15,6 @@ class ForeignWord(NamedTuple):
     """A word that begins a statement in another language.
 
     Attributes:
-        hint: What to write here.
         new: Replacement with which the rest of the text can be checked: a word, or, ending in ":", the
             whole head of a block; empty: the line is removed.
         exact: The replacement keeps the meaning.

@@ -228,9 +228,7 @@ class WatchedMove:
     """A move, or a stream of calls.
 
     Attributes:
-        name: Of the builtin.
         arguments: By parameter, of the last call.
-        thread: Name of the thread.
         line: Of its first call, from 1.
         start: Seconds of robot time at which it began.
         end: Seconds at which its instruction ended.

@@ -308,12 +308,7 @@ _ITEMS_OF_A_STATEMENT: Final = 16
 
 
 class _Cost(NamedTuple):
-    """What one execution costs at most.
-
-    Attributes:
-        statements: As the language counts them.
-        tenths: Of units.
-    """
+    """What one execution costs at most."""
 
     statements: int
     tenths: int

@@ -27,10 +27,8 @@ class CompiledStatements:
 
     Attributes:
         source: The line.
-        compiled: Its functions.
         entry: Python name of the function that runs them.
         depth: Calls inside one another that they allow, recursive ones aside.
-        builtins: Builtin functions that they use.
         variables: Python names of the variables that they add.
         added: The names that the statements so far have added, these included; pickled, because they are only
             passed on to the next compilation.
@@ -57,7 +55,6 @@ def compile_statements(
         number: No other line of the same program has it.
         scope: The names at the call of `interpreter_mode`, a pickled `LivingScope`.
         added: The names that earlier statements have added, pickled.
-        catalogue: The builtins of the software.
 
     Raises:
         ScriptCompileError: The first error in the line.

@@ -44,7 +44,6 @@ class _AssignmentAnalysis:
     """Walks one body in order, in time that is linear in its length.
 
     Attributes:
-        names: The variables to analyse.
         maybe_unassigned: Receives those that may be read too early.
         assigned: Those with a value at the present statement.
         set_before_calls: Variables with a value at every call of a user function; None without such a call.

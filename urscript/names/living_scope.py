@@ -52,7 +52,6 @@ class LivingScope:
     """Names that statements can use.
 
     Attributes:
-        globals: Global variables of the program.
         functions: A later one hides an earlier one of the same name.
         variables: Locals of the function that calls `interpreter_mode`, and variables of the interpreter.
     """

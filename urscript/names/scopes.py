@@ -26,7 +26,6 @@ class FunctionScope:
         name: As in the program; the body of the program has its name.
         node: The definition; None for a program without `def` around it.
         parent: The enclosing scope; None for the program body.
-        body: Its statements.
         python_name: Name of the Python function it is compiled to.
         functions: Functions and threads defined directly in it.
         locals: Its local variables; the program body has none, its variables are global.
@@ -83,13 +82,10 @@ class ResolvedProgram:
     Attributes:
         kind: "def", "sec", or "statement" for text without a definition around it.
         name: The `def` name; for a statement the function it calls.
-        main: The program body.
         calls_after: Calls of the program below its definition; they are not part of it.
         functions: All functions and threads, in the order of the text.
-        globals: All global variables.
         declared_globals: Those that are declared with `global` (the keys), in the order of the text.
         maybe_unassigned_globals: Those that may be read before a value is assigned to them.
-        builtins: Builtin functions the program uses.
         prefix: Of the Python names of its functions and values.
         interpreted: Variables of interpreter mode, and locals of the function that called it; the statements
             of interpreter mode see them as globals.

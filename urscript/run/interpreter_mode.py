@@ -34,8 +34,6 @@ class InterpreterMode:
 
     Args:
         namespace: The globals of the compiled program.
-        scheduler: Its threads.
-        meter: Counts what they do.
         bind: Gives builtins by their names in Python.
         texts: Code and text of the program, and of all statements that are linked, by pseudo file name.
         scopes: The names that statements find, pickled, by the function that calls `interpreter_mode`.
@@ -71,7 +69,6 @@ class InterpreterMode:
         """Run statements until the mode ends.
 
         Args:
-            enter: Begins the mode.
             function: Python name of the function that calls.
             values: Its locals, by the names that they have for statements.
 

@@ -38,7 +38,6 @@ class ScriptThread:
     Attributes:
         thread_id: From 1 (the main thread) in the order of starts.
         name: Name of the `thread` definition; of the main thread the program's.
-        parent: The thread that started it.
         finished: It ended or was killed.
         wait: What it waits for; None when it can run in the next cycle.
         label: Text of the last `$` line it passed.
@@ -47,7 +46,6 @@ class ScriptThread:
         depth: How deep it is in recursive functions.
         open_calls: Calls inside one another: the most that its functions allow, and its recursive ones.
         resuming: Units that resuming it takes, because Python passes through all of them.
-        body: The generator that runs it.
     """
 
     thread_id: int

@@ -39,11 +39,8 @@ class IoConfiguration:
     """What programs have configured; it stays when they end.
 
     Attributes:
-        io: the lines.
-        registers: the general purpose registers.
         modbus: signals of other units, with actions and rules of their own.
         input_actions: (group, index) to the action, where it is not the default.
-        program_runs: a primary program runs.
     """
 
     io: InputOutput

@@ -109,12 +109,7 @@ class Encoder:
 
 
 class Encoders:
-    """The encoders of a box.
-
-    Attributes:
-        encoders: all of them.
-        decoding: those that count pulses.
-    """
+    """The encoders of a box."""
 
     def __init__(self) -> None:
         self.encoders = tuple(Encoder() for _ in range(N_ENCODERS))

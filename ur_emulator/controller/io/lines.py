@@ -196,8 +196,6 @@ def level(rule: RunState, program_runs: bool, *, unscheduled: bool = False) -> b
     """Return the level of an output (True is high); None does not change it.
 
     Args:
-        rule: of the output.
-        program_runs: a primary program runs.
         unscheduled: it has just been stopped, and not by itself or by a user.
     """
     if program_runs:
@@ -213,14 +211,11 @@ class InputOutput:
     """The lines of one box.
 
     Attributes:
-        digital_in: word of the digital inputs.
-        digital_out: word of the digital outputs.
         analog: all analogue lines; the three lists below are its parts.
         tool_voltage: supply of the tool: 0, 12 or 24 V.
         tool_output_modes: how the tool outputs drive: 0 each by itself, 1 both as power; then of each output
             1 sinking, 2 sourcing, 3 push-pull. It is only reported.
         tool_line: settings of the tool's serial line, which are only reported.
-        flags: of the scripts.
         euromap: signals to and from a moulding machine.
     """
 

@@ -80,16 +80,13 @@ class ModbusSignal:
     """One signal: a coil or register, or neighbouring ones.
 
     Attributes:
-        name: as programs call it.
         unit: where its unit listens.
         slave: number of the unit behind that address, 0 to 255.
         address: of the first coil or register, 0 to 65535.
-        type: what it is.
         count: how many coils or registers are read.
         write_address, write_count: of the registers that READ_WRITE_REGISTERS writes.
         sequential: the unit takes one request at a time.
         frequency: how often it is refreshed [Hz]; 0 only on demand.
-        action: action of a digital input.
         rule: what an output does when programs start and stop.
         values: last ones known: of the unit, or what a program has set; 0 before.
         output: what a program has set, to be written; None while the signal is only read.

@@ -139,7 +139,6 @@ class MapMemory:
 
     Attributes:
         words: the general purpose ones, 0 to 65535.
-        latched_tick: when the clock was latched.
         version: of the software, major and minor.
     """
 

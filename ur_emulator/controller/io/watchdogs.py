@@ -31,7 +31,6 @@ class LateInput(NamedTuple):
     """A variable was not written in time.
 
     Attributes:
-        report: the message about it.
         action: of its watchdog, PAUSE or STOP.
     """
 
@@ -64,7 +63,6 @@ class Watchdogs:
         """Watch a variable from now on, as if it had just been written; replaces its earlier watchdog.
 
         Args:
-            variable: name of an RTDE input.
             min_frequency: how often it must be written at least [Hz].
             action: what to do when it is not.
             tick: present one.

@@ -52,11 +52,9 @@ class SafetyPlane:
     """A safety plane in the base frame.
 
     Attributes:
-        name: that somebody gave it.
         position: a point of the plane [m].
         normal: unit vector, towards the allowed side.
         mode: when it is active, and as what.
-        restricts_elbow: it holds the elbow, too.
     """
 
     name: str

@@ -58,11 +58,7 @@ ACTIVE = frozenset({_S.ENABLING, _S.TO_BE_RELEASED})
 
 
 class EnablingDevice:
-    """The device of a box, or none.
-
-    Attributes:
-        state: where it is.
-    """
+    """The device of a box, or none."""
 
     def __init__(self) -> None:
         self.state = EnablingState.NO_DEVICE
@@ -231,8 +227,6 @@ class SafetyInputs:
 
         Args:
             handle: called with each event.
-            device: the enabling device.
-            choice: of the operational mode.
             chosen: called when the operational mode has changed.
         """
         self._handle = handle

@@ -35,7 +35,6 @@ class Violation:
     """Why a protective stop begins.
 
     Attributes:
-        error: the error code to report.
         blocked: the arm is away from its target, which must be dropped.
     """
 
@@ -71,7 +70,6 @@ class SetpointCheck:
         """Return what is wrong with the next set-point, or None.
 
         Args:
-            limits: of the joints.
             before: set-point at the end of the last cycle.
             target: set-point at the end of this one.
         """

@@ -24,9 +24,7 @@ class SafetySettings:
         q_max: upper ends [rad].
         joint_speed: [rad/s].
         reduced_joint_speed: in reduced mode [rad/s].
-        arm: the others.
         reduced_arm: in reduced mode.
-        boundaries: safety planes and tool direction.
         unwatched: settings that the safety system does not watch, for the log.
         inputs: pairs of configurable inputs with functions that need operational modes.
     """
@@ -57,7 +55,6 @@ class ConfiguredLimits:
         recovery_speed: allowed in recovery mode [rad/s].
         arm: beside those of the joints.
         reduced_arm: in reduced mode.
-        boundaries: safety planes and tool direction.
     """
 
     q_min: Vector6

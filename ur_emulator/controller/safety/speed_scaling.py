@@ -38,7 +38,6 @@ class ModeLimits:
 
     Attributes:
         joints: speeds [rad/s].
-        arm: the others.
     """
 
     joints: Vector6
@@ -51,10 +50,7 @@ def limits_of_mode(
     """Return what is allowed in a mode; None where the rated joint speeds are all.
 
     Args:
-        mode: the safety mode.
-        is_manual: the operational mode is MANUAL.
         limits: of the arm and its installation.
-        rules: limits of the generation.
     """
     manual = rules.manual if is_manual else UNLIMITED
     match mode:
@@ -77,7 +73,6 @@ class SpeedLimiter:
         """Begin.
 
         Args:
-            limits: of the mode.
             scale: in force until now.
             hard: slow down with the deceleration of a stop, else with the rate of the speed slider.
         """
@@ -91,7 +86,6 @@ class SpeedLimiter:
 
         Args:
             motion: of the arm; the rate of its scaling is set.
-            arm: kinematics of the arm.
             tcp: tool centre point in the flange frame.
             slider: speed slider, 0..1.
             dt: duration of a cycle [s].

@@ -66,7 +66,6 @@ def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
     """Return the message for an event; None for events that stand only in the log.
 
     Args:
-        event: what happened.
         timestamp: microseconds since controller start.
     """
     match event:

@@ -53,7 +53,6 @@ def size_of(value: Any, most: int) -> tuple[int, int]:
     """Return at least how many bytes a value takes on the wire, and how many elements are encoded for it.
 
     Args:
-        value: of a script.
         most: the bytes at which counting ends; so it takes no longer than encoding a value that fits.
     """
     if isinstance(value, str):

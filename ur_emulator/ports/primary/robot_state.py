@@ -69,8 +69,6 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
     """Return the sub-packages that change from state to state.
 
     Args:
-        snapshot: of the cycle.
-        checksum: of the safety settings.
         dexterity: of the arm as it stands.
     """
     snap = snapshot
@@ -161,7 +159,6 @@ class StateEncoder:
         """Prepare what stays.
 
         Args:
-            software: decides sizes and contents.
             arm: the controller's kinematics.
             safety: has the limits of the installation.
             masterboard: its version, by which clients know the box.
@@ -208,7 +205,6 @@ def setup_records(
 
     Args:
         robot: type and nominal kinematics.
-        calibrated_dh: kinematics of this very arm.
         limits: of the arm and its installation.
         masterboard: its version, by which clients know the box.
     """
