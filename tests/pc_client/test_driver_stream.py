@@ -380,7 +380,7 @@ def test_a_safety_stop_that_comes_with_another_error_is_named_before_it():
             robot.safety_mode = 3
             raise DriverError("the tool is off its path")
 
-    with pytest.raises(RobotStoppedError, match="PROTECTIVE_STOP.*; before that: the tool is off its path"):
+    with pytest.raises(RobotStoppedError, match=r"PROTECTIVE_STOP.*; before that: the tool is off its path"):
         stream(robot, rows=sink)
     assert robot.at_rest
 

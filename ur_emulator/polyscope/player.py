@@ -108,8 +108,7 @@ def is_paused(box: ServedBox) -> bool:
 
 
 def obstacle_to_playing(box: ServedBox, *, has_program: bool) -> str:
-    """Return what stands against playing, "" if nothing does.
-    """
+    """Return what stands against playing, "" if nothing does."""
     state, mode = box.controller.state, box.snapshot.robot_mode
     if not state.safety.lets_programs_run:
         return "the robot is stopped for safety"
