@@ -76,8 +76,8 @@ class ArmDynamics:
     def greatest_deceleration(self, target: JointTarget) -> float:
         """Return the greatest deceleration of the leading axis that the drives can give in a stop [rad/s^2].
 
-        All joints come to rest together, see `ramp_towards`. Friction helps joints that move; of others it
-        may take a part of the torque.
+        All joints come to rest together, see `ramp_towards`. Friction helps joints that move, and may take a
+        part of the torque of joints that do not.
         """
         leading = max(map(abs, target.qd))
         if leading <= REST_SPEED:
@@ -92,7 +92,7 @@ class ArmDynamics:
         return max(greatest, _LEAST_DECELERATION)
 
     def _friction(self, qd: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the dry friction of joints at rest, either way, and the friction of the others [Nm]."""
+        """Return the dry friction of joints at rest, in either direction, and that of moving joints [Nm]."""
         robot, speed = self._robot, np.abs(qd)
         slow = speed if robot.viscous_kink is None else np.minimum(speed, robot.viscous_kink)
         dry = np.array(robot.coulomb)

@@ -250,7 +250,7 @@ class ForceMode:
         else:
             rotation = _block_diagonal(axes)
             speed = rotation @ self._axis_speeds(rotation, measured.q, dt)
-            # The program's motion along compliant axes, turned by the displacement, is not executed.
+            # The program's motion along compliant axes, turned by the displacement, is cancelled.
             displacement = np.array(along_path)
             displacement[3:] = rotvec_to_matrix(self._shift[3:]) @ displacement[3:]
             cancelled = rotation @ np.where(self._chosen, rotation.T @ displacement, 0.0)
@@ -292,7 +292,7 @@ class ForceMode:
         # The exact solution: the force acts for a shorter time while the damping takes from what it gives.
         gained = self._mobility * dt * ((kept - 1.0) / log(kept) if 0.0 < kept < 1.0 else kept)
         free = _shortened(kept * (before - pressing) + gained * missing, gained * _IDLE_WRENCH)
-        # What a wrench within the friction causes is no free motion.
+        # A motion that a wrench within the friction causes is not free.
         moved = _FREE_SHARE * _shortened(rotation.T @ self._twist, gain * _IDLE_WRENCH)
         wanted = pressing + np.clip(free, np.minimum(moved, 0.0), np.maximum(moved, 0.0))
         wanted = np.clip(wanted, before - _ACCELERATION * dt, before + _ACCELERATION * dt)
