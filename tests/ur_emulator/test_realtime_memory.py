@@ -125,6 +125,17 @@ def test_what_a_program_held_is_given_back_when_none_runs_any_more(system):
     assert box.kept == 0
 
 
+def test_garbage_is_looked_for_as_often_as_the_process_grows(system, monkeypatch):
+    watch, box, collected = MemoryWatch(Tasks()), Programs(system, 0), []
+    monkeypatch.setattr(memory.gc, "collect", collected.append)
+    monkeypatch.setattr(memory.gc, "get_count", lambda: (0, 0, 0))
+    for time, size in enumerate((1, 2, 3, 4, 5, 1, 3, 4)):
+        box.needs[:] = [size]
+        look(watch, box, time=time)
+        look(watch, box, time=time)
+    assert collected == [1, 1]  # at 3 MiB, and at 4 after it had less
+
+
 def test_what_cannot_be_given_back_is_tried_once(system, monkeypatch):
     watch, box, tried = MemoryWatch(Tasks()), Programs(system, 0), []
     box.end_for_memory("by its user")

@@ -7,7 +7,7 @@ evaluate the chain on a model of their own, in about two microseconds; the rest 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite, pi, sqrt
+from math import inf, isfinite, pi, sqrt
 from typing import NamedTuple
 
 import mujoco
@@ -89,6 +89,7 @@ class ArmModel:
 
     Attributes:
         mass: of all moving links [kg].
+        n_iterations: of Newton's method in the last call of `inverse`.
 
     `tcp` in all methods: pose of the tool centre point in the flange frame; None for the flange itself.
     """
@@ -115,6 +116,7 @@ class ArmModel:
         self._root_velocity = data.subtree_linvel[root]
         self._root_spin = data.subtree_angmom[root]
         self.mass = float(self._model.body_subtreemass[root])
+        self.n_iterations = 0
         self._tcp: Sequence[float] | None = None
         self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
         self.set_range(robot.q_min, robot.q_max)
@@ -231,8 +233,9 @@ class ArmModel:
         flange = tuple(pose) if tcp is None else pose_trans(pose, pose_inv(tcp))
         near = [float(angle) for angle in q_near]
         position = (flange[0], flange[1], flange[2])
+        self.n_iterations = 0
         rotation = rotvec_to_flat(flange[3], flange[4], flange[5])
-        found = self._refine(near, position, rotation)
+        found = self._refine(near, position, rotation, 2.0 * _NEAR)
         if found is not None and max(abs(a - b) for a, b in zip(found, near, strict=True)) < _NEAR:
             inside = self._into_range(found, near)
             if inside is not None:
@@ -283,13 +286,22 @@ class ArmModel:
         )
 
     def _refine(
-        self, start: Sequence[float], position: Sequence[float], rotation: Sequence[float]
+        self,
+        start: Sequence[float],
+        position: Sequence[float],
+        rotation: Sequence[float],
+        within: float = inf,
     ) -> Vector6 | None:
-        """Newton's method on the calibrated arm for a flange pose; None if it does not converge."""
-        q = np.array(start)
+        """Newton's method on the calibrated arm for a flange pose.
+
+        None if it does not converge, or a joint leaves its start by more than `within` [rad].
+        """
+        first = np.array(start)
+        q = first.copy()
         wanted = np.array(rotation).reshape(3, 3)
         error = np.empty(6)
         for _ in range(_MAX_ITERATIONS):
+            self.n_iterations += 1
             jacobian = self.jacobian(q)
             error[:3] = position - self._flange_position
             error[3:] = rotvec_from_flat(*(wanted @ self._flange_rotation.reshape(3, 3).T).ravel().tolist())
@@ -299,6 +311,8 @@ class ArmModel:
             step = joint_speeds(jacobian, error)
             longest = float(np.abs(step).max())
             q += step if longest < _LONGEST_STEP else step * (_LONGEST_STEP / longest)
+            if within < inf and float(np.abs(q - first).max()) > within:
+                return None
         return None
 
     def _into_range(self, q: Sequence[float], near: Sequence[float]) -> Vector6 | None:

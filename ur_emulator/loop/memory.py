@@ -31,6 +31,9 @@ _RARELY = (50_000, 20, 100)
 _SWITCH_INTERVAL = 1e-4  # s
 # Objects that are new when the collector looks at them [1]: so many take a fifth of a millisecond.
 _NEW = 2_000
+# The same where few objects are long [bytes]: the collector looks at all elements of new lists, half a
+# millisecond for a MiB.
+_GROWN = 2 * MIB
 # Generation of the collector with all objects.
 _ALL = 2
 # How often the memory is measured [s]: a program makes 5 MiB in that time.
@@ -120,7 +123,7 @@ class MemoryWatch:
 
     def __init__(self, tasks: Tasks) -> None:
         self._tasks = tasks
-        self._at_rest = self._now = resident()
+        self._at_rest = self._now = self._collected = resident()
         # What it holds when nothing can be given back.
         self._floor = 0
         # How much each box has made it grow since it held half of what is allowed.
@@ -129,11 +132,13 @@ class MemoryWatch:
 
     def look(self, programs: ProgramRunner, now: float) -> None:
         """Measure, after a cycle of the box whose programs are given; let pay who must."""
-        if gc.get_count()[0] > _NEW:
+        if gc.get_count()[0] > _NEW or self._now - self._collected > _GROWN:
             gc.collect(1)
+            self._collected = self._now
         if now < self._next_look:
             return
         before, self._now = self._now, resident()
+        self._collected = min(self._collected, self._now)
         held = self._now - self._at_rest
         if 2 * held < BUDGETS.memory:
             self._next_look = now + _PERIOD

@@ -38,6 +38,7 @@ class ScriptThread:
     Attributes:
         thread_id: From 1 (the main thread) in the order of starts.
         name: Name of the `thread` definition; of the main thread the program's.
+        charge: Charges it statements and units that a builtin has needed beyond those of its row.
         finished: It ended or was killed.
         wait: What it waits for; None when it can run in the next cycle.
         label: Text of the last `$` line it passed.
@@ -52,6 +53,7 @@ class ScriptThread:
     name: str
     parent: ScriptThread | None
     body: ThreadBody
+    charge: Callable[[int, int], None]
     children: list[ScriptThread] = field(default_factory=list)
     finished: bool = False
     wait: Blocked | None = None
@@ -124,7 +126,7 @@ class Scheduler:
         if len(self.threads) >= MAX_THREADS <= sum(not thread.finished for thread in self.threads):
             raise ScriptRuntimeError(f"too many threads: a program may have {MAX_THREADS} at the same time")
         self._count += 1
-        thread = ScriptThread(self._count, name, parent, function())
+        thread = ScriptThread(self._count, name, parent, function(), self._meter.charge)
         thread.budget = self._budget
         self.deepen(thread, depth)
         if parent is None:
