@@ -317,3 +317,14 @@ def test_secondary_programs_that_come_faster_than_they_end_are_refused():
     )
     bench.tick(BUDGETS.secondary_programs * 12)
     assert not bench.controller.programs.has_work
+
+
+def test_an_inverse_that_needs_many_iterations_costs_as_many():
+    bench, used = Bench(), {}
+    for where, pose in {
+        "near": "get_actual_tcp_pose()",
+        "out of reach": "p[0.548, 0, 0.15, 0, 3.14, 0]",
+    }.items():
+        bench.start(f"def p():\n  x = get_inverse_kin_has_solution({pose})\n  sync()\nend\n")
+        used[where] = bench.controller.programs.work
+    assert 10 * used["near"] < used["out of reach"] < MOST_AT_ONCE
