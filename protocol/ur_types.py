@@ -200,6 +200,7 @@ class Ports:
 
     Attributes:
         robot_api: Robot API of PolyScope X over HTTP.
+        modbus: Modbus TCP.
         dashboard: commands for programs, power and stops, a line each.
         primary: states and all messages, ten a second; takes scripts.
         secondary: states, ten a second; takes scripts.

@@ -102,7 +102,9 @@ class ServedAt:
     """Where clients find a box, and as what.
 
     Attributes:
+        title: arm, generation and software.
         serial_number: as the dashboard gives it; simulated boxes are recognisable by it.
+        host: address that it listens on.
         ports: numbers of its ports; 0 for one that it does not have.
         port_base: what was added to the standard ones.
         control_port: number of the port for the control API over HTTP, 0 if it is not open.
