@@ -19,7 +19,7 @@ The column *origin* says how the box obtains a value:
 | constant | a plausible fixed value without a model |
 | internal, zero | no published meaning, always 0 |
 
-A test (`tests/ur_emulator/test_wire_origins.py`) takes a box through all its states and checks
+A test (`tests/ur_emulator/test_wire_agreement.py`) takes a box through all its states and checks
 every mark: measured and modelled values change, the others do not.
 """
 assert all(f"| {mark.value} |" in MARKS for mark in ValueOrigin)
@@ -38,5 +38,5 @@ def _line(cells: Iterable[object]) -> str:
 
 def example(command: str, lines: Iterable[str]) -> str:
     """A command and what it prints, as a block of code."""
-    why = "<!-- not run: values differ each time; tests/protocol/test_wire_pages.py compares the form -->"
+    why = "<!-- not run: values differ each time; tests/test_generated_pages.py compares the form -->"
     return "\n".join((why, "", "```console", f"$ {command}", *lines, "```"))

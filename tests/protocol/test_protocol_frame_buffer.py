@@ -38,16 +38,6 @@ def test_any_split_gives_the_same_frames(bodies, cuts, drain_often):
     assert buffer.pending == 0
 
 
-@given(BODIES)
-def test_one_frame_a_feed_and_several_waiting(bodies):
-    frames = [frame(body) for body in bodies]
-    buffer = FrameBuffer(64)
-    for one in frames:
-        buffer.feed(one)
-    assert buffer.pending == sum(map(len, frames))
-    assert drain(buffer) == frames
-
-
 def test_trailing_bytes_wait():
     buffer = FrameBuffer(64)
     buffer.feed(frame(b"abc") + b"\0\0")
@@ -65,13 +55,6 @@ def test_absurd_lengths_are_refused_again_and_again(size):
     for _ in range(2):
         with pytest.raises(RemoteProtocolError, match=f"length {size} is not within 5 to 64"):
             buffer.next_frame()
-
-
-def test_a_frame_that_is_whole_but_too_long_is_refused_too():
-    buffer = FrameBuffer(max_size=8)
-    buffer.feed(frame(b"12345"))
-    with pytest.raises(RemoteProtocolError, match="length 9"):
-        buffer.next_frame()
 
 
 def test_what_is_handed_out_does_not_change_with_the_callers_buffer():

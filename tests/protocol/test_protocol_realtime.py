@@ -11,9 +11,7 @@ import pytest
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.realtime.layout import (
     COLUMNS,
-    MAX_FRAME_SIZE,
     SNAPSHOT_FIELDS,
-    VERSIONS,
     layout_for_size,
     layout_for_version,
 )
@@ -54,11 +52,6 @@ def test_frame_size_of_each_version(version, size):
 def test_versions_that_never_were(version):
     with pytest.raises(LocalProtocolError, match=version):
         layout_for_version(SoftwareVersion.parse(version))
-
-
-def test_versions_ascend():
-    assert [version for version, _ in VERSIONS] == sorted(version for version, _ in VERSIONS)
-    assert max(SIZES) == MAX_FRAME_SIZE
 
 
 # Offset of each field and its first gnuplot column, as in the vendor's sheet.

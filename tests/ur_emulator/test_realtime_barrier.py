@@ -1,9 +1,5 @@
 """The error barrier: an error ends what has caused it, the log says so in one line, and everybody else goes on."""
 
-import selectors
-import socket
-from types import SimpleNamespace
-
 import pytest
 from box_support import FrameReader, MessageReader, connect, inside, listening_socket
 from control_support import Http, control_box
@@ -13,7 +9,6 @@ from protocol.primary.messages import LONGEST_TITLE, PopupMessage, ReportLevel
 from ur_emulator.commands.power import PowerOff
 from ur_emulator.control_api.step_operations import ReadState
 from ur_emulator.loop import listener
-from ur_emulator.loop.event_loop import EventLoop
 from ur_emulator.outgoing.sockets import ScriptConnection
 from ur_emulator.ports.session import Session
 
@@ -22,90 +17,6 @@ DEFECT = "KeyError('defect') in fail, line "
 
 def fail(*args, **options):
     raise KeyError("defect")
-
-
-# --- the loop alone
-
-
-@pytest.fixture
-def loop():
-    made = EventLoop()
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def ready():
-    """A socket with a byte to read."""
-    near, far = socket.socketpair()
-    far.send(b"x")
-    with near, far:
-        yield near
-
-
-class Turns:
-    """Stops its loop after so many turns."""
-
-    def __init__(self, loop, n):
-        self._loop, self._left = loop, n
-
-    def advance(self, now):
-        self._left -= 1
-        if self._left < 0:
-            self._loop.stop()
-        return now
-
-    failed = pytest.fail
-
-
-def test_the_owner_of_a_socket_is_informed_once_and_the_socket_is_no_longer_watched(loop, ready):
-    errors = []
-    loop.watch(ready, selectors.EVENT_READ, fail, errors.append)
-    loop.add(Turns(loop, 5))
-    loop.run()
-    assert [repr(error) for error in errors] == ["KeyError('defect')"]
-    assert ready not in loop._selector.get_map()
-
-
-def test_a_callback_may_close_its_socket_before_it_fails(loop, ready):
-    errors = []
-
-    def end_and_fail(events):
-        loop.unwatch(ready)
-        ready.close()
-        fail()
-
-    loop.watch(ready, selectors.EVENT_READ, end_and_fail, errors.append)
-    loop.add(Turns(loop, 5))
-    loop.run()
-    assert len(errors) == 1
-
-
-def test_a_call_that_fails_keeps_no_other_from_its_turn(loop):
-    errors, done = [], []
-    loop.call_soon(fail, errors.append)
-    loop.call_soon_threadsafe(fail, errors.append)
-    loop.call_soon(lambda: done.append(1), pytest.fail)
-    loop.add(Turns(loop, 2))
-    loop.run()
-    assert (len(errors), done) == (2, [1])
-
-
-def test_a_service_that_fails_is_called_no_more(loop):
-    errors = []
-    loop.add(SimpleNamespace(advance=fail, failed=errors.append))
-    loop.add(Turns(loop, 5))
-    loop.run()
-    assert len(errors) == 1
-
-
-def test_an_error_that_nobody_takes_ends_the_loop(loop):
-    loop.call_soon(fail, lambda error: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        loop.run()
-
-
-# --- a box
 
 
 @pytest.fixture
@@ -139,11 +50,8 @@ def open_port(box, name):
     return connect(box, name)
 
 
-PORTS = ("primary", "secondary", "realtime_ro", "rtde", "dashboard", "modbus", "control")
-
-
 @pytest.mark.parametrize("method", ["opened", "received"])
-@pytest.mark.parametrize("name", PORTS)
+@pytest.mark.parametrize("name", ["primary", "rtde", "control"])
 def test_an_error_of_a_port_ends_the_connection_that_has_caused_it(box, name, method, monkeypatch):
     port, connections = inside(box)._port_set._ports[name], inside(box)._port_set._listeners[name].connections
     with open_port(box, name) as other:

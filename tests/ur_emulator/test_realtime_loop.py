@@ -14,6 +14,13 @@ from ur_emulator.loop.event_loop import EventLoop
 
 
 @pytest.fixture
+def loop():
+    made = EventLoop()
+    yield made
+    made.close()
+
+
+@pytest.fixture
 def pairs():
     made = [socket.socketpair() for _ in range(2)]
     yield made
@@ -26,12 +33,11 @@ def run_once(loop):
     """Let the loop take one turn."""
     loop.call_soon_threadsafe(loop.stop, pytest.fail)
     loop.run()
-    loop.close()
 
 
 @pytest.mark.parametrize("number_is_taken", [False, True])
-def test_a_socket_that_was_closed_in_the_same_turn_is_not_called(pairs, number_is_taken):
-    loop, called, spare = EventLoop(), [], []
+def test_a_socket_that_was_closed_in_the_same_turn_is_not_called(loop, pairs, number_is_taken):
+    called, spare = [], []
     ends = {pair[0]: pair[0].fileno() for pair in pairs}
 
     def ready(sock):
@@ -86,34 +92,32 @@ def until_due(loop, story, name, period):
 
 
 @pytest.mark.parametrize("period", [0.002, 0.0], ids=["in time", "late"])
-def test_a_service_is_called_between_long_callbacks_and_nobody_has_two_turns_in_a_round(pairs, period):
-    loop, story = EventLoop(), []
+def test_a_service_is_called_between_long_callbacks_and_nobody_has_two_turns_in_a_round(loop, pairs, period):
+    story = []
     for name, (near, far) in zip("ab", pairs, strict=True):
         far.send(b"x")  # never read: ready in every round
         loop.watch(near, selectors.EVENT_READ, until_due(loop, story, name, period + 0.001), pytest.fail)
     loop.add(Due(loop, story, period, 9))
     loop.run()
-    loop.close()
     turns = [name for name in story if name != "service"]
     assert sorted(turns[:2]) == ["a", "b"]
     assert turns == (turns[:2] * 9)[: len(turns)]
     assert all({a, b} != {"a", "b"} for a, b in pairwise(story))
 
 
-def test_a_late_service_with_a_short_cycle_waits_for_one_callback_of_a_tenth_of_it(pairs):
-    loop, story = EventLoop(), []
+def test_a_late_service_with_a_short_cycle_waits_for_one_callback_of_a_tenth_of_it(loop, pairs):
+    story = []
     loop.keep_pace(0.002)
     for name, (near, far) in zip("ab", pairs, strict=True):
         far.send(b"x")
         loop.watch(near, selectors.EVENT_READ, until_due(loop, story, name, 100e-6), pytest.fail)
     loop.add(Due(loop, story, 0.0, 20))
     loop.run()
-    loop.close()
     assert all("service" in turns for turns in pairwise(story))
 
 
-def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiting(pairs):
-    loop, story = EventLoop(), []
+def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiting(loop, pairs):
+    story = []
     near, far = pairs[0]
     far.send(b"x")
     loop.watch(near, selectors.EVENT_READ, lambda events: story.append("socket"), pytest.fail)
@@ -125,7 +129,6 @@ def test_calls_that_call_themselves_again_do_not_keep_sockets_and_services_waiti
     loop.call_soon(again, pytest.fail)
     loop.add(Due(loop, story, 0.0, 50))
     loop.run()
-    loop.close()
     assert abs(story.count("call") - story.count("socket")) <= 1
     assert story.count("call") > 9
 
@@ -141,11 +144,72 @@ def test_a_loop_that_does_not_end_is_an_error(monkeypatch):
     runner._thread.join()
 
 
-def test_a_call_for_later_comes_after_its_time_and_in_order():
-    loop, called = EventLoop(), []
+def test_a_call_for_later_comes_after_its_time_and_in_order(loop):
+    called = []
     for delay in (0.002, 0.001, 0.0):
         loop.call_later(delay, lambda delay=delay: called.append(delay), pytest.fail)
     loop.call_later(0.003, loop.stop, pytest.fail)
     loop.run()
-    loop.close()
     assert called == [0.0, 0.001, 0.002]
+
+
+# --- what an error ends
+
+
+def fail(*arguments):
+    raise KeyError("defect")
+
+
+@pytest.fixture
+def ready(pairs):
+    """A socket with a byte to read."""
+    near, far = pairs[0]
+    far.send(b"x")
+    return near
+
+
+def test_the_owner_of_a_socket_is_informed_once_and_the_socket_is_no_longer_watched(loop, ready):
+    errors = []
+    loop.watch(ready, selectors.EVENT_READ, fail, errors.append)
+    loop.add(Due(loop, [], 0.0, 5))
+    loop.run()
+    assert [repr(error) for error in errors] == ["KeyError('defect')"]
+    assert ready not in loop._selector.get_map()
+
+
+def test_a_callback_may_close_its_socket_before_it_fails(loop, ready):
+    errors = []
+
+    def end_and_fail(events):
+        loop.unwatch(ready)
+        ready.close()
+        fail()
+
+    loop.watch(ready, selectors.EVENT_READ, end_and_fail, errors.append)
+    loop.add(Due(loop, [], 0.0, 5))
+    loop.run()
+    assert len(errors) == 1
+
+
+def test_a_call_that_fails_keeps_no_other_from_its_turn(loop):
+    errors, done = [], []
+    loop.call_soon(fail, errors.append)
+    loop.call_soon_threadsafe(fail, errors.append)
+    loop.call_soon(lambda: done.append(1), pytest.fail)
+    loop.add(Due(loop, [], 0.0, 2))
+    loop.run()
+    assert (len(errors), done) == (2, [1])
+
+
+def test_a_service_that_fails_is_called_no_more(loop):
+    errors = []
+    loop.add(SimpleNamespace(advance=fail, failed=errors.append))
+    loop.add(Due(loop, [], 0.0, 5))
+    loop.run()
+    assert len(errors) == 1
+
+
+def test_an_error_that_nobody_takes_ends_the_loop(loop):
+    loop.call_soon(fail, lambda error: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        loop.run()

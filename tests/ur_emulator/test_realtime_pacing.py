@@ -1,3 +1,5 @@
+"""When the next cycle of a box begins, in real time and in lockstep; the clock is a number."""
+
 from dataclasses import dataclass
 from functools import partial
 from types import SimpleNamespace
@@ -8,15 +10,7 @@ from ur_emulator.commands.programs import SetSpeedSlider
 from ur_emulator.commands.safety import TriggerFault
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import SafetyModeChanged
-from ur_emulator.loop.pacing import (
-    HANG_LIMIT,
-    MAX_BACKLOG,
-    READER_LIMIT,
-    LockstepPacer,
-    Pace,
-    RealtimePacer,
-    make_pacer,
-)
+from ur_emulator.loop.pacing import HANG_LIMIT, MAX_BACKLOG, READER_LIMIT, LockstepPacer, RealtimePacer
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
@@ -92,11 +86,15 @@ def test_the_lead_is_at_most_a_quarter_of_a_short_period():
     assert pacer.may_tick(0.76 * PERIOD / 100, Box())
 
 
+def served_box():
+    """A box in real time, alone in its loop."""
+    hosts = partial(robot_hosts, network=None)
+    controller = Controller(robot_by_name("ur3"), CB3.fidelity("exact"), 0, hosts)
+    return ServedBox(controller, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
+
+
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():
-    controller = Controller(
-        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(robot_hosts, network=None)
-    )
-    box = ServedBox(controller, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
+    box = served_box()
     seen = []
     box.attach([SimpleNamespace(publish=seen.append)])
     assert box.advance(10.0) == pytest.approx(10.0 + PERIOD)
@@ -113,17 +111,14 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
 
 
 def test_messages_of_a_cycle_that_was_computed_early_are_sent_before_anybody_can_see_its_state():
-    controller = Controller(
-        robot_by_name("ur3"), CB3.fidelity("exact"), 0, partial(robot_hosts, network=None)
-    )
-    box = ServedBox(controller, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
+    box = served_box()
     seen = []
     box.attach([SimpleNamespace(publish=lambda snapshot: seen.append("state"))], [seen.append])
     box.advance(10.0)
     seen.clear()
     box.submit(TriggerFault())
     box.advance(10.0 + PERIOD - 0.0003)
-    assert SafetyModeChanged(int(controller.snapshot.safety_mode)) in seen
+    assert SafetyModeChanged(int(box.controller.snapshot.safety_mode)) in seen
     assert "state" not in seen
     box.advance(10.0 + PERIOD)
     assert seen[-1] == "state"
@@ -208,8 +203,3 @@ def test_a_script_that_hangs_is_not_held_up_by_readers_as_well():
     box = Box(waits_outside=True, readers_full=True)
     assert wait(LockstepPacer(PERIOD), box, 2 * HANG_LIMIT) == pytest.approx(HANG_LIMIT, abs=2 * PERIOD)
     assert box.given_up == 1
-
-
-def test_pacers_have_names():
-    assert isinstance(make_pacer(Pace("realtime"), PERIOD), RealtimePacer)
-    assert isinstance(make_pacer(Pace("lockstep"), PERIOD), LockstepPacer)

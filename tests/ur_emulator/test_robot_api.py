@@ -12,7 +12,6 @@ import pytest
 from box_support import TIMEOUT, inside
 
 from protocol.robot_api import BASE, CALLS
-from protocol.ur_types import Ports
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError
 
@@ -114,10 +113,6 @@ def test_services_and_versions_that_do_not_exist():
         ControlBox(in_process=True, services=["rtde"])
     with pytest.raises(EmulatorError, match=r"10\.11 given"):
         ControlBox(in_process=True, robot="ur3", version="10.11")
-
-
-def test_standard_number():
-    assert Ports().robot_api == 80
 
 
 def test_description_names_the_version_by_which_clients_choose(box):
@@ -225,7 +220,6 @@ def test_a_program_as_large_as_the_makers_is_taken_and_sent(box):
     data = urpx("large", "#" + "x" * 200_000 + "\nsync()")
     assert ask(box, "POST", "/programs/v1/", form("filename", data), FORM)[0] == 200
     assert ask(box, "GET", "/programs/v1/large")[1] == data
-    assert ask(box, "POST", "/programs/v1/", form("filename", data * 6), FORM)[0] == 413
     assert ask(box, "PUT", "/program/v1/state", b'{"action":"' + b" " * 70_000 + b'"}')[0] == 422
 
 

@@ -2,15 +2,18 @@
 
 import math
 
+import numpy as np
 import pytest
 from box_support import Bench
 
+from protocol.pose import rotvec_to_matrix
 from protocol.rtde.codec import data_header
-from protocol.rtde.fields import INPUTS, OUTPUTS, output_fields
+from protocol.rtde.fields import INPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RtdeType
-from protocol.ur_types import RobotMode, SafetyMode, SoftwareVersion
+from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
 from ur_emulator.commands.client_writes import WriteInputs
+from ur_emulator.commands.programs import ResumeProgram
 from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.controller.snapshot import safety_status_bits
 
@@ -66,35 +69,6 @@ def test_registers_are_read_back_in_the_cycle_they_are_written(bench):
     now = write(bench, REGISTERS)
     assert published(now, *REGISTERS) == tuple(REGISTERS.values())
     assert published(now, "input_bit_register_65", "input_int_register_1") == (False, 0)
-
-
-def test_scripts_read_what_clients_wrote(bench):
-    write(bench, REGISTERS)
-    said = bench.run(
-        "def r():\n"
-        "  textmsg([read_input_boolean_register(0), read_input_boolean_register(1),"
-        " read_input_boolean_register(31), read_input_boolean_register(127)])\n"
-        "  textmsg([read_input_integer_register(0), read_input_integer_register(47)])\n"
-        "  textmsg(read_input_float_register(0))\n"
-        "end\n"
-    )
-    assert said == ["[True,False,True,True]", "[-5,2147483647]", "0.1"]
-
-
-def test_clients_read_what_scripts_wrote_and_it_outlives_the_program(bench):
-    bench.run(
-        "def w():\n"
-        "  write_output_integer_register(24, -7)\n"
-        "  write_output_float_register(3, 2.5)\n"
-        "  write_output_boolean_register(33, True)\n"
-        "  write_output_boolean_register(70, True)\n"
-        "end\n"
-    )
-    bench.run("def other():\n  sync()\nend\n")
-    names = ("output_int_register_24", "output_double_register_3")
-    assert published(bench.now, *names) == (-7, 2.5)
-    bits = ("output_bit_registers0_to_31", "output_bit_registers32_to_63", "output_bit_register_70")
-    assert published(bench.now, *bits) == (0, 2, True)
 
 
 def test_registers_are_copied_only_after_a_write(bench):
@@ -202,11 +176,6 @@ def test_status_bits_follow_the_modes(bench):
     assert published(bench.tick(), *names) == (0b01, 1 << 2 | 1 << 10)
 
 
-def test_an_unpowered_arm_says_so():
-    bench = Bench(mode=RobotMode.POWER_OFF)
-    assert published(bench.now, "robot_status_bits") == (0,)
-
-
 def test_every_safety_mode_that_stops_the_arm_has_a_bit_of_its_own():
     stopping = [mode for mode in SafetyMode if 3 <= mode <= 9 and mode is not SafetyMode.RECOVERY]
     words = [safety_status_bits(mode) for mode in stopping]
@@ -214,11 +183,6 @@ def test_every_safety_mode_that_stops_the_arm_has_a_bit_of_its_own():
     assert len(set(words)) == len(words)
     emergency = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
     assert [mode for mode in stopping if safety_status_bits(mode) & 1 << 7] == list(emergency)
-
-
-def test_the_force_scalar_is_the_norm_of_the_force(bench):
-    force, scalar = published(bench.now, "actual_TCP_force", "tcp_force_scalar")
-    assert scalar == pytest.approx(math.sqrt(sum(f * f for f in force[:3])))
 
 
 def test_the_tool_says_what_a_script_sets(bench):
@@ -237,7 +201,121 @@ def test_the_script_line_is_looked_up_only_when_somebody_wants_it(bench):
     assert published(bench.tick(), "script_control_line") == (0,)
 
 
-def test_the_table_names_only_what_the_snapshot_has(bench):
-    for field in OUTPUTS:
-        if field.comes_from:
-            assert hasattr(bench.now, field.comes_from.partition(".")[0].partition("[")[0]), field.name
+# --- watchdogs over inputs; `chunks/watchdogs.script` has what one program shows
+
+REGISTER = "input_int_register_24"
+WRITE = WriteInputs(((REGISTER, 5),))
+
+
+def watching(call):
+    bench = Bench()
+    bench.start(f"def p():\n  {call}\n  while True:\n    sync()\n  end\nend\n")
+    return bench
+
+
+def reports(bench):
+    return [event.text for event in bench.events if getattr(event, "code", None) == 207]
+
+
+def test_a_paused_program_is_reported_once_and_watched_again_when_it_goes_on():
+    bench = watching(f'rtde_set_watchdog("{REGISTER}", 10)')
+    bench.tick(13)  # 0.1 s are 12.5 cycles
+    assert not bench.controller.programs.is_paused
+    bench.tick(2)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    bench.tick(100)
+    assert len(reports(bench)) == 1
+    bench.tick(1, ResumeProgram())
+    for _ in range(30):
+        bench.tick(1, WRITE)
+    bench.tick(10)
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    bench.tick(10)
+    assert bench.now.runtime_state == ProgramState.PAUSED
+    assert len(reports(bench)) == 2
+
+
+def test_of_two_late_variables_the_one_that_stops_counts():
+    bench = watching(
+        f'rtde_set_watchdog("{REGISTER}", 10, "pause")\n  rtde_set_watchdog("input_int_register_25", 10, "stop")'
+    )
+    bench.tick(14)
+    assert not bench.controller.programs.is_running
+    assert "input_int_register_25" in reports(bench)[0]
+
+
+@pytest.mark.parametrize(("frequency", "cycles"), [(125, 1), (62.5, 2), (25, 5), (10, 13), (200, 1)])
+def test_packages_at_the_minimum_frequency_are_enough_and_one_cycle_more_is_not(frequency, cycles):
+    bench = watching(f'rtde_set_watchdog("{REGISTER}", {frequency}, "stop")')
+    for _ in range(10):
+        bench.tick(1, WRITE)
+        bench.tick(cycles - 1)
+    assert bench.controller.programs.is_running
+    bench.tick(1, WRITE)
+    bench.tick(cycles)
+    assert bench.controller.programs.is_running
+    bench.tick()
+    assert not bench.controller.programs.is_running
+
+
+def test_a_frequency_of_0_takes_a_watchdog_away():
+    bench = watching(f'rtde_set_watchdog("{REGISTER}", 10, "stop")\n  rtde_set_watchdog("{REGISTER}", 0)')
+    bench.tick(100)
+    assert bench.controller.programs.is_running
+
+
+# --- a force sensor whose readings come through RTDE
+
+READING = (1.0, -2.0, 3.0, 0.1, 0.2, -0.3)
+
+
+def sensed(call, reading=READING):
+    """A program that enables the sensor, and a reading in its second cycle."""
+    bench = watching(call)
+    write(bench, {"external_force_torque": reading})
+    return bench
+
+
+def rotation(bench):
+    return rotvec_to_matrix(bench.now.actual_tcp_pose[3:])
+
+
+def test_the_reading_is_turned_from_the_flange_to_the_base():
+    bench = sensed("ft_rtde_input_enable(True)")
+    turned = rotation(bench)
+    expected = [*(turned @ READING[:3]), *(turned @ READING[3:])]
+    assert bench.now.actual_tcp_force == pytest.approx(expected, abs=1e-3)
+    assert bench.now.tcp_force_scalar == pytest.approx(math.sqrt(14.0))
+
+
+@pytest.mark.parametrize(
+    ("builtin", "sign"), [("ft_rtde_input_enable", 1.0), ("enable_external_ft_sensor", -1.0)]
+)
+def test_the_lever_of_the_sensor(builtin, sign):
+    bench = sensed(f"{builtin}(True, 0.5, [0.01, 0.02, 0.05], [0, 0, 0.02])")
+    moment = np.add(READING[3:], sign * np.cross((0.01, 0.02, 0.05), READING[:3]))
+    assert bench.now.actual_tcp_force[3:] == pytest.approx(list(rotation(bench) @ moment), abs=1e-3)
+    assert bench.controller.state.force_sense.sensor.mass == 0.5
+
+
+def test_the_moment_is_given_at_the_tcp():
+    bench = sensed("ft_rtde_input_enable(True)\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])")
+    moment = np.subtract(READING[3:], np.cross((0, 0, 0.1), READING[:3]))
+    assert bench.now.actual_tcp_force[3:] == pytest.approx(list(rotation(bench) @ moment), abs=1e-3)
+
+
+def test_without_a_sensor_the_input_changes_nothing_and_nonsense_is_no_force():
+    assert sensed("sync()", (500.0, 0, 0, 0, 0, 0)).now.tcp_force_scalar < 100.0
+    assert sensed("ft_rtde_input_enable(True)", (math.nan,) * 6).now.actual_tcp_force == pytest.approx(
+        (0.0,) * 6
+    )
+
+
+def test_an_enabled_sensor_must_speak_ten_times_a_second():
+    bench = sensed("ft_rtde_input_enable(True)")
+    for _ in range(5):
+        bench.tick(12)
+        write(bench, {"external_force_torque": READING})
+    assert bench.controller.programs.is_running
+    bench.tick(14)
+    assert bench.controller.programs.is_paused

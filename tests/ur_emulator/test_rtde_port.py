@@ -1,12 +1,23 @@
-"""The RTDE port without sockets: rates, repeats while time stands still, owners, clients that misbehave."""
+"""Port 30004 without sockets: rates, repeats while time stands still, owners, bad clients; then over real ones.
+
+Clients of one port share: a recipe is encoded once a cycle, however many clients have it.
+"""
+
+import socket
+import struct
+from collections import Counter
+from itertools import pairwise
 
 import pytest
-from box_support import BareBox, Bench
-from rtde_support import input_package
+from box_support import TIMEOUT, BareBox, Bench, FakeConnection, connect
+from rtde_support import RtdeClient, input_package
 
 from protocol.rtde import codec as M
+from protocol.rtde import server_connection
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
-from protocol.ur_types import SoftwareVersion
+from protocol.rtde.fields import output_fields
+from protocol.ur_types import ProgramState, SoftwareVersion
+from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.models.generations import CB3
 from ur_emulator.ports.rtde import RtdePort
@@ -14,46 +25,12 @@ from ur_emulator.ports.rtde import RtdePort
 V3_15 = SoftwareVersion(3, 15, 8)
 
 
-class FakeConnection:
-    """What the port sees of a client; the other end is a protocol of the PC."""
+class Client(FakeConnection):
+    """A client whose other end is a protocol of the PC."""
 
-    def __init__(self, port, *, full=False):
-        self.port = port
-        self.is_open = True
-        self.has_ended = False
-        self.takes_answers = True
-        self.full = full
-        self.sent = []
-        self.calls, self.reads = [], True
+    def __init__(self, port):
+        super().__init__(port)
         self.pc = RtdeClientConnection()
-        port.opened(self)
-
-    def send(self, package):
-        if self.full or not self.is_open:
-            return False
-        self.sent.append(package)
-        return True
-
-    def close(self):
-        if self.is_open:
-            self.is_open = False
-            self.port.closed(self)
-
-    close_when_sent = close
-
-    def failed(self, error):
-        raise error
-
-    def call_soon(self, call):
-        self.calls.append(call)
-
-    def set_reading(self, wanted):
-        self.reads = wanted
-
-    def say(self, data):
-        self.port.received(self, data)
-        while self.calls:
-            self.calls.pop(0)()
 
     def ask(self, request):
         self.say(self.pc.send(request))
@@ -96,10 +73,15 @@ class PortBench(Bench):
         self.box.steps.publish(self.now)
 
     def client(self, *names, frequency=125.0):
-        client = FakeConnection(self.port)
+        client = Client(self.port)
         assert client.ask(M.RequestProtocolVersion(2)).accepted
         if names:
             assert client.ask(M.SetupOutputs(names, frequency)).recipe_id == 1
+        return client
+
+    def started(self, *names, frequency=125.0):
+        client = self.client(*names, frequency=frequency)
+        assert client.ask(M.Start()) == M.StartReply(True)
         return client
 
 
@@ -122,25 +104,16 @@ def test_the_reply_to_start_precedes_the_first_package(bench):
     assert [type(event) for event in client.events()] == [M.StartReply, DataReceived, DataReceived]
 
 
-def test_the_full_rate_is_every_cycle(bench):
-    client = bench.client("timestamp")
-    client.ask(M.Start())
-    first = bench.now.tick
-    bench.tick(4)
-    assert client.stamps() == [first + 1, first + 2, first + 3, first + 4]
-
-
-@pytest.mark.parametrize(("frequency", "cycles"), [(60.0, 2), (25.0, 5), (10.0, 12)])
-def test_lower_rates_are_every_nth_cycle(bench, frequency, cycles):
-    client = bench.client("timestamp", frequency=frequency)
-    client.ask(M.Start())
+@pytest.mark.parametrize(("frequency", "cycles"), [(125.0, 1), (60.0, 2), (25.0, 5)])
+def test_the_rate_is_every_nth_cycle(bench, frequency, cycles):
+    client = bench.started("timestamp", frequency=frequency)
     first = bench.now.tick + 1
     bench.tick(3 * cycles)
     assert client.stamps() == [first, first + cycles, first + 2 * cycles]
 
 
 def test_version_1_has_the_full_rate_and_no_ids(bench):
-    client = FakeConnection(bench.port)
+    client = Client(bench.port)
     assert client.ask(M.SetupOutputs(("timestamp",))) == M.SetupOutputsReply(("DOUBLE",))
     client.ask(M.Start())
     bench.tick(3)
@@ -149,8 +122,7 @@ def test_version_1_has_the_full_rate_and_no_ids(bench):
 
 
 def test_pause_ends_the_data_and_start_resumes_it(bench):
-    client = bench.client("timestamp", frequency=25.0)
-    client.ask(M.Start())
+    client = bench.started("timestamp", frequency=25.0)
     bench.tick(3)
     assert len(client.events()) == 1
     assert client.ask(M.Pause()) == M.PauseReply(True)
@@ -162,43 +134,25 @@ def test_pause_ends_the_data_and_start_resumes_it(bench):
 
 
 def test_while_time_stands_still_the_last_state_comes_at_the_clients_rate(bench):
-    client = bench.client("timestamp", frequency=25.0)
-    client.ask(M.Start())
+    client = bench.started("timestamp", frequency=25.0)
     bench.stand(11)
-    now = bench.now.tick
-    assert client.stamps() == [now, now, now]
+    assert client.stamps() == [bench.now.tick] * 3
 
 
 def test_the_cycles_that_are_sent_do_not_depend_on_how_long_time_stood_still(bench):
-    clients = [bench.client("timestamp", frequency=25.0)]
-    clients[0].ask(M.Start())
+    client = bench.started("timestamp", frequency=25.0)
     first = bench.now.tick + 1
     bench.tick(3)
     bench.stand(4)  # less than the client's period
     bench.tick(8)
-    assert clients[0].stamps() == [first, first + 5, first + 10]
+    assert client.stamps() == [first, first + 5, first + 10]
 
 
 def test_a_state_reached_between_two_packages_is_reported_once_time_stands_still(bench):
-    client = bench.client("timestamp", frequency=25.0)
-    client.ask(M.Start())
+    client = bench.started("timestamp", frequency=25.0)
     bench.tick(2)
     bench.stand(5)
     assert client.stamps() == [bench.now.tick - 1, bench.now.tick]
-
-
-def test_several_clients_have_recipes_and_rates_of_their_own(bench):
-    fast, slow = bench.client("timestamp"), bench.client("timestamp", "actual_q", frequency=25.0)
-    fast.ask(M.Start())
-    slow.ask(M.Start())
-    bench.tick(10)
-    assert len(fast.events()) == 10
-    (one, two) = slow.events()
-    assert one.names == two.names == ("timestamp", "actual_q")
-    slow.close()
-    bench.tick(1)
-    assert len(fast.events()) == 1
-    assert set(bench.port._sessions) == {fast}
 
 
 # --- inputs
@@ -223,28 +177,17 @@ def test_the_last_client_wins_in_a_cycle(bench):
     assert bench.tick().registers.input_integers[:2] == (1, 2)
 
 
-def test_an_owned_input_is_in_use_for_others_variable_by_variable(bench):
+def test_an_input_is_in_use_for_others_until_its_owner_is_gone(bench):
     owner, other = bench.client(), bench.client()
+    assert other.ask(M.SetupInputs(("input_int_register_0", "nonsense"))).recipe_id == 0  # owns nothing
     assert owner.ask(M.SetupInputs(("input_int_register_0", "input_int_register_1"))).recipe_id == 1
     assert owner.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 2
     refused = other.ask(M.SetupInputs(("input_int_register_0", "input_int_register_2")))
     assert refused == M.SetupInputsReply(("IN_USE", "INT32"), 0)
     assert other.ask(M.SetupInputs(("input_int_register_2",))).recipe_id == 1
     assert owner.ask(M.SetupInputs(("input_int_register_2",))).types == ("IN_USE",)
-
-
-def test_a_refused_recipe_owns_nothing(bench):
-    one, other = bench.client(), bench.client()
-    assert one.ask(M.SetupInputs(("input_int_register_0", "nonsense"))).recipe_id == 0
-    assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 1
-
-
-def test_inputs_are_free_as_soon_as_their_owner_is_gone(bench):
-    owner, other = bench.client(), bench.client()
-    owner.ask(M.SetupInputs(("input_int_register_0",)))
-    assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 0
     owner.close()
-    assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 1
+    assert other.ask(M.SetupInputs(("input_int_register_0",))).recipe_id == 2
 
 
 def test_equal_input_recipes_are_one_object(bench):
@@ -299,12 +242,9 @@ def test_an_absurd_size_is_answered_with_a_text_and_the_end(bench):
     assert text.level == 1
     assert not client.is_open
     assert not bench.port._sessions
-
-
-def test_a_client_in_version_1_gets_its_text_in_version_1(bench):
-    client = FakeConnection(bench.port)
-    client.say(b"GET / HTTP/1.1\r\n\r\n")
-    (text,) = client.events()
+    old = Client(bench.port)  # in version 1, it gets the text of version 1
+    old.say(b"GET / HTTP/1.1\r\n\r\n")
+    (text,) = old.events()
     assert text.message.startswith("an RTDE package of 18245 bytes")
 
 
@@ -326,9 +266,7 @@ def test_a_reply_that_cannot_be_sent_ends_the_connection(bench):
 
 
 def test_data_for_a_full_client_is_dropped_and_the_others_get_theirs(bench):
-    full, other = bench.client("timestamp"), bench.client("timestamp")
-    full.ask(M.Start())
-    other.ask(M.Start())
+    full, other = bench.started("timestamp"), bench.started("timestamp")
     full.full = True
     bench.tick(3)
     full.full = False
@@ -342,3 +280,238 @@ def test_a_client_that_closes_within_a_burst_of_requests_is_read_no_further(benc
     client.full = True
     client.say(client.pc.send(M.Start()) + client.pc.send(M.Pause()))
     assert not client.is_open
+
+
+# --- what clients share
+
+Q = ("timestamp", "actual_q", "actual_qd")
+POSE = ("timestamp", "actual_TCP_pose")
+
+
+@pytest.fixture
+def encoded(monkeypatch):
+    """Counts calls of encoders, by the names of the recipe's variables."""
+    calls = Counter()
+    original = server_connection.snapshot_encoder
+    made = {}
+
+    def counting(fields, header):
+        encode = original(fields, header)
+        if encode not in made:
+            names = tuple(field.name for field in fields)
+
+            def counted(snapshot):
+                calls[names] += 1
+                return encode(snapshot)
+
+            made[encode] = counted
+        return made[encode]
+
+    monkeypatch.setattr(server_connection, "snapshot_encoder", counting)
+    return calls
+
+
+def test_fifty_clients_with_one_recipe_cost_one_encoding_a_cycle(bench, encoded):
+    clients = [bench.started(*Q) for _ in range(50)]
+    bench.tick(10)
+    assert encoded == {Q: 10}
+    first = clients[0].sent
+    assert len(first) == 10
+    assert all(client.sent == first for client in clients)
+    assert [client.stamps()[-1] for client in clients] == [bench.now.tick] * 50
+
+
+def test_each_recipe_is_encoded_for_itself(bench, encoded):
+    for names in (Q, POSE, Q, POSE, Q):
+        bench.started(*names)
+    bench.tick(4)
+    assert encoded == {Q: 4, POSE: 4}
+
+
+def test_slow_clients_share_with_fast_ones_and_nothing_is_encoded_for_nobody(bench, encoded):
+    slow = bench.started(*Q, frequency=125.0 / 4)
+    bench.tick(8)
+    assert encoded == {Q: 2}
+    fast = bench.started(*Q)
+    bench.tick(8)
+    assert encoded == {Q: 10}
+    assert len(fast.stamps()) == 8
+    assert [b - a for a, b in pairwise(slow.stamps())] == [4, 4, 4]
+
+
+def test_a_heartbeat_is_encoded_anew_only_once_for_all(bench, encoded):
+    for _ in range(3):
+        bench.started(*Q)
+    bench.tick(1)
+    bench.stand(5)
+    assert encoded == {Q: 6}
+
+
+def test_clients_whose_recipes_have_other_numbers_get_their_own_header(bench):
+    one, two = bench.started(*Q), bench.started(*POSE)
+    assert two.ask(M.SetupOutputs(Q, 125.0)).recipe_id == 2
+    bench.tick(1)
+    assert one.sent[0][3] == 1
+    assert two.sent[0][3] == 2
+    assert one.sent[0][4:] == two.sent[0][4:]
+
+
+def test_a_recipe_that_is_set_up_again_begins_a_new_stream(bench):
+    client = bench.started(*Q, frequency=125.0 / 4)
+    bench.tick(2)
+    client.stamps()
+    assert client.ask(M.SetupOutputs(Q, 125.0 / 4)).recipe_id == 2
+    bench.tick(1)
+    assert client.stamps() == [bench.now.tick]
+
+
+# --- over real sockets, in lockstep
+
+COUNT = "def c():\n  i = 0\n  while i < {}:\n    i = i + 1\n    write_output_integer_register(24, i)\n    sync()\n  end\nend\n"
+
+# What ur_rtde 1.6.5 asks of a 3.15, each list with its trailing comma.
+UR_RTDE_RECEIVE = (
+    "timestamp,target_q,target_qd,target_qdd,target_current,target_moment,actual_q,actual_qd,actual_current,"
+    "joint_control_output,actual_TCP_pose,actual_TCP_speed,actual_TCP_force,target_TCP_pose,target_TCP_speed,"
+    "actual_digital_input_bits,joint_temperatures,actual_execution_time,robot_mode,joint_mode,safety_mode,"
+    "actual_tool_accelerometer,speed_scaling,target_speed_fraction,actual_momentum,actual_main_voltage,"
+    "actual_robot_voltage,actual_robot_current,actual_joint_voltage,actual_digital_output_bits,runtime_state,"
+    "standard_analog_input0,standard_analog_input1,standard_analog_output0,standard_analog_output1,"
+    "robot_status_bits,safety_status_bits,payload,payload_cog,payload_inertia,output_int_register_2,"
+    + "".join(f"output_int_register_{i}," for i in range(12, 20))
+    + "".join(f"output_double_register_{i}," for i in range(12, 20))
+)
+
+
+@pytest.fixture
+def box():
+    with ControlBox(pace="lockstep", port_base=None, seed=7) as running:
+        yield running
+
+
+@pytest.fixture
+def client(box):
+    with connect(box, "rtde") as sock:
+        yield RtdeClient(sock)
+
+
+def run(box, text):
+    with connect(box, "secondary") as sock:
+        sock.sendall(text.encode())
+
+
+def raw_ask(sock, kind, payload):
+    """One request in bytes, one package back: what a client that looks at nothing does."""
+    sock.sendall(struct.pack(">HB", 3 + len(payload), kind) + payload)
+    return raw_next(sock)
+
+
+def raw_next(sock):
+    size, kind = struct.unpack(">HB", sock.recv(3, socket.MSG_WAITALL))
+    return kind, sock.recv(size - 3, socket.MSG_WAITALL) if size > 3 else b""
+
+
+def test_start_up_of_ur_rtde_reads_exactly_one_package_after_each_request(box):
+    with connect(box, "rtde") as sock:
+        assert raw_ask(sock, ord("V"), b"\0\2") == (ord("V"), b"\1")
+        assert raw_ask(sock, ord("v"), b"") == (ord("v"), struct.pack(">4I", 3, 15, 8, 106339))
+        kind, types = raw_ask(sock, ord("O"), struct.pack(">d", 125.0) + UR_RTDE_RECEIVE.encode())
+        assert (kind, types[0]) == (ord("O"), 1)
+        words = types[1:].decode().split(",")
+        names = UR_RTDE_RECEIVE.rstrip(",").split(",")
+        fields = output_fields(V3_15)
+        assert words == [fields[name].type.value for name in names]
+        assert raw_ask(sock, ord("S"), b"") == (ord("S"), b"\1")
+        kind, values = raw_next(sock)
+        assert (kind, values[0]) == (ord("U"), 1)
+        assert len(values) == 1 + sum(fields[name].type.size for name in names)
+
+
+def test_no_cycle_is_lost_in_lockstep(box, client):
+    client.subscribe("timestamp", "output_int_register_24", "runtime_state")
+    run(box, COUNT.format(100))
+    counts, stamps = [], []
+    while not counts or counts[-1] != 100:
+        values = client.data()
+        if values["runtime_state"] == ProgramState.PLAYING and values["timestamp"] not in stamps[-1:]:
+            counts.append(values["output_int_register_24"])
+            stamps.append(values["timestamp"])
+    assert counts == list(range(1, 101))
+    steps = [round((after - before) / 0.008, 6) for before, after in pairwise(stamps)]
+    assert set(steps) == {1.0}
+
+
+def test_while_time_stands_still_packages_keep_coming(client):
+    client.subscribe("timestamp", "runtime_state")
+    last = client.data()
+    while (values := client.data()) != last:  # until time stands still
+        last = values
+    assert client.data() == client.data() == last
+
+
+def test_a_script_and_a_client_hand_values_to_and_fro(box, client):
+    command = client.own("input_int_register_24", "input_double_register_24")
+    client.subscribe("output_double_register_24", "output_int_register_24", "runtime_state")
+    client.write(command, 0, 0.0)
+    run(
+        box,
+        "def dialogue():\n"
+        "  write_output_integer_register(24, 1)\n"
+        "  while read_input_integer_register(24) != 7:\n    sync()\n  end\n"
+        "  write_output_float_register(24, 2 * read_input_float_register(24))\n"
+        "  write_output_integer_register(24, 2)\n"
+        "end\n",
+    )
+    client.until(lambda v: v["output_int_register_24"] == 1)
+    client.write(command, 7, 1.25)
+    done = client.until(lambda v: v["output_int_register_24"] == 2)
+    assert done["output_double_register_24"] == 2.5
+    client.until(lambda v: v["runtime_state"] == ProgramState.STOPPED)
+
+
+def test_a_client_that_does_not_read_gets_whole_packages_and_does_not_stop_the_others():
+    """In real time, as fast as the processor goes: the sleeper loses packages, what it gets is whole."""
+    with (
+        ControlBox(pace="realtime", speed=100.0, port_base=None, seed=7) as fast,
+        socket.socket() as sleeper,
+        connect(fast, "rtde") as sock,
+    ):
+        sleeper.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        sleeper.settimeout(TIMEOUT)
+        sleeper.connect((fast.host, fast.ports.rtde))
+        names = tuple(output_fields(V3_15))[:60]
+        asleep = RtdeClient(sleeper)
+        asleep.subscribe(*names)
+        awake = RtdeClient(sock)
+        awake.subscribe("timestamp")
+        first = awake.data()["timestamp"]
+        size = sum(output_fields(V3_15)[name].type.size for name in names)
+        enough = 600_000 // size  # cycles that certainly fill every buffer on the way
+        awake.until(lambda v: v["timestamp"] > first + 0.008 * enough)
+        stamps = [asleep.data()["timestamp"]]
+        while stamps[-1] < first + 0.008 * enough:  # decoding would fail on a package that is cut
+            stamps.append(asleep.data()["timestamp"])
+        gaps = [round((b - a) / 0.008) for a, b in pairwise(stamps)]
+        assert max(gaps) > 1
+        assert min(gaps) == 1
+
+
+def test_in_lockstep_time_waits_for_a_client_that_reads_late(box):
+    fields = output_fields(V3_15)
+    names = ("output_int_register_24", *[name for name in fields if fields[name].type.count == 6])
+    n_cycles = 2000
+    size = sum(fields[name].type.size for name in names)
+    assert size * n_cycles > 1_000_000  # more than the buffers on the way hold
+    with socket.socket() as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        sock.settimeout(TIMEOUT)
+        sock.connect((box.host, box.ports.rtde))
+        late = RtdeClient(sock)
+        late.subscribe(*names)
+        run(box, COUNT.format(n_cycles))
+        with connect(box, "primary") as other:
+            other.recv(1)  # the box goes on serving others meanwhile
+        counts = [0]
+        while counts[-1] < n_cycles:
+            counts.append(late.data()["output_int_register_24"])
+    assert {after - before for before, after in pairwise(counts)} <= {0, 1}
