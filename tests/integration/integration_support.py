@@ -6,7 +6,6 @@ Everything goes over real sockets. Time-outs are limits for hangs: no test waits
 import json
 import os
 import random
-import select
 import socket
 import struct
 import subprocess
@@ -29,7 +28,6 @@ VERSION = SoftwareVersion(3, 15, 8)
 LAYOUT = layout_for_version(VERSION)
 TIMEOUT = 20.0  # s
 PERIOD = 0.008  # s
-QD_MAX = 3.1415927  # rad/s; the slowest joints of a UR3
 SPIN = "def spin():\n  while True:\n    speedj([0.3,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
 STARTED = "PROGRAM_XXX_STARTED"
 HELLO_PROGRAM = 'def hello():\n  textmsg("hello")\nend\n'
@@ -89,10 +87,6 @@ class Frames:
     def until_stamp(self, stamp):
         """Read on, cheaply, until a stamp."""
         self.until(lambda frame: self.stamps[-1] >= stamp - PERIOD / 2, self.raw)
-
-    def has_come(self):
-        """True when the next frame, or a part of it, is there already."""
-        return bool(self._rest) or bool(select.select([self.sock], [], [], 0)[0])
 
     def new(self):
         """Return the next frame with a stamp of its own."""
@@ -266,10 +260,10 @@ def start(package, *arguments, **options):
     return subprocess.Popen(command, **{**settings, **options})
 
 
-def finish(process, text=None):
+def finish(process):
     """Wait for the end of a process."""
     try:
-        out, err = process.communicate(text, timeout=60)
+        out, err = process.communicate(timeout=60)
     except BaseException:
         process.kill()
         process.communicate()
@@ -277,16 +271,14 @@ def finish(process, text=None):
     return Finished(process.returncode, out or "", err or "")
 
 
-def command(package, *arguments, text=None, **options):
+def command(package, *arguments):
     """Run `python -m package arguments...` to its end."""
-    if text is not None:
-        options["stdin"] = subprocess.PIPE
-    return finish(start(package, *arguments, **options), text)
+    return finish(start(package, *arguments))
 
 
 def at(box):
     """The options that lead the client to a box."""
-    return ("--robot", box.host, "--port-base", port_base_of(box))
+    return ("--robot", box.host, "--port-base", box.ports.realtime - Ports.standard().realtime)
 
 
 @contextmanager
@@ -301,11 +293,6 @@ def run_in_movement(box, frames, out):
         if not client.stdout.closed:
             client.kill()
             finish(client)
-
-
-def port_base_of(box):
-    """The offset of a box, as the client wants it."""
-    return box.ports.realtime - Ports.standard().realtime
 
 
 def free_port_base():

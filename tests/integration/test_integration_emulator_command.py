@@ -21,7 +21,6 @@ from integration_support import (
     connect,
     finish,
     free_port_base,
-    in_background,
     send,
     serving,
     start,
@@ -72,10 +71,6 @@ def test_an_address_that_is_not_of_this_machine_is_one_line_and_exit_1(ur_emulat
     check_complaint(ur_emulator_command("serve", "--port-base", free_port_base(), "--host", host), host)
 
 
-def test_the_process_leaves_with_that_code_and_line():
-    check_complaint(serve("--fidelity", "perfect"), "perfect", code=2)
-
-
 def test_a_ready_file_that_cannot_be_written_is_one_line_and_exit_1():
     check_complaint(serve("--ready-file", "/nowhere/ready.json"), "/nowhere/ready.json")
 
@@ -99,14 +94,6 @@ def test_a_box_that_cannot_be_made_leaves_nothing_open():
     assert "ResourceWarning" not in done.stderr
 
 
-@pytest.mark.parametrize("arguments", [("--pase", "lockstep"), ("--seed", "many"), ("again",)])
-def test_wrong_usage_is_exit_2_without_a_traceback(ur_emulator_command, arguments):
-    done = ur_emulator_command("serve", *arguments)
-    assert done.code == 2
-    assert "Traceback" not in done.err
-    assert arguments[-1] in done.err or arguments[0] in done.err
-
-
 @pytest.mark.parametrize("port", ["dashboard", "realtime_ro"])
 def test_a_taken_port_is_one_line_and_exit_1(ur_emulator_command, port, tmp_path):
     base, ready = free_port_base(), tmp_path / "ready.json"
@@ -116,13 +103,6 @@ def test_a_taken_port_is_one_line_and_exit_1(ur_emulator_command, port, tmp_path
     check_complaint(done, str(taken))
     assert "--port-base" in done.err
     assert not ready.exists()
-
-
-def test_a_second_box_on_the_same_ports_is_refused_and_the_first_goes_on(ur_emulator_command, tmp_path):
-    with serving(tmp_path) as box, Frames(box) as frames:
-        frames.next()
-        assert ur_emulator_command("serve", "--port-base", box.base).code == 1
-        frames.new()
 
 
 @pytest.mark.parametrize(("pace", "end"), [("realtime", signal.SIGINT), ("lockstep", signal.SIGTERM)])
@@ -192,28 +172,6 @@ def test_the_log_goes_to_stderr_if_asked_for(tmp_path):
         "INFO Program: Program stopped: f",
         "FAULT Program: Compile error: name 'nowhere' is not defined (line 2, column 7)",
     ]
-
-
-def test_a_log_that_nobody_reads_costs_no_cycle_and_no_answer_and_the_end_does_not_wait_for_it(
-    tmp_path,
-):
-    line = b"addToLog " + b"x" * 500 + b"\n"
-    with (
-        serving(tmp_path, "--log", "--pace", "lockstep") as box,
-        Frames(box) as frames,
-        connect(box, "dashboard") as sock,
-        sock.makefile("rb") as dashboard,
-    ):
-        frames.next()
-        assert dashboard.readline()
-        with in_background(frames.raw):
-            for _ in range(50):  # several times what a pipe and the box take
-                sock.sendall(100 * line)
-                for _ in range(100):
-                    assert dashboard.readline() == b"Added log message\n"
-        assert frames.lost() == 0
-        box.process.terminate()
-        assert box.process.wait(TIMEOUT) == 0
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes cannot be filled there without waiting")

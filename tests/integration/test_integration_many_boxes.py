@@ -259,25 +259,14 @@ def box():
         yield box
 
 
-def dial(box, host, port):
-    with socket.create_connection((box.host, box.ports.secondary), timeout=10) as client:
-        client.sendall(f'def p():\n  socket_open("{host}", {port})\n  sleep(0.1)\nend\n'.encode())
-
-
-@pytest.mark.parametrize("listening", ["127.0.0.1", ELSEWHERE])
-def test_programs_call_from_the_address_of_the_box(box, listening):
+@pytest.mark.parametrize(
+    ("called", "listening"), [("127.0.0.1",) * 2, ("localhost", "127.0.0.1"), (ELSEWHERE,) * 2]
+)
+def test_programs_call_from_the_address_of_the_box(box, called, listening):
     with socket.create_server((listening, 0)) as server:
-        server.settimeout(10)
-        dial(box, listening, server.getsockname()[1])
-        caller, (address, _) = server.accept()
-        caller.close()
-    assert address == ELSEWHERE
-
-
-def test_a_name_is_called_from_there_too(box):
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(10)
-        dial(box, "localhost", server.getsockname()[1])
+        server.settimeout(TIMEOUT)
+        call = f'socket_open("{called}", {server.getsockname()[1]})'
+        send(box, "secondary", f"def p():\n  {call}\n  sleep(0.1)\nend\n")
         caller, (address, _) = server.accept()
         caller.close()
     assert address == ELSEWHERE

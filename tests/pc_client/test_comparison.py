@@ -10,11 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
-from fake_robot import FakeRobot
 
-import pc_client.arm as arm_module
-import pc_client.driver.session as ur_driver_module
-import pc_client.driver.transport as transport
+import pc_client.studies.comparison as comparison
 from pc_client import cli
 from pc_client.errors import ClientError
 from pc_client.movements.generate import GENERATORS
@@ -197,21 +194,13 @@ def test_page_shows_every_generator(sets):
     assert len(panels) == 2 * len(GENERATORS)
 
 
-@pytest.fixture
-def robot(monkeypatch):
-    fake = FakeRobot(delay=4)
-    fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
-    for module in (transport, ur_driver_module, arm_module):
-        monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
-    return fake
-
-
-def test_command_executes_measures_and_writes(robot, tmp_path, capsys):
+def test_command_executes_measures_and_writes(robot, tmp_path, capsys, monkeypatch):
+    few = {kind: GENERATORS[kind] for kind in ("lognormal", "uniform")}
+    monkeypatch.setattr(comparison, "GENERATORS", few)
     out = tmp_path / "out"
     arguments = ["compare", "--robot", "127.0.0.1", "--out", str(out), "--targets", "2", "--seed", "5"]
     assert cli.run(arguments) == 0
-    assert len(list(out.glob("*.mcap"))) == len(GENERATORS)
-    assert len(list((out / "movements").glob("*.toml"))) == len(GENERATORS)
+    assert len(list(out.glob("*.mcap"))) == len(list((out / "movements").glob("*.toml"))) == len(few)
     assert "compare.svg" in capsys.readouterr().out
     data = json.loads((out / "compare.json").read_text())
     assert data["robot"] == "SIMULATED UR3 3.15.8, seed 7, controller preview"
@@ -223,7 +212,7 @@ def test_command_executes_measures_and_writes(robot, tmp_path, capsys):
         assert row["executed"]["peak_speed"] == pytest.approx(row["filtered"]["peak_speed"], rel=0.02)
         assert row["executed"]["log_jerk"] == pytest.approx(row["filtered"]["log_jerk"], abs=0.4)
     markdown = (out / "compare.md").read_text()
-    assert markdown.count("executed |") == len(GENERATORS)
+    assert markdown.count("executed |") == len(few)
     assert all(column.heading in markdown for column in (*COLUMNS, *EXECUTED_COLUMNS))
     assert (out / "compare.svg").stat().st_size > 10_000
 

@@ -100,20 +100,33 @@ def test_heartbeats_are_neither_answered_nor_logged():
 
 def test_a_robot_that_repeats_a_frame_now_and_then_is_followed():
     def repeat(robot):
-        if robot.tick == 1050:
-            robot.pipes["realtime"].incoming.append(robot.frame())
+        robot.pipes["realtime"].incoming.append(robot.frame())
 
-    report, _ = stream(FakeRobot(lockstep=False, on_tick=repeat))
+    report, _ = stream(FakeRobot(lockstep=False, on_tick=spoil_at(1050, repeat)))
     assert report.heartbeats == 1
     assert report.lost_frames == 0
 
 
-def test_waiting_frames_are_logged_and_the_newest_is_answered():
-    def spoil(robot):
-        if robot.tick == 1050:
-            robot.hold = 3
+def spoil_at(tick, action):
+    def on_tick(robot):
+        if robot.tick == tick:
+            action(robot)
 
-    robot = FakeRobot(lockstep=False, on_tick=spoil)
+    return on_tick
+
+
+def set_to(**values):
+    """What a robot becomes: its attributes."""
+
+    def action(robot):
+        for name, value in values.items():
+            setattr(robot, name, value)
+
+    return action
+
+
+def test_waiting_frames_are_logged_and_the_newest_is_answered():
+    robot = FakeRobot(lockstep=False, on_tick=spoil_at(1050, set_to(hold=3)))
     report, rows = stream(robot)
     assert report.late_frames == 3
     assert report.lost_frames == 0
@@ -126,67 +139,23 @@ def test_waiting_frames_are_logged_and_the_newest_is_answered():
 
 
 def test_missing_stamps_are_counted():
-    def spoil(robot):
-        if robot.tick == 1050:
-            robot.skip = 4
-
-    report, rows = stream(FakeRobot(lockstep=False, on_tick=spoil))
+    report, rows = stream(FakeRobot(lockstep=False, on_tick=spoil_at(1050, set_to(skip=4))))
     assert report.lost_frames == 4
     assert np.diff([stamp for stamp, _ in rows]).max() == pytest.approx(5 * PERIOD)
 
 
-def spoil_at(tick, action):
-    def on_tick(robot):
-        if robot.tick == tick:
-            action(robot)
+def closes(*kinds):
+    """Sockets that the robot closes; all if none is named."""
 
-    return on_tick
+    def action(robot):
+        for pipe in (*robot.pipes.values(), robot.reverse):
+            pipe.broken |= not kinds or pipe.kind in kinds
 
-
-def protective_stop(robot):
-    robot.safety_mode = 3
+    return action
 
 
-def emergency_stop(robot):
-    robot.safety_mode, robot.robot_mode = 7, 3
-
-
-def program_ends(robot):
-    robot.program = None
-
-
-def script_fails(robot):
-    robot.report_error()
-
-
-def robot_gone(robot):
-    robot.silent = True
-
-
-def frames_socket_closes(robot):
-    robot.pipes["realtime"].broken = True
-
-
-def script_socket_closes(robot):
-    robot.pipes["secondary"].broken = True
-
-
-def everything_closes(robot):
-    for pipe in (*robot.pipes.values(), robot.reverse):
-        pipe.broken = True
-
-
-def reverse_socket_closes(robot):
-    robot.reverse.broken = True
-
-
-def long_gap(robot):
-    robot.skip = 70
-
-
-def long_freeze(robot):
-    """The frames are there all at once when the client wakes up."""
-    robot.hold = 70
+protective_stop, program_ends, robot_gone = set_to(safety_mode=3), set_to(program=None), set_to(silent=True)
+long_freeze = set_to(hold=70)  # the frames are there all at once when the client wakes up
 
 
 def time_runs_back(robot):
@@ -198,15 +167,15 @@ def time_runs_back(robot):
     ("action", "error", "words"),
     [
         (protective_stop, RobotStoppedError, "PROTECTIVE_STOP"),
-        (emergency_stop, RobotStoppedError, "emergency stop"),
+        (set_to(safety_mode=7, robot_mode=3), RobotStoppedError, "emergency stop"),
         (program_ends, RobotStoppedError, "ended before the movement"),
-        (script_fails, RobotStoppedError, "C153A2"),
+        (FakeRobot.report_error, RobotStoppedError, "C153A2"),
         (robot_gone, DriverError, "no new realtime frame"),
-        (frames_socket_closes, DriverError, "closed the realtime"),
-        (script_socket_closes, DriverError, "closed the secondary"),
-        (everything_closes, DriverError, "closed the"),
-        (reverse_socket_closes, DriverError, "closed the connection"),
-        (long_gap, DriverError, r"no command for 0\.57 s, allowed is 0\.5 s"),
+        (closes("realtime"), DriverError, "closed the realtime"),
+        (closes("secondary"), DriverError, "closed the secondary"),
+        (closes(), DriverError, "closed the"),
+        (closes("reverse"), DriverError, "closed the connection"),
+        (set_to(skip=70), DriverError, r"no command for 0\.57 s, allowed is 0\.5 s"),
         (long_freeze, DriverError, r"no command for 0\.57 s, allowed is 0\.5 s"),
         (time_runs_back, DriverError, "jump back"),
     ],
@@ -260,7 +229,7 @@ LONGEST_UNSEEN = 40
 @pytest.mark.parametrize("lockstep", [False, True])
 @pytest.mark.parametrize("slider", [0.3, 0.5, 0.95])
 def test_a_slider_that_is_moved_in_a_run_ends_it(lockstep, slider):
-    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, lambda r: setattr(r, "slider", slider)))
+    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, set_to(slider=slider)))
     rows = Rows()
     with pytest.raises(DriverError, match=f"speed slider is {slider:.0%}".replace("%", " %, must be 100 %;")):
         stream(robot, rows=rows)
@@ -270,7 +239,7 @@ def test_a_slider_that_is_moved_in_a_run_ends_it(lockstep, slider):
 
 @pytest.mark.parametrize("lockstep", [False, True])
 def test_a_controller_that_slows_the_arm_down_ends_the_run_in_the_next_cycle(lockstep):
-    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, lambda r: setattr(r, "scaling", 0.8)))
+    robot = FakeRobot(lockstep=lockstep, on_tick=spoil_at(1040, set_to(scaling=0.8)))
     rows = Rows()
     with pytest.raises(DriverError, match="speed scaling is 80 %, must be 100 %; end reduced mode"):
         stream(robot, rows=rows)

@@ -1,4 +1,4 @@
-"""Batches: any executor, every outcome in its place, broken files beside good ones, the drawings' figures.
+"""Batches of extractions and `ur-client extract`: every outcome in its place, broken files beside good ones, figures.
 
 Pictures of extractions are made of anything that moves.
 """
@@ -8,14 +8,18 @@ from __future__ import annotations
 import csv
 import io
 import json
+import zipfile
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from extraction_samples import DRAWINGS, DRAWINGS_OF_PEOPLE, needs_omniglot, own_strokes, recorded
 from matplotlib.image import imread
 
+import pc_client.studies.executors as executors
 import pc_client.studies.extraction.batch as batch
+from pc_client import cli
 from pc_client.errors import ClientError, RecordingError
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
@@ -90,8 +94,11 @@ def check(outcomes, folder):
     assert (b.row, e.row) == (None, None)
 
 
-def test_one_after_the_other(folder):
-    check(extract_many(pen_sources([folder]), AtOnce()), folder)
+def test_one_after_the_other_with_pictures_of_the_first(folder):
+    outcomes = extract_many(pen_sources([folder]), AtOnce(), n_pictures=2)
+    check(outcomes, folder)
+    assert outcomes[0].picture.startswith(b"\x89PNG")
+    assert [outcome.picture for outcome in outcomes[1:]] == [None] * 4
 
 
 def test_in_processes(folder):
@@ -106,12 +113,6 @@ def test_every_outcome_is_reported_once_and_few_jobs_are_in_flight(folder, monke
         outcomes = extract_many(pen_sources([folder]), executor, on_outcome=told.append)
     check(outcomes, folder)
     assert sorted(outcome.name for outcome in told) == [outcome.name for outcome in outcomes]
-
-
-def test_pictures_of_the_first(folder):
-    outcomes = extract_many(pen_sources([folder]), AtOnce(), n_pictures=2)
-    assert outcomes[0].picture.startswith(b"\x89PNG")
-    assert [outcome.picture for outcome in outcomes[1:]] == [None] * 4
 
 
 def test_an_executor_that_breaks_down_is_one_line(folder):
@@ -221,3 +222,107 @@ def test_a_batch(n):
     ]
     empty = ink(draw_overview(table_of([{"file": "dot", "n_strokes": 0, "n_speed_peaks": 0}])))
     assert (ink(draw_overview(table_of(rows))) > empty + 0.01) is (n > 0)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder to be in, with a movement; workers are threads, which start at once."""
+
+    @contextmanager
+    def threads(workers=None, dask=None):
+        with ThreadPoolExecutor(1) as executor:
+            yield executor
+
+    monkeypatch.setattr(executors, "open_executor", threads)
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "one.csv", own_strokes(0, 2, n=2))
+    return tmp_path
+
+
+def extracted(folder):
+    return json.loads((folder / "extraction.json").read_text())
+
+
+def test_one_file(here, capsys):
+    assert cli.run(["extract", "one.csv", "--out", "out/deep"]) == 0
+    (row,) = extracted(here / "out/deep")
+    assert (row["file"], row["n_strokes"], row["n_speed_peaks"]) == ("one.csv", 2, 2)
+    assert min(row["snr_v_db"], row["snr_t_db"]) >= 60.0
+    assert sorted(path.name for path in (here / "out/deep").rglob("*.*")) == [
+        "1_one.png", "extraction.json", "overview.png", "strokes.csv",
+    ]  # fmt: skip
+    captured = capsys.readouterr()
+    assert "one.csv" in captured.out
+    assert "1 of 1 recordings; results in out/deep" in captured.out
+    assert captured.err == ""
+
+
+def test_broken_files_are_a_line_each_and_the_rest_is_done(here, capsys):
+    (here / "bad.txt").write_text("hello\n")
+    (here / "bad.zip").write_text("no archive")
+    (here / "dot.txt").write_text("START\n1,2,0\nBREAK\n")
+    files = ["bad.txt", "gone.csv", "bad.zip", "one.csv", "dot.txt"]
+    assert cli.run(["extract", *files, "--out", "out", "--figures", "none"]) == 1
+    assert [row["file"] for row in extracted(here / "out")] == ["one.csv", "dot.txt"]
+    assert extracted(here / "out")[1] == {
+        "file": "dot.txt", "snr_v_db": None, "snr_t_db": None, "n_strokes": 0, "n_speed_peaks": 0,
+    }  # fmt: skip
+    captured = capsys.readouterr()
+    lines = captured.err.splitlines()
+    named = [line.split(":")[1].strip().partition(",")[0] for line in lines]
+    assert named == ["bad.zip", "bad.txt", "gone.csv"]
+    assert all(line.startswith("ur-client: ") for line in lines)
+    assert "2 of 5 recordings" in captured.out
+    assert not list((here / "out").rglob("*.png"))
+
+
+def test_nothing_that_can_be_used_still_gives_a_list(here, capsys):
+    assert cli.run(["extract", "gone.csv", "--out", "out"]) == 1
+    assert extracted(here / "out") == []
+    assert (
+        capsys.readouterr().err
+        == "ur-client: gone.csv: cannot be read (No such file or directory); give a file that exists\n"
+    )
+
+
+def test_archives_and_folders_and_pictures_that_lie_in_the_folder_whatever_names_an_archive_has(here, capsys):
+    inside = ["inside/one.csv", "../../evil.csv", "-a\x1b[2J.csv"]
+    with zipfile.ZipFile(here / "all.zip", "w") as archive:
+        for name in inside:
+            archive.write(here / "one.csv", name)
+    (here / "more").mkdir()
+    (here / "one.csv").rename(here / "more" / "two.csv")
+    before = set(here.rglob("*"))
+    assert cli.run(["extract", "all.zip", "more", "--out", "deep/out", "--figures", "all"]) == 0
+    assert sorted(row["file"] for row in extracted(here / "deep/out")) == sorted([*inside, "more/two.csv"])
+    new = {path.relative_to(here).as_posix() for path in set(here.rglob("*")) - before if path.is_file()}
+    pictures = {f"deep/out/figures/{name}.png" for name in ("1_a_2J", "2_evil", "3_one", "4_two")}
+    assert {name for name in new if name.endswith(".png")} == {*pictures, "deep/out/overview.png"}
+    assert "\x1b[2J" not in capsys.readouterr().out
+
+
+def test_the_unit_of_time_can_be_given(here):
+    assert cli.run(["extract", "one.csv", "--out", "out", "--time-unit", "ms", "--figures", "none"]) == 0
+    assert extracted(here / "out")[0]["n_strokes"] <= 1
+
+
+def test_a_folder_that_cannot_be_written(here, capsys):
+    assert cli.run(["extract", "one.csv", "--out", "one.csv/out", "--figures", "none"]) == 1
+    assert "cannot write" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "FILE"),
+        (["one.csv"], "--out"),
+        (["one.csv", "--out", "o", "--time-unit", "hours"], "is not one of 'auto', 's', 'ms', 'us', 'ns'"),
+        (["one.csv", "--out", "o", "--figures", "some"], "is not one of 'few', 'all', 'none'"),
+        (["one.csv", "--out", "o", "--workers", "0"], "workers"),
+        (["one.csv", "--out", "o", "--workers", "2", "--dask", "tcp://h:1"], "give only one"),
+        (["one.csv", "--out", "o", "--strokes-per-peak", "0"], "strokes-per-peak"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(here, one_line, words, message):
+    assert cli.run(["extract", *words]) == 2
+    assert message in one_line()

@@ -204,12 +204,6 @@ def test_slowed_down_movements_have_the_same_strokes_slowed_down():
     )
 
 
-def test_the_same_recording_gives_the_same_strokes():
-    one, other = extract(hand()), extract(hand())
-    assert np.array_equal(one.parts[0].trajectory.target_points, other.parts[0].trajectory.target_points)
-    assert one.snr_v_db == other.snr_v_db
-
-
 def test_parts_share_a_time_axis_and_a_budget():
     first, second = hand(1).parts[0], hand(2).parts[0]
     later = PenPart(second.t + first.t[-1] + 0.4, second.p)

@@ -1,20 +1,26 @@
-"""Movement files: the library of ten, what is written comes back equal, what is wrong is named."""
+"""Files of movements: parameters, samples, poses, joint angles. What is written comes back equal, what is wrong is named."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
+from pc_client import JointTrajectory
 from pc_client.errors import MovementError
 from pc_client.movements.description import describe
-from pc_client.movements.generate import generate_library, generate_movement, write_library
+from pc_client.movements.generate import generate_movement, write_library
 from pc_client.movements.library_sets import LIBRARY_FOLDER, LIBRARY_SETS, library_names
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
-from pc_client.movements.movement import Movement, load_movement
+from pc_client.movements.movement import Movement, load_motion, load_movement
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
+from pc_client.movements.trajectory import Similarity
 from pc_client.movements.uniform import Uniform
 
 NAMES = [
@@ -45,22 +51,6 @@ def test_generation_reproduces_the_files_to_the_byte(tmp_path: Path) -> None:
         for name in NAMES:
             file = Path(set_name, f"{name}.toml")
             assert (tmp_path / file).read_bytes() == (LIBRARY_FOLDER / file).read_bytes()
-
-
-def test_another_seed_gives_other_movements() -> None:
-    other = generate_library("paper", seed=100)
-    assert list(other) == NAMES
-    assert not np.allclose(other["lognorm_4_1"].target_points, load_movement("lognorm_4_1").target_points)
-
-
-@pytest.mark.parametrize("name", library_names("paper") + library_names("arcs"))
-def test_library_movement_survives_saving(name: str, tmp_path: Path) -> None:
-    movement = load_movement(name)
-    movement.save(tmp_path / "copy.toml")
-    copy = load_movement(tmp_path / "copy.toml")
-    assert_equal(copy, movement)
-    assert copy.name == name.replace("/", "_")
-    assert dict(copy.provenance) == dict(movement.provenance)
 
 
 def assert_equal(copy: Movement, movement: Movement) -> None:
@@ -140,6 +130,8 @@ def test_bad_samples_are_named_by_line(text: str, complaint: str, tmp_path: Path
 
 HUMAN = load_movement("arcs/lognorm_4_1").text
 ROBOT = load_movement("arcs/uniform_4_1").text
+JERK = generate_movement("minimum_jerk", 4, 1).text
+POWER = generate_movement("power_law", 4, 1).text
 
 
 @pytest.mark.parametrize(
@@ -195,6 +187,19 @@ ROBOT = load_movement("arcs/uniform_4_1").text
         (ROBOT, ("ramps = [0.16, 0.05]", "ramps = [2.2, 0.1]"), "every stroke must last longer"),
         (ROBOT, ("duration = 5.901", "duration = 6"), "duration: 6.0 s"),
         (ROBOT, ("stroke_durations", "durations"), "stroke_durations: missing"),
+        (JERK, ('passing = "stop"', 'passing = "blend"'), "profile.passing: 'blend'; give 'stop' or 'via'"),
+        (JERK, ('passing = "stop"', 'passing = "stop"\nramps = [1]'), "profile.ramps: no such key"),
+        (JERK, ("duration = 8.685", "duration = 6.0"), "duration: 6.0 s"),
+        (JERK, ("stroke_durations", "durations"), "stroke_durations: missing"),
+        (
+            JERK,
+            ('kind = "minimum_jerk"', 'kind = "jerk"'),
+            "kind: 'jerk'; give one of lognormal, uniform, minimum_jerk, power_law",
+        ),
+        (POWER, ("largest_radius = 1.0", "largest_radius = -1.0"), "largest radius of -1.0 m"),
+        (POWER, ("largest_radius = 1.0", ""), "profile.largest_radius: missing"),
+        (POWER, ("exponent = 0.3333333333333333", "exponent = 3.0"), "exponent 3.0"),
+        (POWER, ("[profile]", "[profil]"), "profile: missing"),
     ],
 )
 def test_bad_files_are_named_by_field(
@@ -210,11 +215,17 @@ def test_bad_files_are_named_by_field(
     assert "\n" not in str(caught.value)
 
 
-def test_without_stroke_durations_they_are_the_speed_minima(tmp_path: Path) -> None:
-    path = tmp_path / "short.toml"
-    path.write_text("\n".join(line for line in HUMAN.splitlines() if not line.startswith("stroke_durations")))
+@pytest.mark.parametrize(
+    ("text", "tolerance"), [(HUMAN, 1.1e-3), (POWER, 1e-9)], ids=["lognormal", "power law"]
+)
+def test_without_stroke_durations_they_are_the_speed_minima_or_the_passages(
+    text: str, tolerance: float, tmp_path: Path
+) -> None:
+    whole, short = tmp_path / "whole.toml", tmp_path / "short.toml"
+    whole.write_text(text)
+    short.write_text("\n".join(line for line in text.splitlines() if not line.startswith("stroke_durations")))
     np.testing.assert_allclose(
-        load_movement(path).stroke_durations, load_movement("arcs/lognorm_4_1").stroke_durations, atol=1.1e-3
+        load_movement(short).stroke_durations, load_movement(whole).stroke_durations, atol=tolerance
     )
 
 
@@ -273,3 +284,107 @@ def test_description_is_plain_data() -> None:
     assert human["expected_snr_db"]["22 ms"] > human["expected_snr_db"]["35 ms"]
     assert human["provenance"] == dict(load_movement("lognorm_5_2").provenance)
     assert human["provenance"]["seed"] == 4
+
+
+T = np.linspace(0.0, 2.0, 9)
+PATH = np.column_stack((0.3 + 0.01 * T, 0.1 * T, 0.3 + 0.0 * T))
+TURNS = Rotation.from_rotvec(np.outer(T, [0.1, 0.0, 0.2]))
+
+
+def written(folder, header, columns, name="poses.csv"):
+    path = folder / name
+    rows = [",".join(f"{value:.12g}" for value in row) for row in np.column_stack(columns)]
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "columns"),
+    [
+        ("x,y,z,rx,ry,rz,t", (PATH, TURNS.as_rotvec(), T)),
+        ("t,x,y,z,rx,ry,rz", (T, PATH, TURNS.as_rotvec())),
+        ("x,y,z,qx,qy,qz,qw,t", (PATH, TURNS.as_quat(), T)),
+    ],
+)
+def test_a_file_of_poses_turns_the_tool(tmp_path, header, columns):
+    movement = Movement.from_csv(written(tmp_path, header, columns))
+    np.testing.assert_allclose(movement.rotations(T), TURNS.as_matrix(), atol=1e-9)
+    np.testing.assert_allclose(movement.sample(T).p, PATH, atol=1e-9)
+
+
+def test_poses_are_written_and_read_back(tmp_path):
+    movement = Movement.from_samples(T, PATH, TURNS.as_quat(), name="turn")
+    movement.save(tmp_path / "turn.csv")
+    again = load_movement(tmp_path / "turn.csv")
+    np.testing.assert_array_equal(again.sample(T).p, movement.sample(T).p)
+    np.testing.assert_allclose(again.rotations(T), movement.rotations(T), atol=1e-12)
+
+
+def test_poses_that_are_turned_elsewhere_turn_the_tool_too():
+    R = Rotation.from_rotvec([0.0, 0.0, 0.5]).as_matrix()
+    movement = Movement.from_samples(T, PATH, TURNS.as_rotvec()).transformed(Similarity(1.0, R, np.zeros(3)))
+    np.testing.assert_allclose(movement.rotations(T), R @ TURNS.as_matrix(), atol=1e-9)
+    assert isinstance(movement, Movement)
+
+
+def test_positions_alone_leave_the_orientation_to_planning():
+    assert Movement.from_samples(T, PATH).rotations(T) is None
+    assert Movement.library("uniform_4_1").rotations(T) is None
+
+
+def test_a_file_of_joint_angles_is_a_trajectory_of_joints(tmp_path):
+    q = np.outer(T, np.arange(6.0) / 10)
+    path = written(tmp_path, "t,q0,q1,q2,q3,q4,q5", (T, q))
+    trajectory = load_motion(path)
+    assert isinstance(trajectory, JointTrajectory)
+    assert trajectory.name == "poses"
+    np.testing.assert_allclose(trajectory.q, q)
+    with pytest.raises(MovementError, match="holds joint angles"):
+        load_movement(path)
+
+
+def test_seven_columns_without_names_are_not_guessed(tmp_path):
+    path = tmp_path / "seven.csv"
+    path.write_text("0,0,0,0,0,0,0\n")
+    with pytest.raises(MovementError, match="name them in the first line"):
+        load_motion(path)
+
+
+@pytest.mark.parametrize(
+    ("rotations", "complaint"),
+    [
+        (np.zeros((9, 2)), "give \\(n, 3\\) rotation vectors"),
+        (np.zeros((9, 4)), "give one of length 1"),
+        (np.full((9, 3), np.nan), "give finite ones"),
+        (np.zeros((8, 3)), "give one for each"),
+    ],
+)
+def test_orientations_that_make_no_sense_are_refused(rotations, complaint):
+    with pytest.raises(MovementError, match=complaint):
+        Movement.from_samples(T, PATH, rotations)
+
+
+@pytest.mark.parametrize(
+    ("t", "q", "complaint"),
+    [
+        (T, np.zeros((9, 5)), "six angles"),
+        (T[:3], np.zeros((3, 6)), "at least 4"),
+        (T, np.full((9, 6), np.inf), "not finite"),
+        (T[::-1], np.zeros((9, 6)), "times must increase"),
+        (1e4 * T, np.zeros((9, 6)), "duration"),
+    ],
+)
+def test_joint_angles_that_make_no_sense_are_refused(t, q, complaint):
+    with pytest.raises(MovementError, match=complaint):
+        JointTrajectory(t, q)
+
+
+@given(
+    t=st.lists(st.floats(-1e3, 1e3), min_size=4, max_size=6, unique=True).map(sorted),
+    turn=st.lists(st.tuples(*3 * [st.floats(width=32)]), min_size=4, max_size=6),
+)
+def test_samples_of_any_numbers_make_a_movement_or_one_error(t, turn):
+    n = min(len(t), len(turn))
+    with suppress(MovementError):
+        movement = Movement.from_samples(t[:n], np.zeros((n, 3)), turn[:n])
+        assert np.isfinite(movement.rotations(movement.duration * np.linspace(0.0, 1.0, 5))).all()

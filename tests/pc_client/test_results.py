@@ -7,7 +7,6 @@ import io
 import json
 import math
 import re
-import subprocess
 import sys
 
 import numpy as np
@@ -240,16 +239,6 @@ def test_json_rounds_and_knows_no_infinity() -> None:
     assert finite(data, 6) == {"a": [1.234568, None, None, "x"], "b": {"c": [None, 2, True]}}
     assert finite(data)["a"][0] == 1.23456789
     assert json.loads(to_json(data, 3)) == finite(data, 3)
-
-
-def test_polars_is_loaded_only_for_a_table() -> None:
-    """Not by what moves an arm, nor by what worker processes run."""
-    code = (
-        "import sys, pc_client.arm, pc_client.analysis.run, pc_client.studies.extraction.batch\n"
-        "import pc_client.studies.sweep.schedule, pc_client.commands.movements, pc_client.results.tables\n"
-        "sys.exit('polars' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_without_polars_one_line_says_what_to_install(

@@ -9,12 +9,8 @@ from contextlib import nullcontext
 import pytest
 import sweep_samples
 import typer
-from fake_robot import FakeRobot
 from sweep_samples import write
 
-import pc_client.arm as arm_module
-import pc_client.driver.session as ur_driver_module
-import pc_client.driver.transport as transport
 from pc_client import cli
 from pc_client.recording.recording import load_recording
 
@@ -65,17 +61,10 @@ def read_csv(out):
         return list(csv.DictReader(file))
 
 
-def one_line(capsys):
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1, err
-    assert "Traceback" not in err
-    return err
-
-
-def test_a_sweep_finds_the_best_gains(job, tmp_path, capsys):
-    job(sweep_samples.invented)
-    out = tmp_path / "out"
-    assert run(write(tmp_path, GRID), out, "--format", "csv") == 0
+def test_a_sweep_finds_the_best_gains_and_a_second_call_does_nothing_again(job, tmp_path, capsys):
+    ran = job(sweep_samples.invented)
+    out, path = tmp_path / "out", write(tmp_path, GRID)
+    assert run(path, out, "--format", "csv") == 0
     told = capsys.readouterr().out
     assert "24 cases, 0 of them done before" in told
     assert "5 of 6 settings; the table has all\n" in told  # five are shown
@@ -89,20 +78,12 @@ def test_a_sweep_finds_the_best_gains(job, tmp_path, capsys):
     assert page.count("<h1>Sweep</h1>") == 1  # of the file sweep.toml
     assert edge in page
     assert page.index("gain_p = 5, gain_i = 2") < page.index("gain_p = 8, gain_i = 0")
-
-
-def test_a_second_call_does_nothing_again_and_gives_the_same_table(job, tmp_path, capsys):
-    ran = job(sweep_samples.invented)
-    out, path = tmp_path / "out", write(tmp_path, GRID)
-    assert run(path, out, "--format", "csv") == 0
-    first = (out / "sweep.csv").read_bytes()
-    page = (out / "sweep.html").read_bytes()
+    first = files_of(out)
     ran.clear()
     assert run(path, out, "--format", "csv") == 0
     assert ran == []
     assert "24 of them done before" in capsys.readouterr().out
-    assert (out / "sweep.csv").read_bytes() == first
-    assert (out / "sweep.html").read_bytes() == page
+    assert files_of(out) == first
 
 
 def test_a_changed_configuration_uses_the_cases_that_it_shares(quick_job, tmp_path):
@@ -115,11 +96,11 @@ def test_a_changed_configuration_uses_the_cases_that_it_shares(quick_job, tmp_pa
     assert {row["gain_p"] for row in read_csv(out)} == {"5.0", "6.0"}
 
 
-def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(quick_job, tmp_path, capsys):
+def test_ctrl_c_keeps_what_is_done_and_the_same_command_goes_on(quick_job, tmp_path, one_line):
     out, path = tmp_path / "out", write(tmp_path, GRID.replace("seeds = [1]", "seeds = [1, 13]"))
     quick_job(sweep_samples.interrupted)
     assert run(path, out, "--format", "csv") == 130
-    assert "interrupted; 12 of 48 cases are kept" in one_line(capsys)
+    assert "interrupted; 12 of 48 cases are kept" in one_line()
     assert len(read_csv(out)) == 24
     ran = quick_job(sweep_samples.invented)
     ran.clear()
@@ -208,7 +189,7 @@ def test_without_matplotlib_there_is_a_table(job, tmp_path, capsys, monkeypatch)
     assert (tmp_path / "out" / "sweep.csv").exists()
 
 
-def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, capsys, monkeypatch):
+def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, monkeypatch, one_line):
     from pc_client.studies.sweep.store import ResultStore
 
     stored = []
@@ -224,7 +205,7 @@ def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, ca
     ran = quick_job(sweep_samples.invented)
     monkeypatch.setattr(ResultStore, "settle", settle)
     assert run(write(tmp_path, GRID), tmp_path / "out", "--format", "csv") == 1
-    assert "cannot write" in one_line(capsys)
+    assert "cannot write" in one_line()
     assert len(ran) == 6
 
 
@@ -241,29 +222,19 @@ def test_a_disk_that_fills_up_ends_the_sweep_in_one_line(quick_job, tmp_path, ca
         (GRID, ["--dask", "tcp://127.0.0.1:1"], 1, "no Dask scheduler answers"),
     ],
 )
-def test_what_does_not_work_is_one_line(text, options, code, words, tmp_path, capsys, monkeypatch):
+def test_what_does_not_work_is_one_line(text, options, code, words, tmp_path, monkeypatch, one_line):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("pc_client.studies.executors._DASK_TIMEOUT", "300ms")
     path = write(tmp_path, text)
     assert (
         cli.run(["sweep", str(path), *(["--out", "out"] if "--out" not in options else []), *options]) == code
     )
-    assert words in one_line(capsys)
+    assert words in one_line()
 
 
-def test_a_sweep_needs_a_folder(tmp_path, capsys):
+def test_a_sweep_needs_a_folder(tmp_path, one_line):
     assert cli.run(["sweep", str(write(tmp_path, GRID))]) == 1
-    assert "--out DIR" in one_line(capsys)
-
-
-@pytest.fixture
-def robot(monkeypatch):
-    """A robot in memory instead of the network."""
-    fake = FakeRobot()
-    fake.q = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
-    for module in (transport, ur_driver_module, arm_module):
-        monkeypatch.setattr(module, "TcpNetwork", lambda: fake)
-    return fake
+    assert "--out DIR" in one_line()
 
 
 GIVEN = (

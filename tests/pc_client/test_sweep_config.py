@@ -266,11 +266,3 @@ def test_missing_optuna_names_the_extra(monkeypatch, tmp_path, capsys):
     path.write_text('movements = ["uniform_4_1"]\n[search]\ntrials = 2\n[controller]\ngain_p = [1.0, 2.0]')
     assert cli.run(["sweep", str(path), "--out", str(tmp_path / "out")]) == 1
     assert "pip install 'ur-hil[search]'" in capsys.readouterr().err
-
-
-def test_a_sweep_without_a_search_loads_no_optuna(tmp_path):
-    import subprocess
-
-    code = "import sys; import pc_client.studies.sweep.schedule, pc_client.commands.sweep; print('optuna' in sys.modules)"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "False"

@@ -1,3 +1,5 @@
+"""Kinematics against the closed form of the DH tables; the models of all arms and their hulls."""
+
 from __future__ import annotations
 
 import sys
@@ -7,7 +9,9 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 import pytest
-from closed_form_ik import DH
+from closed_form_ik import DH, branch_error, closed_form_ik, dh_pose, frames, wrap
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.arms import (
@@ -19,10 +23,199 @@ from pc_client.kinematics.arms import (
     urdf_text,
 )
 from pc_client.kinematics.clearance import clearance_model, link_hulls, load_hulls
-from pc_client.kinematics.model import robot_model, solve_ik, tcp_jacobian, tcp_pose
+from pc_client.kinematics.model import (
+    measure_singularity,
+    nearest_posture,
+    robot_model,
+    solve_ik,
+    tcp_jacobian,
+    tcp_pose,
+    tcp_positions,
+)
 from pc_client.planning.joint_path import fixed_tcp_rotation
 
+ANGLES = st.lists(st.floats(-2 * np.pi, 2 * np.pi), min_size=6, max_size=6).map(np.array)
 UR3 = robot_model("ur3")
+
+
+@pytest.mark.parametrize("name", sorted(ROBOTS))
+def test_the_nominal_model_is_the_published_dh_table_in_the_base_frame(name):
+    model, rng = robot_model(name), np.random.default_rng(1)
+    for q in rng.uniform(-2 * np.pi, 2 * np.pi, (200, 6)):
+        np.testing.assert_allclose(tcp_pose(model, q), dh_pose(q, DH[name]), rtol=0, atol=1e-10)
+
+
+@given(ANGLES)
+def test_the_oracle_solves_its_own_forward_kinematics(q):
+    T = dh_pose(q)
+    for solution in closed_form_ik(T).values():
+        np.testing.assert_allclose(dh_pose(solution), T, rtol=0, atol=1e-11)
+    # The posture itself is one of them, unless it is so near the wrist singularity that q4 and q6 blur.
+    if abs(np.sin(q[4])) > 1e-3 and measure_singularity(tcp_jacobian(UR3, q)[None]).sigma_min[0] > 1e-3:
+        assert min(np.abs(wrap(q - solution)).max() for solution in closed_form_ik(T).values()) < 1e-8
+
+
+@settings(max_examples=50)
+@given(ANGLES)
+def test_the_jacobian_is_the_derivative_of_the_pose(q):
+    J, h = tcp_jacobian(UR3, q), 1e-6
+    R = tcp_pose(UR3, q)[:3, :3]
+    for joint in range(6):
+        dq = np.zeros(6)
+        dq[joint] = h
+        after, before = dh_pose(q + dq), dh_pose(q - dq)
+        spin = (after[:3, :3] - before[:3, :3]) / (2 * h) @ R.T
+        difference = [*((after - before)[:3, 3] / (2 * h)), spin[2, 1], spin[0, 2], spin[1, 0]]
+        np.testing.assert_allclose(J[:, joint], difference, rtol=0, atol=1e-8)
+
+
+def test_positions_along_a_path_are_those_of_the_poses():
+    q = np.random.default_rng(2).uniform(-3, 3, (20, 6))
+    np.testing.assert_array_equal(tcp_positions(UR3, q), [tcp_pose(UR3, q_k)[:3, 3] for q_k in q])
+
+
+def test_results_are_not_overwritten_by_the_next_call():
+    q = np.array(UR3.description.q_branch)
+    T, J = tcp_pose(UR3, q), tcp_jacobian(UR3, q)
+    T_copy, J_copy = T.copy(), J.copy()
+    tcp_pose(UR3, q + 1)
+    tcp_jacobian(UR3, q + 1)
+    np.testing.assert_array_equal(T, T_copy)
+    np.testing.assert_array_equal(J, J_copy)
+
+
+@pytest.mark.parametrize(
+    ("q_deg", "joint"),
+    [
+        ((20, -100, 0, -60, 70, 30), 2),  # elbow stretched
+        ((20, -100, -90, -60, 0, 30), 4),  # wrist 1 and wrist 3 aligned
+    ],
+)
+def test_known_singularities_are_seen_and_named(q_deg, joint):
+    measure = measure_singularity(tcp_jacobian(UR3, np.radians(q_deg))[None])
+    assert measure.sigma_min[0] < 1e-10
+    assert measure.condition[0] > 1e9
+    assert measure.critical_joint[0] == joint
+
+
+def test_the_wrist_above_the_base_axis_is_seen_and_named():
+    # Of all shoulder angles take the one that brings the wrist centre nearest to the base axis.
+    postures = np.radians([(20, q2, -110, -60, 70, 30) for q2 in np.linspace(-180, 0, 2001)])
+    radius = [np.hypot(*frames(q)[4][:2, 3]) for q in postures]
+    nearest = postures[int(np.argmin(radius))]
+    measure = measure_singularity(tcp_jacobian(UR3, nearest)[None])
+    assert measure.sigma_min[0] < 1e-3
+    assert measure.critical_joint[0] == 0
+
+
+def test_manipulability_is_the_jacobian_determinant_and_condition_the_ratio():
+    q = np.random.default_rng(3).uniform(-3, 3, (30, 6))
+    J = np.array([tcp_jacobian(UR3, q_k) for q_k in q])
+    measure = measure_singularity(J)
+    np.testing.assert_allclose(measure.manipulability, np.abs(np.linalg.det(J)), rtol=1e-9)
+    np.testing.assert_allclose(measure.condition, np.linalg.cond(J), rtol=1e-9)
+    np.testing.assert_allclose(
+        measure.sigma_min, 1 / np.linalg.norm(np.linalg.inv(J), ord=2, axis=(1, 2)), rtol=1e-9
+    )
+
+
+def test_a_near_seed_comes_back_to_the_same_posture():
+    rng = np.random.default_rng(4)
+    tried = 0
+    while tried < 300:
+        q = rng.uniform(-2 * np.pi, 2 * np.pi, 6)
+        if measure_singularity(tcp_jacobian(UR3, q)[None]).sigma_min[0] < 0.05:
+            continue
+        tried += 1
+        solution = solve_ik(UR3, dh_pose(q), q + rng.uniform(-0.03, 0.03, 6))
+        assert solution.converged
+        assert solution.iterations <= 6
+        np.testing.assert_allclose(solution.q, q, rtol=0, atol=1e-8)
+
+
+def test_from_anywhere_it_ends_on_a_true_solution_or_says_that_it_did_not():
+    rng = np.random.default_rng(4)
+    solved = 0
+    for _ in range(200):
+        T = dh_pose(rng.uniform(-3, 3, 6))
+        solution = solve_ik(UR3, T, rng.uniform(-3, 3, 6))
+        reached = dh_pose(solution.q)
+        if solution.converged:
+            solved += 1
+            np.testing.assert_allclose(reached, T, rtol=0, atol=1e-9)
+            assert max(solution.position_error, solution.rotation_error) <= 1e-9
+    assert solved > 150
+
+
+def test_a_solution_is_one_of_the_closed_form_branches():
+    rng = np.random.default_rng(5)
+    seed = np.array(UR3.description.q_branch)
+    T = dh_pose(seed)
+    for _ in range(50):
+        T[:3, 3] = rng.uniform((0.275, -0.2, 0.15), (0.425, 0.2, 0.35))
+        solution = solve_ik(UR3, T, seed)
+        assert solution.converged
+        assert branch_error(solution.q, T)[1] < 1e-8
+
+
+def test_out_of_reach_it_stops_at_the_nearest_it_can_do():
+    T = dh_pose(UR3.description.q_branch)
+    T[:3, 3] = (0.9, 0.0, 0.3)
+    solution = solve_ik(UR3, T, UR3.description.q_branch)
+    assert not solution.converged
+    assert 0.2 < solution.position_error < 1.0
+    assert np.isfinite(solution.q).all()
+
+
+def test_a_singular_seed_is_no_dead_end():
+    goal = np.radians((22.6, -101.1, -120.3, -5.9, 74.2, 106.4))
+    solution = solve_ik(UR3, dh_pose(goal), np.radians((20.0, -90.0, 0.0, -90.0, 0.0, 0.0)))
+    assert solution.converged
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_nearest_posture_is_the_nearest_of_all_branches(name):
+    rng, model, dh = np.random.default_rng(6), robot_model(name), DH[name]
+    for _ in range(40):
+        T, near = dh_pose(rng.uniform(-np.pi, np.pi, 6), dh), rng.uniform(-np.pi, np.pi, 6)
+        q = nearest_posture(model, T, near)
+        np.testing.assert_allclose(dh_pose(q, dh), T, rtol=0, atol=1e-9)
+        others = [o + 2 * np.pi * np.rint((near - o) / (2 * np.pi)) for o in closed_form_ik(T, dh).values()]
+        assert np.sum((q - near) ** 2) <= min(np.sum((o - near) ** 2) for o in others) + 1e-6
+
+
+def test_a_near_posture_keeps_its_turns_within_the_ranges():
+    q = np.array(UR3.description.q_branch)
+    turned = q + 2 * np.pi * np.array([-1, 1, 1, 0, -1, 0])
+    np.testing.assert_allclose(nearest_posture(UR3, dh_pose(q), turned), turned, rtol=0, atol=1e-8)
+    for turns in (1, 40):
+        beyond = q + 2 * np.pi * turns
+        assert np.abs(nearest_posture(UR3, dh_pose(q), beyond)).max() <= 2 * np.pi
+
+
+def test_aligned_wrists_and_a_stretched_elbow_have_postures_too():
+    for q in ((0.3, -1.2, 1.0, 0.2, 0.0, 0.7), (0.3, -1.2, 0.0, 0.2, 0.9, 0.7)):
+        T = dh_pose(q)
+        reached = dh_pose(nearest_posture(UR3, T, np.add(q, 0.01)))
+        np.testing.assert_allclose(reached, T, rtol=0, atol=1e-9)
+
+
+def test_a_pose_out_of_reach_is_refused_in_one_line():
+    T = dh_pose(UR3.description.q_branch)
+    for place in ((0.9, 0.0, 0.3), (0.0, 0.01, 0.3)):
+        T[:3, 3] = place
+        with pytest.raises(PlanningError, match=r"no posture of a UR3 brings the TCP to \(") as caught:
+            nearest_posture(UR3, T, UR3.description.q_branch)
+        assert "\n" not in str(caught.value)
+
+
+def test_the_seed_is_left_alone():
+    seed = np.array(UR3.description.q_branch)
+    before = seed.copy()
+    solve_ik(UR3, dh_pose(seed + 0.1), seed)
+    np.testing.assert_array_equal(seed, before)
+
+
 HULLS = clearance_model(UR3)
 
 
@@ -53,14 +246,6 @@ def test_in_its_working_box_an_arm_does_350_mm_a_second_in_every_direction(name)
         clearance = hulls.along(q)
         assert clearance.own.least[0] > 0.01
         assert clearance.floor.least[0] > 0.03
-
-
-def test_the_large_joints_of_large_arms_accelerate_less():
-    shoulder = [ROBOTS[name].limits.qdd_max[1] for name in ("ur3", "ur5", "ur10")]
-    assert shoulder == sorted(shoulder, reverse=True)
-    for description in ROBOTS.values():
-        # No joint gets more than UR's own driver asks for.
-        assert max(description.limits.qdd_max) <= 40.0
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
@@ -126,11 +311,6 @@ def test_the_flange_face_sets_the_floor_distance_of_a_tool_that_points_down():
     clearance = HULLS.along(q)
     assert clearance.floor.nearest[0] == ("wrist 3", "the floor at z = 0 m", 5)
     assert clearance.floor.least[0] == pytest.approx(T[2, 3], abs=3e-3)
-
-
-def test_an_arm_in_the_floor_has_negative_clearance():
-    clearance = HULLS.along(np.radians((0, 40, 0, 0, 0, 0)))
-    assert clearance.floor.least[0] < -0.1
 
 
 def test_turning_the_base_changes_no_clearance_from_the_floor():

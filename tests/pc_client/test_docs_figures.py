@@ -1,4 +1,4 @@
-"""docs/theory.md is read and computed again: every table and every figure in its sentences, to the printed digit."""
+"""docs/theory.md and docs/movements.md are read and computed again: tables and figures in sentences, to the printed digit."""
 
 from __future__ import annotations
 
@@ -8,27 +8,38 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from numpy.typing import NDArray
 from scipy.special import erf, ndtr
-from test_likeness import REFERENCE
 
+from pc_client.movements.description import describe, snr_of_delay
 from pc_client.movements.durations import Fitts, Isochrony
-from pc_client.movements.generate import GENERATORS
-from pc_client.movements.lognormal import FULL_COVERAGE, LiteralTiming, Lognormal, TwoSidedTiming
+from pc_client.movements.generate import GENERATORS, uniform_twin
+from pc_client.movements.library_sets import library_names
+from pc_client.movements.lognormal import (
+    FULL_COVERAGE,
+    LiteralTiming,
+    Lognormal,
+    TwoSidedTiming,
+    lead_from_k,
+    sigma_for_k,
+)
 from pc_client.movements.minimum_jerk import stroke_shape
+from pc_client.movements.movement import load_movement
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS
 from pc_client.movements.recipes import ARC_RULES, HAND
 from pc_client.movements.sigma_lognormal import LEAD, SigmaLognormal, Stroke, sinc
 from pc_client.movements.uniform import SmoothedSquareWave
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED
+from pc_client.planning.plan import plan_movement
 from pc_client.studies.comparison import COLUMNS, EXECUTED_COLUMNS, build_comparison, make_sets
+from pc_client.studies.likeness import log_dimensionless_jerk, sparc, speed_peaks
 
 PAGE = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
 SENTENCES = " ".join(PAGE.split())
 
 
 def table(first_heading: str, second_heading: str = "") -> list[list[str]]:
-    """The cells of the one table on the page that begins with these headings."""
+    """The cells of the one table of docs/theory.md that begins with these headings."""
     found = re.findall(
         rf"^\| {re.escape(first_heading)} \| {re.escape(second_heading)}.*\n\|[-:| ]+\n((?:\|.*\n)+)",
         PAGE,
@@ -64,6 +75,8 @@ def test_literal_windows(cells: list[str]) -> None:
     lognormal = timing.lognormal
     over, _, under = cells[1].partition("/")
     assert timing.k == pytest.approx(float(over) / float(under or 1), rel=1e-14)
+    assert lead_from_k(timing.k, 1.0) == pytest.approx(float(cells[0]), abs=1e-13)
+    assert lognormal.mode == pytest.approx(0.5, abs=1e-12)
     done = lognormal.evaluate([0.0, 1.0]).done
     figures = (
         lognormal.sigma,
@@ -92,6 +105,7 @@ def test_two_sided_windows(cells: list[str]) -> None:
     )
     for value, text in zip(figures, cells[1:], strict=True):
         assert_printed(value, text)
+    assert lognormal.mode == pytest.approx(full.mode_fraction, abs=1e-12)
 
 
 def test_berios_letters_are_the_two_sided_window() -> None:
@@ -103,25 +117,45 @@ def test_berios_letters_are_the_two_sided_window() -> None:
         assert lognormal.t0 == pytest.approx(0.2 - math.exp(mu - 3.0 * sigma), abs=1e-13)
 
 
-PRINTED_NAMES = {
-    "minimum jerk": "minimum jerk",
-    "lognormal, literal, lead 0": "lognormal k=2",
-    "lognormal, two-sided, sigma .0426": "two-sided .0426",
-    "lognormal, two-sided, sigma .1": "two-sided .1",
-    "lognormal, two-sided c = 3, sigma .25": "two-sided c=3 .25",
-    "trapezoid, ramps .2 and .2 s": "trapezoid .2/.2",
-    "trapezoid, ramps .1 and .1 s": "trapezoid .1/.1",
-    "trapezoid, ramps .05 and .05 s": "trapezoid .05/.05",
-    "trapezoid, ramps .15 and .25 s": "trapezoid .15/.25",
-    "square wave, two boxcars of 101 samples": "two boxcars",
+STROKE = np.linspace(0.0, 1.0, 1001)
+
+
+def trapezoid(up: float, down: float) -> NDArray[np.float64]:
+    return np.clip(np.minimum(STROKE / up, (1.0 - STROKE) / down), 0.0, 1.0) / (1.0 - 0.5 * (up + down))
+
+
+def two_boxcars() -> NDArray[np.float64]:
+    """As the figure of the page was made: a square of .8 s and two boxcars of .1 s, sampled with both ends."""
+    boxcar = np.ones(101) / 101
+    wave = np.convolve(np.convolve(np.ones(801), boxcar), boxcar)
+    return wave / (wave.sum() / 1000.0)
+
+
+def lognormal_profile(timing: LiteralTiming | TwoSidedTiming) -> NDArray[np.float64]:
+    return timing.lognormal.evaluate(STROKE).rate
+
+
+PROFILES = {
+    "minimum jerk": stroke_shape(STROKE).rate,
+    "lognormal, literal, lead 0": lognormal_profile(LiteralTiming(0.0, 1.0, 0.0)),
+    "lognormal, two-sided, sigma .0426": lognormal_profile(TwoSidedTiming(0.0, 1.0, 0.0426)),
+    "lognormal, two-sided, sigma .1": lognormal_profile(TwoSidedTiming(0.0, 1.0, 0.1)),
+    "lognormal, two-sided c = 3, sigma .25": lognormal_profile(TwoSidedTiming(0.0, 1.0, 0.25, 3.0)),
+    "trapezoid, ramps .2 and .2 s": trapezoid(0.2, 0.2),
+    "trapezoid, ramps .1 and .1 s": trapezoid(0.1, 0.1),
+    "trapezoid, ramps .05 and .05 s": trapezoid(0.05, 0.05),
+    "trapezoid, ramps .15 and .25 s": trapezoid(0.15, 0.25),
+    "square wave, two boxcars of 101 samples": two_boxcars(),
 }
 
 
-def test_smoothness_is_the_reference_table() -> None:
-    """Whose figures test_likeness.py computes."""
-    printed = {cells[0]: tuple(cells[1:]) for cells in table("profile")}
-    assert printed == {name: REFERENCE[key][1:] for name, key in PRINTED_NAMES.items()}
-    assert len(REFERENCE) == len(printed)
+@pytest.mark.parametrize("cells", table("profile"), ids=lambda cells: cells[0])
+def test_smoothness_of_strokes_of_one_second(cells: list[str]) -> None:
+    speed = PROFILES[cells[0]]
+    figures = (float(speed.max()), sparc(speed, 1000.0), log_dimensionless_jerk(speed, 1000.0))
+    for value, text in zip(figures, cells[1:], strict=True):
+        assert_printed(value, text)
+    assert speed_peaks(speed) == 1
 
 
 def test_ranges_of_variability() -> None:
@@ -282,15 +316,6 @@ def test_textbook_form_loses_digits() -> None:
     assert textbook_error(1.2) < 1e-15
 
 
-def test_moments_by_quadrature_of_the_lognormal() -> None:
-    """The page's closed forms, against quadrature of Lambda alone, for a wide lognormal."""
-    lognormal = Lognormal(0.0, 0.2, 0.4)
-    mean = quad(lambda t: t * float(lognormal.evaluate(t).rate), 0.0, 60.0, limit=300, points=[1.0])[0]
-    assert mean == pytest.approx(math.exp(0.2 + 0.08), rel=1e-9)
-    power = quad(lambda t: float(lognormal.evaluate(t).rate) ** 2, 0.0, 60.0, limit=300, points=[1.0])[0]
-    assert power == pytest.approx(math.exp(-0.2 + 0.04) / (0.8 * math.sqrt(math.pi)), rel=1e-9)
-
-
 def test_exponents_of_the_page() -> None:
     assert "curvature^(-1/3)" in SENTENCES
     assert "`gamma = 1/6`" in SENTENCES
@@ -331,3 +356,104 @@ def test_comparison_is_that_of_the_command() -> None:
     assert_printed(speeds["lognormal"] / speeds["uniform"], "3.7")
     assert "Arcs that overlap need .66 of it" in SENTENCES
     assert_printed(speeds["arcs"] / speeds["lognormal"], ".66")
+
+
+MOVEMENTS_PAGE = (Path(__file__).parents[2] / "docs" / "movements.md").read_text(encoding="utf-8")
+SAID_OF_MOVEMENTS = " ".join(MOVEMENTS_PAGE.split())
+
+
+def rows(first_cell: str) -> list[list[str]]:
+    """Cells of the rows of docs/movements.md whose first cell matches a pattern, without their marks."""
+    lines = [
+        line.replace("`", "").replace("**", "")
+        for line in MOVEMENTS_PAGE.splitlines()
+        if line.startswith("|")
+    ]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return [row for row in cells if re.fullmatch(first_cell, row[0])]
+
+
+@pytest.mark.parametrize("name", library_names("paper") + library_names("arcs"))
+def test_the_row_of_a_movement_is_what_it_is(name: str) -> None:
+    (row,) = [row for row in rows(re.escape(name)) if len(row) == 11]
+    movement = load_movement(name)
+    figures, report = describe(movement), plan_movement(movement).report
+    snr, vector = figures["expected_snr_db"], figures["expected_vector_snr_db"]
+    wanted = [
+        f"{movement.duration:.3f}",
+        ", ".join(f"{duration:.3f}" for duration in movement.stroke_durations),
+        f"{1e3 * figures['path_length_m']:.0f}",
+        f"{figures['peak_speed_m_s']:.3f}",
+        f"{figures['peak_acceleration_m_s2']:.2f}",
+        f"{report.joint_speed.value:.2f}",
+        f"{report.joint_acceleration.value:.1f}",
+        f"{figures['speed_rms_frequency_rad_s']:.2f}",
+        f"{snr['22 ms']:.1f}, {snr['35 ms']:.1f}",
+        f"{vector['22 ms']:.1f}, {vector['35 ms']:.1f}",
+    ]
+    assert row[1:] == wanted
+
+
+def test_the_table_of_kinds_is_that_of_the_generators() -> None:
+    table = [row for row in rows("|".join(GENERATORS)) if len(row) == 5]
+    assert [row[0] for row in table] == list(GENERATORS)
+    for kind, _, targets, strokes, _ in table:
+        assert targets == ("yes" if GENERATORS[kind].same_targets else "no: only the first")
+        assert strokes == ("yes" if GENERATORS[kind].same_strokes else "only the whole")
+
+
+def test_k_decides_skewness_and_kurtosis() -> None:
+    table = [row for row in rows(r"[\d/]+") if len(row) == 6 and row[1] != "k"]
+    assert [row[1] for row in table] == ["2", "3/2", "4/3", "6/5", "12/11"]
+    for lead, k, *figures in table:
+        lead_in_windows = 0.5 if lead == "1/2" else float(lead)
+        ratio = (lead_in_windows + 1.0) / (lead_in_windows + 0.5)
+        top, _, bottom = k.partition("/")
+        assert ratio == pytest.approx(float(top) / float(bottom or 1))
+        sigma = sigma_for_k(ratio)
+        lognormal = Lognormal(0.0, math.log(0.1 * (1.0 + lead_in_windows)) - FULL_COVERAGE * sigma, sigma)
+        for printed, value in zip(
+            figures, (sigma, lognormal.skewness, lognormal.kurtosis, lognormal.mu), strict=True
+        ):
+            assert float(printed) == pytest.approx(value, abs=0.51 * 10.0 ** -len(printed.partition(".")[2]))
+
+
+@pytest.mark.parametrize(
+    ("label", "setback"), [("stop", 0.0), ("blend, setback 30 mm", 0.03), ("blend, setback 10 mm", 0.01)]
+)
+def test_what_corners_cost(label: str, setback: float) -> None:
+    ((_, acceleration, joint, missed, snr),) = rows(label)
+    twins = [
+        uniform_twin(load_movement(name), "twin", "blend" if setback else "stop", setback)
+        for name in library_names("paper")[5:]
+    ]
+    assert float(acceleration.split()[0]) == pytest.approx(
+        max(describe(m)["peak_acceleration_m_s2"] for m in twins), rel=0.02
+    )
+    assert float(joint.split()[0]) == pytest.approx(
+        max(plan_movement(m).report.joint_acceleration.value for m in twins), rel=0.02
+    )
+    off = [
+        np.linalg.norm(m.sample(np.cumsum(m.stroke_durations)[:-1]).p - m.target_points[1:-1], axis=1).max()
+        for m in twins
+    ]
+    assert float(missed.split()[0]) == pytest.approx(1e3 * max(off), abs=0.51)
+    for printed, delay in zip(snr.removesuffix(" dB").split(", "), (0.022, 0.035), strict=True):
+        assert float(printed) == pytest.approx(np.mean([snr_of_delay(m, delay) for m in twins]), abs=0.051)
+
+
+def test_what_the_page_says_of_the_strokes_in_the_hands_time() -> None:
+    mu, strokes, gaps = [], [], []
+    for name in library_names("paper")[5:]:
+        movement = load_movement(name)
+        stretch = float(movement.provenance["time_stretch"])
+        mu += [stroke["mu"] - math.log(stretch) for stroke in describe(movement)["strokes"]]
+        strokes += (movement.stroke_durations / stretch).tolist()
+        gaps += (movement.trajectory.speed_minima() - np.cumsum(movement.stroke_durations)[:-1]).tolist()
+    assert f"mu does: {min(mu):.2f} to {max(mu):.2f} in the hand's time" in SAID_OF_MOVEMENTS
+    assert f"at random: {min(strokes):.3f} to {max(strokes):.3f} s".replace("0.", ".") in SAID_OF_MOVEMENTS
+    assert (
+        f"{min(strokes) / 2:.3f} to {max(strokes) / 2:.3f} s after its start".replace("0.", ".")
+        in SAID_OF_MOVEMENTS
+    )
+    assert f"{min(gaps):.1f} to {max(gaps):.2f} s on the robot".replace("0.", ".") in SAID_OF_MOVEMENTS

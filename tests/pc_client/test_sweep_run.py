@@ -1,4 +1,4 @@
-"""Cases on a real box in a process of its own: the same figures twice, and no box outlives its user."""
+"""Cases over processes and Dask, and on boxes of their own: errors are rows, nothing outlives its user."""
 
 from __future__ import annotations
 
@@ -7,21 +7,106 @@ import signal
 import socket
 import subprocess
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
-from sweep_samples import case
+from sweep_samples import case, deadly, faulty, interrupted, invented, process_id
 
 import pc_client.studies.sweep.box as box_module
-import pc_client.studies.sweep.schedule as run_case_module
+import pc_client.studies.sweep.schedule as schedule
 from pc_client.errors import SweepError
+from pc_client.movements.movement import Movement
 from pc_client.studies.executors import open_executor
 from pc_client.studies.sweep.box import HOST, simulated_box
-from pc_client.studies.sweep.case import SimulatedArm
-from pc_client.studies.sweep.schedule import run_case
+from pc_client.studies.sweep.case import MovementFile, Outcome, SimulatedArm, failed
+from pc_client.studies.sweep.schedule import in_turn, run_case, side_by_side
 from protocol.ur_types import Ports
 
+CASES = [case(seed=seed) for seed in (1, 2, 13, 3, 4, 5)]
+
+
+def statuses(outcomes):
+    return {case.arm.seed: outcome.status for case, outcome in outcomes}
+
+
+def done_by(job, cases=CASES, *, workers=None, dask=None):
+    with side_by_side(job, workers=workers, dask=dask) as run:
+        return list(run(cases))
+
+
+def test_side_by_side_in_processes():
+    outcomes = done_by(invented, workers=2)
+    assert len(outcomes) == len(CASES)
+    assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
+    assert all(outcome == invented(case) for case, outcome in outcomes)
+
+
+def test_side_by_side_on_dask():
+    distributed = pytest.importorskip("distributed")
+    keeping = partial(invented, keep_recordings=True)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
+        outcomes = done_by(keeping, dask=cluster.scheduler_address)
+    assert dict(outcomes) == {case: keeping(case) for case in CASES}
+
+
+def test_a_job_that_kills_its_worker_costs_only_its_own_case():
+    outcomes = done_by(deadly, workers=1)
+    assert len(outcomes) == len(CASES)
+    assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
+    (error,) = [outcome.error for case, outcome in outcomes if case.arm.seed == 13]
+    assert "worker process died" in error
+
+
+def test_processes_last_for_all_batches_and_are_replaced_when_one_has_died():
+    with side_by_side(process_id, workers=1, dask=None) as run:
+        ids = [[outcome.error for _, outcome in run([case(seed=seed)])] for seed in (1, 2, 13, 3, 4)]
+    assert ids[0] == ids[1]
+    assert "worker process died" in ids[2][0]
+    assert ids[0] != ids[3] == ids[4]
+
+
+def test_a_mistake_in_the_job_is_a_row_too():
+    ((_, outcome),) = done_by(faulty, [case()], workers=1)
+    assert outcome == failed("ZeroDivisionError: division by zero")
+
+
+def test_nothing_to_do_starts_nothing(monkeypatch):
+    monkeypatch.setattr("pc_client.studies.sweep.schedule.open_executor", None)
+    assert done_by(invented, [], workers=2) == []
+
+
+def test_ctrl_c_goes_through():
+    outcomes = in_turn(interrupted)(CASES)
+    assert [next(outcomes)[0].arm.seed for _ in range(2)] == [1, 2]
+    with pytest.raises(KeyboardInterrupt):
+        next(outcomes)
+
+
+def test_without_the_box_every_case_fails_in_one_line(monkeypatch):
+    monkeypatch.setattr(
+        "pc_client.studies.sweep.box._command", lambda *a: [sys.executable, "-m", "ur_emulator_not_here"]
+    )
+    outcome = run_case(case(), False)
+    assert outcome.status == "failed"
+    assert "No module named" in outcome.error
+    assert "\n" not in outcome.error
+
+
+def test_a_folder_without_room_is_a_failed_case(monkeypatch):
+    def full(*args, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pc_client.studies.sweep.box.tempfile.mkdtemp", full)
+    assert run_case(case(), False) == Outcome("failed", "[Errno 28] No space left on device")
+
+
 ARM = SimulatedArm("ur3", "typical", 7)
+REACH = Movement.through([(0.35, -0.06, 0.25), (0.35, 0.06, 0.3)], "robot", [1.5], name="short")
+SHORT = MovementFile("short", "short.toml", REACH.text)
 
 
 def connect(box):
@@ -39,7 +124,7 @@ def read_to_the_end(link):
 
 
 def test_the_same_case_gives_the_same_figures_here_and_in_another_process():
-    short = case(repeat=2)
+    short = replace(case(repeat=2), movement=SHORT)
     with open_executor(1, None) as executor:
         there = executor.submit(run_case, short, True)
         here = run_case(short, True)
@@ -52,11 +137,11 @@ def test_the_same_case_gives_the_same_figures_here_and_in_another_process():
     assert here.rows[0]["late_frames"] == here.rows[0]["lost_frames"] == 0
     assert here.rows[0]["snr_db"] != here.rows[1]["snr_db"]
     assert here == there  # figures and recordings, to the last bit
-    assert [name for name, _ in here.recordings] == ["uniform_4_1_r1.mcap", "uniform_4_1_r2.mcap"]
+    assert [name for name, _ in here.recordings] == ["short_r1.mcap", "short_r2.mcap"]
 
 
 def test_gains_that_the_loop_does_not_bear_are_refused_before_the_movement_runs():
-    outcome = run_case(case(gain_p=60.0), True)
+    outcome = run_case(replace(case(gain_p=60.0), movement=SHORT), True)
     assert outcome.status == "refused"
     assert "gain margin" in outcome.error
     (row,) = outcome.rows
@@ -94,7 +179,7 @@ def test_a_box_that_is_refused_says_why():
 def test_a_box_that_dies_in_the_middle_is_named(monkeypatch):
     before = set(children_of(os.getpid()))  # an earlier test may have left an idle worker process
 
-    class Fatal(run_case_module.ExperimentRunner):
+    class Fatal(schedule.ExperimentRunner):
         """Kills the box when the movement is about to run."""
 
         def _record(self, *args, **options):
@@ -103,8 +188,8 @@ def test_a_box_that_dies_in_the_middle_is_named(monkeypatch):
             os.kill(box, signal.SIGKILL)
             return super()._record(*args, **options)
 
-    monkeypatch.setattr(run_case_module, "ExperimentRunner", Fatal)
-    outcome = run_case(case(), False)
+    monkeypatch.setattr(schedule, "ExperimentRunner", Fatal)
+    outcome = run_case(replace(case(), movement=SHORT), False)
     assert outcome.status == "failed"
     assert outcome.error.startswith("the simulated box died (exit code -9): ")
 

@@ -1,4 +1,4 @@
-"""Clients that come and go in numbers, and a process that gets nothing more from the system.
+"""Clients that come and go in numbers, read late or never, and a process that gets nothing more from the system.
 
 The box keeps nothing of clients that have gone. Without descriptors or threads what needs them fails, and no more.
 """
@@ -9,16 +9,28 @@ import random
 import socket
 import struct
 import sys
-import threading
 from collections import Counter
 from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType, FunctionType
 
 import psutil
 import pytest
-from integration_support import TIMEOUT, Frames, Messages, connect, finish, inside, send, serving
+from integration_support import (
+    PERIOD,
+    TIMEOUT,
+    Frames,
+    Messages,
+    connect,
+    finish,
+    in_background,
+    inside,
+    send,
+    serving,
+)
 
+import ur_emulator.loop.pacing as pacing
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
+from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
 from ur_emulator.box_log import MAX_ENTRIES, LogEntry
 from ur_emulator.controller.snapshot import Snapshot
@@ -76,20 +88,6 @@ def settle(dashboard, condition):
             return
         exchange(dashboard)
     raise AssertionError("the box still holds something of clients that have gone")
-
-
-def test_descriptors_are_back_and_no_reader_has_lost_a_frame(tmp_path):
-    with serving(tmp_path, "--pace", "lockstep") as box, connect(box, "dashboard") as dashboard:
-        dashboard.recv(100)
-        process = psutil.Process(box.process.pid)
-        before = process.num_fds()
-        with Frames(box) as frames:
-            frames.next()
-            storm(box, 6, random.Random(2))
-            settle(dashboard, lambda: process.num_fds() == before + 1)
-            frames.until_stamp(frames.next().timestamp)
-            assert frames.lost() == 0
-        settle(dashboard, lambda: process.num_fds() == before)
 
 
 @pytest.fixture
@@ -248,25 +246,81 @@ def test_without_descriptors_no_program_is_compiled_or_connected_and_later_it_is
     assert "Traceback" not in log
 
 
-CALLS = ('socket_open("localhost", 9)', 'rpc_factory("xmlrpc", "http://127.0.0.1:9").f()')
+def test_several_clients_see_the_same_frames(lockstep_box):
+    ports = ("realtime", "realtime", "realtime_ro")
+    with ExitStack() as stack:
+        readers = [stack.enter_context(Frames(lockstep_box, port)) for port in ports]
+        begins = [reader.next().timestamp for reader in readers]
+        send(lockstep_box, "secondary", "def f():\n  sleep(1)\nend\n")
+        seen = [{} for _ in readers]
+        while min(reader.stamps[-1] for reader in readers) < begins[0] + 1.0:
+            for reader, frames in zip(readers, seen, strict=True):
+                frame = reader.raw()
+                frames[reader.stamps[-1]] = frame
+        shared = set.intersection(*map(set, seen))
+        assert len(shared) > 100
+        for stamp in shared:
+            assert len({frames[stamp] for frames in seen}) == 1
+        assert [reader.lost() for reader in readers] == [0, 0, 0]
 
 
-@pytest.mark.parametrize("call", CALLS, ids=["name", "xmlrpc"])
-def test_without_threads_a_program_that_needs_one_ends_and_the_box_does_not(lockstep_box, call, monkeypatch):
-    with Frames(lockstep_box) as frames, Messages(lockstep_box) as primary:
-        frames.next()
-        with monkeypatch.context() as patch:
-            patch.setattr(threading.Thread, "start", no_thread)
-            send(lockstep_box, "secondary", f"def calls():\n  x = {call}\nend\n")
-            frames.until(lambda frame: has_stopped(lockstep_box))
-        send(lockstep_box, "secondary", 'def next():\n  textmsg("next")\nend\n')
-        primary.message(TextMessage, text="next")
+def test_speed_makes_the_same_frames_faster(tmp_path):
+    with serving(tmp_path, "--pace", "realtime", "--speed", 10) as box, Frames(box) as frames:
+        begin = frames.next().timestamp
+        frames.until_stamp(begin + 1.0)
         assert frames.lost() == 0
 
 
-def no_thread(thread):
-    raise RuntimeError("can't start new thread")
+MINUTE = 'def minute():\n  sleep(60)\n  textmsg("done")\nend\n'
+PATIENCE = 0.2  # s; instead of the seconds that a box waits for a reader in lockstep
 
 
-def has_stopped(box):
-    return any(entry.text == "Program stopped: calls" for entry in box.log)
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(pacing, "READER_LIMIT", PATIENCE)
+
+
+def said(primary):
+    return [m for m in primary.all if isinstance(m, TextMessage)]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_reader_that_comes_back_gets_whole_frames_again(lockstep_box):
+    with Frames(lockstep_box) as late, Frames(lockstep_box) as frames:
+        begin = frames.next().timestamp
+        send(lockstep_box, "secondary", MINUTE)
+        frames.until_stamp(begin + 50.0)
+        late.until_stamp(begin + 40.0)  # asserts that every package is whole
+        with in_background(late.raw):
+            frames.until_stamp(begin + 60.0)
+        assert frames.lost() == 0
+        assert late.lost() > 1000
+        after = [round(s / PERIOD) for s in late.stamps if s > begin + 52.0]
+        assert after[-1] - after[0] + 1 == len(set(after))
+
+
+@pytest.mark.parametrize("pause", ["sync()", ""], ids=["over cycles", "in one cycle"])
+def test_a_flood_of_messages_from_a_program_reaches_who_reads(lockstep_box, pause):
+    n = 1000
+    text = (
+        f"def f():\n  i = 0\n  while i < {n}:\n    textmsg(i)\n    i = i + 1\n    {pause}\n  end\n"
+        '  sync()\n  sync()\n  textmsg("end")\nend\n'
+    )
+    with Messages(lockstep_box) as primary:
+        primary.next()
+        send(lockstep_box, "secondary", text)
+        primary.message(TextMessage, limit=50_000, text="end")
+        assert [m.text for m in said(primary)] == [*map(str, range(n)), "end"]
+
+
+def test_a_client_that_reads_nothing_for_a_while_is_waited_for_and_loses_nothing(lockstep_box):
+    with Frames(lockstep_box) as late, Frames(lockstep_box) as frames:
+        begin = late.next().timestamp
+        send(lockstep_box, "secondary", "def f():\n  sleep(60)\nend\n")
+        frames.until(
+            lambda f: f.runtime_state == ProgramState.PLAYING and frames.stamps[-2:-1] == frames.stamps[-1:]
+        )
+        held = frames.stamps[-1]
+        assert held < begin + 60.0
+        late.until_stamp(held)
+        assert late.lost() == 0
