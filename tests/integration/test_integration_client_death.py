@@ -216,9 +216,10 @@ def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(ur_client
             before = frame
         assert not frames.new().target_qd.any()  # the target of the cycle in which the program stopped
         assert frames.lost() == 0
-    done = ur_client("run", "uniform_4_1", *at(standard_box), "--out", tmp_path / "next")
+    Movement.through([(0.35, -0.06, 0.25), (0.35, 0.06, 0.3)], durations=[1.5]).save(tmp_path / "next.toml")
+    done = ur_client("run", tmp_path / "next.toml", *at(standard_box), "--out", tmp_path / "next")
     assert done.code == 0, done.err
-    assert (tmp_path / "next" / "uniform_4_1_r1.mcap").exists()
+    assert len(list((tmp_path / "next").glob("*_r1.mcap"))) == 1
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
