@@ -31,6 +31,7 @@ from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
 from urscript.source import Source, as_bytes
 from urscript.syntax.parser import parse
+from urscript.values import size_of
 
 if TYPE_CHECKING:
     from urscript.run.host import Host
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
 
 _LONGEST_KEPT: Final = 4_000
 """Elements or characters of a global that can be read when the program has ended."""
+
+_RELEASED_AT_ONCE: Final = 1_000_000
+"""Values of such globals that are released in a cycle (1 to 2 ms)."""
 
 
 def compile_program(
@@ -161,6 +165,7 @@ class RunningProgram:
         self._host = host
         self._in_step = False
         self._kill_wanted = False
+        self._unreleased: list[Any] = []
         self._namespace: dict[str, Any] = {}
         meter = Meter(self._namespace, work or WorkBudget())
         self._namespace.update(runtime.base_namespace(program.dialect, program.catalogue.methods, meter))
@@ -242,6 +247,17 @@ class RunningProgram:
             line, column = self.position(self._main)
             self._fail(ScriptRuntimeError(text).locate(self.program.source, line, column))
 
+    @property
+    def is_releasing(self) -> bool:
+        """Whether the run has ended and still holds long values: to release all takes longer than a cycle."""
+        return bool(self._unreleased)
+
+    def release(self) -> None:
+        """Release as many of them as a cycle has time for."""
+        left = _RELEASED_AT_ONCE
+        while self._unreleased and left > 0:
+            left -= size_of(self._unreleased.pop())
+
     def forget(self) -> None:
         """Drop the values of all variables; after the end."""
         self._namespace.update(dict.fromkeys(self._namespace, UNDEFINED))
@@ -279,6 +295,7 @@ class RunningProgram:
                 del self._namespace[name]
             elif isinstance(value, (list, str)) and len(value) > _LONGEST_KEPT:
                 self._namespace[name] = UNDEFINED
+                self._unreleased.append(value)
         self._host.program_ended()
 
 

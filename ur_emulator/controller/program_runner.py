@@ -84,10 +84,15 @@ class ProgramRunner:
 
     @property
     def has_work(self) -> bool:
-        """True while any program needs cycles, and in the cycle in which one ended."""
+        """True while any program needs cycles, and after one has ended as long as that takes."""
         if self._primary is None:
-            return self._ran or bool(self._secondaries)
+            return self._ran or bool(self._secondaries) or self.is_releasing
         return self._phase is not _PAUSED or bool(self._secondaries)
+
+    @property
+    def is_releasing(self) -> bool:
+        """True while the last program, which has ended, still holds long values."""
+        return self.latest is not None and self.latest.is_releasing
 
     @property
     def runtime_state(self) -> ProgramState:
@@ -213,6 +218,8 @@ class ProgramRunner:
         self._work.renew()
         self._secondary_work.renew()
         granted = self._work.left + self._secondary_work.left
+        if self.latest is not None and self._primary is None:
+            self.latest.release()
         self._run()
         self.work = granted - self._work.left - self._secondary_work.left
 

@@ -128,6 +128,8 @@ class MemoryWatch:
         self._floor = 0
         # How much each box has made it grow since it held half of what is allowed.
         self._grown: dict[ProgramRunner, int] = {}
+        # The programs that had to end last, until what they held is given back.
+        self._ended: ProgramRunner | None = None
         self._next_look = 0.0
 
     def look(self, programs: ProgramRunner, now: float) -> None:
@@ -135,8 +137,11 @@ class MemoryWatch:
         if gc.get_count()[0] > _NEW or self._now - self._collected > _GROWN:
             gc.collect(1)
             self._collected = self._now
-        if now < self._next_look:
+        if now < self._next_look or any(one.is_releasing for one in (programs, *self._grown)):
             return
+        if self._ended is not None:
+            self._give_back(self._ended)
+            self._ended = None
         before, self._now = self._now, resident()
         self._collected = min(self._collected, self._now)
         held = self._now - self._at_rest
@@ -159,7 +164,7 @@ class MemoryWatch:
         programs = max(self._grown, key=lambda one: (one.is_any_running, self._grown[one]))
         text = f"the program was ended: box and programs hold more than {BUDGETS.memory // MIB} MiB of memory"
         programs.end_for_memory(text)
-        self._give_back(programs)
+        self._ended = programs
 
     def _give_back(self, programs: ProgramRunner) -> None:
         """Give back what programs held that have ended."""
