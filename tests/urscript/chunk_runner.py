@@ -33,7 +33,7 @@ from typing import Any
 from unittest import mock
 
 import pytest
-from tree_printer import print_program
+from program_texts import print_program
 
 from urscript.catalogue import Catalogue, catalogue_for
 from urscript.check.checking import check_program

@@ -1,7 +1,7 @@
 """The rows of the language notes (`reference/urscript.md`) that chunks show by `#ref`, with their evidence.
 
 D documented by the maker, O observed, I inferred, U unknown and chosen (see `urscript/dialect.py`). A row counts
-as shown when a chunk names it; `test_urscript_lang_chunks` holds the table and the chunks together.
+as shown when a chunk names it; `test_urscript_chunks` holds the table and the chunks together.
 """
 
 ROWS = {
@@ -204,18 +204,3 @@ ROWS = {
     "7 limits": "U nesting",
     "7 overflow": "U ints fold around",
 }
-
-ELSEWHERE = {
-    "1.2 framing on the ports, replacement, key messages": "tests/integration",
-    "1.5 handles of remote procedures": "tests/ur_emulator/chunks/rpc.script",
-    "1.5 a float where socket_send_int wants an int": "tests/ur_emulator/chunks/sockets.script",
-    "1.7 socket_send_string of a number": "tests/ur_emulator/chunks/sockets.script",
-    "2.1-2.4, 2.7, 2.8 every builtin that needs a robot": "tests/ur_emulator/chunks",
-    "2.13 how many builtins each version has": "tests/urscript/test_urscript_catalogue.py",
-    "3 motion": "tests/ur_emulator/chunks/motion_moves.script",
-    "3.4 ownership of the arm": "tests/ur_emulator/chunks/motion_moves.script",
-    "4 values are constant within a frame": "tests/ur_emulator/chunks/internals_state.script",
-    "5 inverse kinematics, protective stops": "tests/ur_emulator/chunks/motion_moves.script",
-    "5 codes of variable types on the wire": "tests/protocol",
-}
-"""Rows that need a box or a socket, and where they are shown."""

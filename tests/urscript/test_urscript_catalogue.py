@@ -1,10 +1,17 @@
-"""The table of builtins against the script manuals, and the page that shows all of it."""
+"""The table of builtins against the script manuals, the page that shows it, and how calls fit its rows.
+
+The texts of wrong arguments are in `chunks/errors_of_arguments.script`.
+"""
 
 import itertools
+import math
 import pickle
 from collections import Counter
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from docs.generate.coverage_page import render
 from urscript.builtins import pure_builtins
@@ -20,13 +27,17 @@ from urscript.catalogue import (
     Version,
     catalogue_for,
 )
-from urscript.catalogue.calls import compile_check, fits
+from urscript.catalogue.calls import compile_check, fits, static_bind
 from urscript.catalogue.catalogue import read_rows
 from urscript.catalogue.methods import METHODS
+from urscript.errors import ScriptTypeError
+from urscript.values import Matrix, Pose
 
 VERSIONS = (
     "3.2", "3.8", "3.14", "3.15", "5.0", "5.4", "5.10", "5.11", "5.15", "5.21", "5.23", "5.25", "10.13",
 )  # fmt: skip
+
+# --- rows
 
 
 @pytest.mark.parametrize(
@@ -56,117 +67,50 @@ def test_each_release_of_the_e_series_brought_its_functions_and_dropped_none(min
 
 
 @pytest.mark.parametrize(
-    ("version", "name", "known"),
-    [
-        ("3.5", "get_tcp_offset", False),
-        ("3.6", "get_tcp_offset", True),
-        ("3.7", "protective_stop", False),
-        ("3.8", "protective_stop", True),
-        ("3.13", "tool_contact", False),
-        ("3.14", "tool_contact", True),
-        ("3.14", "get_inverse_kin_has_solution", False),
-        ("5.8", "get_inverse_kin_has_solution", False),
-        ("5.9", "get_inverse_kin_has_solution", True),
-        ("5.9", "set_target_payload", False),
-        ("5.10", "set_target_payload", True),
-        ("5.14", "make_list", False),
-        ("5.15", "make_list", True),
-        ("5.22", "get_jacobian", False),
-        ("5.23", "get_jacobian", True),
-        ("3.15", "interpreter_mode", False),
-        ("3.15", "set_tool_communication", False),
-        ("10.7", "optimovej", False),
-        ("10.8", "optimovej", True),
-        ("5.24", "ros_publisher_factory", False),
-        ("10.11", "ros_publisher_factory", True),
-        ("10.10", "direct_torque", False),
-        ("10.11", "direct_torque", True),
-    ],
-)
-def test_first_releases(version: str, name: str, known: bool) -> None:
-    assert (name in catalogue_for(version)) is known
-
-
-@pytest.mark.parametrize(
     ("version", "name", "signature"),
     [
-        ("3.15", "movej", "movej(q, a=1.4, v=1.05, t=0, r=0)"),
-        ("3.15", "movel", "movel(pose, a=1.2, v=0.25, t=0, r=0)"),
-        ("3.15", "movep", "movep(pose, a=1.2, v=0.25, r=0)"),
-        ("3.15", "movec", "movec(pose_via, pose_to, a=1.2, v=0.25, r=0, mode=0)"),
         ("3.15", "servoj", "servoj(q, a=0, v=0, t=0.008, lookahead_time=0.1, gain=300)"),
         ("5.25", "servoj", "servoj(q, a=0, v=0, t=0.002, lookahead_time=0.1, gain=300)"),
         ("3.15", "stopl", "stopl(a, aRot=a)"),
-        ("3.15", "stop_conveyor_tracking", "stop_conveyor_tracking(a=20)"),
-        ("3.15", "freedrive_mode", "freedrive_mode()"),
-        (
-            "5.10",
-            "freedrive_mode",
-            "freedrive_mode(freeAxes=[1, 1, 1, 1, 1, 1], feature=p[0, 0, 0, 0, 0, 0])",
-        ),
-        (
-            "3.15",
-            "get_inverse_kin",
-            "get_inverse_kin(x, qnear=current joint positions, maxPositionError=1e-10, "
-            "maxOrientationError=1e-10, tcp=active TCP)",
-        ),
         ("3.15", "popup", 'popup(s, title="Popup", warning=False, error=False, blocking=False)'),
-        ("3.15", "socket_open", 'socket_open(address, port, socket_name="socket_0")'),
-        (
-            "3.15",
-            "socket_read_binary_integer",
-            'socket_read_binary_integer(number, socket_name="socket_0", timeout=2)',
-        ),
-        (
-            "3.15",
-            "socket_read_string",
-            'socket_read_string(socket_name="socket_0", prefix="", suffix="", interpret_escape=False, '
-            "timeout=2)",
-        ),
-        ("3.15", "rtde_set_watchdog", 'rtde_set_watchdog(variable_name, min_frequency, action="pause")'),
-        (
-            "5.25",
-            "direct_torque",
-            "direct_torque(torque, friction_comp=True, viscous_scale=[0.9, 0.9, 0.8, 0.9, 0.9, 0.9], "
-            "coulomb_scale=[0.8, 0.8, 0.7, 0.8, 0.8, 0.8])",
-        ),
-        ("5.24", "direct_torque", "direct_torque(torque, friction_comp=True)"),
+        ("5.10", "freedrive_mode", "freedrive_mode(freeAxes=[1, 1, 1, 1, 1, 1], feature=p[0, 0, 0, 0, 0, 0])"),
+        ("3.15", "get_inverse_kin",
+         "get_inverse_kin(x, qnear=current joint positions, maxPositionError=1e-10, maxOrientationError=1e-10, tcp=active TCP)"),
         ("10.11", "direct_torque", "direct_torque(torque, friction_comp=True)"),
-        ("5.17", "time", "time()"),
-        ("5.18", "time", "time(mode=0)"),
-        (
-            "5.10",
-            "set_target_payload",
-            "set_target_payload(m, cog, inertia=[0, 0, 0, 0, 0, 0], transition_time=0)",
-        ),
     ],
-)
-def test_signatures(version: str, name: str, signature: str) -> None:
+)  # fmt: skip
+def test_every_kind_of_default_is_shown_in_a_signature(version, name, signature):
     assert catalogue_for(version)[name].signature == signature
 
 
-@pytest.mark.parametrize("row", ALL_ROWS, ids=lambda row: f"{row.name}-{row.since}")
-def test_row_is_sane(row: Builtin) -> None:
-    names = [param.name for param in row.params]
-    assert len(set(names)) == len(names)
-    optional = [not param.is_required for param in row.params]
-    assert optional == sorted(optional), "a parameter with default stands before one without"
-    assert row.summary
-    assert row.source
-    assert str(row.since) != "-"
+def described(rows):
+    return [f"{row.name}-{row.since}" for row in rows]
+
+
+def test_every_row_says_what_it_is_and_where_that_is_from():
+    assert described(row for row in ALL_ROWS if not row.summary or not row.source) == []
+    assert described(row for row in ALL_ROWS if str(row.since) == "-") == []
     # Approximate rows say what differs.
-    assert bool(row.note) or row.support is Support.EXACT
+    assert described(row for row in ALL_ROWS if not row.note and row.support is not Support.EXACT) == []
 
 
-@pytest.mark.parametrize("row", ALL_ROWS, ids=lambda row: f"{row.name}-{row.since}")
-def test_defaults_fit_their_own_parameters(row: Builtin) -> None:
-    defaults = [param.default for param in row.params if param.default is not REQUIRED]
-    required = [param for param in row.params if param.is_required]
-    for param in row.params[len(required) :]:
-        if param.default is not None:
-            assert fits(param.type, param.default)
-    if not required:
-        compile_check(row)(defaults)
+def test_parameters_have_names_of_their_own_and_those_with_defaults_come_last():
+    for row in ALL_ROWS:
+        names = [param.name for param in row.params]
+        assert len(set(names)) == len(names), row.name
+        optional = [not param.is_required for param in row.params]
+        assert optional == sorted(optional), row.name
+
+
+def test_defaults_fit_their_own_parameters():
+    for row in ALL_ROWS:
+        for param in row.params:
+            assert param.default in (REQUIRED, None) or fits(param.type, param.default), (
+                row.name,
+                param.name,
+            )
+        if not any(param.is_required for param in row.params):
+            compile_check(row)([param.default for param in row.params])
 
 
 RESULTS = {
@@ -176,20 +120,19 @@ RESULTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("row", ALL_ROWS, ids=lambda row: f"{row.name}-{row.since}")
-def test_results_are_declared_in_words_the_compiler_reads(row: Builtin) -> None:
-    assert row.returns.partition(",")[0] in RESULTS
+def test_results_are_declared_in_words_the_compiler_reads():
+    assert {row.returns.partition(",")[0] for row in ALL_ROWS} <= RESULTS
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_no_version_has_two_forms_of_one_name(version: str) -> None:
+def test_no_version_has_two_forms_of_one_name(version):
     wanted = Version.of(version)
     names = Counter(row.name for row in ALL_ROWS if row.is_in(wanted))
     assert [name for name, count in names.items() if count > 1] == []
     assert catalogue_for(version).names == set(names)
 
 
-def test_successive_forms_leave_no_gap() -> None:
+def test_successive_forms_leave_no_gap():
     forms: dict[str, list[Builtin]] = {}
     for row in ALL_ROWS:
         forms.setdefault(row.name, []).append(row)
@@ -200,24 +143,7 @@ def test_successive_forms_leave_no_gap() -> None:
             assert only_other_generation or ends == begins
 
 
-def test_time_classes_that_the_interpreter_depends_on() -> None:
-    def of_class(time: TimeClass) -> set[str]:
-        return {row.name for row in CB3_3_15 if row.time is time}
-
-    assert of_class(TimeClass.FRAMES) == {"sleep", "sync"}
-    moves = "movej movel movep movec servoj servoc speedj speedl stopj stopl stop_conveyor_tracking"
-    assert of_class(TimeClass.MOTION) == set(moves.split())
-    modes = "force_mode freedrive_mode teach_mode"
-    begin = {*modes.split(), "freedrive_mode_no_incorrect_payload_check"}
-    assert of_class(TimeClass.SWITCH) == begin | {f"end_{mode}" for mode in modes.split()}
-    reads = {row.name for row in CB3_3_15 if row.name.startswith(("socket_read", "request_"))}
-    assert of_class(TimeClass.BLOCKING) == reads | {"popup", "socket_open", "socket_get_var"}
-    assert CB3_3_15["speedj"].may_wait
-    assert not CB3_3_15["force_mode"].may_wait
-    assert not CB3_3_15["socket_send_int"].may_wait
-
-
-def test_pure_functions_are_exactly_those_of_the_table() -> None:
+def test_pure_functions_are_exactly_those_of_the_table():
     newest = catalogue_for("5.25")
     strings = {row.name for row in newest if row.name.startswith(("str_", "to_"))}
     urmath = {row.name for row in newest if row.module == "urmath"}
@@ -225,21 +151,38 @@ def test_pure_functions_are_exactly_those_of_the_table() -> None:
     assert all(newest[name].support is not Support.DECLARED_ONLY for name in pure_builtins(0))
 
 
-def test_module_variables_and_arrays() -> None:
-    values = {name: item.value for name, item in CB3_3_15.variables.items()}
-    assert values == {
-        "a_joint_default": 1.4,
-        "a_tool_default": 1.2,
-        "v_joint_default": 1.05,
-        "v_tool_default": 0.25,
-    }
-    array = CB3_3_15.arrays["digital_out"]
-    assert array.getter in CB3_3_15
-    assert array.setter in CB3_3_15
-    assert CB3_3_15[array.getter].params[0].high == array.size - 1
+def test_an_array_ends_where_its_functions_do():
+    for array in CB3_3_15.arrays.values():
+        for name in (array.getter, array.setter):
+            assert CB3_3_15[name].params[0].high == array.size - 1
 
 
-def test_extra_names_are_switched_on_by_hand() -> None:
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("f(a: number)\n    sum\n    exact", "write name"),
+        ("f(a: number) -> None", "write name"),
+        ("f(a: float) -> None\n    sum\n    exact", "'a: float' of .* is not a parameter"),
+        ("f(a: number = 1 2) -> None\n    sum\n    exact", "'a: number = 1 2' of .* is not a parameter"),
+        ("f() -> None\n    sum\n    exactly", "exactly in 'exactly'; allowed: zero, motion"),
+    ],
+)
+def test_a_row_that_cannot_be_read_is_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        list(read_rows(text, "motion"))
+
+
+def test_what_holds_by_default_ends_with_the_section():
+    text = "by default:\n    exact, nan ok\nf() -> int\n    one\ng() -> int\n    two\n    motion, exact\n\n"
+    f, g, h = read_rows(text + "h() -> int\n    three\n    approximate: why", "motion")
+    assert [row.nan_ok for row in (f, g, h)] == [True, False, False]
+    assert (g.time, h.support, h.note) == (TimeClass.MOTION, Support.APPROXIMATE, "why")
+
+
+# --- catalogues
+
+
+def test_extra_names_are_switched_on_by_hand():
     opened = catalogue_for("3.15", extra=["set_tool_communication", "movej"])
     assert "set_tool_communication" in opened
     assert opened["movej"] == CB3_3_15["movej"]
@@ -248,7 +191,7 @@ def test_extra_names_are_switched_on_by_hand() -> None:
         catalogue_for("3.15", extra=["no_such"])
 
 
-def test_versions() -> None:
+def test_versions():
     assert Version.of("3.15.8") == Version.of((3, 15, 8, 106339)) == (3, 15)
     assert catalogue_for((3, 15, 8, 0)) is CB3_3_15
     assert Version(5, 9) < Version(5, 11)
@@ -275,12 +218,8 @@ def test_versions() -> None:
         ("zzz", None),
     ],
 )
-def test_suggestions(misspelt: str, meant: str | None) -> None:
+def test_suggestions(misspelt, meant):
     assert CB3_3_15.suggest(misspelt, ["my_function"]) == meant
-
-
-def test_parameter_types_all_have_a_check() -> None:
-    assert [kind for kind in ParamType if kind is not ParamType.ANY and fits(kind, object())] == []
 
 
 def test_a_catalogue_of_the_tables_is_pickled_by_its_version_and_any_other_whole():
@@ -289,63 +228,135 @@ def test_a_catalogue_of_the_tables_is_pickled_by_its_version_and_any_other_whole
     assert pickle.loads(pickle.dumps(own)).names == own.names < catalogue_for("5.11").names
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("f(a: number)\n    sum\n    exact", "write name"),
-        ("f(a: number) -> None", "write name"),
-        ("f(a: float) -> None\n    sum\n    exact", "'a: float' of .* is not a parameter"),
-        ("f(a: number = 1 2) -> None\n    sum\n    exact", "'a: number = 1 2' of .* is not a parameter"),
-        ("f() -> None\n    sum\n    exactly", "exactly in 'exactly'; allowed: zero, motion"),
-    ],
-)
-def test_a_row_that_cannot_be_read_is_refused(text, message):
-    with pytest.raises(ValueError, match=message):
-        list(read_rows(text, "motion"))
-
-
-def test_what_holds_by_default_ends_with_the_section():
-    text = "by default:\n    exact, nan ok\nf() -> int\n    one\ng() -> int\n    two\n    motion, exact\n\n"
-    f, g, h = read_rows(text + "h() -> int\n    three\n    approximate: why", "motion")
-    assert [row.nan_ok for row in (f, g, h)] == [True, False, False]
-    assert (g.time, h.support, h.note) == (TimeClass.MOTION, Support.APPROXIMATE, "why")
-
-
 # --- the page
 
 
-def test_page_shows_every_form_of_every_function() -> None:
+def test_the_page_shows_every_form_of_every_function_and_every_method():
     page = render()
     assert [row.signature for row in ALL_ROWS if f"`{row.signature}`" not in page] == []
-
-
-def test_totals_add_up() -> None:
-    line = next(line for line in render().splitlines() if line.startswith("| **total**"))
-    cells = [int(cell) for cell in line.split("|")[2:6]]
-    assert cells == [*(sum(row.support is kind for row in CB3_3_15) for kind in Support), len(CB3_3_15)]
-
-
-def test_page_shows_every_method() -> None:
-    page = render()
     assert [row.form for row in METHODS if f"`{row.form}`" not in page] == []
 
 
-def test_every_version_has_its_totals() -> None:
-    for version in ("3.15", "5.12", "10.11"):
-        line = next(
-            line for line in render().splitlines() if line.startswith("| ") and f" {version} |" in line
-        )
-        rows = catalogue_for(version)
-        counts = [*(sum(row.support is kind for row in rows) for kind in Support), len(rows)]
-        assert [int(cell) for cell in line.split("|")[2:6]] == counts
+@pytest.mark.parametrize(
+    ("version", "label"), [("3.15", "**total**"), *((v, f" {v} |") for v in ("3.15", "5.12", "10.11"))]
+)
+def test_totals_add_up(version, label):
+    line = next(line for line in render().splitlines() if line.startswith("| ") and label in line)
+    rows = catalogue_for(version)
+    counts = [*(sum(row.support is kind for row in rows) for kind in Support), len(rows)]
+    assert [int(cell) for cell in line.split("|")[2:6]] == counts
 
 
-def test_tables_are_rectangular() -> None:
-    width = 0
-    for line in render().splitlines():
-        if not line.startswith("|"):
-            width = 0
+# --- calls
+
+
+def bind(name: str, args: list[Any], /, **named: Any) -> tuple[Any, ...]:
+    """The bound arguments; raises ScriptTypeError if the call does not fit the signature."""
+    sources = {"arg": args.__getitem__, "kw": named.__getitem__, "default": lambda value: value}
+    return tuple(sources[kind](key) for kind, key in CB3_3_15.static_bind(name, len(args), tuple(named)))
+
+
+def test_slots_name_the_source_of_each_parameter():
+    assert CB3_3_15.static_bind("movej", 1, ["r", "a"]) == [
+        ("arg", 0),
+        ("kw", "a"),
+        ("default", 1.05),
+        ("default", 0),
+        ("kw", "r"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "n_positional", "keywords", "text"),
+    [
+        ("speedl", 2, ["t_min"], "speedl() got an unexpected keyword argument 't_min'"),
+        ("sync", 1, [], "sync takes exactly 0 arguments (1 given)"),
+        ("set_tcp", 0, [], "set_tcp takes exactly 1 argument (0 given)"),
+        ("movej", 6, [], "movej takes exactly 1 to 5 arguments (6 given)"),
+        ("str_sub", 1, [], "str_sub takes exactly 2 or 3 arguments (1 given)"),
+        ("socket_open", 1, ["socket_name"], "socket_open() missing required argument 'port'"),
+        ("movej", 1, ["q"], "movej() got multiple values for keyword argument 'q'"),
+        ("movej", 1, ["a", "a"], "movej() got multiple values for keyword argument 'a'"),
+    ],
+)
+def test_wrong_calls(name, n_positional, keywords, text):
+    with pytest.raises(ScriptTypeError) as caught:
+        CB3_3_15.static_bind(name, n_positional, keywords)
+    assert caught.value.message == text
+    assert caught.value.hint == f"use {CB3_3_15[name].signature}"
+    assert caught.value.wire_text == f"Type error: {text}"
+
+
+@pytest.mark.parametrize(
+    ("version", "name", "n_positional", "keywords", "hint"),
+    [
+        ("3.15", "modbus_add_signal", 7, [], "5.15, PolyScope X 10.0; this is CB3 3.15"),
+        ("5.12", "modbus_add_signal", 5, ["register_count"], "5.15, PolyScope X 10.0; this is e-Series 5.12"),
+        ("3.15", "freedrive_mode", 1, [], "5.10, PolyScope X 10.0; this is CB3 3.15"),
+    ],
+)
+def test_a_call_that_other_software_knows_names_it(version, name, n_positional, keywords, hint):
+    with pytest.raises(ScriptTypeError) as caught:
+        catalogue_for(version).static_bind(name, n_positional, keywords)
+    assert caught.value.hint == f"with these arguments it is known since e-Series {hint}"
+
+
+def test_every_row_binds_its_shortest_and_longest_call():
+    for row in ALL_ROWS:
+        if row.any_names:
             continue
-        cells = line.replace("\\|", "").count("|")
-        width = width or cells
-        assert cells == width, line
+        n_required, n_all = sum(param.is_required for param in row.params), len(row.params)
+        kinds = [kind for kind, _ in static_bind(row, n_required)]
+        assert kinds == ["arg"] * n_required + ["default"] * (n_all - n_required)
+        assert static_bind(row, n_all) == [("arg", i) for i in range(n_all)]
+
+
+def test_a_struct_takes_named_arguments_of_any_name():
+    rows = catalogue_for("5.15")
+    assert rows.static_bind("struct", 0, ["x", "y"]) == [("kw", "x"), ("kw", "y")]
+    for form in ((0, []), (1, ["x"])):
+        with pytest.raises(ScriptTypeError, match="takes one or more named arguments"):
+            rows.static_bind("struct", *form)
+    with pytest.raises(ScriptTypeError, match="multiple values for keyword argument 'x'"):
+        rows.static_bind("struct", 0, ["x", "y", "x"])
+
+
+@given(data=st.data(), row=st.sampled_from(sorted(CB3_3_15, key=lambda row: row.name)))
+def test_any_split_into_positional_and_named_binds_the_same(data, row):
+    values: dict[str, Any] = {param.name: object() for param in row.params}
+    n_positional = data.draw(st.integers(0, len(values)))
+    named = data.draw(st.permutations(list(values)[n_positional:]))
+    positional = list(values.values())[:n_positional]
+    bound = bind(row.name, positional, **{name: values[name] for name in named})
+    assert bound == tuple(values.values())
+
+
+Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0]
+POSE = Pose(0.1, 0.2, 0.3, 0, 3.14, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "args"),
+    [
+        ("movej", [Q]),
+        ("movej", [POSE, 1, 2.5, 0, 0]),
+        ("speedj", [Q, 1, None]),
+        ("speedl", [POSE, 1, 1, None]),
+        ("speedl", [[0, 0, 0.1, 0, 0, 0], 1]),
+        ("get_forward_kin", []),
+        ("set_payload", [1, [0, 0, 0.1]]),
+        ("set_standard_digital_out", [4.0, True]),
+        ("write_output_float_register", [24, math.nan]),
+        ("write_output_integer_register", [24, 2.5]),
+        ("textmsg", [Matrix([[1]]), None]),
+        ("socket_send_string", [0.5]),
+        ("socket_read_binary_integer", [30, "s", -1]),
+        ("popup", [3]),
+    ],
+)
+def test_accepted_values(name, args):
+    CB3_3_15.check_of(name)(bind(name, args))
+
+
+def test_parameter_types_all_have_a_check():
+    assert [kind for kind in ParamType if kind is not ParamType.ANY and fits(kind, object())] == []

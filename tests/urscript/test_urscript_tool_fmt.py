@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lark import Lark
-from random_trees import programs, statements
-from tree_printer import print_program
+from program_texts import print_program, programs, statements
 from typer.testing import CliRunner
 
 from urscript.cli import app
@@ -17,9 +16,18 @@ from urscript.syntax.nodes import same_tree
 from urscript.syntax.parser import parse
 
 ROOT = Path(__file__).parents[2]
+# The chunks of the box are left out: they have no other words than those of the language.
 SCRIPTS = sorted(
     file
-    for folder in ("urscript", "ur_emulator", "pc_client", "examples", "tests", "docs")
+    for folder in (
+        "urscript",
+        "ur_emulator",
+        "pc_client",
+        "examples",
+        "tests/programs",
+        "tests/urscript",
+        "docs",
+    )
     for file in (ROOT / folder).rglob("*.script")
 )
 COMMENTS = []
@@ -64,18 +72,13 @@ gaps = st.one_of(
 )
 
 
-@settings(max_examples=50)
-@given(programs)
-def test_what_the_printer_writes_is_canonical(tree):
-    text = print_program(tree)
-    assert formatted(text) == text
-
-
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(programs, st.data())
 def test_any_blanks_and_comments_between_tokens_leave_the_tree_and_the_comments_as_they_are(tree, data):
+    canonical = print_program(tree)
+    assert formatted(canonical) == canonical
     text = data.draw(gaps)
-    for token in LEXER.lex(print_program(tree)):
+    for token in LEXER.lex(canonical):
         # Nothing but a line end can stand after a label.
         text += token + ("\n" if token.type == "LABEL" else "") + data.draw(gaps)
     assert parse(Source(text)) == tree
@@ -163,7 +166,7 @@ def test_a_program_stays_one_program_on_the_wire():
 
 
 def test_deep_nesting_is_laid_out_or_refused_in_words():
-    for text in ("if True:\n" * 3000 + "end\n" * 3000, "x = " + "(" * 3000 + "1" + ")" * 3000 + "\n"):
+    for text in ("if True:\n" * 1000 + "end\n" * 1000, "x = " + "(" * 1000 + "1" + ")" * 1000 + "\n"):
         try:
             result = formatted(text)
         except ScriptSyntaxError:
@@ -222,7 +225,7 @@ def test_fmt_of_a_missing_file_is_wrong_use(folder):
     assert call("nowhere.script").exit_code == 2
 
 
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(programs, statements)
 def test_same_tree_is_equality(tree, other):
     assert same_tree(tree, parse(Source(print_program(tree))))

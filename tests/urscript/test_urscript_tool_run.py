@@ -10,6 +10,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from program_texts import program_of
 from typer.testing import CliRunner
 
 import urscript.commands.run_command
@@ -36,16 +37,12 @@ def run(tmp_path, monkeypatch):
     return call
 
 
-def body(*lines):
-    return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"
-
-
 # --- what it tells ---------------------------------------------------------------------------------------
 
 
 def test_moves_are_reported_with_start_place_goal_and_duration(run):
     # 0.3 rad at 1 rad/s and 2 rad/s2 are a triangle: 2 * sqrt(0.3 / 2) = 0.775 s, 97 cycles.
-    text = body(
+    text = program_of(
         f"movej({HOME})",
         "t0 = 0",
         "movej([0.3, -1.5708, 0, -1.5708, 0, 0], a=2, v=1)",
@@ -76,7 +73,7 @@ def test_moves_are_reported_with_start_place_goal_and_duration(run):
 
 def test_the_final_pose_is_that_of_the_last_move(run):
     lower = "pose_add(get_target_tcp_pose(), p[0, 0, -0.05, 0, 0, 0])"
-    text = body("movej([0, -1.2, 1.2, -1.57, -1.57, 0])", f"movel({lower}, a=0.5, v=0.2)")
+    text = program_of("movej([0, -1.2, 1.2, -1.57, -1.57, 0])", f"movel({lower}, a=0.5, v=0.2)")
     document = json.loads(run(text, "--json", "--fidelity", "ideal").stdout)
     assert document["status"] == "finished"
     assert len(document["joints"]) == 6
@@ -87,7 +84,7 @@ def test_the_final_pose_is_that_of_the_last_move(run):
 
 
 def test_a_stream_ends_where_the_program_stops_calling(run):
-    text = body(
+    text = program_of(
         "i = 0",
         "while i < 4:",
         "speedj([0, 0, 0, 0, 0, 0.1], 1, 0.008)",
@@ -115,7 +112,7 @@ def test_threads_beside_the_moving_one_are_reported_in_between(run):
 
 
 def test_popups_are_closed_and_questions_answered(run):
-    text = body(
+    text = program_of(
         'popup("mind", "Caution", True, blocking=True)',
         'n = request_integer_from_primary_client("how many")',
         'b = request_boolean_from_primary_client("sure")',
@@ -129,7 +126,7 @@ def test_popups_are_closed_and_questions_answered(run):
 
 
 def test_a_question_that_nobody_answers_ends_the_run_with_its_place(run):
-    result = run(body('n = request_integer_from_primary_client("how many")'), "--answer", "no idea")
+    result = run(program_of('n = request_integer_from_primary_client("how many")'), "--answer", "no idea")
     assert result.exit_code == 1
     assert (
         "a.script:2:7: Runtime error: the program asks for an integer: 'how many', but the answer is 'no idea' (--answer)\n"
@@ -141,14 +138,16 @@ def test_a_question_that_nobody_answers_ends_the_run_with_its_place(run):
 
 
 def test_a_failing_program_shows_where(run):
-    result = run(body("x = [1]", "i = 7", "textmsg(x[i])"))
+    result = run(program_of("x = [1]", "i = 7", "textmsg(x[i])"))
     assert result.exit_code == 1
     assert "a.script:4:11: Runtime error: index 7 is out of range" in result.stderr
     assert "      textmsg(x[i])\n              ^\n" in result.stderr
 
 
 def test_a_protective_stop_shows_its_code_and_the_move_that_led_to_it(run):
-    result = run(body(f"movej({HOME})", "sync()", "movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])", "textmsg(1)"))
+    result = run(
+        program_of(f"movej({HOME})", "sync()", "movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])", "textmsg(1)")
+    )
     assert result.exit_code == 1
     assert "a.script:4:3: Robot: C204A0: Protective Stop" in result.stderr
     assert "      movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])\n      ^\n" in result.stderr
@@ -167,7 +166,7 @@ def test_a_protective_stop_shows_its_code_and_the_move_that_led_to_it(run):
     ],
 )  # fmt: skip
 def test_a_target_that_the_arm_cannot_reach_is_named(run, move, said):
-    result = run(body(move))
+    result = run(program_of(move))
     assert result.exit_code == 1
     assert result.stderr.startswith("a.script:2:3: ")
     assert said in result.stderr
@@ -180,7 +179,7 @@ def test_an_endless_program_ends_at_the_limit_and_says_so(run):
 
 
 def test_a_wrong_program_is_not_run(run):
-    result = run(body("movj(1)"), "--json")
+    result = run(program_of("movj(1)"), "--json")
     assert result.exit_code == 1
     document = json.loads(result.stdout)
     assert (document["status"], document["events"]) == ("failed", [])
@@ -188,7 +187,7 @@ def test_a_wrong_program_is_not_run(run):
 
 
 def test_a_failure_is_a_diagnostic_for_editors(run):
-    result = run(body("x = [1]", "i = 7", "textmsg(x[i])"), "--json")
+    result = run(program_of("x = [1]", "i = 7", "textmsg(x[i])"), "--json")
     assert result.exit_code == 1
     found = json.loads(result.stdout)["diagnostics"]
     assert [(item["line"], item["column"], item["code"]) for item in found] == [(4, 11, "E201")]
@@ -200,12 +199,12 @@ def test_a_secondary_program_has_one_cycle(run):
 
 
 def test_quiet_shows_the_texts_alone(run):
-    result = run(body(f"movej({HOME})", "textmsg(1)"), "--quiet")
+    result = run(program_of(f"movej({HOME})", "textmsg(1)"), "--quiet")
     assert (result.exit_code, result.output) == (0, "1\n")
 
 
 def test_the_same_seed_is_the_same_run(run):
-    text = body(f"movej({HOME})", "textmsg(get_actual_joint_positions())")
+    text = program_of(f"movej({HOME})", "textmsg(get_actual_joint_positions())")
 
     def told(*words):
         document = json.loads(run(text, "--json", *words).stdout)
@@ -216,7 +215,7 @@ def test_the_same_seed_is_the_same_run(run):
 
 
 def test_tracing_shows_the_lines_between_the_moves(run):
-    result = run(body("x = 1", f"movej({HOME})", "textmsg(x)"), "--trace")
+    result = run(program_of("x = 1", f"movej({HOME})", "textmsg(x)"), "--trace")
     assert [line[:10] for line in result.stdout.splitlines()[:3]] == [
         "     0  p:",
         "     0  p:",
@@ -258,7 +257,7 @@ def test_sockets_reach_real_peers(run):
 
         thread = threading.Thread(target=peer)
         thread.start()
-        text = body(
+        text = program_of(
             f'socket_open("127.0.0.1", {server.getsockname()[1]})',
             "r = socket_read_ascii_float(2)",
             "socket_send_string(r[1] + r[2])",
@@ -283,8 +282,8 @@ def test_the_package_offers_its_arms():
     assert tuple(MAKER.robots) == tuple(ROBOTS)
 
 
-@pytest.mark.parametrize("name", list(ROBOTS))
-def test_every_arm_can_be_chosen(run, name):
+@pytest.mark.parametrize("name", ["ur3", "ur20"])
+def test_an_arm_can_be_chosen(run, name):
     document = json.loads(run("sync()", "--robot", name.upper(), "--json").stdout)
     assert document["robot"].startswith(ROBOTS[name].title)
 
@@ -320,10 +319,10 @@ def test_wrong_options_say_what_is_allowed(run, words, allowed):
 
 def test_without_a_robot_it_only_writes_down(run, monkeypatch):
     monkeypatch.setattr(urscript.commands.run_command, "find_makers", list)
-    result = run(body(f"movej({HOME})"))
+    result = run(program_of(f"movej({HOME})"))
     assert result.stdout == "    0.000 s  p: movej([0, -1.5708, 0, -1.5708, 0, 0], 1.4, 1.05, 0, 0)\n"
     assert result.stderr == "finished after 0.024 s of robot time (no robot)\n"
-    assert result.stdout == run(body(f"movej({HOME})"), "--robot", "none").stdout
+    assert result.stdout == run(program_of(f"movej({HOME})"), "--robot", "none").stdout
 
 
 # --- --trace

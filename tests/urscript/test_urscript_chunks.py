@@ -1,4 +1,4 @@
-"""Every error that the language can make is made by some chunk, which says its place and text.
+"""The conformance corpus: every chunk runs, every rule and every error of the language is shown by one.
 
 The places in the code that make an error are found in its syntax; those that chunks pass are recorded while
 the chunks run. An error counts only if a chunk ended with it.
@@ -7,17 +7,62 @@ the chunks run. An error counts only if a chunk ended with it.
 import ast
 import re
 import sys
+from collections import defaultdict
 from functools import cache
 from pathlib import Path
 
 import pytest
-from chunk_runner import load_chunks, run_chunk
+from chunk_runner import load_chunks, matches, run_chunk, unknown_types
+from reference_rows import ROWS
 
 import urscript
 from urscript import errors
+from urscript.builtins import pure_builtins
+
+TESTS = Path(__file__).parents[1]
+CHUNKS = load_chunks(*sorted((TESTS / "urscript" / "chunks").glob("*.script")))
+
+
+@pytest.mark.parametrize("chunk", CHUNKS, ids=str)
+def test_chunk(chunk):
+    run_chunk(chunk)
+
+
+@pytest.mark.parametrize("chunk", CHUNKS, ids=str)
+def test_chunk_without_static_types(chunk):
+    with unknown_types():
+        run_chunk(chunk)
+
+
+def test_a_wrong_expectation_is_noticed():
+    assert matches("a ... b", "a long b")
+    assert not matches("a ... b", "a long c")
+    assert not matches("division", "division by zero")
+
+
+def test_every_row_of_the_language_notes_is_shown_by_a_chunk():
+    assert {row for chunk in CHUNKS for row in chunk.rows} == set(ROWS)
+
+
+def test_every_builtin_without_a_robot_is_called_by_a_chunk():
+    called = {name for chunk in CHUNKS for name in re.findall(r"\b(\w+)\(", chunk.text)}
+    assert set(pure_builtins(0)) - called == set()
+
+
+def test_no_chunk_is_another_one_with_other_numbers():
+    """Of all chunks, those of the box too; marks of what is expected are part of a chunk, words for people are not."""
+    comment = re.compile(r'("[^"\n]*")|#(?: |#|ref ).*')
+    number = re.compile(r'("[^"\n]*")|(?<!\w)[0-9]*\.?[0-9]+([eE][+-]?[0-9]+)?')
+    alike = defaultdict(list)
+    for chunk in load_chunks(*sorted(TESTS.glob("*/chunks/*.script"))):
+        program = comment.sub(lambda found: found[1] or "", chunk.text)
+        alike[" ".join(number.sub(lambda found: found[1] or "0", program).split())].append(str(chunk))
+    assert [names for names in alike.values() if len(names) > 1] == []
+
+
+# --- errors ----------------------------------------------------------------------------------------------
 
 PACKAGE = Path(urscript.__file__).parent
-CHUNKS = load_chunks(*sorted(Path(__file__).parent.glob("chunks/*.script")))
 # Commands and warnings: they report errors, their own tests look at those.
 NOT_THE_LANGUAGE = re.compile(r"(check|commands)/.*|(cli|formatter)\.py")
 ERROR_CLASSES = {
@@ -29,11 +74,11 @@ OUT_OF_REACH = {
     "compile/compiler.py compile_resolved": "the limits before it are lower than Python's",
     "compile/interpreter_mode.py compile_statements": "as program.py resolve_source; tests/ur_emulator/test_interpreter",
     "run/runtime.py equal": "dialect.MIXED_TYPES_COMPARE",
-    "names/resolver.py resolve": "201 functions; test_urscript_lang_running",
+    "names/resolver.py resolve": "201 functions; test_urscript_running",
     "program.py resolve_source": "the resolver is deeper than the compiler in no program short enough for a chunk",
-    "program.py RunningProgram._finish": "a fault of a host; test_urscript_lang_running",
+    "program.py RunningProgram._finish": "a fault of a host; test_urscript_running",
     "run/runtime.py _declared_only.call": "the recording host has every builtin; the chunks of the box do",
-    "program.py _script_error": "a fault of a host; test_urscript_lang_running",
+    "program.py _script_error": "a fault of a host; test_urscript_running",
     "values.py Pose.of": "six items are the grammar's",
     "values.py wrap_int": "dialect.INT_OVERFLOW",
 }
