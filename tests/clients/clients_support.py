@@ -78,6 +78,14 @@ def served_box(folder, *options):
     assert "Traceback" not in log.read_text()
 
 
+def wait_until(condition, what="what was waited for"):
+    """Ask again and again, without hurry: a client's own threads need the processor."""
+    end = time.monotonic() + TIMEOUT
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not come"
+        time.sleep(0.002)
+
+
 def connect(box, port):
     """Connect to a port of a box by its name in `Ports`."""
     sock = socket.create_connection((box.host, getattr(box.ports, port)), timeout=TIMEOUT)

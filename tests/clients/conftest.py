@@ -36,14 +36,20 @@ def fresh_box(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def ur_rtde_interfaces(box):
-    """ur_rtde's control and receive interfaces, connected once for all tests of a file."""
-    from ur_rtde_support import Arm, RTDEControl, RTDEReceive
+def home_q():
+    """Joint angles where tests of ur_rtde begin [rad]."""
+    from ur_rtde_support import HOME
 
-    arm = Arm(box=box, receive=RTDEReceive(box.host), control=RTDEControl(box.host))
-    yield arm
-    arm.control.disconnect()
-    arm.receive.disconnect()
+    return HOME
+
+
+@pytest.fixture(scope="module")
+def ur_rtde_interfaces(box, home_q):
+    """ur_rtde's control and receive interfaces, connected once for all tests of a file."""
+    from ur_rtde_support import Arm, RTDEControl, RTDEReceive, connected
+
+    with connected(RTDEReceive, box.host) as receive, connected(RTDEControl, box.host) as control:
+        yield Arm(box=box, receive=receive, control=control, home=home_q)
 
 
 @pytest.fixture

@@ -21,8 +21,7 @@ from driver_patterns import (
     DriverServers,
     headless_driver,
 )
-from primary_wire import KEY, VERSION_MESSAGE, PrimaryWire
-from strict_rtde import StrictRtde
+from strict_clients import VERSION_MESSAGE, PrimaryWire, StrictRtde
 
 OUTPUTS = (
     "timestamp",
@@ -263,16 +262,3 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
             assert moved[5:90].min() > 1e-5, "the arm went on, without a stutter"
             point(np.add(start, [0.1, 0, 0, 0, 0, 0]), 0)
             rtde.until(lambda v: v["runtime_state"] == STOPPED)
-
-
-@BOTH_GENERATIONS
-def test_a_program_is_reported_by_key_messages(box):
-    with PrimaryWire(box) as primary:
-        primary.write("def named():\n\tsync()\nend\n")
-        titles = []
-        while len(titles) < 2:
-            message = primary.message(KEY)
-            length = message.body[8]
-            if message.body[9 + length :] == b"named":
-                titles.append(message.body[9 : 9 + length].decode())
-        assert titles == ["PROGRAM_XXX_STARTED", "PROGRAM_XXX_STOPPED"]

@@ -1,12 +1,25 @@
-"""A driver starts on boxes of 5.x as on a real arm: dashboard, RTDE, primary port, a first program."""
+"""A driver built on the maker's client library starts on a box as on a real arm: dashboard, RTDE, primary port.
 
+It refuses what the library refuses when it is built for its own tests: sub-packages that are shorter or longer
+than the software announces, another arm than the one it was started for, recipes with unknown names.
+"""
+
+import re
 import struct
+from itertools import pairwise
 
 import pytest
-from clients_support import connect, receive_exactly, served_box
-from driver_startup import UR_TYPES, RefusedError, series, start
-from primary_wire import KEY, TEXT, PrimaryWire
-from strict_rtde import StrictRtde
+from clients_support import connect, served_box, wait_until
+from strict_clients import (
+    CONFIGURATION,
+    KINEMATICS,
+    MASTERBOARD,
+    MODE,
+    TEXT_MESSAGE,
+    VERSION_MESSAGE,
+    PrimaryWire,
+    StrictRtde,
+)
 
 from protocol.primary.layout import ConfigurationData
 from protocol.rtde.fields import OUTPUTS
@@ -16,10 +29,42 @@ from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.robots import ROBOTS
 from ur_emulator.ports.primary.robot_state import setup_records
 
-# Software, and the size of its realtime frames.
-SOFTWARE = {"5.3.0": 1108, "5.8.0": 1116, "5.9.4": 1140, "5.12.2": 1220, "5.15.0": 1220, "5.25.1": 1220}
-# The drivers' library needs 5.9.4.
-FOR_DRIVERS = [version for version in SOFTWARE if tuple(map(int, version.split("."))) >= (5, 9)]
+# What a driver is started for: type code and series of the arm.
+UR_TYPES = {
+    "ur3e": (3, "E"),
+    "ur5e": (1, "E"),
+    "ur7e": (1, "E"),
+    "ur10e": (2, "E"),
+    "ur12e": (2, "E"),
+    "ur16e": (4, "E"),
+    "ur8long": (6, "UR"),
+    "ur15": (9, "UR"),
+    "ur18": (5, "UR"),
+    "ur20": (7, "UR"),
+    "ur30": (8, "UR"),
+}
+# The recipes of the ROS 2 driver.
+DRIVER_OUTPUTS = (
+    "timestamp", "actual_q", "actual_qd", "speed_scaling", "target_speed_fraction", "runtime_state",
+    "actual_TCP_force", "actual_TCP_pose", "target_TCP_pose", "actual_digital_input_bits",
+    "actual_digital_output_bits", "standard_analog_input0", "standard_analog_input1",
+    "standard_analog_output0", "standard_analog_output1", "analog_io_types", "tool_mode",
+    "tool_analog_input_types", "tool_analog_input0", "tool_analog_input1", "tool_output_voltage",
+    "tool_output_current", "tool_temperature", "robot_mode", "safety_mode", "robot_status_bits",
+    "safety_status_bits", "actual_current", "tcp_offset", "payload", "payload_cog", "payload_inertia",
+)  # fmt: skip
+DRIVER_INPUTS = (
+    "speed_slider_mask", "speed_slider_fraction", "standard_digital_output_mask", "standard_digital_output",
+    "configurable_digital_output_mask", "configurable_digital_output", "tool_digital_output_mask",
+    "tool_digital_output", "standard_analog_output_mask", "standard_analog_output_type",
+    "standard_analog_output_0", "standard_analog_output_1",
+)  # fmt: skip
+# First software of outputs that the driver leaves out where the robot does not have them.
+SINCE = {"payload_inertia": (5, 11)}
+# What the reader holds at most of a package.
+READER_SIZE = 4096
+# The oldest software that the library takes, and a new one.
+FOR_DRIVERS = pytest.mark.parametrize("box", ["5.9.4", "5.25.1"], indirect=True)
 
 
 @pytest.fixture(scope="module")
@@ -30,28 +75,73 @@ def box(tmp_path_factory, request):
         yield served
 
 
-@pytest.mark.parametrize("box", FOR_DRIVERS, indirect=True)
-def test_a_driver_for_this_arm_starts(box):
-    started = start(box, "ur5e")
-    assert ".".join(map(str, started.version[:3])) == box.software
-    assert started.period == 0.002
+def ask_version(box):
+    """Read the greeting of the dashboard, and ask it for the software: the four numbers before the bracket."""
+    with connect(box, "dashboard") as sock, sock.makefile("rb") as lines:
+        assert lines.readline() == b"Connected: Universal Robots Dashboard Server\n"
+        sock.sendall(b"PolyscopeVersion\n")
+        reply = lines.readline().decode()
+    numbers = re.fullmatch(r"URSoftware (\d+\.\d+\.\d+\.\d+) \(\w{3} \d{2} \d{4}\)\n", reply)
+    assert numbers, reply
+    return tuple(map(int, numbers[1].split(".")))
 
 
-@pytest.mark.parametrize("box", FOR_DRIVERS, indirect=True)
-@pytest.mark.parametrize("ur_type", ["ur3e", "ur20"])
-def test_a_driver_for_another_arm_does_not(box, ur_type):
-    with pytest.raises(RefusedError):
-        start(box, ur_type)
+def start_rtde(box, version, rate):
+    """Set up outputs, read data, set up inputs; return the time between two packages at the full rate [s]."""
+    with StrictRtde(box) as client:
+        assert client.controller() == version
+        client.want(*(name for name in DRIVER_OUTPUTS if version >= SINCE.get(name, (0,))), frequency=rate)
+        client.start()
+        stamps = [client.data()["timestamp"] for _ in range(20)]
+        client.pause()
+        assert client.inputs(*DRIVER_INPUTS) == 1
+        client.start()
+        assert client.data()["robot_mode"] == 7
+    return round(min(after - before for before, after in pairwise(stamps)), 6)
 
 
-@pytest.mark.parametrize("box", SOFTWARE, indirect=True)
-def test_frames_have_the_size_of_the_software(box):
-    with connect(box, "realtime") as sock:
-        frames = [receive_exactly(sock, SOFTWARE[box.software]) for _ in range(3)]
-    assert [struct.unpack_from(">i", frame)[0] for frame in frames] == [SOFTWARE[box.software]] * 3
+def read_setup(box, version):
+    """Read the primary port until the configuration data; return the robot type."""
+    with PrimaryWire(box) as wire:
+        check_version(wire.message(VERSION_MESSAGE)[1], version)
+        parts = wire.state()
+    sizes = {
+        MODE: 42,
+        MASTERBOARD: 70,
+        KINEMATICS: 220,
+        CONFIGURATION: 444 if version >= (5, 25, 1) else 440,
+    }
+    assert {part: len(parts[part]) for part in sizes} == sizes
+    assert 5 + sum(5 + len(body) for body in parts.values()) < READER_SIZE
+    assert parts[MASTERBOARD][62] == 0  # no Euromap67 board, so its fields are absent
+    *_, robot_type, sub_type = struct.unpack_from(">4i", parts[CONFIGURATION], 424)
+    assert sub_type == 3
+    return robot_type
 
 
-@pytest.mark.parametrize("box", FOR_DRIVERS, indirect=True)
+def check_version(body, version):
+    """Check the version message: the project's name, the three numbers, build 0 and a date of 20 characters."""
+    name = body[1 : 1 + body[0]].decode()
+    major, minor, bugfix, build = struct.unpack_from(">BBii", body, 1 + body[0])
+    assert (name, major, minor, bugfix, build) == ("URControl", *version[:3], 0)
+    assert re.fullmatch(r"\d\d-\d\d-\d{4}, \d\d:\d\d:\d\d", body[1 + body[0] + 10 :].decode())
+
+
+def series(robot_type):
+    """Return the series of an arm of 5.x by its type: those from 5 on came after the e-Series."""
+    return "UR" if robot_type >= 5 else "E"
+
+
+@FOR_DRIVERS
+def test_a_driver_for_this_arm_and_for_no_other_starts(box):
+    version = ask_version(box)
+    assert ".".join(map(str, version[:3])) == box.software
+    assert start_rtde(box, version, 500.0) == 0.002
+    robot_type = read_setup(box, version)
+    assert (robot_type, series(robot_type)) == UR_TYPES["ur5e"]
+
+
+@FOR_DRIVERS
 def test_all_outputs_can_be_asked_for_at_once(box):
     """The library's list of all names, then the same without those that this software does not have."""
     software = SoftwareVersion.parse(box.software)
@@ -62,17 +152,29 @@ def test_all_outputs_can_be_asked_for_at_once(box):
         assert {name for name, kind in zip(names, types, strict=True) if kind == "NOT_FOUND"} == absent
         assert number == (0 if absent else 1)
         client.want(*(name for name in names if name not in absent), frequency=500.0)
-        assert client.start()
+        client.start()
         assert client.data()["timestamp"] > 0.0
 
 
-@pytest.mark.parametrize("box", FOR_DRIVERS, indirect=True)
+@FOR_DRIVERS
 def test_a_program_sent_at_once_runs_at_500_hz(box):
     with PrimaryWire(box) as wire:
         wire.write("stop program\ndef externalControl():\n\ttextmsg(get_steptime())\nend\n")
-        said = [wire.message() for _ in range(5)]
-    texts = [message.body.decode("latin-1") for message in said if message.kind in (KEY, TEXT)]
-    assert [text[-15:] for text in texts] == ["externalControl", "0.002", "externalControl"]
+        said = wire.titles_and_texts(3)
+    assert said == [
+        ("PROGRAM_XXX_STARTED", "externalControl"),
+        "0.002",
+        ("PROGRAM_XXX_STOPPED", "externalControl"),
+    ]
+
+
+def test_a_driver_for_a_cb3_sets_up_rtde_and_writes_into_the_log(tmp_path):
+    text, source = b"written by a client", b"driver"
+    with served_box(tmp_path) as box:
+        assert start_rtde(box, ask_version(box), 125.0) == 0.008
+        with StrictRtde(box) as client:
+            client.send(TEXT_MESSAGE, bytes([len(text)]) + text + bytes([len(source)]) + source + b"\3")
+            wait_until(lambda: "INFO driver: written by a client" in box.log.read_text(), "the text")
 
 
 @pytest.mark.parametrize("name", [name for name, robot in ROBOTS.items() if robot.generation is E_SERIES])
@@ -80,4 +182,4 @@ def test_every_arm_is_the_type_that_its_driver_expects(name):
     robot = ROBOTS[name]
     setup = setup_records(robot, robot.dh, limits_of(robot))
     (told,) = (record for record in setup if isinstance(record, ConfigurationData))
-    assert (told.robot_type, series(told.robot_type, (5, 22))) == UR_TYPES[name]
+    assert (told.robot_type, series(told.robot_type)) == UR_TYPES[name]

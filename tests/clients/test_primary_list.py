@@ -3,22 +3,26 @@
 import struct
 
 import pytest
-from clients_support import BOTH_GENERATIONS, TIMEOUT
-from primary_wire import (
+from clients_support import TIMEOUT
+from strict_clients import (
     CONFIGURATION,
     ERROR,
     EXCEPTION,
-    KEY,
     KINEMATICS,
     MASTERBOARD,
     MODE,
     SAFETY_MODE,
-    TEXT,
-    VERSION_MESSAGE,
     PrimaryWire,
+    StrictRtde,
 )
-from strict_rtde import StrictRtde
 
+# In lockstep: nothing here needs a client that is in time.
+BOTH_GENERATIONS = pytest.mark.parametrize(
+    "box",
+    [("--pace", "lockstep"), ("--pace", "lockstep", "--robot", "ur5e", "--software", "5.25.1")],
+    indirect=True,
+    ids=["cb3", "e-series"],
+)
 POWER_OFF, IDLE, RUNNING = 3, 5, 7
 PROTECTIVE_STOP_CODE = 209
 WARNING = 2
@@ -35,7 +39,7 @@ def is_protective_stopped(state):
 
 def until(primary, condition):
     for _ in range(int(TIMEOUT * 10)):
-        if condition(state := primary.state(MODE)):
+        if condition(state := primary.state()):
             return state
     raise AssertionError("what was waited for did not come")
 
@@ -58,14 +62,6 @@ def test_soon_after_connecting(box):
     assert {MODE, MASTERBOARD, KINEMATICS, CONFIGURATION} <= seen.keys()
     assert len(seen[KINEMATICS]) == 6 * 4 + 24 * 8 + 4
     assert robot_mode(seen) == RUNNING
-
-
-def test_version_message(primary):
-    body = primary.message(VERSION_MESSAGE).body
-    name = body[1 : 1 + body[0]]
-    major, minor, bugfix, build = struct.unpack_from(">BBii", body, 1 + body[0])
-    assert (name, major, minor, bugfix) == (b"URControl", 3, 15, 8)
-    assert build >= 0
 
 
 @BOTH_GENERATIONS
@@ -93,26 +89,13 @@ def test_stop_program_may_be_said_again_and_again(primary):
     primary.write("stop program\n")
     until(primary, lambda s: s[MODE][13] == 0)
     primary.write("stop program\n")
-    assert robot_mode(primary.state(MODE)) == RUNNING
-
-
-def titles_and_texts(primary, count):
-    """Return the next key and text messages: title and text, or the text alone."""
-    found = []
-    while len(found) < count:
-        message = primary.message()
-        if message.kind == KEY:
-            length = message.body[8]
-            found.append((message.body[9 : 9 + length].decode(), message.body[9 + length :].decode()))
-        elif message.kind == TEXT:
-            found.append(message.body.decode())
-    return found
+    assert robot_mode(primary.state()) == RUNNING
 
 
 @BOTH_GENERATIONS
 def test_started_text_stopped(primary):
     primary.write('def talk():\n\ttextmsg("hello from a program")\nend\n')
-    assert titles_and_texts(primary, 3) == [
+    assert primary.titles_and_texts(3) == [
         ("PROGRAM_XXX_STARTED", "talk"),
         "hello from a program",
         ("PROGRAM_XXX_STOPPED", "talk"),
@@ -121,7 +104,7 @@ def test_started_text_stopped(primary):
 
 def exception(primary):
     """Return line, column and text of the next runtime exception."""
-    body = primary.message(EXCEPTION).body
+    _, body = primary.message(EXCEPTION)
     return *struct.unpack_from(">ii", body), body[8:].decode()
 
 
@@ -137,17 +120,16 @@ def test_an_unreachable_joint_move_is_an_exception(primary):
     line, _, text = exception(primary)
     assert line == 2
     assert text
-    assert not is_protective_stopped(primary.state(MODE))
+    assert not is_protective_stopped(primary.state())
 
 
 def error_codes(primary):
     """Return code, argument and level of the errors until the safety mode message."""
     while True:
-        message = primary.message()
-        if message.kind == ERROR:
-            yield struct.unpack_from(">iii", message.body)
-        if message.kind == SAFETY_MODE:
+        kind, body = primary.message(ERROR, SAFETY_MODE)
+        if kind == SAFETY_MODE:
             return
+        yield struct.unpack_from(">iii", body)
 
 
 def unlock(primary):
@@ -178,7 +160,7 @@ def test_a_secondary_protective_stop_is_one_error_code(primary):
 @BOTH_GENERATIONS
 def test_halt_alone_is_a_program(primary):
     primary.write("halt\n")
-    titles = [title for title, _ in titles_and_texts(primary, 2)]
+    titles = [title for title, _ in primary.titles_and_texts(2)]
     assert titles == ["PROGRAM_XXX_STARTED", "PROGRAM_XXX_STOPPED"]
 
 
@@ -194,13 +176,3 @@ def test_a_tool_that_is_set_is_the_tool(box, primary):
         rtde.until(lambda v: v["payload"] == 0.5)
         primary.write("sec setup():\n\tset_tcp(p[0,0,0,0,0,0])\nend\nsec setup():\n\tset_payload(0)\nend\n")
         rtde.until(lambda v: not any(v["tcp_offset"]) and v["payload"] == 0.0)
-
-
-def test_state_packages_of_the_secondary_port_suit_urx(old_box):
-    """Sizes 5 to 2000, type 16; the robot mode has 46 bytes in the 3.4 layout."""
-    with PrimaryWire(old_box, "secondary") as wire:
-        for _ in range(10):
-            kind, payload = wire.package()
-            if kind == 16:
-                assert 5 <= len(payload) + 5 <= 2000
-        assert len(wire.state(MODE)[MODE]) + 5 == 46

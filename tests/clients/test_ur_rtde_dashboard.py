@@ -1,8 +1,8 @@
 """ur_rtde's DashboardClient: every call it has, on a box with a program."""
 
 import pytest
-from clients_support import served_box
-from ur_rtde_support import Dashboard, dashboard_client, wait_until
+from clients_support import served_box, wait_until
+from ur_rtde_support import Dashboard, dashboard_client
 
 
 @pytest.fixture(scope="module")

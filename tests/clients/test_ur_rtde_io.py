@@ -1,7 +1,8 @@
 """ur_rtde's RTDEIOInterface beside the other interfaces: outputs, slider, registers; and who may have them."""
 
 import pytest
-from ur_rtde_support import RTDEIO, RTDEControl, RTDEReceive, connected, home, wait_until
+from clients_support import wait_until
+from ur_rtde_support import RTDEIO, RTDEControl, RTDEReceive, connected, home
 
 VOLTAGE_RANGE, CURRENT_RANGE = 10.0, (0.004, 0.020)  # V, A
 DIGITAL_OUTPUTS = 18

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from ur_rtde_support import ACCELERATION, CLOSE_X, HOME, SPEED, home, rtde_control, shifted, wait_until
+from clients_support import wait_until
+from ur_rtde_support import ACCELERATION, CLOSE_X, HOME, SPEED, home, rtde_control, shifted
 
 PathEntry, Path = rtde_control.PathEntry, rtde_control.Path
 

@@ -4,8 +4,8 @@ import gzip
 import socket
 
 import pytest
-from clients_support import served_box
-from ur_rtde_support import HOME, Arm, Dashboard, RTDEControl, RTDEReceive, connected, home, wait_until
+from clients_support import served_box, wait_until
+from ur_rtde_support import HOME, Arm, Dashboard, RTDEControl, RTDEReceive, connected, home
 
 STOP = 255  # the client's command for its script to end
 
@@ -112,7 +112,7 @@ def test_the_box_fetches_the_control_script_itself(tmp_path):
         dashboard.play()
         wait_until(control.isProgramRunning, "the program")
         assert dashboard.programState() == "PLAYING external_control.urp"
-        arm = Arm(box=box, control=control, receive=receive)
+        arm = Arm(box=box, control=control, receive=receive, home=HOME)
         assert control.moveJ(home(0.1), 3.0, 12.0)
         assert arm.is_at(home(0.1))
         dashboard.stop()

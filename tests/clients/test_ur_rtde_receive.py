@@ -1,15 +1,14 @@
-"""ur_rtde's RTDEReceiveInterface: every getter, and that they fit together."""
+"""ur_rtde's RTDEReceiveInterface: every getter, rates, recordings, recipes, registers."""
 
 import csv
 from contextlib import ExitStack
 
 import numpy as np
 import pytest
-from primary_wire import calibrated_dh, forward, rotation, twist
-from ur_rtde_support import HOME, PERIOD, RTDEIO, RTDEControl, RTDEReceive, connected, sample, wait_until
+from clients_support import wait_until
+from ur_rtde_support import HOME, PERIOD, RTDEIO, RTDEControl, RTDEReceive, connected
 
 RUNNING_ROBOT, NORMAL_SAFETY, RUNNING_JOINT, PLAYING = 7, 1, 253, 2
-GRAVITY = 9.81  # m/s^2
 
 
 def within(low, high):
@@ -92,73 +91,6 @@ def test_every_getter_is_plausible_at_rest(arm):
     }
     with pytest.raises(RuntimeError):
         arm.receive.getFtRawWrench()
-
-
-def test_values_at_rest_hold_the_arm_against_gravity(arm):
-    arm.still()
-    names = (
-        "TargetCurrent",
-        "ActualCurrent",
-        "JointControlOutput",
-        "ActualToolAccelerometer",
-        "ActualTCPForce",
-    )
-    rows = []
-    for _ in range(60):
-        arm.after(PERIOD)
-        rows.append(np.concatenate(sample(arm.receive, *names)[1]))
-    mean = np.mean(rows, axis=0)
-    target, actual, control, acceleration = mean[:6], mean[6:12], mean[12:18], mean[18:21]
-    assert np.allclose(actual, target, atol=0.15)
-    assert np.allclose(control, target, atol=0.15)
-    assert np.linalg.norm(acceleration) == pytest.approx(GRAVITY, abs=0.3)
-    _, r = forward(calibrated_dh(arm.box), arm.receive.getActualQ())
-    assert np.allclose(acceleration, r.T @ [0, 0, GRAVITY], atol=0.3) or np.allclose(
-        acceleration, r.T @ [0, 0, -GRAVITY], atol=0.3
-    )
-
-
-def test_getters_of_one_cycle_agree_while_the_arm_moves(arm):
-    dh = calibrated_dh(arm.box)
-    names = (
-        "ActualQ",
-        "ActualQd",
-        "ActualTCPPose",
-        "ActualTCPSpeed",
-        "TargetQ",
-        "TargetQd",
-        "TargetTCPPose",
-        "TargetTCPSpeed",
-    )
-    assert arm.control.moveJ([0.9, -1.5, -1.8, -0.4, 1.0, 1.2], 1.5, 4.0, True)
-    arm.until(lambda r: any(r.getTargetQd()))
-    stamps, *columns = arm.trace(lambda: any(arm.receive.getTargetQd()), *names)
-    cycles = stamps / PERIOD
-    assert np.allclose(cycles, np.round(cycles), atol=1e-4)
-    steps = np.diff(np.round(cycles)).astype(int)
-    assert steps.min() >= 1
-    assert len(stamps) >= 30
-    top = 0.0
-    for q, qd, pose, speed, target_q, target_qd, target_pose, target_speed in zip(*columns, strict=True):
-        for joints, rates, x, v, exact in (
-            (q, qd, pose, speed, 1e-6),
-            (target_q, target_qd, target_pose, target_speed, 1e-6),
-        ):
-            at, turned = forward(dh, joints)
-            assert np.allclose(at, x[:3], atol=exact)
-            assert np.allclose(turned, rotation(x[3:]), atol=exact)
-            assert np.allclose(twist(dh, joints, rates), v, atol=1e-4)
-        top = max(top, np.abs(target_qd).max())
-        assert np.abs(q - target_q).max() < 0.05
-        assert np.abs(qd - target_qd).max() < 0.3
-    assert top > 0.3
-    # Set-points are what their velocities say.
-    target_q, target_qd = columns[4], columns[5]
-    one = steps == 1
-    moved = np.diff(target_q, axis=0)[one]
-    expected = (target_qd[:-1] + target_qd[1:])[one] / 2 * PERIOD
-    assert one.sum() > 10
-    assert np.allclose(moved, expected, atol=3e-4)
 
 
 def test_a_slower_stream_comes_in_whole_multiples_of_a_cycle(box):

@@ -4,7 +4,8 @@ import time
 
 import numpy as np
 import pytest
-from ur_rtde_support import HOME, home, shifted, wait_until
+from clients_support import wait_until
+from ur_rtde_support import HOME, home, shifted
 
 LOOKAHEAD, GAIN = 0.1, 300
 

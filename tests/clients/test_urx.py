@@ -4,11 +4,11 @@
 works is tried with it, and moves to poses with `URRobot`, the class below it, which takes lists.
 """
 
-import time
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from clients_support import TIMEOUT, wait_until
 
 urx = pytest.importorskip("urx")
 
@@ -16,15 +16,7 @@ urx = pytest.importorskip("urx")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
 CLOSE_Q, CLOSE_X = 2e-3, 2e-3  # rad, m
-PATIENCE = 20.0  # s; a limit for hangs
 SPEED, ACCELERATION = 2.0, 8.0
-
-
-def wait_until(condition):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, "what was waited for did not come"
-        time.sleep(0.02)
 
 
 @contextmanager
@@ -37,7 +29,7 @@ def connected(kind, *arguments, **options):
         client.close()
         for thread in (client.secmon, client.rtmon):
             if thread is not None:
-                thread.join(PATIENCE)
+                thread.join(TIMEOUT)
 
 
 @pytest.fixture(scope="module")

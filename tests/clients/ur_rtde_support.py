@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from clients_support import wait_until
 
 REASON = f"ur_rtde 1.6.5 has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]} on this machine"
 rtde_control = pytest.importorskip("rtde_control", reason=REASON)
@@ -24,16 +25,7 @@ PERIOD = 0.008  # s
 SPEED, ACCELERATION = 3.0, 12.0  # rad/s, rad/s^2; no test is about slowness
 CLOSE_Q = 5e-4  # rad; backlash and sag of the arm at rest
 CLOSE_X = 1e-3  # m, and rad for a rotation vector
-PATIENCE = 20.0  # s; a limit for hangs
 TRIES = 3  # before the last
-
-
-def wait_until(condition, what="what was waited for"):
-    """Ask again and again, without hurry: the client's own threads need the processor."""
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, f"{what} did not come"
-        time.sleep(0.002)
 
 
 @contextmanager
@@ -55,7 +47,7 @@ def connected(interface, *arguments):
 
 
 class Arm(SimpleNamespace):
-    """The control and receive interfaces of one arm."""
+    """The control and receive interfaces of one arm, and the joint angles where its tests begin."""
 
     def get_ready(self):
         """Run the control script, unlock the arm if need be, and bring it to its start."""
@@ -91,9 +83,9 @@ class Arm(SimpleNamespace):
         return refusals
 
     def go_home(self):
-        wait_until(lambda: self.control.moveJ(list(HOME), SPEED, ACCELERATION), "the start")
+        wait_until(lambda: self.control.moveJ(list(self.home), SPEED, ACCELERATION), "the start")
         # The answer may overtake the last packages of the move.
-        self.until(lambda r: np.allclose(r.getTargetQ(), HOME, rtol=0, atol=1e-9))
+        self.until(lambda r: np.allclose(r.getTargetQ(), self.home, rtol=0, atol=1e-9))
 
     def until(self, condition):
         """Wait until the receive interface shows it."""
