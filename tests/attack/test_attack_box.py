@@ -1,8 +1,11 @@
 """What attacks do, in a moment: a served box in its own process lives, answers, moves, keeps its mode and lets go of all; an innocent client misses no cycle."""
 
+import json
+from pathlib import Path
+
 import pytest
 from attack_record import attacked
-from attack_table import SECTIONS
+from attack_table import SECTIONS, described
 
 SECONDS = 0.2
 
@@ -13,3 +16,8 @@ SECONDS = 0.2
 )
 def test_the_box_withstands(attack, box_for):
     assert attacked(attack, box_for(attack), SECONDS).problems == ()
+
+
+def test_the_page_describes_all_attacks_in_the_words_of_their_functions():
+    found = json.loads(Path(__file__).with_name("results.json").read_text())
+    assert found["attacks"] == described(), "python tests/attack, or one attack by its name"

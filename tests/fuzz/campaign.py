@@ -21,8 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "pc_client"))
 
 from dashboard_support import write_programs
 from fuzz_box import CB3, E_SERIES, POLYSCOPE_X, run
-from fuzz_cases import run_cases
-from fuzz_files import TARGETS
+from fuzz_files import TARGETS, run_cases
 
 # Boxes, one after the other: most cases between few cycles, some with time for programs and stops.
 BOXES = tuple(

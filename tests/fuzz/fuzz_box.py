@@ -18,10 +18,9 @@ from types import SimpleNamespace
 
 import psutil
 from box_support import inside
+from fuzz_clients import READERS, Wire
 from fuzz_corpus import DIALLING_PROGRAMS, MESSAGES, peer_message
 from fuzz_mutations import mutate_bytes
-from fuzz_replies import READERS
-from fuzz_wire import Wire
 from states_support import check_wires
 
 from protocol.robot_api import BASE

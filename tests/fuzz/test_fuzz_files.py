@@ -6,8 +6,7 @@ The long run is `python tests/fuzz/campaign.py`.
 from pathlib import Path
 
 import pytest
-from fuzz_cases import run_case, run_cases
-from fuzz_files import TARGETS
+from fuzz_files import TARGETS, run_case, run_cases
 
 CORPUS = Path(__file__).parent / "corpus"
 FINDINGS = {

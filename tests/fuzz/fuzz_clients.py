@@ -1,7 +1,13 @@
-"""What a port says, checked byte by byte: every reader takes a stream in pieces and fails on what is not whole."""
+"""Clients of the ports under fire: real sockets that never wait, and readers that check what a port says byte by byte.
+
+What a `Wire` sends has arrived when the loop turns next. A reader takes a stream in pieces and fails on what is not
+whole.
+"""
 
 import json
 import re
+import socket
+import struct
 
 from pymodbus.pdu import DecodePDU
 
@@ -14,6 +20,76 @@ from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.codec import Role, decode_message
 from protocol.rtde.codec import RtdePackageType as RtdeType
+
+_TIMEOUT = 20.0  # s; a limit for hangs
+_RESET = struct.pack("ii", 1, 0)
+
+
+class Wire:
+    """One end of a TCP connection to a box.
+
+    Attributes:
+        number: of the client's TCP port.
+        is_open: the box has not closed the connection, as far as this end has seen.
+        reads: what comes is taken; False lets the buffers of the box fill.
+    """
+
+    @classmethod
+    def to(cls, address):
+        """Connect to a port."""
+        return cls(socket.create_connection(address, timeout=_TIMEOUT))
+
+    def __init__(self, sock):
+        self.sock = sock
+        self.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.sock.setblocking(False)
+        self.number = self.sock.getsockname()[1]
+        self.is_open = True
+        self.reads = True
+
+    def send(self, data):
+        """Send what the kernel takes."""
+        if self.is_open:
+            try:
+                self.sock.send(data)
+            except BlockingIOError:
+                pass
+            except OSError:  # closed by the box, or ended by this client
+                pass
+
+    def end(self):
+        """Say no more, and listen on."""
+        if self.is_open:
+            try:
+                self.sock.shutdown(socket.SHUT_WR)
+            except OSError:
+                self.close()
+
+    def reset(self):
+        """Go without a word."""
+        if self.is_open:
+            self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+            self.close()
+
+    def close(self):
+        self.is_open = False
+        self.sock.close()
+
+    def take(self):
+        """Return what has come since."""
+        taken = bytearray()
+        while self.is_open and self.reads:
+            try:
+                data = self.sock.recv(1 << 16)
+            except BlockingIOError:
+                break
+            except OSError:
+                data = b""
+            if not data:
+                self.close()
+            taken += data
+        return bytes(taken)
+
 
 # pymodbus's decoder of answers.
 _MODBUS = DecodePDU(is_server=False)

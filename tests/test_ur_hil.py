@@ -1,10 +1,14 @@
-"""The reader of records: nothing is converted, nothing is left over, and what is wrong is one line."""
+"""What the packages share: records of files, patience, the check of package names."""
 
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import field
+from pathlib import Path
 from typing import Annotated, Literal
 
 import pytest
@@ -12,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ur_hil.input_files import MIB, FileKind
+from ur_hil.patience import LONGEST_STEP, Patience
 from ur_hil.records import (
     Finite,
     Flag,
@@ -24,6 +29,10 @@ from ur_hil.records import (
     whole,
     word,
 )
+
+ROOT = Path(__file__).parents[1]
+
+# --- records: nothing is converted, nothing is left over, and what is wrong is one line
 
 
 class ReadError(Exception):
@@ -135,3 +144,58 @@ def test_a_file_is_read_into_its_record(tmp_path):
     path.write_text("share = 2")
     with pytest.raises(ReadError, match=r"a\.toml: share: 2; give a number from 0 to 1"):
         kind.read_record(path, Whole)
+
+
+# --- patience: waiting counts only while the one who waits runs
+
+
+@given(st.lists(st.floats(0.0, LONGEST_STEP), max_size=50))
+def test_who_looks_often_counts_the_time_that_passes(steps):
+    patience, now = Patience(), 1e6
+    assert patience.spent(now) == 0.0
+    for step in steps:
+        now += step
+        spent = patience.spent(now)
+    assert abs((spent if steps else 0.0) - (now - 1e6)) < 1e-6
+
+
+@given(st.lists(st.floats(0.0, 1e6), min_size=1, max_size=50))
+def test_a_jump_of_the_clock_counts_as_one_step_at_most(steps):
+    patience, now = Patience(), 0.0
+    patience.spent(now)
+    for step in steps:
+        before, now = patience.spent(now), now + step
+        assert before <= patience.spent(now) <= before + LONGEST_STEP + 1e-9
+
+
+def test_a_new_wait_begins_with_its_first_look():
+    patience = Patience()
+    patience.spent(0.0)
+    assert patience.spent(0.05) == 0.05
+    patience.restart()
+    assert patience.spent(10.0) == 0.0
+
+
+# --- another package of one of our names is said in one line at import
+
+
+@pytest.mark.parametrize("package", ["pc_client", "ur_emulator", "urscript"])
+@pytest.mark.parametrize("other", ["protocol", "protocol.py"])
+def test_another_package_before_ours_is_named(package, other, tmp_path):
+    if other.endswith(".py"):
+        place = tmp_path / other
+    else:
+        (tmp_path / other).mkdir()
+        place = tmp_path / other / "__init__.py"
+    place.touch()
+    done = subprocess.run(
+        [sys.executable, "-c", f"import {package}"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert f"finds 'protocol' at {place}" in last
+    assert "rename the other one" in last
