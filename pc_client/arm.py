@@ -16,9 +16,10 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pc_client.analysis.run import Run, Signals
+from pc_client.arrays import Array
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
 from pc_client.control.tracker import ControlLaw
 from pc_client.driver.report import RobotInfo, RobotReport, read_report
@@ -39,8 +40,6 @@ from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from ur_hil.records import checked
 
-__all__ = ["QUESTION", "Arm", "Confirm", "connect", "plan"]
-
 Confirm = Callable[[str], bool]
 """Gets the text that describes the motion; returns whether the arm may move."""
 
@@ -52,11 +51,7 @@ _NO_TERMINAL = (
 
 
 def _ask_at_terminal(text: str) -> bool:
-    """Show the description of a motion and ask at the terminal.
-
-    Raises:
-        ClientError: there is no terminal to ask at.
-    """
+    """Show the description of a motion and ask; ClientError if there is no terminal to ask at."""
     if sys.stdin is None or sys.stdin.closed:
         raise ClientError(_NO_TERMINAL)
     print(text)
@@ -64,23 +59,6 @@ def _ask_at_terminal(text: str) -> bool:
         return input(f"{QUESTION} [y/N]: ").strip().lower() in ("y", "yes")
     except EOFError:
         raise ClientError(_NO_TERMINAL) from None
-
-
-def _experiment_description(host: str, report: RobotReport, model: RobotModel, wanted: Experiment) -> str:
-    """Describe the motion of an experiment, for the people beside the arm.
-
-    Raises:
-        ClientError: there is no clear path to the start.
-    """
-    approach = plan_approach(wanted.planned[0].joints, report.frame.actual_q, model=model)
-    return "\n".join(
-        (
-            f"robot at {host}: {report.info}",
-            conditions_text(preflight(report, model)),
-            experiment_text(wanted),
-            approach_text(approach),
-        )
-    )
 
 
 def connect(
@@ -184,7 +162,7 @@ class Arm:
         """
         return self._report_now().frame
 
-    def fk(self, q: ArrayLike) -> NDArray[np.float64]:
+    def fk(self, q: ArrayLike) -> Array:
         """Forward kinematics of the nominal arm; nothing moves.
 
         The robot computes with the calibration of its own arm: `frame().actual_tcp_pose` differs by a few mm.
@@ -202,7 +180,7 @@ class Arm:
         poses = [T_to_pose(tcp_pose(self.model, one)) for one in angles.reshape(-1, 6)]
         return np.array(poses).reshape(angles.shape)
 
-    def ik(self, pose: ArrayLike, q_near: ArrayLike | None = None) -> NDArray[np.float64]:
+    def ik(self, pose: ArrayLike, q_near: ArrayLike | None = None) -> Array:
         """Inverse kinematics of the nominal arm, on the branch nearest to a posture; nothing moves.
 
         Args:
@@ -358,7 +336,11 @@ class Arm:
         Raises:
             ClientError: there is no clear path to the start.
         """
-        return _experiment_description(self._host, self._report_now(), self.model, wanted)
+        report = self._report_now()
+        approach = plan_approach(wanted.planned[0].joints, report.frame.actual_q, model=self.model)
+        conditions = conditions_text(preflight(report, self.model))
+        texts = (f"robot at {self._host}: {report.info}", conditions, experiment_text(wanted))
+        return "\n".join((*texts, approach_text(approach)))
 
     def _report_now(self) -> RobotReport:
         report = read_report(TcpNetwork(), self._host, self._ports)
@@ -387,7 +369,7 @@ class Arm:
             raise ClientError("the arm was not moved: the answer was no")
 
 
-def _sixes(values: ArrayLike, what: str) -> NDArray[np.float64]:
+def _sixes(values: ArrayLike, what: str) -> Array:
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):

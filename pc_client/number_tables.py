@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
@@ -23,7 +23,7 @@ class Rows(NamedTuple):
     """A table: values (n, m) in the order of `columns`, and the line (n,) of each row."""
 
     columns: tuple[str, ...]
-    values: NDArray[np.float64]
+    values: Array
     lines: tuple[int, ...]
 
 

@@ -47,11 +47,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from pc_client.analysis.track import MIN_MOVEMENT_ROWS, ShiftedReference, TcpTrack, speed, velocity
+from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.recording.recording import Recording
 from pc_client.recording.rows import Phase
-
-Array = NDArray[np.float64]
 
 # Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
 MIN_LAG_S, MAX_LAG_S = -0.1, 0.4
@@ -86,14 +85,11 @@ class Snr:
 
 
 def snr_db(reference: Array, actual: Array) -> float:
-    """Eq. 10 on two signals of the same shape, (n,) or (n, 3).
+    """Eq. 10 on two signals of the same shape, (n,) or (n, 3): dB.
 
-    Returns:
-        dB; inf when they are equal, -inf when the reference is all zero and the actual is not.
+    It is inf when they are equal, -inf when the reference is all zero and the actual is not.
     """
-    signal = float(np.sum(np.square(reference)))
-    noise = float(np.sum(np.square(actual - reference)))
-    return decibels(signal, noise)
+    return decibels(float(np.sum(np.square(reference))), float(np.sum(np.square(actual - reference))))
 
 
 def decibels(signal: float, noise: float) -> float:
@@ -201,13 +197,7 @@ class Errors:
 
 
 def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Errors:
-    """Measure position and joint errors over the movement.
-
-    Args:
-        recording: the run.
-        track: its TCP path.
-        lag_s: best time shift of the run, from the velocity.
-    """
+    """Measure position and joint errors over the movement; the best shift is that of the velocity [s]."""
     moving = track.movement
     error = track.p_actual[moving] - track.p_ref[moving]
     path_error = track.p_actual[moving] - ShiftedReference(track).at(lag_s, moving)
@@ -234,8 +224,7 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
 
 def joint_errors(recording: Recording, track: TcpTrack) -> Array:
     """Return reference minus actual joint position at the samples of the track, (n, 6) rad."""
-    error: Array = recording.column("ref_q")[track.rows] - recording.column("actual_q")[track.rows]
-    return error
+    return recording.column("ref_q")[track.rows] - recording.column("actual_q")[track.rows]
 
 
 def position_errors(track: TcpTrack) -> Array:
@@ -272,14 +261,10 @@ def _rms(values: Array) -> float:
 
 
 def speed_noise(v: Array, covariance: Array) -> tuple[Array, Array]:
-    """Mean and variance of |v + n| - |v|, n being normal with mean zero.
+    """Mean (n,) [m/s] and variance (n,) [(m/s)2] of |v + n| - |v|, n being normal with mean zero.
 
-    Args:
-        v: (n, 3) velocities [m/s].
-        covariance: (n, 3, 3) or (3, 3), of n [(m/s)2].
-
-    Returns:
-        Mean (n,) [m/s] and variance (n,) [(m/s)2], by Gauss-Hermite quadrature.
+    The velocities are (n, 3) [m/s], the covariance of n is (n, 3, 3) or (3, 3) [(m/s)2]. By Gauss-Hermite
+    quadrature.
     """
     nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
     grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -319,13 +304,7 @@ class Budget:
 
 
 def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
-    """Cut the power of the speed error of one run into its parts.
-
-    Args:
-        recording: the run.
-        track: its TCP path.
-        lag_s: best time shift of the scalar speed.
-    """
+    """Cut the power of the speed error of one run into its parts; the best shift is that of the speed [s]."""
     steps = track.movement_steps
     ref_speed = speed(track.t, track.p_ref)[steps]
     error_power = _power(speed(track.t, track.p_actual)[steps] - ref_speed)

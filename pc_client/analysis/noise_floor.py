@@ -22,16 +22,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pc_client.analysis.measures import decibels, rest_samples, speed_noise
 from pc_client.analysis.run import MeasuredRun
 from pc_client.analysis.track import speed, velocity
+from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel, robot_model, tcp_jacobian
-
-Array = NDArray[np.float64]
 
 LEAST_STEPS = 30
 """Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
@@ -57,12 +55,9 @@ def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
 
 
 def _floor_power(run: MeasuredRun, covariance: Array, model: RobotModel) -> float:
-    """Return P_floor [(m/s)2] of one run's movement.
+    """Return P_floor [(m/s)2] of one run's movement, by its reference and time stamps and by C (6, 6) [rad2].
 
-    Args:
-        run: gives the reference and its time stamps.
-        covariance: C (6, 6) [rad2].
-        model: the nominal arm; its Jacobian is good to the calibration, 1 %.
+    The Jacobian of the nominal arm is good to the calibration, 1 %.
     """
     track, steps = run.track, run.track.movement_steps
     q = run.recording.column("ref_q")[track.rows][steps]

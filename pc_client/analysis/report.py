@@ -67,12 +67,7 @@ class Report:
 def build_report(
     run_dir: Path | str, console: Console | None = None, *, include_aborted: bool = False
 ) -> Report:
-    """Rebuild tables and page from the recordings `<movement>_r<k>.mcap` in a folder.
-
-    Args:
-        run_dir: the folder; the results are written into it.
-        console: where progress is shown; None shows none.
-        include_aborted: as of `build_tables`.
+    """Rebuild tables and page from the recordings `<movement>_r<k>.mcap` in a folder, as `build_tables`.
 
     Raises:
         RecordingError: as `build_tables`, or matplotlib or jinja2 is missing.
@@ -122,11 +117,7 @@ def build_tables(
 
 
 def render_page(table: Table, left_out: Iterable[str] = (), console: Console | None = None) -> str:
-    """Return the text of `report.html`.
-
-    Raises:
-        RecordingError: matplotlib or jinja2 is not installed.
-    """
+    """The text of `report.html`; RecordingError if matplotlib or jinja2 is not installed."""
     require_report_libraries()
     from pc_client.analysis import figures
 
@@ -220,11 +211,8 @@ def _cell_summary(text: str) -> str:
 def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
     """Return the identified loop and its margins as texts by name; nothing for old recordings."""
     facts: dict[str, str] = {}
-    if loop.keys() >= {
-        "dead_time_s",
-        "lag_s",
-        "joint_spread_s",
-    }:  # by a controller that identifies dead time and lag separately
+    # By a controller that identifies dead time and lag separately.
+    if loop.keys() >= {"dead_time_s", "lag_s", "joint_spread_s"}:
         facts["identified loop"] = (
             f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
             f"lag {1e3 * float(loop['lag_s']):.1f} ms, "

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pc_client.analysis.measures import (
     PARTS,
@@ -27,6 +26,7 @@ from pc_client.analysis.measures import (
     position_errors,
 )
 from pc_client.analysis.track import TcpTrack, rows_per_sample, speed, track_of
+from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance, Source, origin_of
 from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
@@ -47,8 +47,6 @@ from protocol.ur_types import JOINT_NAMES
 if TYPE_CHECKING:
     import polars
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 GIVEN_UP = "given up"
 """Kind of the movement of a run that did not come to its end."""

@@ -138,11 +138,7 @@ class SideBySide:
 
 
 def side_by_side(tables: Sequence[Table]) -> SideBySide:
-    """Put experiments beside each other.
-
-    Raises:
-        RecordingError: there is none.
-    """
+    """Put experiments beside each other; RecordingError if there is none."""
     if not tables:
         raise RecordingError("there is no experiment to show; give at least one folder")
     unchanged = {_base(table) for table in tables if table.provenance.controller == _base(table)[1]}
@@ -176,9 +172,6 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
     Args:
         reports: of their folders; the page links to those that have pages.
         out: the page.
-
-    Returns:
-        What is on it.
 
     Raises:
         RecordingError: there is no experiment, matplotlib or jinja2 is missing, or the page cannot be
@@ -241,7 +234,7 @@ def _settings(tables: Sequence[Table]) -> str:
     fields = [name for name in FIELDS if len({config.get(name) for config in configs}) > 1]
     kinds = tables[0].kinds
     rows = [
-        {name: _value(config.get(name)) for name in fields}
+        {name: f"{x:g}" if isinstance(x := config.get(name), float) else str(x) for name in fields}
         | {kind: table.mean_of(kind) for kind in kinds}
         | {"n_runs": len(next(iter(table.runs.values()))), "is_own": table is tables[0]}
         | {LAG.name: table.frame[LAG.name].mean()}
@@ -254,10 +247,6 @@ def _settings(tables: Sequence[Table]) -> str:
         LAG,
     ]
     return to_html(pl.DataFrame(rows, infer_schema_length=None), columns, bold="is_own")
-
-
-def _value(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _common(facts: Sequence[Mapping[str, str]]) -> Mapping[str, str | list[str]]:

@@ -215,15 +215,13 @@ def build_table(runs: Sequence[MeasuredRun]) -> Table:
     frame = _frame_of_runs(ordered).group_by("name", maintain_order=True).agg(_FIGURES)
     levels = {
         "noise_floor_db": [floor_db(group[0], covariance) for group in by_name.values()],
-        "unrepeatable_db": [_unrepeatable_db(group) for group in by_name.values()],
+        # What does not repeat from run to run would leave this; None when it is not known.
+        "unrepeatable_db": [
+            decibels(group[0].budget.signal_power, power) if (power := unrepeatable_power(group)) else None
+            for group in by_name.values()
+        ],
     }
     return Table(frame.with_columns(pl.DataFrame(levels, dict.fromkeys(levels, pl.Float64))), by_name)
-
-
-def _unrepeatable_db(runs: Sequence[MeasuredRun]) -> float | None:
-    """SNR that what does not repeat from run to run would leave; None when it is not known."""
-    power = unrepeatable_power(runs)
-    return decibels(runs[0].budget.signal_power, power) if power else None
 
 
 def _rank(run: MeasuredRun) -> tuple[int, str, int, str]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pc_client.arrays import Array
 from pc_client.control.loop import SAMPLING_TIME
 from pc_client.errors import RecordingError
 from pc_client.recording.recording import Recording
@@ -52,9 +53,9 @@ class TcpTrack:
         t_begin: controller time at which the movement began, s: up to a cycle before its first sample.
     """
 
-    t: NDArray[np.float64]
-    p_ref: NDArray[np.float64]
-    p_actual: NDArray[np.float64]
+    t: Array
+    p_ref: Array
+    p_actual: Array
     rows: NDArray[np.intp]
     new_rows: NDArray[np.intp]
     movement: slice
@@ -114,17 +115,13 @@ def track_of(recording: Recording) -> TcpTrack:
     )
 
 
-def rows_per_sample(t: NDArray[np.float64]) -> int:
+def rows_per_sample(t: Array) -> int:
     """How many steps of the times (n,) [s] make 8 ms: 1 at 125 Hz, 4 at 500 Hz."""
     return 1 if len(t) < 2 else max(round(SAMPLING_TIME / float(np.median(np.diff(t)))), 1)
 
 
 def _movement_of(recording: Recording, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Which of these rows (n,) are of the movement phase.
-
-    Raises:
-        RecordingError: too few.
-    """
+    """Which of these rows (n,) are of the movement phase; RecordingError if they are too few."""
     moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
     if len(moving) < MIN_MOVEMENT_ROWS:
         raise RecordingError(
@@ -133,22 +130,17 @@ def _movement_of(recording: Recording, rows: NDArray[np.intp]) -> NDArray[np.int
     return moving
 
 
-def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """First differences of positions over time.
+def velocity(t: Array, p: Array) -> Array:
+    """First differences of positions (n, 3) [m] over times (n,) [s]: (n - 1, 3) m/s.
 
-    Args:
-        t: (n,) s.
-        p: (n, 3) m.
-
-    Returns:
-        (n - 1, 3) m/s; step k is from sample k to k + 1.
+    Step k is from sample k to k + 1.
     """
     return np.diff(p, axis=0) / np.diff(t)[:, None]
 
 
-def speed(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+def speed(t: Array, p: Array) -> Array:
     """Length of `velocity`, (n - 1,) m/s: the scalar TCP speed."""
-    length: NDArray[np.float64] = np.linalg.norm(velocity(t, p), axis=1)
+    length: Array = np.linalg.norm(velocity(t, p), axis=1)
     return length
 
 
@@ -163,8 +155,8 @@ class ShiftedReference:
         self._t = track.t
         self._spline = CubicSpline(track.t, track.p_ref)
 
-    def at(self, lag_s: float, samples: slice = slice(None)) -> NDArray[np.float64]:
+    def at(self, lag_s: float, samples: slice = slice(None)) -> Array:
         """Return the reference position at `t - lag_s`, (n, 3) m; at rest before and after the recording."""
         t = np.clip(self._t[samples] - lag_s, self._t[0], self._t[-1])
-        positions: NDArray[np.float64] = self._spline(t)
+        positions: Array = self._spline(t)
         return positions

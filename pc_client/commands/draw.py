@@ -220,7 +220,7 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
     from pc_client.studies.drawing.table import drawing_rich, drawings_json, drawings_markdown, render_page
 
     sheets = {
-        entry.name: sheets_of(Shown.of(entry.drawing, entry.executions[-1]))
+        entry.name: sheets_of(Shown(entry.drawing, entry.executions[-1]))
         for entry in track(entries, description="drawing", console=console, transient=True)
     }
     texts = {

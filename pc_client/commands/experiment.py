@@ -76,13 +76,6 @@ def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, set
 
     A dry run shows the plan and the question, on a simulated arm too, and ends the command there.
 
-    Args:
-        movements: what the TCP shall do, in order.
-        robot: name or address of the control box.
-        out: folder of the recordings.
-        repeat: runs of each.
-        settings: how to move.
-
     Raises:
         ClientError: a check failed, the robot stopped or the user interrupted; the arm rests.
         typer.Exit: it was a dry run.
@@ -126,11 +119,7 @@ def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, set
 
 
 def read_runs(folder: Path) -> list[MeasuredRun]:
-    """Read and measure all recordings of a folder, by their file names.
-
-    Raises:
-        RecordingError: one cannot be read or measured.
-    """
+    """Read and measure all recordings of a folder, by their file names; RecordingError if one cannot be."""
     from rich.progress import track
 
     from pc_client.analysis.run import analyse_run

@@ -12,9 +12,7 @@ from pc_client.commands.options import SetOption, console, say
 from ur_hil.command_line import examples
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from pc_client.arrays import Array
     from pc_client.movements.movement import Movement
 
 app = typer.Typer(help="The movement library.", rich_markup_mode=None)
@@ -184,7 +182,7 @@ def _check_and_save(movement: Movement, out: Path) -> None:
     say(f"saved: {out}")
 
 
-def _numbers(words: str) -> NDArray[np.float64]:
+def _numbers(words: str) -> Array:
     import numpy as np
 
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -14,14 +15,13 @@ from rich.console import Console
 
 from pc_client.control.controller import DEFAULT, Controller, load_controller
 from pc_client.errors import ClientError, ControllerError, printable
-from pc_client.kinematics.cell import NO_CELL, Cell
+from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 
 if TYPE_CHECKING:
     from pc_client.analysis.report import Report
     from pc_client.arm import Arm
-    from pc_client.kinematics.cell import Cell
 
 console = Console(highlight=False)
 
@@ -122,32 +122,18 @@ def show_report(folder: Path, *, include_aborted: bool = False) -> Report:
 
 
 def check_workers(workers: int | None, dask: str | None) -> None:
-    """Refuse both `--workers` and `--dask`.
-
-    Raises:
-        typer.BadParameter: both are given.
-    """
+    """Raise typer.BadParameter for both `--workers` and `--dask`."""
     if workers is not None and dask is not None:
         raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
 
 
 def cell_of(path: Path | None) -> Cell:
-    """What stands around the arm and what it carries; nothing is known without a file.
-
-    Raises:
-        CellError: the file makes no sense.
-    """
-    from pc_client.kinematics.cell import load_cell
-
+    """What stands around the arm and what it carries, by a file; without one nothing is known."""
     return NO_CELL if path is None else load_cell(path)
 
 
 def ports_of(port_base: int) -> Ports:
-    """The robot's ports.
-
-    Raises:
-        typer.BadParameter: the offset leaves the TCP ports.
-    """
+    """The robot's ports; typer.BadParameter if the offset leaves the TCP ports."""
     try:
         return Ports.standard(offset=port_base)
     except ProtocolError as error:
@@ -192,13 +178,7 @@ def _read_settings(
     yes: YesOption = False,
     dry_run: _DryRunOption = False,
 ) -> RunSettings:
-    """Make the record from what was given on the command line.
-
-    Raises:
-        ControllerError: there is no such controller, or its file makes no sense.
-        CellError: the cell's file makes no sense.
-        typer.BadParameter: an option makes no sense.
-    """
+    """Make the record from what was given on the command line."""
     given = {"gain_p": gain_p, "gain_i": gain_i, "speedj_acceleration": acceleration}
     numbers = {name: value for name, value in given.items() if value is not None}
     base = load_controller(controller)
@@ -232,12 +212,7 @@ def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:
 def reach(robot: str, ports: Ports, cell: Cell, reverse_port: int | None = None, *, yes: bool = False) -> Arm:
     """Ask a robot what it is, and refuse it before anything is planned; it stays as it is.
 
-    Args:
-        robot: name or address of the control box.
-        ports: its ports.
-        cell: what stands around it and what it carries.
-        reverse_port: where its programs dial back.
-        yes: do not ask before a real arm moves.
+    With `yes` nobody is asked before a real arm moves.
 
     Raises:
         ClientError: it does not answer, does not report which arm it is, or is not as it must be.
@@ -249,14 +224,7 @@ def reach(robot: str, ports: Ports, cell: Cell, reverse_port: int | None = None,
 
 
 def _ask(text: str) -> bool:
-    """Show what is going to happen, and ask.
-
-    Raises:
-        ClientError: there is no terminal to ask at.
-        typer.Abort: the answer is no.
-    """
-    import sys
-
+    """Show what is going to happen, and ask; typer.Abort for no, ClientError without a terminal."""
     from pc_client.arm import QUESTION
 
     say(text)

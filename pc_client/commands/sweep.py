@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from pc_client.arm import Arm
     from pc_client.studies.sweep.case import Case, GivenRobot, Outcome, SimulatedArm
-    from pc_client.studies.sweep.config import SweepConfig
     from pc_client.studies.sweep.store import ResultStore
 
 _MOST_SHOWN = 5
@@ -60,7 +59,9 @@ def sweep(
     host, port_base = plan.file.robot, plan.file.port_base or 0
     if host is not None and (workers is not None or dask is not None):
         raise typer.BadParameter(f"robot = {host!r} is one robot: no --workers and no --dask")
-    store = ResultStore(_folder_of(plan, out), plan.file.keep_recordings)
+    if (folder := out or plan.file.output) is None:
+        raise SweepError(f"{config}: no folder for the results; give output = DIR, or --out DIR")
+    store = ResultStore(Path(folder), plan.file.keep_recordings)
     arm: Arm | None = None
     arms: Sequence[SimulatedArm] | Sequence[GivenRobot] = plan.arms
     if host is not None:
@@ -129,24 +130,8 @@ def _work(outcomes: Iterator[Outcome], n_cases: int, n_settled: int, *, live: bo
             say(f"{words} in {60.0 * minutes:.0f} s, {n_runs / minutes:.0f} runs a minute")
 
 
-def _folder_of(plan: SweepConfig, out: Path | None) -> Path:
-    """Where the results go.
-
-    Raises:
-        SweepError: it is not given.
-    """
-    folder = out or plan.file.output
-    if folder is None:
-        raise SweepError(f"{plan.source}: no folder for the results; give output = DIR, or --out DIR")
-    return Path(folder)
-
-
 def _confirm(arm: Arm, waiting: Sequence[Case], n_runs: int) -> None:
-    """Show all that an arm is going to do, and ask.
-
-    Raises:
-        typer.Abort: the answer is no.
-    """
+    """Show all that an arm is going to do, and ask; typer.Abort if the answer is no."""
     from pc_client.experiment.experiment import Experiment
     from pc_client.studies.sweep.schedule import plan_case
 

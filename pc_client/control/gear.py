@@ -24,12 +24,10 @@ from math import log, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.control.reference import JointReference
-
-Array = NDArray[np.float64]
 
 ORDERS = np.arange(30, 331)
 """Whole numbers, because the error repeats with each turn of the joint. Once and twice a motor turn, of
@@ -58,15 +56,12 @@ class Wave(NamedTuple):
 
 
 def find_waves(before: Array, after: Array, surprise: Array) -> list[Wave]:
-    """Find the waves of one gear.
+    """Find the waves of one gear; none for a joint that has hardly moved.
 
     Args:
         before: (n,) reported positions at one frame each [rad].
         after: (n,) those one cycle later [rad].
         surprise: (n,) what of each step the commands do not explain [rad].
-
-    Returns:
-        The waves that are significant; none for a joint that has hardly moved.
     """
     orders: list[int] = []
     rest = surprise
@@ -134,8 +129,7 @@ def _spectrum(before: Array, after: Array, rest: Array) -> tuple[Array, Array]:
 def _histogram(q: Array, weights: Array) -> Array:
     """Sum of the weights (n,) by position in a turn, (_N_BINS,)."""
     bins = np.rint(q * (_N_BINS / (2.0 * pi))).astype(np.int64) % _N_BINS
-    sums: Array = np.bincount(bins, weights, _N_BINS).astype(np.float64)
-    return sums
+    return np.bincount(bins, weights, _N_BINS).astype(np.float64)
 
 
 _LONGEST = 480.0
@@ -171,14 +165,7 @@ class GearModel:
 
 
 class MotorReference:
-    """What the motors have to do so that the joints follow a reference.
-
-    Args:
-        joints: what the joints shall do.
-        gear: their gears.
-    """
-
-    __slots__ = ("_gear", "_joints", "duration")
+    """What the motors have to do so that the joints with these gears follow a reference."""
 
     def __init__(self, joints: JointReference, gear: GearModel) -> None:
         self._joints = joints
@@ -195,12 +182,8 @@ class MotorReference:
 class GearObserver:
     """Collects runs; each makes the waves better known.
 
-    Args:
-        loop: the identified loop: what of a motion the commands explain.
-        period: control cycle [s].
+    The identified loop says what of a motion the commands explain; the control cycle is the period [s].
     """
-
-    __slots__ = ("_most", "_response", "_runs")
 
     def __init__(self, loop: LoopModel, period: float) -> None:
         self._response = velocity_response(loop, period) * period
@@ -208,12 +191,7 @@ class GearObserver:
         self._runs: deque[tuple[Array, Array]] = deque()
 
     def take(self, qd_cmd: Array, q: Array) -> None:
-        """Take a run without gaps.
-
-        Args:
-            qd_cmd: (n, 6) commands, one a cycle, from rest [rad/s].
-            q: (n, 6) reported positions [rad].
-        """
+        """Take a run without gaps: commands (n, 6) from rest [rad/s], one a cycle; positions (n, 6) [rad]."""
         n = len(q)
         commanded = [np.convolve(joint, self._response)[1:n] for joint in qd_cmd.T]  # up to frames 1, 2, ...
         self._runs.append((q, np.diff(q, axis=0) - np.transpose(commanded)))

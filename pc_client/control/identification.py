@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from math import cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pc_client.arrays import Array
 from pc_client.control.loop import NO_LAG, LoopModel, lagged_displacement
 from pc_client.errors import DriverError
 
@@ -40,14 +40,7 @@ _SIGNS = (1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 
 
 class Excitation:
-    """Raised-cosine velocity pulses, out and back, around a start posture.
-
-    Args:
-        q_start: (6,) where the arm stands [rad].
-        pulse: length of one pulse [s].
-    """
-
-    __slots__ = ("_pulse", "_q_start")
+    """Raised-cosine velocity pulses of a length [s], out and back, around a start posture (6,) [rad]."""
 
     def __init__(self, q_start: Sequence[float], pulse: float = PULSE) -> None:
         self._q_start = tuple(q_start)
@@ -102,19 +95,16 @@ class DelayEstimate:
     n_samples: int
 
 
-def estimate_delay(
-    t: NDArray[np.float64], qd_cmd: NDArray[np.float64], q: NDArray[np.float64], period: float
-) -> DelayEstimate:
+def estimate_delay(t: Array, qd_cmd: Array, q: Array, period: float) -> DelayEstimate:
     """Find the delay T that best explains q(t) = q0 + integral of qd_cmd up to t - T, over all joints.
+
+    The estimate is finer than a cycle, as the integral is a continuous function of time.
 
     Args:
         t: (n,) time stamps of the frames [s], rising.
         qd_cmd: (n, 6) command sent in answer to each frame, in force until the next [rad/s].
         q: (n, 6) reported positions in each frame [rad].
         period: control cycle [s].
-
-    Returns:
-        The estimate; sub-sample, as the integral is a continuous function of time.
 
     Raises:
         DriverError: too little motion, or the arm did not follow the commands.
@@ -155,35 +145,21 @@ def estimate_delay(
     return DelayEstimate(max(delay, 0.0), residual, motion, len(t))
 
 
-Array = NDArray[np.float64]
-
 _LONGEST_LAG = 0.06
 """Lags up to this are looked for [s]: a drive of 2.6 Hz."""
-
-_LEAST_DISPLACEMENT = 2e-3
-"""A joint that was commanded to move less than this [rad] says nothing."""
 
 _WORST_REST = 0.1
 """Share of the motion that dead time and lag may leave unexplained."""
 
 
 def identify_loop(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel:
-    """Find dead time and lag of a loop.
-
-    Args:
-        t: (n,) time stamps of the frames [s], rising.
-        qd_cmd: (n, 6) command sent in answer to each frame, in force until the next [rad/s].
-        q: (n, 6) reported positions in each frame [rad].
-        period: control cycle [s].
-
-    Returns:
-        The model, and by how much single joints differ from it.
+    """Find dead time and lag of a loop, and by how much single joints differ; arguments of `estimate_delay`.
 
     Raises:
         DriverError: too little motion, or the arm did not follow the commands.
     """
     total = estimate_delay(t, qd_cmd, q, period).delay
-    moved = np.ptp(np.cumsum(qd_cmd, axis=0) * period, axis=0) > _LEAST_DISPLACEMENT
+    moved = np.ptp(np.cumsum(qd_cmd, axis=0) * period, axis=0) > _LEAST_MOTION
     commands, actual = qd_cmd[:, moved], q[:, moved]
     knots = np.append(t, t[-1] + period)
 
@@ -235,5 +211,4 @@ def _beside(displacement: Array, signal: Array) -> Array:
     centred = displacement - displacement.mean()
     scaled = centred / max(float(np.abs(centred).max()), 1e-12)
     basis, _ = np.linalg.qr(np.vander(scaled, 4))
-    rest: Array = signal - basis @ (basis.T @ signal)
-    return rest
+    return signal - basis @ (basis.T @ signal)

@@ -25,13 +25,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import pi, sin
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.loop import SAMPLING_TIME, LoopModel, frequency_response, sensitivity
-
-Array = NDArray[np.float64]
 
 _WORST_MISMATCH = 0.5
 """Largest |1 - P / P_model| at the cut-off: at least half of what repeats is gone after each run."""
@@ -64,24 +63,15 @@ class LearningFilter:
         """Q at frequencies (m,) [Hz], (m,)."""
         low, high = (1.0 - _ROLL_OFF) * self.cut_off, (1.0 + _ROLL_OFF) * self.cut_off
         x = np.clip((hertz - low) / (high - low), 0.0, 1.0)
-        weight: Array = 0.5 * (1.0 + np.cos(pi * x))
-        return weight
+        return 0.5 * (1.0 + np.cos(pi * x))
 
 
 def design_filter(
     loop: LoopModel, period: float, *, learning_gain: float, gain_p: float, gain_i: float
 ) -> LearningFilter:
-    """Choose Q for an identified loop.
+    """Choose Q for an identified loop, its feedback [1/s, 1/s2] and a gain of learning, 0..1.
 
-    Args:
-        loop: with its spread.
-        period: control cycle [s].
-        learning_gain: 0..1.
-        gain_p: of the feedback [1/s].
-        gain_i: of the feedback [1/s2].
-
-    Returns:
-        The filter; `contraction` of 1 or more means that this loop must not learn.
+    A `contraction` of 1 or more means that this loop must not learn. The control cycle is the period [s].
     """
     hertz = np.linspace(0.0, 0.5 / period, 501)[1:-1]
     model = frequency_response(loop, period, hertz)
@@ -135,14 +125,8 @@ class RunSignals:
     added: Array
 
 
-@dataclass(frozen=True, slots=True)
-class LearningBounds:
-    """What a learned command may reach, whatever was measured.
-
-    Attributes:
-        speed: [rad/s].
-        acceleration: change a second [rad/s2].
-    """
+class LearningBounds(NamedTuple):
+    """What a learned command may reach, whatever was measured: speed [rad/s] and its change [rad/s2]."""
 
     speed: float
     acceleration: float
@@ -189,13 +173,7 @@ def learn(
 
 
 def learnable_power(run: RunSignals, weight: LearningFilter, period: float) -> float:
-    """Mean square of the differenced error [(rad/s)2], a joint, in the frequencies that are learned.
-
-    Args:
-        run: complete and without gaps.
-        weight: Q.
-        period: control cycle [s].
-    """
+    """Mean square of the differenced error [(rad/s)2], a joint, in the frequencies that are learned."""
     slope = np.diff(run.error, axis=0) / period
     hertz: Array = np.asarray(np.fft.rfftfreq(len(slope), period), dtype=np.float64)
     kept = np.fft.irfft(weight.weight(hertz)[:, None] * np.fft.rfft(slope, axis=0), len(slope), axis=0)

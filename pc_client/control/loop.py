@@ -20,7 +20,7 @@ from math import ceil, exp, inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pc_client.arrays import Array
 
 SAMPLING_TIME = 0.008
 """Eq. 10 differences positions over this time [s], the control cycle of the paper's arm, on every arm:
@@ -87,11 +87,7 @@ class LoopModel:
 
 
 def velocity_response(loop: LoopModel, period: float) -> Array:
-    """Differenced position after a unit velocity that is commanded for one cycle.
-
-    Args:
-        loop: dead time and lag.
-        period: control cycle [s].
+    """Differenced position after a unit velocity that is commanded for one cycle, the period [s].
 
     Returns:
         (n,): (q_k - q_(k-1)) / period for k = 0, 1, ...; the command is held from k = 0 to k = 1. Sums to 1.
@@ -99,16 +95,14 @@ def velocity_response(loop: LoopModel, period: float) -> Array:
     n = ceil((loop.dead_time + _SETTLED * loop.lag) / period) + 3
     t: Array = np.arange(-1, n, dtype=np.float64) * period - loop.dead_time
     pulse = _displacement_after_step(t, loop.lag) - _displacement_after_step(t - period, loop.lag)
-    response: Array = np.diff(pulse) / period
-    return response
+    return np.diff(pulse) / period
 
 
 def frequency_response(loop: LoopModel, period: float, hertz: Array) -> NDArray[np.complex128]:
     """Response of the differenced position to the commands at frequencies (m,) [Hz], (m,)."""
     response = velocity_response(loop, period)
     turns = np.outer(hertz, np.arange(len(response)) * period)
-    values: NDArray[np.complex128] = (np.exp(-2j * np.pi * turns) @ response).astype(np.complex128)
-    return values
+    return (np.exp(-2j * np.pi * turns) @ response).astype(np.complex128)
 
 
 def lagged_displacement(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]:
@@ -138,8 +132,7 @@ def _displacement_after_step(t: Array, lag: float) -> Array:
     since = np.maximum(t, 0.0)
     if lag < NO_LAG:
         return since
-    displacement: Array = since - lag * -np.expm1(-since / lag)
-    return displacement
+    return since - lag * -np.expm1(-since / lag)
 
 
 LEAST_GAIN_MARGIN = 2.0
@@ -170,24 +163,16 @@ class LoopMargins:
 
 
 def sensitivity(
-    loop: LoopModel, gain_p: float, gain_i: float, period: float, hertz: NDArray[np.float64]
+    loop: LoopModel, gain_p: float, gain_i: float, period: float, hertz: Array
 ) -> NDArray[np.complex128]:
     """S = 1 / (1 + L) of the sampled loop at frequencies (m,) [Hz]: what feedback leaves of an error."""
-    values: NDArray[np.complex128] = 1.0 / (1.0 + _open_loop(loop, gain_p, gain_i, period, hertz))
-    return values
+    return 1.0 / (1.0 + _open_loop(loop, gain_p, gain_i, period, hertz))
 
 
 def loop_margins(loop: LoopModel, gain_p: float, gain_i: float, period: float) -> LoopMargins:
-    """Measure the margins of the sampled loop.
+    """Measure the margins of the sampled loop with gains [1/s, 1/s2] of 0 or more, and a control cycle [s].
 
-    Args:
-        loop: dead time and lag.
-        gain_p: proportional gain [1/s], >= 0.
-        gain_i: integral gain [1/s2], >= 0.
-        period: control cycle [s].
-
-    Returns:
-        The margins; without feedback all are infinite and the peak is 1.
+    Without feedback all are infinite and the peak is 1.
     """
     if gain_p == 0.0 and gain_i == 0.0:
         return LoopMargins(inf, inf, inf, 1.0)
@@ -215,7 +200,7 @@ def _gain_margin(
     gain_p: float,
     gain_i: float,
     period: float,
-    hertz: NDArray[np.float64],
+    hertz: Array,
     values: NDArray[np.complex128],
 ) -> float:
     """The smallest factor k with a pole of 1 + k L on the unit circle: 1 over the largest crossing.
@@ -236,7 +221,7 @@ def _gain_margin(
 
 
 def _open_loop(
-    loop: LoopModel, gain_p: float, gain_i: float, period: float, hertz: NDArray[np.float64]
+    loop: LoopModel, gain_p: float, gain_i: float, period: float, hertz: Array
 ) -> NDArray[np.complex128]:
     """L of the sampled loop: the integral takes an error into account one cycle after it was seen."""
     back = np.exp(-2j * np.pi * hertz * period)

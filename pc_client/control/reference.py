@@ -11,7 +11,8 @@ from math import floor
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from pc_client.arrays import Array
 
 
 class JointReference(Protocol):
@@ -20,21 +21,16 @@ class JointReference(Protocol):
     @property
     def duration(self) -> float:
         """Length of the movement [s]."""
-        ...
 
-    def at(
-        self, t: float
-    ) -> tuple[Sequence[float] | NDArray[np.float64], Sequence[float] | NDArray[np.float64]]:
+    def at(self, t: float) -> tuple[Sequence[float] | Array, Sequence[float] | Array]:
         """Positions (6,) [rad] and velocities (6,) [rad/s] at time t [s]."""
-        ...
 
 
 class TcpReference(Protocol):
     """The TCP's desired motion over time, for the log; `movements.Movement` is one."""
 
-    def sample(self, t: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sample(self, t: Array, /) -> tuple[Array, Array]:
         """Positions (n, 3) [m] and velocities (n, 3) [m/s], base frame, at times (n,) [s]."""
-        ...
 
 
 class ReferencePoint(NamedTuple):
@@ -51,10 +47,10 @@ class ReferencePoint(NamedTuple):
 
     q: tuple[float, ...]
     qd_feedforward: tuple[float, ...]
-    q_array: NDArray[np.float64]
-    qd_array: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
+    q_array: Array
+    qd_array: Array
+    p: Array
+    v: Array
 
 
 # Time stamps are multiples of the cycle up to rounding; one microsecond separates neighbours and is
@@ -81,20 +77,6 @@ class ReferenceTable:
         tcp: the TCP reference to log, or None when there is none.
     """
 
-    __slots__ = (
-        "_joints",
-        "_lag",
-        "_learned",
-        "_lookahead",
-        "_motors",
-        "_period",
-        "_points",
-        "_tcp",
-        "duration",
-        "lead",
-        "settle",
-    )
-
     def __init__(
         self,
         joints: JointReference,
@@ -105,7 +87,7 @@ class ReferenceTable:
         lookahead: float | None = None,
         motors: JointReference | None = None,
         lag: float = 0.0,
-        learned: NDArray[np.float64] | None = None,
+        learned: Array | None = None,
         tcp: TcpReference | None = None,
     ) -> None:
         self.duration = joints.duration
@@ -114,7 +96,7 @@ class ReferenceTable:
         self._joints = joints
         self._motors = joints if motors is None else motors
         self._tcp = tcp
-        self._period = period
+        self.period = period
         self._lookahead = lookahead
         self._lag = lag
         self._learned = learned
@@ -122,18 +104,10 @@ class ReferenceTable:
         grid = np.arange(round((lead + self.duration + settle) / period) + 2) * period - lead
         self._compute(np.round(grid * _TICKS_PER_SECOND).astype(int).tolist())
 
-    @property
-    def period(self) -> float:
-        """Control cycle of the robot [s]."""
-        return self._period
-
-    def commands(self) -> NDArray[np.float64]:
+    def commands(self) -> Array:
         """The feed-forward of a whole run (n, 6) [rad/s], one a cycle: all that is sent but for feedback."""
-        n = round((self.lead + self.duration + self.settle) / self._period) + 1
-        rows: NDArray[np.float64] = np.array(
-            [self.at(k * self._period - self.lead).qd_feedforward for k in range(n)]
-        )
-        return rows
+        n = round((self.lead + self.duration + self.settle) / self.period) + 1
+        return np.array([self.at(k * self.period - self.lead).qd_feedforward for k in range(n)])
 
     def at(self, t: float) -> ReferencePoint:
         """The reference at time t [s] since the movement began, negative before it."""
@@ -160,20 +134,19 @@ class ReferenceTable:
                 tuple(q.tolist()), tuple(feedforward.tolist()), q, qd, p[i], v[i]
             )
 
-    def _mean_velocity(self, t: float) -> NDArray[np.float64]:
+    def _mean_velocity(self, t: float) -> Array:
         """Mean (6,) [rad/s] of the motors' velocity + lag * acceleration over the cycle from t [s] on.
 
         Both are differences over the cycle, of position and of velocity: nothing is integrated numerically.
         """
         q_now, qd_now = (np.asarray(x, dtype=np.float64) for x in self._motors.at(t))
-        q_later, qd_later = (np.asarray(x, dtype=np.float64) for x in self._motors.at(t + self._period))
-        mean: NDArray[np.float64] = (q_later - q_now + self._lag * (qd_later - qd_now)) / self._period
-        return mean
+        q_later, qd_later = (np.asarray(x, dtype=np.float64) for x in self._motors.at(t + self.period))
+        return (q_later - q_now + self._lag * (qd_later - qd_now)) / self.period
 
-    def _learned_at(self, t: float) -> NDArray[np.float64]:
+    def _learned_at(self, t: float) -> Array:
         """What was learned for time t [s]; between two cycles in between, 0 outside."""
         assert self._learned is not None
-        position = (t + self.lead) / self._period
+        position = (t + self.lead) / self.period
         k = floor(position)
         share = position - k
         n = len(self._learned)

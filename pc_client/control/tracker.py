@@ -21,8 +21,8 @@ from math import asin, ceil, degrees, exp, floor, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.controller import Controller
 from pc_client.control.loop import NO_LAG, LoopModel
 from pc_client.control.reference import ReferencePoint, ReferenceTable
@@ -109,8 +109,6 @@ def step_pi(
     return command
 
 
-Array = NDArray[np.float64]
-
 BEHIND = 0.3
 """The arm may trail by this time [s]: the longest loop delay that is accepted, and the robot's ramp."""
 
@@ -134,19 +132,6 @@ class ToolGuard:
         path_tolerance: largest distance of the tool from its path [m].
         angle_tolerance: largest angle of the tool to its orientation there [rad].
     """
-
-    __slots__ = (
-        "_angle",
-        "_distance",
-        "_inverse",
-        "_lead",
-        "_model",
-        "_period",
-        "_points",
-        "_scale",
-        "_steps",
-        "_trail",
-    )
 
     def __init__(
         self, reference: ReferenceTable, model: RobotModel, path_tolerance: float, angle_tolerance: float
@@ -222,14 +207,13 @@ class ToolGuard:
         return float(np.linalg.norm(parts[:, 3])), 2.0 * asin(min(chord, 1.0)) if chord == chord else chord
 
     def _point(self, q: Sequence[float]) -> Array:
-        point: Array = (tcp_pose(self._model, q)[:3] * self._scale).ravel()
-        return point
+        return (tcp_pose(self._model, q)[:3] * self._scale).ravel()
 
 
 # After a gap in the frames the integral must not jump: no more than this many cycles count.
 _MOST_CYCLES_PER_STEP = 3
 
-ControlLaw = Callable[[RealtimeFrame, ReferencePoint], Sequence[float] | NDArray[np.float64]]
+ControlLaw = Callable[[RealtimeFrame, ReferencePoint], Sequence[float] | Array]
 """A controller of a user: takes a frame of port 30003 and the reference at its time; returns (6,) joint
 velocities [rad/s]."""
 
@@ -263,20 +247,10 @@ class Tracker:
         model: the nominal arm: what its tool does is guarded, and the controller uses its share of the joint
             speed limits.
         law: computes the commands in place of the built-in controller; None: that computes them.
-    """
 
-    __slots__ = (
-        "_config",
-        "_end",
-        "_guard",
-        "_last_stamp",
-        "_law",
-        "_model",
-        "_qd_max",
-        "_reference",
-        "_start",
-        "_state",
-    )
+    Attributes:
+        qd_max: (6,) the largest speeds that a step can command [rad/s].
+    """
 
     def __init__(
         self, reference: ReferenceTable, config: Controller, model: RobotModel, law: ControlLaw | None = None
@@ -286,24 +260,15 @@ class Tracker:
         self._config = config
         self._model = model
         self._guard = ToolGuard(reference, model, config.path_tolerance, config.angle_tolerance)
-        self._qd_max = tuple(limit * config.speed_share for limit in model.limits.qd_max)
+        self.qd_max = tuple(limit * config.speed_share for limit in model.limits.qd_max)
         self._state = PiState()
         self._start: float | None = None
         self._last_stamp = 0.0
         # Half a microsecond: the same grid as the reference, whatever rounding the stamps carry.
         self._end = reference.duration + reference.settle - 0.5e-6
 
-    @property
-    def qd_max(self) -> tuple[float, ...]:
-        """(6,) the largest speeds that a step can command [rad/s]."""
-        return self._qd_max
-
     def check_report(self, q: Sequence[float], pose: Sequence[float]) -> None:
-        """Refuse a report whose joint angles (6,) [rad] and TCP pose (6,) [m, rad] do not belong together.
-
-        Raises:
-            DriverError: they are further apart than `kinematics.check_flange` allows.
-        """
+        """See `kinematics.model.check_flange`."""
         check_flange(self._model, q, pose)
 
     def answer(self, frame: RealtimeFrame) -> TrackerStep:
@@ -333,7 +298,7 @@ class Tracker:
         point = reference.at(t)
         self._guard.check(t, q)
         if self._law is None or frame is None:
-            command = step_pi(self._config, self._qd_max, self._state, point.q, point.qd_feedforward, q, dt)
+            command = step_pi(self._config, self.qd_max, self._state, point.q, point.qd_feedforward, q, dt)
         else:
             command = self._state.qd_cmd = six_velocities(self._law(frame, point))
         return TrackerStep(t, self._phase(t), point, command, t >= self._end)
@@ -352,12 +317,8 @@ class Tracker:
         return Phase.MOVEMENT if t <= self._reference.duration + 0.5e-6 else Phase.SETTLE_AFTER
 
 
-def six_velocities(qd: Sequence[float] | NDArray[np.float64]) -> list[float]:
-    """The velocities (6,) [rad/s] that a user's law gave.
-
-    Raises:
-        DriverError: they are no six finite numbers.
-    """
+def six_velocities(qd: Sequence[float] | Array) -> list[float]:
+    """The six velocities [rad/s] that a user's law gave; DriverError if they are not six finite numbers."""
     try:
         velocities = np.asarray(qd, dtype=np.float64)
     except (TypeError, ValueError):
@@ -368,9 +329,7 @@ def six_velocities(qd: Sequence[float] | NDArray[np.float64]) -> list[float]:
     return given
 
 
-def predict_run(
-    reference: ReferenceTable, config: Controller, model: RobotModel, loop: LoopModel
-) -> NDArray[np.float64]:
+def predict_run(reference: ReferenceTable, config: Controller, model: RobotModel, loop: LoopModel) -> Array:
     """Where the joints go when the controller follows a reference on an ideal arm with this loop.
 
     Beside the loop's dead time and lag the robot's `speedj` counts: all joints change their velocities

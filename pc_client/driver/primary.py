@@ -7,6 +7,7 @@ robot has to hold back its packages.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeVar
 
 from pc_client.driver.transport import MOST_WAITING, Network, Transport
@@ -57,8 +58,6 @@ class PackageStream:
         version: software of the controller, once its version message came.
     """
 
-    __slots__ = ("_buffer", "_early", "_name", "_network", "_newest", "_transport", "_unread", "version")
-
     def __init__(self, transport: Transport, network: Network, name: str) -> None:
         self._transport = transport
         self._network = network
@@ -76,24 +75,16 @@ class PackageStream:
             DriverError: no version message in time, this is no Universal Robots port, or the software is of
                 a CB2, whose packages have other forms.
         """
-        waited = Patience()
-        while self.version is None:
-            if waited.spent(self._network.now()) > VERSION_TIMEOUT:
-                raise DriverError(
-                    f"the {self._name} port says nothing about its version: is this a control box?"
-                )
-            self._early += self._read(LONGEST_STEP) or []
+        self._read_until(lambda: self.version is not None)
+        if self.version is None:
+            raise DriverError(f"the {self._name} port says nothing about its version: is this a control box?")
         if self.version < OLDEST:
             raise DriverError(software(self.version).complaint)
         return self.version
 
     def wait_for_configuration(self) -> ConfigurationData | None:
-        """Return the configuration, which the first state has; None if the robot does not send it in time."""
-        waited = Patience()
-        while ConfigurationData.SUB_TYPE not in self._newest:
-            if waited.spent(self._network.now()) > VERSION_TIMEOUT:
-                break
-            self._early += self._read(LONGEST_STEP) or []
+        """The configuration, which the first state has; None if the robot does not send it in time."""
+        self._read_until(lambda: ConfigurationData.SUB_TYPE in self._newest)
         return self.newest(ConfigurationData)
 
     def newest(self, record: type[S]) -> S | None:
@@ -135,6 +126,12 @@ class PackageStream:
         """Close the connection."""
         self._transport.close()
 
+    def _read_until(self, condition: Callable[[], bool]) -> None:
+        """Read until a condition holds, or until VERSION_TIMEOUT is over."""
+        waited = Patience()
+        while not condition() and waited.spent(self._network.now()) <= VERSION_TIMEOUT:
+            self._early += self._read(LONGEST_STEP) or []
+
     def _read(self, timeout: float) -> list[RobotMessage] | None:
         """Messages in the next piece of the stream, or None when nothing came for `timeout` [s]."""
         data = self._transport.receive(timeout)
@@ -170,11 +167,7 @@ class PackageStream:
 
 
 def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:
-    """Turn what a robot reports about a failed program into an exception.
-
-    Args:
-        messages: what came from the primary port.
-        program: the text that we sent, to quote the line that failed.
+    """Turn what a robot reports about a failed program into an exception, quoting the line that failed.
 
     Raises:
         RobotStoppedError: a runtime exception, or an error code of a serious level.
@@ -187,11 +180,7 @@ def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:
                 f"the robot's program failed in line {message.line}, column {message.column}: "
                 f"{message.text}{quoted}"
             )
-        if isinstance(message, ErrorCodeMessage) and _is_serious(message.report_level):
-            raise RobotStoppedError(
-                f"the robot reports C{message.code}A{message.argument} {message.text}".rstrip()
-            )
-
-
-def _is_serious(level: int) -> bool:
-    return ReportLevel.VIOLATION <= level <= ReportLevel.CRITICAL_FAULT
+        serious = range(ReportLevel.VIOLATION, ReportLevel.CRITICAL_FAULT + 1)
+        if isinstance(message, ErrorCodeMessage) and message.report_level in serious:
+            what = f"C{message.code}A{message.argument} {message.text}"
+            raise RobotStoppedError(f"the robot reports {what}".rstrip())

@@ -95,11 +95,7 @@ class _Lines:
         self._pending = b""
 
     def read(self) -> str | None:
-        """The next line, or None when none comes.
-
-        Raises:
-            DriverError: the connection broke, or a line has no end.
-        """
+        """The next line, or None when none comes; DriverError if the line has no end."""
         begun = Patience()
         while b"\n" not in self._pending:
             late = bool(self._pending) and begun.spent(self._network.now()) > _LINE_TIMEOUT
@@ -141,16 +137,9 @@ class RtdeAnswer:
 
 
 def ask_rtde(network: Network, host: str, port: int, names: tuple[str, ...]) -> RtdeAnswer | None:
-    """Ask for the software and for output variables.
+    """Ask for the software and for output variables; None when there is no RTDE at the port.
 
-    Args:
-        network: makes the connection.
-        host: the robot.
-        port: its RTDE port.
-        names: of the variables; those that the software does not know are left out.
-
-    Returns:
-        None when there is no RTDE port, or no RTDE behind it.
+    Variables that the software does not know are left out.
     """
     try:
         connection = network.connect(host, port, _CONNECT_TIMEOUT)

@@ -67,8 +67,6 @@ class RealtimeClient:
         last_stamp: newest time stamp seen [s], or None before the first frame.
     """
 
-    __slots__ = ("_buffer", "_layout", "_n_repeated", "_network", "_transport", "last_stamp", "time_waits")
-
     def __init__(self, transport: Transport, network: Network, *, time_waits: bool) -> None:
         self._transport = transport
         self._network = network
@@ -117,11 +115,7 @@ class RealtimeClient:
         return max(timeout, _STOPPED_TIMEOUT) if self.time_waits else timeout
 
     def drain(self) -> Arrival | None:
-        """Take what has already arrived, without waiting; None when nothing has.
-
-        Raises:
-            DriverError: as `receive`.
-        """
+        """Take what has arrived, without waiting; None when nothing has. Errors are those of `receive`."""
         taken: Arrival | None = None
         n_bytes = 0
         while data := self._transport.receive(0.0):
@@ -246,10 +240,7 @@ def wait_until(
 
 
 def wait_for_rest(frames: RealtimeClient, network: Network) -> RealtimeFrame:
-    """Wait until the arm has been at rest for a while, or rests while time itself stands still.
-
-    Returns:
-        The state at rest.
+    """Wait until the arm has been at rest for a while, or rests while time itself stands still; its state.
 
     Raises:
         DriverError: it took longer than REST_TIMEOUT, or the frames ended.

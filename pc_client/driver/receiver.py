@@ -41,11 +41,7 @@ _ADDRESS = re.compile(r"[0-9A-Za-z.:-]+")
 
 @cache
 def receiver_template() -> str:
-    """The program text, whose lines to fill in end in `# <- client`.
-
-    Raises:
-        DriverError: the file is not installed.
-    """
+    """The program text, whose lines to fill in end in `# <- client`; DriverError if it is not installed."""
     spec = find_spec("urscript")  # finds a top-level package without running it
     for folder in (spec.submodule_search_locations or ()) if spec is not None else ():
         path = Path(folder) / _FILE
@@ -122,27 +118,20 @@ class ReverseServer:
         port: which one; 0: any free one; None: REVERSE_PORT, or any free one if it is taken and the robot is
             on this machine, where no firewall lies between and many emulated robots may be used at once.
 
+    Attributes:
+        address: to dial.
+        port: to dial.
+
     Raises:
         DriverError: the port is taken, or may not be used.
     """
 
-    __slots__ = ("_address", "_listener", "_network", "_robot_address")
-
     def __init__(self, network: Network, address: str, robot_address: str, port: int | None) -> None:
         self._network = network
-        self._address = address
+        self.address = address
         self._robot_address = robot_address
         self._listener = _listen(network, address, port)
-
-    @property
-    def address(self) -> str:
-        """The address to dial."""
-        return self._address
-
-    @property
-    def port(self) -> int:
-        """The port to dial."""
-        return self._listener.port
+        self.port = self._listener.port
 
     def forget_callers(self) -> None:
         """Close calls that are no longer expected; to be called before a program is started.
@@ -155,7 +144,7 @@ class ReverseServer:
                 return
             caller.close()
         raise DriverError(
-            f"more than {_MOST_CALLERS} callers wait at {self._address}:{self.port}; the robot has one "
+            f"more than {_MOST_CALLERS} callers wait at {self.address}:{self.port}; the robot has one "
             "program: look who else calls, or give another --reverse-port"
         )
 
@@ -177,13 +166,15 @@ class ReverseServer:
         while True:
             caller = self._listener.accept(_POLL)
             if caller is not None:
-                if _is_from(caller.peer_address, self._robot_address):
+                if caller.peer_address == self._robot_address or (
+                    _is_loopback(caller.peer_address) and _is_loopback(self._robot_address)
+                ):
                     break
                 caller.close()  # somebody else found the port
             meanwhile()
             if waited.spent(self._network.now()) > timeout:
                 raise DriverError(
-                    f"the robot's program did not dial back to {self._address}:{self.port} within "
+                    f"the robot's program did not dial back to {self.address}:{self.port} within "
                     f"{timeout:g} s: does a firewall keep it from this TCP port?"
                 )
         try:
@@ -214,10 +205,6 @@ class ReverseServer:
             check_hello(received)
         except RemoteProtocolError as error:
             raise DriverError(f"the robot's program is not our velocity receiver: {error}") from error
-
-
-def _is_from(caller: str, robot: str) -> bool:
-    return caller == robot or (_is_loopback(caller) and _is_loopback(robot))
 
 
 def _is_loopback(address: str) -> bool:

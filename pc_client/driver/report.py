@@ -18,7 +18,7 @@ from pc_client.driver.questions import RtdeAnswer, ask_dashboard, ask_rtde
 from pc_client.driver.realtime import RealtimeClient
 from pc_client.driver.transport import NO_ROUTE, Network
 from pc_client.errors import DriverError, UnknownHostError
-from pc_client.recording.provenance import Source, origin_of
+from pc_client.recording.provenance import Source, origin_of, source_of
 from protocol.errors import RemoteProtocolError
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.realtime.layout import RealtimeFrame
@@ -80,11 +80,7 @@ class RobotInfo:
         return _E_SERIES_PERIOD if self.version.major >= 5 else _CB3_PERIOD
 
     def check_same(self, model: str, serial: str) -> None:
-        """Refuse another robot than the one of this arm and serial number.
-
-        Raises:
-            DriverError: it is another one.
-        """
+        """Raise DriverError for another robot than the one of this arm and serial number."""
         if (self.model, self.serial) != (model, serial):
             raise DriverError(
                 f"another robot answers: {self.model}, serial number {self.serial}, must be {model}, "
@@ -94,8 +90,7 @@ class RobotInfo:
     @property
     def source(self) -> Source:
         """Columns of a table of the robot's data."""
-        names = ("robot", "software", "serial", "simulated")
-        return dict(zip(names, (self.model, str(self.version), self.serial, self.simulated), strict=True))
+        return source_of(self.model, str(self.version), self.serial, self.simulated)
 
     def __str__(self) -> str:
         origin = origin_of(self.simulated).name
@@ -216,21 +211,13 @@ class StatePorts:
         return self.info
 
     def open_frames(self) -> None:
-        """Connect to the realtime port; `identify` comes before.
-
-        Raises:
-            DriverError: the port does not answer.
-        """
+        """Connect to the realtime port, after `identify`; DriverError if the port does not answer."""
         transport = self.network.connect(self.host, self.ports.realtime, self._timeout)
         self.frames = RealtimeClient(transport, self.network, time_waits=self.info.lockstep)
         self._closing.append(self.frames.close)
 
     def read_frame(self) -> RealtimeFrame:
-        """The state of the robot now.
-
-        Raises:
-            DriverError: no frames come.
-        """
+        """The state of the robot now; DriverError if no frames come."""
         self.frames.drain()
         return self.frames.receive().latest
 

@@ -12,9 +12,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pc_client.arrays import Array
 from pc_client.driver.primary import PackageStream, raise_on_error
 from pc_client.driver.realtime import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.receiver import DIAL_TIMEOUT, STOP_DECELERATION, ReverseServer, receiver_script
@@ -107,7 +105,7 @@ class UrDriver:
         finally:
             self._robot.close()
 
-    def actual_q(self) -> NDArray[np.float64]:
+    def actual_q(self) -> Array:
         """Joint positions (6,) as reported now [rad].
 
         Raises:
@@ -115,15 +113,11 @@ class UrDriver:
         """
         frame = self._robot.read_frame()
         check_angles(frame)
-        q: NDArray[np.float64] = frame.actual_q
+        q: Array = frame.actual_q
         return q.copy()
 
     def report(self) -> RobotReport:
-        """What the robot reports of itself now.
-
-        Raises:
-            DriverError: no frames come, or a connection broke.
-        """
+        """What the robot reports of itself now; DriverError if no frames come, or a connection broke."""
         return self._robot.report(self._robot.read_frame())
 
     def stream(self, source: CommandSource[S], on_row: RowSink[S], *, acceleration: float) -> StreamReport:
@@ -160,7 +154,12 @@ class UrDriver:
         Raises:
             DriverError: the arm could not be seen to come to rest.
         """
-        _stop_arm(self._robot, reverse)
+        robot, word = self._robot, encode_velocity(VelocityMode.STOP_PROGRAM)
+        stopped = reverse is not None and _attempt(robot, lambda: reverse.send(word))
+        if not stopped and not _attempt(robot, lambda: _send_stop_program(robot)):
+            raise DriverError(
+                "the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves"
+            )
         self._in_motion = False
 
     def check_ready(self) -> RealtimeFrame:
@@ -243,10 +242,7 @@ class _SessionPorts(StatePorts):
         super().__init__(network, host, ports, timeout=_CONNECT_TIMEOUT)
 
     def open(self, reverse_port: int | None) -> None:
-        """Connect to the robot and listen for its programs.
-
-        Args:
-            reverse_port: see ReverseServer.
+        """Connect to the robot and listen for its programs; the reverse port is that of ReverseServer.
 
         Raises:
             DriverError: a port does not answer, or the robot's software is not one that we drive.
@@ -260,11 +256,7 @@ class _SessionPorts(StatePorts):
         self._closing.append(self.server.close)
 
     def renew(self) -> None:
-        """Make new connections for programs and frames: the present ones may be broken.
-
-        Raises:
-            DriverError: a port does not answer.
-        """
+        """Connect anew for programs and frames: the present connections may be broken."""
         for connection in (self.scripts, self.frames):
             connection.close()
         self.scripts = self._open_packages(self.ports.secondary, "secondary")
@@ -297,11 +289,7 @@ class _ProgramWatch:
         )
 
     def wait(self, condition: Callable[[RealtimeFrame], bool], timeout: float, complaint: str) -> None:
-        """Wait for a frame; raise on safety stops and on errors that the robot reports.
-
-        Raises:
-            DriverError: see `wait_until` and `check`.
-        """
+        """Wait for a frame; raise on safety stops and on errors that the robot reports."""
 
         def check(frame: RealtimeFrame) -> None:
             check_safety(frame)
@@ -326,11 +314,7 @@ class _ProgramWatch:
         check_slider(self._robot.slider)
 
     def look_after(self) -> None:
-        """Read everything that has come, while waiting for something else; at least one frame comes.
-
-        Raises:
-            DriverError: see `check`; the robot is in a safety stop.
-        """
+        """Read everything that has come, while waiting for something else; at least one frame comes."""
         check_safety(self._robot.frames.receive().latest)
         self.check()
 
@@ -349,24 +333,6 @@ class _ProgramWatch:
         if self._is_read_only:
             raise RobotStoppedError(control(remote=False).complaint)
         return not is_stopped(frame)
-
-
-def _stop_arm(robot: _SessionPorts, reverse: Transport | None) -> None:
-    """Bring the arm to rest, and end the program that moves it.
-
-    Args:
-        robot: the connections; those for programs and frames are made anew if the stop word does not help.
-        reverse: connection to the receiver program, when one runs.
-
-    Raises:
-        DriverError: the arm could not be seen to come to rest.
-    """
-    if reverse is not None and _attempt(
-        robot, lambda: reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
-    ):
-        return
-    if not _attempt(robot, lambda: _send_stop_program(robot)):
-        raise DriverError("the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves")
 
 
 def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:

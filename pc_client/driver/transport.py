@@ -45,24 +45,19 @@ class Transport(Protocol):
     @property
     def local_address(self) -> str:
         """Our end's address, as the other end sees it."""
-        ...
 
     @property
     def peer_address(self) -> str:
         """The other end's address."""
-        ...
 
     def send(self, data: bytes) -> None:
         """Send everything. Raises DriverError when the connection is gone."""
-        ...
 
     def receive(self, timeout: float) -> bytes | None:
         """Bytes that arrived, b"" at the end of the stream, None when nothing came for `timeout` seconds."""
-        ...
 
     def close(self) -> None:
         """Close; harmless when closed."""
-        ...
 
 
 class Listener(Protocol):
@@ -71,15 +66,12 @@ class Listener(Protocol):
     @property
     def port(self) -> int:
         """The TCP port that is open."""
-        ...
 
     def accept(self, timeout: float) -> Transport | None:
         """The next caller, or None when there was no call for `timeout` seconds."""
-        ...
 
     def close(self) -> None:
         """Close; harmless when closed."""
-        ...
 
 
 class Network(Protocol):
@@ -87,15 +79,12 @@ class Network(Protocol):
 
     def connect(self, host: str, port: int, timeout: float) -> Transport:
         """Connect. Raises DriverError."""
-        ...
 
     def listen(self, address: str, port: int) -> Listener:
         """Listen on a port of one of our own addresses; 0: any free one. Raises DriverError."""
-        ...
 
     def now(self) -> float:
         """Seconds of a monotonic clock."""
-        ...
 
 
 class PortTakenError(DriverError):
@@ -108,8 +97,6 @@ class TcpTransport:
     A robot that answers within a fraction of a millisecond, as an emulated one in lockstep, is polled:
     a blocking wait would take longer than the answer. `EagerWait` measures whether polling helps.
     """
-
-    __slots__ = ("_eager", "_name", "_socket")
 
     def __init__(self, connected: socket.socket, name: str) -> None:
         connected.setblocking(False)
@@ -129,11 +116,7 @@ class TcpTransport:
         return str(self._socket.getpeername()[0])
 
     def send(self, data: bytes) -> None:
-        """Send everything.
-
-        Raises:
-            DriverError: the connection is gone, or the peer took nothing for the time-out.
-        """
+        """Send everything; DriverError if the connection is gone, or the peer takes nothing any more."""
         try:
             sent = self._socket.send(data)
             while sent < len(data):
@@ -185,8 +168,6 @@ class TcpTransport:
 class EagerWait:
     """Measures whether polling helps: after each failure the next try comes later."""
 
-    __slots__ = ("_pause", "_skip")
-
     def __init__(self) -> None:
         self._pause = 1
         self._skip = 0
@@ -211,8 +192,6 @@ class EagerWait:
 
 class TcpListener:
     """A listening TCP socket."""
-
-    __slots__ = ("_socket",)
 
     def __init__(self, listening: socket.socket) -> None:
         self._socket = listening
@@ -240,11 +219,7 @@ class TcpNetwork:
     """The real network."""
 
     def connect(self, host: str, port: int, timeout: float) -> TcpTransport:
-        """Connect.
-
-        Raises:
-            DriverError: unknown name, no answer, connection refused.
-        """
+        """Connect; DriverError for an unknown name, no answer, or a connection that is refused."""
         try:
             connected = socket.create_connection((host, port), timeout)
         except UnicodeError as error:  # of the codec for host names

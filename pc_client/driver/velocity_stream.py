@@ -30,12 +30,10 @@ class Step(Protocol):
     @property
     def qd_cmd(self) -> list[float]:
         """(6,) velocities to send [rad/s]."""
-        ...
 
     @property
     def finished(self) -> bool:
         """True: the run is over, the stop word is sent instead of `qd_cmd`."""
-        ...
 
 
 S = TypeVar("S", bound=Step)
@@ -48,19 +46,15 @@ class CommandSource(Protocol[S_co]):
     @property
     def qd_max(self) -> tuple[float, ...]:
         """(6,) the largest speeds that a step can command [rad/s]."""
-        ...
 
     def answer(self, frame: RealtimeFrame) -> S_co:
         """Answer a new frame with a command; what it raises ends the run."""
-        ...
 
     def observe(self, stamp: float) -> S_co:
         """Describe a frame [s] that gets no command of its own because a newer one is already here."""
-        ...
 
     def check_report(self, q: Sequence[float], pose: Sequence[float]) -> None:
         """Refuse a report whose joint angles (6,) [rad] and TCP pose (6,) [m, rad] do not belong together."""
-        ...
 
 
 RowSink = Callable[[RealtimeFrame, S], None]
@@ -101,10 +95,11 @@ class StreamReport:
     wall_time: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
 class VelocityStream:
     """Streams velocities to a program that has just connected.
 
-    Args:
+    Attributes:
         frames: the realtime port.
         reverse: the program's connection.
         network: the clock that bounds standstill.
@@ -112,21 +107,11 @@ class VelocityStream:
         housekeeping: called now and then; raises when the robot reports an error.
     """
 
-    __slots__ = ("_frames", "_housekeeping", "_network", "_period", "_reverse")
-
-    def __init__(
-        self,
-        frames: RealtimeClient,
-        reverse: Transport,
-        network: Network,
-        period: float,
-        housekeeping: Callable[[], None],
-    ) -> None:
-        self._frames = frames
-        self._reverse = reverse
-        self._network = network
-        self._period = period
-        self._housekeeping = housekeeping
+    frames: RealtimeClient
+    reverse: Transport
+    network: Network
+    period: float
+    housekeeping: Callable[[], None]
 
     def run(self, source: CommandSource[S], on_row: RowSink[S]) -> StreamReport:
         """Stream until the source has finished; then the stop word is sent.
@@ -143,10 +128,10 @@ class VelocityStream:
             DriverError: silence of either side, closed sockets, a command that is not safe to send.
         """
         report = StreamReport()
-        each = round(_HOUSEKEEPING / self._period)
+        each = round(_HOUSEKEEPING / self.period)
         frame = self._wait_for_trigger(report)
-        began = self._network.now()
-        receive, send, limits = self._frames.receive, self._reverse.send, source.qd_max
+        began = self.network.now()
+        receive, send, limits = self.frames.receive, self.reverse.send, source.qd_max
         first_stamp = last_stamp = frame.timestamp
         while True:
             stamp = frame.timestamp
@@ -165,7 +150,7 @@ class VelocityStream:
             on_row(frame, step)
             report.n_commands += 1
             if report.n_commands % each == 0:
-                self._housekeeping()
+                self.housekeeping()
 
             arrival = receive()
             new = arrival.new
@@ -173,7 +158,7 @@ class VelocityStream:
                 report.heartbeats += arrival.n_heartbeats
                 if not new:
                     new = self._wait_for_new(report)
-            if len(new) > 1 and (waiting := self._frames.drain()) is not None:
+            if len(new) > 1 and (waiting := self.frames.drain()) is not None:
                 new = new + waiting.new
             last_stamp = self._count_gaps(new, last_stamp, report)
             if len(new) > 1:
@@ -183,18 +168,10 @@ class VelocityStream:
                     on_row(late, source.observe(late.timestamp))
             frame = new[-1]
             _check_silence(stamp, last_stamp)
-        self.send_stop()
+        send(encode_velocity(VelocityMode.STOP_PROGRAM))  # the program ramps the arm down and ends
         report.robot_time = last_stamp - first_stamp
-        report.wall_time = self._network.now() - began
+        report.wall_time = self.network.now() - began
         return report
-
-    def send_stop(self) -> None:
-        """Send the stop word: the program ramps the arm down and ends.
-
-        Raises:
-            DriverError: the connection is gone.
-        """
-        self._reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
 
     def _wait_for_trigger(self, report: StreamReport) -> RealtimeFrame:
         """Find the frame that the first command answers.
@@ -204,35 +181,35 @@ class VelocityStream:
         runs on sends new frames: the third is the trigger, or a later one if the controller raises the speed
         scaling when a program starts; it gets the word to rest until then.
         """
-        self._frames.drain()
-        n_new, longest = 0, round(_LONGEST_RISE / self._period)
+        self.frames.drain()
+        n_new, longest = 0, round(_LONGEST_RISE / self.period)
         while True:
-            arrival = self._frames.receive()
+            arrival = self.frames.receive()
             report.heartbeats += arrival.n_heartbeats
             n_new += len(arrival.new)
-            stands_still = self._frames.time_waits and arrival.stands_still
+            stands_still = self.frames.time_waits and arrival.stands_still
             if stands_still or n_new >= _FRAMES_BEFORE_START:
                 if stands_still or is_at_full_speed(arrival.latest) or n_new >= longest:
                     return arrival.latest
-                self._reverse.send(encode_velocity(VelocityMode.HOLD))
+                self.reverse.send(encode_velocity(VelocityMode.HOLD))
 
     def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
         """Skip heartbeats until time goes on."""
-        waited, longest = Patience(), self._frames.patience(READ_TIMEOUT)
+        waited, longest = Patience(), self.frames.patience(READ_TIMEOUT)
         while True:
-            arrival = self._frames.receive()
+            arrival = self.frames.receive()
             report.heartbeats += arrival.n_heartbeats
             if arrival.new:
                 return arrival.new
             check_streaming(arrival.latest)
-            if waited.spent(self._network.now()) > longest:
+            if waited.spent(self.network.now()) > longest:
                 raise DriverError(
                     f"the robot's time has stood still for {longest:g} s although it has a command"
                 )
 
     def _check_waiting(self, answered: float) -> None:
         """Look for the reason of a broken connection in the frames that wait; raise it if there is one."""
-        waiting = self._frames.drain()
+        waiting = self.frames.drain()
         if waiting is not None:
             _check_silence(answered, waiting.latest.timestamp)
             check_streaming(waiting.latest)
@@ -242,13 +219,13 @@ class VelocityStream:
         for frame in new:
             stamp = frame.timestamp
             gap = stamp - last_stamp
-            if gap < _SHORTEST_GAP * self._period:
+            if gap < _SHORTEST_GAP * self.period:
                 raise DriverError(
                     f"the robot's frames jump from {last_stamp:.6f} s to {stamp:.6f} s, a cycle is "
-                    f"{self._period:g} s: the stream is broken"
+                    f"{self.period:g} s: the stream is broken"
                 )
-            if gap > 1.5 * self._period:
-                report.lost_frames += round(gap / self._period) - 1
+            if gap > 1.5 * self.period:
+                report.lost_frames += round(gap / self.period) - 1
             last_stamp = stamp
         return last_stamp
 
@@ -256,9 +233,7 @@ class VelocityStream:
 def _check_silence(answered: float, newest: float) -> None:
     """Refuse to go on when the robot had no command for so long that its program has ended.
 
-    Args:
-        answered: time stamp of the last frame that was answered [s].
-        newest: time stamp of the newest frame [s].
+    The time stamps are those of the last frame that was answered and of the newest one [s].
     """
     if newest - answered > READ_TIMEOUT:
         raise DriverError(
@@ -280,11 +255,7 @@ def collector_paused() -> Iterator[None]:
 
 
 def check_command(qd: Sequence[float], limits: Sequence[float]) -> None:
-    """The last check of a command before it is sent.
-
-    Args:
-        qd: (6,) velocities [rad/s].
-        limits: (6,) largest speeds [rad/s].
+    """The last check of a command (6,) [rad/s] against the largest speeds (6,) [rad/s], before it is sent.
 
     Raises:
         DriverError: a velocity is NaN or beyond its limit; a controller must never produce that.

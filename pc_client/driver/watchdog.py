@@ -170,45 +170,26 @@ def speed_scaling(frame: RealtimeFrame) -> Condition:
 
 
 def check_safety(frame: RealtimeFrame) -> None:
-    """Refuse a robot that may not move.
-
-    Raises:
-        RobotStoppedError: safety mode or robot mode forbids motion; says which and what to do.
-    """
+    """Raise RobotStoppedError if safety mode or robot mode forbids motion; it says which and what to do."""
     for condition in (safety_mode(frame), robot_mode(frame)):
         if not condition.holds:
             raise RobotStoppedError(condition.complaint)
 
 
 def check_idle(frame: RealtimeFrame) -> None:
-    """Refuse a robot on which a program of somebody else runs.
-
-    Raises:
-        DriverError: a program is running or paused.
-    """
+    """Raise DriverError for a robot on which a program of somebody else runs or stands paused."""
     if not (condition := program_state(frame)).holds:
         raise DriverError(condition.complaint)
 
 
 def check_slider(fraction: float | None) -> None:
-    """Refuse a robot that is slowed down by its speed slider.
-
-    Args:
-        fraction: of full speed; None when the robot does not report it.
-
-    Raises:
-        DriverError: it does not stand at 100 %.
-    """
+    """Raise DriverError if the speed slider is reported and does not stand at 100 %."""
     if fraction is not None and not fraction >= _FULL_SPEED:  # NaN fails too
         raise DriverError(speed_slider(fraction).complaint)
 
 
 def check_angles(frame: RealtimeFrame) -> None:
-    """Refuse joint angles that are not finite.
-
-    Raises:
-        DriverError: one is not a number, or more than any joint turns.
-    """
+    """Raise DriverError for a joint angle that is no number, or more than any joint turns."""
     q = frame.actual_q.tolist()
     if not all(-_FARTHEST < value < _FARTHEST for value in q):  # NaN is not
         raise DriverError(
@@ -236,22 +217,22 @@ def check_streaming(frame: RealtimeFrame) -> None:
 
 
 def is_at_full_speed(frame: RealtimeFrame) -> bool:
-    """Return True when the controller does not slow the arm down."""
+    """Whether the controller does not slow the arm down."""
     return bool(frame.speed_scaling >= _FULL_SPEED)
 
 
 def is_stopped(frame: RealtimeFrame) -> bool:
-    """Return True when no program runs."""
+    """Whether no program runs."""
     return bool(frame.runtime_state == ProgramState.STOPPED)
 
 
 def has_ended(frame: RealtimeFrame) -> bool:
-    """Return True when nothing moves the arm: no program, or a safety stop, which may only pause it."""
+    """Whether nothing moves the arm: no program, or a safety stop, which may only pause it."""
     return is_stopped(frame) or frame.safety_mode not in _SAFE_MODES or frame.robot_mode != RUNNING
 
 
 def is_at_rest(frame: RealtimeFrame) -> bool:
-    """Return True when every joint reports less than `REST_SPEED`."""
+    """Whether every joint reports less than `REST_SPEED`."""
     return all(-REST_SPEED < qd < REST_SPEED for qd in frame.actual_qd.tolist())
 
 

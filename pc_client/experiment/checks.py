@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
 from pc_client.control.loop import LEAST_GAIN_MARGIN, SAMPLING_TIME, LoopModel, loop_margins
 from pc_client.control.reference import JointReference, ReferenceTable
@@ -26,8 +26,6 @@ from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
-
-Array = NDArray[np.float64]
 
 _LEARNED_DISPLACEMENT = 0.05
 """What was learned may lead a joint this far [rad]."""
@@ -49,12 +47,7 @@ def posture_complaint(bodies: ClearanceModel, limits: PlanLimits, q: Array) -> s
             f"{JOINT_NAMES[joint]} comes to {math.degrees(q[k, joint]):.0f} deg, at least "
             f"{math.degrees(margin):.1f} deg from the end of its range is asked"
         )
-    clearance = bodies.along(q)
-    for distances, least in (
-        (clearance.floor, limits.floor_clearance_min),
-        (clearance.own, limits.own_clearance_min),
-        (clearance.cell, limits.cell_clearance_min),
-    ):
+    for distances, least in zip(bodies.along(q), limits.clearances_min, strict=True):
         k = int(distances.least.argmin())
         if not (distance := float(distances.least[k])) >= least:
             return distances.nearest[k].says(distance, least)
@@ -62,7 +55,7 @@ def posture_complaint(bodies: ClearanceModel, limits: PlanLimits, q: Array) -> s
 
 
 def way_to_rest(model: RobotModel, q: Array, qd: Array) -> Array:
-    """Postures through which an arm comes to rest when it is stopped, [rad].
+    """Postures (m, 6) [rad] through which an arm comes to rest when it is stopped, the given ones among them.
 
     After the reaction the joint that needs longest brakes as the arm can, the others in proportion: a
     straight line in joint space.
@@ -71,9 +64,6 @@ def way_to_rest(model: RobotModel, q: Array, qd: Array) -> Array:
         model: nominal arm; its deceleration is its limit of acceleration, or that of the robot's program.
         q: (6,) or (n, 6) postures when the stop is decided [rad].
         qd: velocities there, of the same shape [rad/s].
-
-    Returns:
-        (m, 6), the given postures among them.
     """
     deceleration = np.minimum(STOP_DECELERATION, model.limits.qdd_max)
     ramp = np.max(np.abs(qd) / deceleration, axis=-1, keepdims=True)
@@ -91,7 +81,7 @@ def broken_limit(
     config: Controller,
     period: float,
 ) -> str:
-    """Name the first limit that a whole run of commands breaks.
+    """Name the first limit that a whole run of commands breaks; empty when all limits are kept.
 
     Args:
         plan: where the run begins, and the limits.
@@ -100,9 +90,6 @@ def broken_limit(
         model: the nominal arm.
         config: its shares of the limits.
         period: control cycle [s].
-
-    Returns:
-        One phrase; empty when all limits are kept.
     """
     limits = plan.report.limits
     q_sent = plan.start_q + np.cumsum(commands, axis=0) * period
@@ -137,11 +124,7 @@ _SLOWER = (1.1, 1.2, 1.3, 1.5, 2.0, 3.0, 5.0)
 
 
 def shortest_loop(period: float) -> LoopModel:
-    """The shortest loop of a robot: one cycle until a command acts, one until the feedback shows it.
-
-    Args:
-        period: control cycle [s].
-    """
+    """The shortest loop of a robot: one cycle [s] until a command acts, one until the feedback shows it."""
     return LoopModel.of_delay(2.0 * period, 0.0)
 
 
@@ -150,12 +133,7 @@ def guarded(
 ) -> Controller:
     """The controller with the tolerances of one movement: what the loop predicts, and a margin.
 
-    Args:
-        plan: the movement.
-        config: the controller; its own tolerances are the largest that are allowed.
-        model: the nominal arm.
-        loop: as identified, or the shortest one.
-        period: control cycle [s].
+    Its own tolerances are the largest that are allowed. The loop is the identified one, or the shortest.
 
     Raises:
         DriverError: the prediction is beyond the tolerances, or leads too near to floor, arm or cell.

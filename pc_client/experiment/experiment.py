@@ -78,10 +78,7 @@ class Experiment:
 
 
 def load_movements(sources: Sequence[str | Path]) -> list[Motion]:
-    """Load movements of one experiment.
-
-    Args:
-        sources: names of the library or movement files.
+    """Load movements of one experiment, by their names in the library or their files.
 
     Raises:
         MovementError: a movement is unknown or makes no sense.
@@ -200,13 +197,9 @@ def _refuse_to_lose(path: Path, overwrite: bool) -> None:
 
 
 def experiment_text(experiment: Experiment) -> str:
-    """Describe what the arm is going to do: box of motion, top speeds, duration, margins.
+    """Describe in a few lines what the arm is going to do: box of motion, top speeds, duration, margins.
 
-    Args:
-        experiment: planned, not yet running.
-
-    Returns:
-        A few lines, the worst of all movements.
+    Of all movements the worst is shown.
     """
     reports = {planned.movement.name: planned.joints.report for planned in experiment.planned}
     low = np.min([report.box_min for report in reports.values()], axis=0)

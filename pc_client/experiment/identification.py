@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.controller import Controller
 from pc_client.control.identification import (
     BRISK_PULSE,
@@ -26,7 +26,6 @@ from pc_client.control.loop import LEAST_GAIN_MARGIN, LoopMargins, LoopModel, lo
 from pc_client.control.reference import ReferenceTable
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.session import UrDriver
-from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError, GainMarginError
 from pc_client.experiment.checks import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
@@ -89,16 +88,13 @@ class Identification:
         return facts
 
 
-def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[Identification, StreamReport]:
+def identify(driver: UrDriver, config: Controller, model: RobotModel) -> Identification:
     """Identify the loop where the arm stands; it moves less than one degree and comes back.
 
     Args:
         driver: a session; the arm rests.
         config: the controller that will be used: its acceleration is part of the loop, its gains are checked.
         model: the nominal arm.
-
-    Returns:
-        What was found, and what happened on the wire.
 
     Raises:
         DriverError: the excitation leads out of the limits, the stream broke, or the arm did not follow.
@@ -111,17 +107,13 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
     open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
     excitation = _excitation(q_start, config)
     table = ReferenceTable(excitation, period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0)
-    stamps: list[float] = []
-    commands: list[list[float]] = []
-    positions: list[list[float]] = []
+    rows: list[tuple[float, list[float], list[float]]] = []
 
     def collect(frame: RealtimeFrame, step: TrackerStep) -> None:
-        stamps.append(frame.timestamp)
-        commands.append(step.qd_cmd)
-        positions.append(frame.actual_q.tolist())
+        rows.append((frame.timestamp, step.qd_cmd, frame.actual_q.tolist()))
 
     report = driver.stream(Tracker(table, open_loop, model), collect, acceleration=config.speedj_acceleration)
-    t, qd_cmd, q = np.array(stamps), np.array(commands), np.array(positions)
+    t, qd_cmd, q = map(np.array, zip(*rows, strict=True))
     try:
         estimate = estimate_delay(t, qd_cmd, q, period)
         _check_return(driver.actual_q() - q_start)
@@ -141,15 +133,10 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> tuple[I
             margin=margins.gain,
             delay=estimate.delay,
         )
-    return Identification(
-        estimate=estimate,
-        loop=loop,
-        margins=margins,
-        learning=learning_filter(config, loop, period),
-    ), report
+    return Identification(estimate, loop, margins, learning_filter(config, loop, period))
 
 
-def check_excitation(q_start: NDArray[np.float64], config: Controller, model: RobotModel) -> None:
+def check_excitation(q_start: Array, config: Controller, model: RobotModel) -> None:
     """Check the excitation at a posture (6,) [rad], and the way to rest from each of its points.
 
     Raises:
@@ -165,7 +152,7 @@ def check_excitation(q_start: NDArray[np.float64], config: Controller, model: Ro
         )
 
 
-def _excitation(q_start: NDArray[np.float64], config: Controller) -> Excitation:
+def _excitation(q_start: Array, config: Controller) -> Excitation:
     return Excitation(q_start.tolist(), BRISK_PULSE if _needs_lag(config) else PULSE)
 
 
@@ -173,7 +160,7 @@ def _needs_lag(config: Controller) -> bool:
     return config.compensates_lag or config.compensates_gear or config.uses_ilc
 
 
-def _check_return(drift: NDArray[np.float64]) -> None:
+def _check_return(drift: Array) -> None:
     """Refuse an excitation that left a joint away from where it began, (6,) [rad]."""
     most = float(np.abs(drift).max())
     if not most <= _RETURN_TOLERANCE:
@@ -191,13 +178,8 @@ def learning_filter(config: Controller, loop: LoopModel, period: float) -> Learn
     """
     if not config.uses_ilc:
         return None
-    learning = design_filter(
-        loop,
-        period,
-        learning_gain=config.learning_gain,
-        gain_p=config.gain_p,
-        gain_i=config.gain_i,
-    )
+    gains = {"gain_p": config.gain_p, "gain_i": config.gain_i}
+    learning = design_filter(loop, period, learning_gain=config.learning_gain, **gains)
     if not learning.contraction < 1.0:
         raise DriverError(
             f"learning would not converge: from run to run an error may grow by {learning.contraction:.2f}, "

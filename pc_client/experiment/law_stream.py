@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.tracker import six_velocities
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import posture_complaint, way_to_rest
@@ -19,8 +19,6 @@ from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import RobotModel, check_flange
 from pc_client.planning.limits import limits_of
 from protocol.realtime.layout import RealtimeFrame
-
-Array = NDArray[np.float64]
 
 VelocityLaw = Callable[[RealtimeFrame], Sequence[float] | Array | None]
 """Takes a frame of port 30003; returns (6,) joint velocities [rad/s], or None to end."""
@@ -47,11 +45,10 @@ class LawStep(NamedTuple):
 
 
 class LawStream:
-    """Asks a law for every command, and refuses what leads out of the arm's limits.
+    """Asks the law of a user for every command, and refuses what leads out of the limits of an arm.
 
-    Args:
-        law: of the user.
-        model: the nominal arm in its cell.
+    Attributes:
+        qd_max: (6,) the largest speeds that a step can command [rad/s].
     """
 
     def __init__(self, law: VelocityLaw, model: RobotModel) -> None:
@@ -60,11 +57,7 @@ class LawStream:
         self._limits = limits_of(model)
         self._clearance = clearance_model(model)
         self._last = _REST
-
-    @property
-    def qd_max(self) -> tuple[float, ...]:
-        """(6,) the largest speeds that a step can command [rad/s]."""
-        return tuple(_SPEED_SHARE * limit for limit in self._model.limits.qd_max)
+        self.qd_max = tuple(_SPEED_SHARE * limit for limit in model.limits.qd_max)
 
     def answer(self, frame: RealtimeFrame) -> LawStep:
         """Ask the law.
@@ -84,11 +77,7 @@ class LawStream:
         return LawStep(self._last, False)
 
     def check_report(self, q: Sequence[float], pose: Sequence[float]) -> None:
-        """Refuse a report whose joint angles (6,) [rad] and TCP pose (6,) [m, rad] do not belong together.
-
-        Raises:
-            DriverError: they are further apart than `kinematics.forward` allows.
-        """
+        """See `kinematics.model.check_flange`."""
         check_flange(self._model, q, pose)
 
     def _check_way(self, frame: RealtimeFrame, qd: Array) -> None:

@@ -64,11 +64,7 @@ def refusal(conditions: Sequence[Condition]) -> str:
 
 
 def require(conditions: Sequence[Condition]) -> None:
-    """Refuse a robot that fails a condition.
-
-    Raises:
-        DriverError: one fails; the first is named.
-    """
+    """Raise DriverError for the first condition that a robot fails."""
     if complaint := refusal(conditions):
         raise DriverError(complaint)
 
@@ -96,16 +92,13 @@ def _arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
 
 def tcp_offset(report: RobotReport, model: RobotModel | None) -> Condition:
     """The TCP is the flange, as in plans."""
-    offset = report.tcp_offset
-    distance, angle = (0.0, 0.0) if offset is None else _size(offset)
-    most_distance, most_angle = _OFFSET_TOLERANCE
-    return Condition(
-        "TCP offset",
-        "" if offset is None else _pose_text(offset),
-        "0 (the flange)",
-        "set the TCP of the installation to zero in all six values",
-        None if offset is None else distance <= most_distance and angle <= most_angle,
-    )
+    offset, reported, holds = report.tcp_offset, "", None
+    if offset is not None:
+        distance, angle = np.linalg.norm(offset[:3]), np.linalg.norm(offset[3:])
+        most_distance, most_angle = _OFFSET_TOLERANCE
+        reported, holds = _pose_text(offset), bool(distance <= most_distance and angle <= most_angle)
+    remedy = "set the TCP of the installation to zero in all six values"
+    return Condition("TCP offset", reported, "0 (the flange)", remedy, holds)
 
 
 def _forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -211,11 +204,6 @@ CONDITIONS: tuple[Check, ...] = (
     _rtde,
 )
 """What a robot must fulfil, in the order in which it is shown: what explains the others comes first."""
-
-
-def _size(pose: Sequence[float]) -> tuple[float, float]:
-    """Length [m] and angle [rad] of a pose."""
-    return float(np.linalg.norm(pose[:3])), float(np.linalg.norm(pose[3:]))
 
 
 def _pose_text(pose: Sequence[float]) -> str:

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.controller import Controller
 from pc_client.control.gear import GearModel
 from pc_client.control.learning import LearningBounds, LearningFilter, RunSignals, learn, learnable_power
@@ -26,8 +26,6 @@ from pc_client.kinematics.model import RobotModel
 from pc_client.planning.plan import JointPlan
 from protocol.realtime.layout import RealtimeFrame
 
-Array = NDArray[np.float64]
-
 _WORSE = 1.5
 """Growth of the learnable error from one run to the next that ends learning: the arm does not answer small
 motions as the model of the loop does. Noise changes it by up to a fifth."""
@@ -36,46 +34,37 @@ motions as the model of the loop does. Noise changes it by up to a fifth."""
 class RunLog:
     """The frames of one run, kept while it goes on, for learning."""
 
-    __slots__ = ("_feedforward", "_q", "_q_ref", "_qd_cmd", "_t")
-
     def __init__(self) -> None:
-        self._t: list[float] = []
-        self._q_ref: list[Sequence[float]] = []
-        self._q: list[Sequence[float]] = []
-        self._feedforward: list[Sequence[float]] = []
-        self._qd_cmd: list[Sequence[float]] = []
+        self._rows: list[tuple[float, Sequence[float], Sequence[float], Sequence[float], list[float]]] = []
 
     def append(self, frame: RealtimeFrame, step: TrackerStep) -> None:
         """Take one frame and what was made of it."""
-        self._t.append(step.t)
-        self._q_ref.append(step.point.q)
-        self._q.append(frame.actual_q.tolist())
-        self._feedforward.append(step.point.qd_feedforward)
-        self._qd_cmd.append(step.qd_cmd)
-
-    @property
-    def qd_cmd(self) -> Array:
-        """(n, 6) commands [rad/s]."""
-        return np.array(self._qd_cmd)
+        q, point = frame.actual_q.tolist(), step.point
+        self._rows.append((step.t, point.q, q, point.qd_feedforward, step.qd_cmd))
 
     @property
     def q(self) -> Array:
         """(n, 6) reported positions [rad]."""
-        return np.array(self._q)
+        return np.array([row[2] for row in self._rows])
+
+    @property
+    def qd_cmd(self) -> Array:
+        """(n, 6) commands [rad/s]."""
+        return np.array([row[4] for row in self._rows])
 
     def signals(self, learned: Array | None, lead: float, period: float) -> RunSignals:
-        """Return the run on the grid of cycles; its time stamps may jitter about it.
+        """Return the run on the grid of cycles [s]; its time stamps may jitter about it.
 
         Args:
             learned: (n, 6) what the run's feed-forward held beside the reference's own, or None.
             lead: time of the first frame before the movement [s].
             period: control cycle [s].
         """
-        t = np.array(self._t)
+        t, q_ref, q, feedforward, qd_cmd = map(np.array, zip(*self._rows, strict=True))
         grid = np.arange(len(t)) * period - lead
         error, added = (
             np.stack([np.interp(grid, t, column) for column in signal.T], axis=1)
-            for signal in (np.array(self._q_ref) - self.q, self.qd_cmd - np.array(self._feedforward))
+            for signal in (q_ref - q, qd_cmd - feedforward)
         )
         if learned is not None:
             n = min(len(grid), len(learned))

@@ -124,7 +124,7 @@ class ExperimentRunner:
         clear_folder(experiment)
         self._observer.connected(driver.info)
         there: JointPlan | None = self._approach(first)
-        found, _ = identify(driver, self._config, experiment.model)
+        found = identify(driver, self._config, experiment.model)
         self._observer.identified(found)
         configs = self._guarded(found.loop)
         report = ExperimentReport(found)
@@ -132,7 +132,8 @@ class ExperimentRunner:
         gears = GearObserver(found.loop, driver.info.period)
         for planned, config in zip(experiment.planned, configs, strict=True):
             name = planned.movement.name
-            repetitions = self._repetitions(found)
+            period = driver.info.period
+            repetitions = Repetitions(self._config, found.loop, found.learning, experiment.model, period)
             for repetition in range(1, experiment.repeat + 1):
                 plan = self._approach(self._plan_approach(planned.joints)) if there is None else there
                 there = None
@@ -166,11 +167,6 @@ class ExperimentRunner:
             return [self._config] * len(self._experiment.planned)
         model, period = self._experiment.model, self._driver.info.period
         return [guarded(one.joints, self._config, model, loop, period) for one in self._experiment.planned]
-
-    def _repetitions(self, found: Identification) -> Repetitions:
-        """The memory of one movement, empty."""
-        model, period = self._experiment.model, self._driver.info.period
-        return Repetitions(self._config, found.loop, found.learning, model, period)
 
     def _table(
         self, planned: Plan, plan: JointPlan, found: Identification, repetitions: Repetitions
@@ -270,12 +266,7 @@ def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame
 
 
 def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> None:
-    """Move the arm along a checked path and wait until it rests at its end.
-
-    Args:
-        driver: a session; the arm rests where the approach begins.
-        approach: the checked path.
-        model: the nominal arm.
+    """Move the arm along a checked path, from where it rests, and wait until it rests at the end.
 
     Raises:
         RobotStoppedError: the robot stopped.

@@ -19,7 +19,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pc_client.kinematics.arms import JointLimits, RobotDescription
+from pc_client.kinematics.arms import RobotDescription
 
 Three = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -102,21 +102,13 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def arm_tree(description: RobotDescription) -> ArmTree:
-    """Read the tree of an arm.
-
-    Raises:
-        PlanningError: example-robot-data is not installed.
-    """
+    """Read the tree of an arm; PlanningError if example-robot-data is not installed."""
     source = ElementTree.fromstring(description.urdf)
-    joints = [
-        _joint(element)
-        for element in source.findall("joint")
-        if not {_link(element, "parent"), _link(element, "child")} & set(_LEFT_OUT)
-    ]
+    joints = [_joint(element) for element in source.findall("joint")]
+    joints = [joint for joint in joints if not {joint.parent, joint.child} & set(_LEFT_OUT)]
     moving = tuple(joint for joint in joints if joint.axis is not None)
     fixed = tuple(joint for joint in joints if joint.axis is None)
-    urdf = _urdf(description, moving, fixed)
-    return ArmTree(description.name, moving, fixed, urdf)
+    return ArmTree(description.name, moving, fixed, _urdf(description, moving, fixed))
 
 
 def _link(joint: Element, end: str) -> str:
@@ -162,21 +154,14 @@ def _urdf(description: RobotDescription, moving: Sequence[Joint], fixed: Sequenc
                 _tubes(links[joint.parent], joint.origin, radius)
             continue
         SubElement(element, "axis", xyz=_text(joint.axis))
-        SubElement(element, "limit", _limits(description.limits, k))
+        limits = description.limits
+        bounds = {"lower": limits.q_min[k], "upper": limits.q_max[k], "velocity": limits.qd_max[k]}
+        # URDF demands an effort, and 0 says that none is given.
+        SubElement(element, "limit", {name: f"{x:.6g}" for name, x in bounds.items()} | {"effort": "0"})
         _tubes(links[joint.parent], joint.origin, radius)
         _cylinder(links[joint.child], (0.0, 0.0, 0.0), np.array(joint.axis), 2.6 * radius, 1.2 * radius, True)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode") + "\n"
-
-
-def _limits(limits: JointLimits, k: int) -> dict[str, str]:
-    """Limits of a joint; URDF demands an effort, and 0 says that none is given."""
-    return {
-        "lower": f"{limits.q_min[k]:.6g}",
-        "upper": f"{limits.q_max[k]:.6g}",
-        "velocity": f"{limits.qd_max[k]:.6g}",
-        "effort": "0",
-    }
 
 
 def _tubes(link: Element, end: Three, radius: float) -> None:

@@ -21,8 +21,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError, PlanningError
 
 Three = tuple[float, float, float]
@@ -54,20 +55,18 @@ class Box:
     high: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        if not all(
-            math.isfinite(a) and math.isfinite(b) and a < b for a, b in zip(self.low, self.high, strict=True)
-        ):
+        if not all(math.isfinite(b - a) and a < b for a, b in zip(self.low, self.high, strict=True)):
             raise MovementError(
                 f"box from {self.low} to {self.high} m: each low edge must lie below its high edge"
             )
 
     @property
-    def size(self) -> NDArray[np.float64]:
+    def size(self) -> Array:
         """Edge lengths, (3,), m."""
         return np.subtract(self.high, self.low)
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> Array:
         """Midpoint, (3,), m."""
         return 0.5 * np.add(self.high, self.low)
 
@@ -81,10 +80,8 @@ class Box:
     def contains(self, p: ArrayLike, tolerance: float = 0.0) -> bool:
         """Whether all points p, (..., 3), m, lie inside, or outside by no more than the tolerance (m)."""
         points = np.asarray(p, dtype=np.float64)
-        return bool(
-            np.all(points >= np.subtract(self.low, tolerance))
-            and np.all(points <= np.add(self.high, tolerance))
-        )
+        inside = (points >= np.subtract(self.low, tolerance)) & (points <= np.add(self.high, tolerance))
+        return bool(inside.all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,11 +158,7 @@ class RobotDescription:
 
     @property
     def urdf(self) -> str:
-        """The URDF of its frames.
-
-        Raises:
-            PlanningError: example-robot-data is not installed.
-        """
+        """The URDF of its frames; PlanningError if example-robot-data is not installed."""
         if isinstance(self.geometry, str):
             return find_robot_file(self.geometry).read_text(encoding="utf-8")
         return urdf_text(self.geometry, self.name)
@@ -227,18 +220,18 @@ def _arm(
     shift: float = 0.0,
     lift: float = 0.0,
 ) -> RobotDescription:
-    """A row of the table.
+    """A row of the table, in SI units but for the rated speeds [deg/s].
 
     Args:
         name: of the arm.
         lengths: None: its URDF is in example-robot-data.
-        speeds: of the joints, as rated [deg/s].
-        accelerations: of shoulder and elbow [rad/s²].
-        reach: [m].
-        position_tolerance: [m].
-        box: working box: x from, x to, y to both sides, z from, z to [m].
-        shift: of the movements of the library, forwards [m].
-        lift: the same, upwards [m].
+        speeds: of the joints, as rated.
+        accelerations: of shoulder and elbow.
+        reach: of the stretched arm.
+        position_tolerance: of the reported flange.
+        box: working box: x from, x to, y to both sides, z from, z to.
+        shift: of the movements of the library, forwards.
+        lift: the same, upwards.
     """
     shoulder, elbow = accelerations
     qdd_max = (shoulder, shoulder, elbow, _WRISTS, _WRISTS, _WRISTS)
@@ -336,7 +329,7 @@ def find_share_folder() -> Path:
 
 
 def find_robot_file(relative: str) -> Path:
-    """Return the path of a file below `example-robot-data/robots/`, e.g. ur_description/urdf/ur3_robot.urdf.
+    """The path of a file below `example-robot-data/robots/`, e.g. ur_description/urdf/ur3_robot.urdf.
 
     Raises:
         PlanningError: the package is missing, or this version of it has no such file.
@@ -370,12 +363,7 @@ def _candidates() -> Iterator[Path]:
 
 
 def urdf_text(arm: DhArm, name: str) -> str:
-    """The frames of an arm as a URDF, without bodies and masses; the limits in it are none.
-
-    Args:
-        arm: its lengths.
-        name: of the robot.
-    """
+    """The frames of an arm as a URDF, without bodies and masses; the limits in it are none."""
     straight, turned, y, z = (0.0, 0.0, 0.0), (0.0, pi / 2, 0.0), (0, 1, 0), (0, 0, 1)
     out, inward, on = (0.0, arm.shoulder_offset, 0.0), -arm.elbow_step, (0.0, arm.wrist_step, 0.0)
     joints = (

@@ -21,11 +21,8 @@ Three = tuple[float, float, float]
 
 
 _NOUNS = {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere", "capsules": "capsule"}
-"""The kinds of solids by the name of their table in a cell file.
-
-Cylinders and capsules lie along their own z axis; the length of a capsule is that of its straight part,
-without the two half spheres.
-"""
+"""The kinds of solids by the name of their table in a cell file. Cylinders and capsules lie along their own z
+axis; the length of a capsule is that of its straight part, without the two half spheres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,24 +245,12 @@ class _Cell(_Solids):
 
 
 def load_cell(path: str | Path) -> Cell:
-    """Read a cell file.
-
-    Raises:
-        CellError: unreachable file, or content that makes no sense, naming file and field.
-    """
+    """Read a cell file; CellError, naming file and field, if it is out of reach or makes no sense."""
     return parse_cell(FILE_KINDS["cell"].read_text(Path(path)), str(path))
 
 
 def parse_cell(text: str, source: str) -> Cell:
-    """Make a cell of the text of its file.
-
-    Args:
-        text: TOML.
-        source: the file's name, for messages.
-
-    Raises:
-        CellError: the content makes no sense; names file and field.
-    """
+    """Make a cell of the text (TOML) of its file; CellError, naming file and field, if it makes no sense."""
     file = checked(_Cell, FILE_KINDS["cell"].parse_toml(text, source), source, CellError)
     tool = Tool(file.tool.solids, file.tool.mass, file.tool.centre_of_gravity)
     return Cell(file.name, file.floor.z, tuple(wall.wall() for wall in file.walls), file.solids, tool, text)

@@ -17,13 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array
 from pc_client.kinematics.arms import DhArm, RobotDescription, find_robot_file, find_share_folder
 from pc_client.kinematics.cell import Solid, Three
 from pc_client.kinematics.model import RobotModel, load_pinocchio_model
-
-Array = NDArray[np.float64]
 
 # The joint that carries a body, as Pinocchio counts: 0 nothing, 3 the forearm's, 4 to 6 the wrists'.
 _FIXED, _WRIST_3 = 0, 6
@@ -89,13 +88,7 @@ class Clearance(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """Bodies whose distances are asked for together.
-
-    Attributes:
-        geometry: Pinocchio's geometry model.
-        data: its scratch memory.
-        names: one for each pair.
-    """
+    """Pairs of bodies whose distances are asked for together, with Pinocchio's model and scratch memory."""
 
     geometry: Any
     data: Any
@@ -112,14 +105,7 @@ class ClearanceModel:
     _cell: _Pairs = field(repr=False)
 
     def along(self, q: ArrayLike) -> Clearance:
-        """Measure the clearance at each posture of a joint path.
-
-        Args:
-            q: (n, 6) joint angles [rad].
-
-        Returns:
-            The distances, one per posture.
-        """
+        """Measure the clearance at each posture of a joint path (n, 6) [rad]."""
         path = np.atleast_2d(np.asarray(q, dtype=np.float64))
         return Clearance(*(self._distances(pairs, path) for pairs in (self._floor, self._own, self._cell)))
 
@@ -137,11 +123,7 @@ class ClearanceModel:
 
 
 def clearance_model(robot: RobotModel) -> ClearanceModel:
-    """Return the bodies of `robot` in its cell.
-
-    Raises:
-        PlanningError: example-robot-data is not installed.
-    """
+    """The bodies of an arm in its cell; PlanningError if example-robot-data is not installed."""
     cell = robot.cell
     hulls = load_hulls(robot.description)
     links = [_Body(str(hull.name).split("_link")[0].replace("_", " "), hull) for hull in hulls]
@@ -242,19 +224,13 @@ UR10 (1.24 to 1.46)."""
 
 
 def link_hulls(arm: DhArm, model: Any) -> tuple[Any, ...]:
-    """The hulls of the links.
+    """The hulls of the links, one convex pin.GeometryObject a link, base to wrist 3.
 
-    Args:
-        arm: its lengths.
-        model: the Pinocchio model of its URDF; its frames place the links.
-
-    Returns:
-        One convex pin.GeometryObject a link, base to wrist 3.
+    The links are placed by the frames of the Pinocchio model of the arm's URDF.
     """
     hulls = []
     for link, points in _housings(arm).items():
-        index = model.getFrameId(link)
-        frame = model.frames[index]
+        frame = model.frames[index := model.getFrameId(link)]
         hulls.append(pin.GeometryObject(link, frame.parentJoint, index, frame.placement, _hull(points)))
     return tuple(hulls)
 
@@ -319,7 +295,7 @@ def _polygon(radius: float) -> tuple[Array, Array]:
 
 
 def _hull(points: Array) -> Any:
-    """The convex hull of points (n, 3), as Pinocchio's collision library has it."""
+    """The convex hull of points (n, 3)."""
     cloud = pin.coal.BVHModelOBBRSS()
     cloud.beginModel(0, len(points))
     cloud.addVertices(points)

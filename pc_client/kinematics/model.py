@@ -2,10 +2,7 @@
 
 Everything is expressed in UR's `base` frame, the frame of the DH table and of the TCP poses that a control
 box reports. (The URDF's own root, `base_link`, is turned by pi about z against it.) The TCP is the flange,
-`tool0`. Thin, typed functions on Pinocchio set frames, order and shapes.
-
-`measure_singularity` says how far a posture is from a singularity, in the mixed units (m and rad) of the
-Jacobian.
+`tool0`.
 
 `solve_ik` is the iterative Jacobian inverse kinematics that the paper used: a damped Newton
 (Levenberg-Marquardt) iteration on the pose error log6(T_tcp_goal). Near a solution the damping is zero and
@@ -13,10 +10,9 @@ convergence quadratic, so a seed from the previous sample of a path needs two st
 the seed; the caller chooses the branch by the seed. `nearest_posture` compares all branches, which it knows
 in closed form (Hawkins 2013), and lets the iteration finish the nearest.
 
-`flange_difference` compares the flange pose that a robot reports with that of the nominal arm, `check_flange`
-refuses what is beyond the tolerances: before anything moves and in each frame of a stream, angles that drift
-away from the pose, or a pose that drifts away from the angles, mean that one of them is not what the robot
-measures.
+`check_flange` holds the flange pose that a robot reports against that of the nominal arm, before anything
+moves and in each frame of a stream: angles that drift away from the pose, or a pose that drifts away from the
+angles, mean that one of them is not what the robot measures.
 
 Source: paper section III ("an iterative Jacobian solver"); log6 on SE(3) as in Pinocchio's example of inverse
 kinematics.
@@ -35,12 +31,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import DriverError, PlanningError
 from pc_client.kinematics.arms import ROBOTS, JointLimits, RobotDescription
 from pc_client.kinematics.cell import NO_CELL, Cell
 from protocol.pose import T_to_pose, pose_inv, pose_trans
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +48,6 @@ class RobotModel:
         description: names, limits, preferred branch.
         cell: what stands around it and what it carries.
         pin_model: Pinocchio model whose world frame is UR's `base`.
-        pin_data: its scratch memory.
         tcp_frame: index of the frame `tool0`.
     """
 
@@ -80,11 +74,7 @@ class RobotModel:
 
 
 def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
-    """Return a fresh nominal model of the arm called `name`.
-
-    Args:
-        name: a key of `ROBOTS`.
-        cell: what stands around it and what it carries.
+    """Return a fresh nominal model of an arm, by its key in `ROBOTS`, in its cell.
 
     Raises:
         PlanningError: unknown name, or example-robot-data is not installed.
@@ -101,9 +91,6 @@ def load_pinocchio_model(description: RobotDescription) -> Any:
     """Read the frames of an arm and move their world into UR's `base` frame.
 
     The result is shared between all callers and must not be changed.
-
-    Returns:
-        The Pinocchio model.
     """
     model = pin.buildModelFromXML(description.urdf)
     T_base_root = model.frames[model.getFrameId("base")].placement.inverse()
@@ -116,28 +103,15 @@ def load_pinocchio_model(description: RobotDescription) -> Any:
 
 
 def tcp_pose(model: RobotModel, q: ArrayLike) -> Array:
-    """Return T_base_tcp at joint angles q.
-
-    Args:
-        model: nominal arm.
-        q: (6,) joint angles [rad].
-
-    Returns:
-        (4, 4) homogeneous matrix; translation in m.
-    """
+    """Return T_base_tcp, (4, 4) with the translation in m, at joint angles q (6,) [rad]."""
     pin.framesForwardKinematics(model.pin_model, model.pin_data, np.asarray(q, dtype=np.float64))
     return np.array(model.pin_data.oMf[model.tcp_frame].homogeneous)
 
 
 def tcp_jacobian(model: RobotModel, q: ArrayLike) -> Array:
-    """Return J_base_tcp: twist of the TCP (linear first, axes of `base`, at the TCP) = J @ qd.
+    """Return J_base_tcp (6, 6) at joint angles q (6,) [rad]: twist of the TCP = J @ qd.
 
-    Args:
-        model: nominal arm.
-        q: (6,) joint angles [rad].
-
-    Returns:
-        (6, 6); rows 0-2 in m, rows 3-5 dimensionless.
+    Linear part first [m], in the axes of `base`, at the TCP; rows 3-5 are dimensionless.
     """
     jacobian = pin.computeFrameJacobian(
         model.pin_model,
@@ -150,15 +124,7 @@ def tcp_jacobian(model: RobotModel, q: ArrayLike) -> Array:
 
 
 def tcp_positions(model: RobotModel, q: ArrayLike) -> Array:
-    """Return the TCP positions along a joint path.
-
-    Args:
-        model: nominal arm.
-        q: (n, 6) joint angles [rad].
-
-    Returns:
-        (n, 3) positions in `base` [m].
-    """
+    """Return the TCP positions (n, 3) in `base` [m] along a joint path q (n, 6) [rad]."""
     path = np.asarray(q, dtype=np.float64)
     positions = np.empty((len(path), 3))
     data, frame = model.pin_data, model.tcp_frame
@@ -199,13 +165,9 @@ class SingularityMeasure(NamedTuple):
 
 
 def measure_singularity(jacobians: ArrayLike) -> SingularityMeasure:
-    """Measure a stack of Jacobians.
+    """Measure Jacobians (n, 6, 6), linear rows first, in `base`; the TCP lies on the axis of wrist 3.
 
-    Args:
-        jacobians: (n, 6, 6) of a UR arm with the TCP on the axis of wrist 3; linear rows first, in `base`.
-
-    Returns:
-        One value per Jacobian of each measure.
+    Lengths [m] and angles [rad] are mixed in them, and so in the measures.
     """
     J = np.asarray(jacobians, dtype=np.float64)
     sigma = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
@@ -276,16 +238,9 @@ class IkSolution(NamedTuple):
 def solve_ik(
     model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max_iterations: int = _MAX_ITERATIONS
 ) -> IkSolution:
-    """Find joint angles that bring the TCP to T_base_tcp, starting from q_seed.
+    """Find joint angles that bring the TCP to T_base_tcp (4, 4), from q_seed (6,) [rad]; check `.converged`.
 
-    Args:
-        model: nominal arm.
-        T_base_tcp: (4, 4) wanted pose in `base`.
-        q_seed: (6,) joint angles to start from [rad].
-        max_iterations: bound of the work.
-
-    Returns:
-        The solution; check `.converged`.
+    `max_iterations` bounds the work.
     """
     goal = np.asarray(T_base_tcp, dtype=np.float64)
     return solve_ik_se3(
@@ -317,15 +272,9 @@ def solve_ik_se3(
 
 
 def nearest_posture(model: RobotModel, T_base_tcp: ArrayLike, q_near: ArrayLike) -> Array:
-    """Return the posture that brings the TCP to a pose, of all that do the nearest to another posture.
+    """Return the posture (6,) [rad] that brings the TCP to T_base_tcp (4, 4), nearest to q_near (6,) [rad].
 
-    Args:
-        model: nominal arm.
-        T_base_tcp: (4, 4) wanted pose in `base`.
-        q_near: (6,) joint angles [rad]; near is a small sum of squares over all joints.
-
-    Returns:
-        (6,) joint angles [rad], each within its range.
+    Near is a small sum of squares over all joints; each joint is within its range.
 
     Raises:
         PlanningError: no posture of the arm reaches the pose.
@@ -386,13 +335,13 @@ def _pose_error(model: RobotModel, T_base_goal: Any, q: Array) -> Array:
 def _step(model: RobotModel, q: Array, error: Array, damping: float) -> Array:
     """Return the joint step [rad] that removes `error`: Newton's without damping, else a damped one."""
     J = pin.computeFrameJacobian(model.pin_model, model.pin_data, q, model.tcp_frame, pin.LOCAL)
-    step: Array
+    step: Array | None = None
     if damping == 0.0:
         try:
             step = np.linalg.solve(J, error)
         except np.linalg.LinAlgError:  # exactly singular: any damping makes it regular
-            step = J.T @ np.linalg.solve(J @ J.T + _FIRST_DAMPING * np.eye(6), error)
-    else:
+            damping = _FIRST_DAMPING
+    if step is None:
         step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
     # A Newton step of several radians is a sign of a singularity, not of distance: it would leave the branch.
     longest = max(abs(step.max()), abs(step.min()))
@@ -426,16 +375,13 @@ _NO_OFFSET = (0.0,) * 6
 def flange_difference(
     model: RobotModel, q: Sequence[float], pose: Sequence[float], tcp_offset: Sequence[float] = _NO_OFFSET
 ) -> tuple[float, float]:
-    """How far the reported flange is from the model's.
+    """How far the reported flange is from the model's [m, rad]; endless where a value is no number.
 
     Args:
         model: nominal arm.
         q: (6,) reported joint angles [rad].
         pose: (6,) reported pose of the TCP in the base frame [m, rad].
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad].
-
-    Returns:
-        Distance [m] and angle [rad]; endless where a value is no number.
     """
     if not all(-_FARTHEST < value < _FARTHEST for value in (*q, *pose, *tcp_offset)):  # NaN is not
         return inf, inf
@@ -447,12 +393,9 @@ def flange_difference(
 
 
 def check_flange(model: RobotModel, q: Sequence[float], pose: Sequence[float]) -> None:
-    """Refuse a robot whose angles and pose do not belong together; the TCP is the flange.
+    """Refuse a robot whose angles q (6,) [rad] and TCP pose (6,) [m, rad] in `base` do not belong together.
 
-    Args:
-        model: nominal arm.
-        q: (6,) reported joint angles [rad].
-        pose: (6,) reported pose of the TCP in the base frame [m, rad].
+    The TCP is the flange.
 
     Raises:
         DriverError: they are further apart than the tolerances.

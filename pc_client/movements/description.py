@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
@@ -72,7 +72,7 @@ def snr_of_delay(movement: Movement, delay: float, *, vector: bool = False) -> f
         raise MovementError(f"delay of {delay} s: give a number greater than 0")
     t = np.linspace(0.0, movement.duration + delay, _N_SAMPLES)
 
-    def signal(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def signal(times: Array) -> Array:
         return movement.sample(times).v.ravel() if vector else movement.speed(times)
 
     desired = signal(t)

@@ -12,8 +12,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 from pc_client.movements.lognormal import LiteralTiming, TwoSidedTiming
 from pc_client.movements.sigma_lognormal import LEAD, SigmaLognormal, Stroke, leg_lengths
@@ -38,7 +39,7 @@ class Isochrony:
                 "give finite numbers, the scale above 0"
             )
 
-    def durations(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+    def durations(self, lengths: Array) -> Array:
         """Durations (n,), s, of strokes of these lengths (n,), m."""
         return self.scale * lengths**self.exponent
 
@@ -66,7 +67,7 @@ class Fitts:
                 "give a slope of 0 or more and a width above 0"
             )
 
-    def durations(self, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+    def durations(self, lengths: Array) -> Array:
         """Durations (n,), s, of strokes of these lengths (n,), m.
 
         Raises:
@@ -85,9 +86,7 @@ DurationRule = Isochrony | Fitts
 """How long a stroke lasts for its length."""
 
 
-def chained_windows(
-    proportions: ArrayLike, total: float, overlap: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def chained_windows(proportions: ArrayLike, total: float, overlap: float) -> tuple[Array, Array]:
     """Windows in these proportions, each overlapping the next, that together last a total.
 
     Args:
@@ -143,7 +142,7 @@ TOP_SPEED = 0.25
 _SHORTEST = 1.0
 
 
-def default_durations(points: ArrayLike) -> NDArray[np.float64]:
+def default_durations(points: ArrayLike) -> Array:
     """How long the strokes between points (n, 3), m, last by themselves, (n - 1,), s.
 
     In the proportions of the recipe (length to the power .3), as quick as its top speed allows the human-like
@@ -153,5 +152,4 @@ def default_durations(points: ArrayLike) -> NDArray[np.float64]:
     proportions = Isochrony(ISOCHRONY).durations(legs)
     speeds = LiteralTiming(0.0, 1.0, LEAD).lognormal.peak * legs / proportions
     durations = np.ceil(1e3 * proportions * float(speeds.max()) / TOP_SPEED) / 1e3
-    longest: NDArray[np.float64] = np.maximum(durations, _SHORTEST)
-    return longest
+    return np.maximum(durations, _SHORTEST)

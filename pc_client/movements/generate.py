@@ -41,26 +41,13 @@ _LARGEST_RADIUS = 1.0
 def uniform_twin(
     movement: Movement, name: str, corners: Corners = "stop", setback: float = SETBACK
 ) -> Movement:
-    """The robot-like movement along the same target points with the same stroke durations.
-
-    Args:
-        movement: any movement with a stroke between each two target points.
-        name: the twin's.
-        corners: as of `uniform_trajectory`.
-        setback: as of `uniform_trajectory`.
-    """
+    """The robot-like movement along the same target points with the same stroke durations."""
     trajectory = uniform_trajectory(movement.target_points, movement.stroke_durations, corners, setback)
     return Movement(name, trajectory, movement.stroke_durations, _facts(movement))
 
 
 def _minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop") -> Movement:
-    """The minimum-jerk movement to the same target points with the same stroke durations.
-
-    Args:
-        movement: any movement with a stroke between each two target points.
-        name: the twin's.
-        passing: whether it stops at the inner target points or passes through them at their times.
-    """
+    """The minimum-jerk movement to the same target points with the same stroke durations."""
     trajectory = MinimumJerk(movement.target_points, movement.stroke_durations, passing)
     return Movement(name, trajectory, movement.stroke_durations, _facts(movement))
 
@@ -68,10 +55,7 @@ def _minimum_jerk_twin(movement: Movement, name: str, passing: Passing = "stop")
 def _power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> Movement:
     """The power-law movement through the same target points in the same total time.
 
-    Args:
-        movement: any movement.
-        name: the twin's.
-        torsion: whether the torsion of the path counts, too.
+    With `torsion` the torsion of the path counts, too.
     """
     ramp = _RAMP_SHARE * float(np.mean(movement.stroke_durations))
     trajectory = PowerLaw(
@@ -86,13 +70,7 @@ def _power_law_twin(movement: Movement, name: str, *, torsion: bool = False) -> 
 
 
 def retimed_twin(movement: Movement, name: str, rule: DurationRule) -> Movement:
-    """The human-like movement on the same arcs in the same total time, its strokes' windows by a rule.
-
-    Args:
-        movement: a "lognormal" one.
-        name: the twin's.
-        rule: how long a stroke lasts for its length.
-    """
+    """The human-like movement on the same arcs in the same total time, its strokes' windows by a rule."""
     if not isinstance(movement.trajectory, SigmaLognormal):
         raise MovementError(
             f"movement {movement.name} is of kind {movement.kind}: give a lognormal one to re-time"
@@ -138,9 +116,7 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
         "lognormal": Generator(
             lambda human, _, name: human.renamed(name), "the paper's recipe: straight lognormal strokes", True
         ),
-        "arcs": Generator(
-            lambda human, seed, name: arcs_twin(human, seed, name), "arcs that overlap, lognormal strokes"
-        ),
+        "arcs": Generator(arcs_twin, "arcs that overlap, lognormal strokes"),
         "isochronous": Generator(
             lambda human, seed, name: _retimed_arcs(human, seed, name, Isochrony()),
             "the arcs with one mu and sigma",
@@ -195,7 +171,7 @@ def generate_movement(
     """A random movement; all kinds of one seed have the same duration and, but for duplicates, target points.
 
     Args:
-        kind: a name of `twins.GENERATORS`, e.g. "lognormal" or "uniform".
+        kind: a name of `GENERATORS`, e.g. "lognormal" or "uniform".
         n_targets: number of target points, at least 2.
         seed: 0 or more; the same seed gives the same movement everywhere.
         name: e.g. "lognorm_5_1"; made from kind, n_targets and seed if None.

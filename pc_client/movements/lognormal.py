@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 
 _SQRT_TWO_PI = math.sqrt(2.0 * math.pi)
@@ -29,9 +30,9 @@ _SQRT_TWO_PI = math.sqrt(2.0 * math.pi)
 class LognormalValues(NamedTuple):
     """A lognormal at some times: `done` is F, 0 to 1; `rate` Lambda, 1/s; `rate_change` dLambda/dt, 1/s^2."""
 
-    done: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    rate_change: NDArray[np.float64]
+    done: Array
+    rate: Array
+    rate_change: Array
 
 
 class Inflections(NamedTuple):
@@ -90,7 +91,7 @@ class Lognormal:
 
     @property
     def lognormal(self) -> Lognormal:
-        """Itself, so that a stroke may be timed by its parameters or by a construction from a window."""
+        """Itself: a stroke is timed by the parameters or by a construction from a window."""
         return self
 
     def stretched(self, factor: float) -> Lognormal:
@@ -117,12 +118,12 @@ class Lognormal:
 
     @property
     def mean(self) -> float:
-        """Centre of gravity of the lognormal, s."""
+        """Centre of gravity, s."""
         return self.time_at_deviation(0.5 * self.sigma)
 
     @property
     def std(self) -> float:
-        """Standard deviation of the lognormal, s."""
+        """Standard deviation, s."""
         return math.exp(self.mu + 0.5 * self.sigma**2) * math.sqrt(math.expm1(self.sigma**2))
 
     @property
@@ -185,8 +186,7 @@ def sigma_for_k(k: float) -> float:
 def lead_from_k(k: float, duration: float) -> float:
     """The lead (s) of the command before the stroke, for a peak in the middle of the stroke's `duration` (s).
 
-    Inverse of k = (lead + duration) / (lead + duration / 2); k = 2 is no lead at all, k towards 1 an endless
-    one.
+    Inverse of k = (lead + duration) / (lead + duration / 2); k = 2 is no lead, k towards 1 an endless one.
     """
     if not (1.0 < k <= 2.0):
         raise MovementError(f"k = {k}: with the peak in the middle of the stroke k must lie in (1, 2]")
@@ -231,7 +231,7 @@ class LiteralTiming:
         )
 
     def stretched(self, factor: float) -> LiteralTiming:
-        """The same construction in a window `factor` times as long and as late."""
+        """The same in a window `factor` times as long and as late."""
         return LiteralTiming(self.start * factor, self.duration * factor, self.lead * factor)
 
 
@@ -275,7 +275,7 @@ class TwoSidedTiming:
         return (math.expm1(-s * s) - math.expm1(-c * s)) / (2.0 * math.sinh(c * s))
 
     def stretched(self, factor: float) -> TwoSidedTiming:
-        """The same construction in a window `factor` times as long and as late."""
+        """The same in a window `factor` times as long and as late."""
         return TwoSidedTiming(self.start * factor, self.duration * factor, self.sigma, self.coverage)
 
 

@@ -16,11 +16,12 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
-from pc_client.movements.trajectory import Motion, Similarity, read_only
+from pc_client.movements.trajectory import Motion, Similarity
 
 #: What happens at the inner target points: come to rest there, or pass through them at their times.
 Passing = Literal["stop", "via"]
@@ -29,9 +30,9 @@ Passing = Literal["stop", "via"]
 class StrokeShape(NamedTuple):
     """The unit stroke, each (n,): share of the length done, 0 to 1, and two derivatives in u = t / T."""
 
-    done: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    rate_change: NDArray[np.float64]
+    done: Array
+    rate: Array
+    rate_change: Array
 
 
 def stroke_shape(u: ArrayLike) -> StrokeShape:
@@ -55,10 +56,10 @@ class MinimumJerk:
             passes the inner points.
     """
 
-    target_points: NDArray[np.float64]
-    stroke_durations: NDArray[np.float64]
+    target_points: Array
+    stroke_durations: Array
     passing: Passing = "stop"
-    _times: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+    _times: Array = field(init=False, repr=False, compare=False)
     _spline: BSpline | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -81,7 +82,13 @@ class MinimumJerk:
         object.__setattr__(self, "target_points", targets)
         object.__setattr__(self, "stroke_durations", durations)
         object.__setattr__(self, "_times", read_only(times))
-        object.__setattr__(self, "_spline", _via_spline(times, targets) if self.passing == "via" else None)
+        # The Euler-Poisson equation of the jerk says: sixth derivative zero between the points; free velocity
+        # and acceleration at a point to pass make everything up to the fourth derivative continuous there. At
+        # rest at both ends.
+        rest = [(1, np.zeros(3)), (2, np.zeros(3))]
+        is_via = self.passing == "via"
+        spline = make_interp_spline(times, targets, k=5, bc_type=(rest, rest)) if is_via else None
+        object.__setattr__(self, "_spline", spline)
 
     @property
     def duration(self) -> float:
@@ -106,17 +113,9 @@ class MinimumJerk:
         )
 
     def transformed(self, similarity: Similarity) -> MinimumJerk:
-        """The movement moved, scaled and rotated; its timing is untouched."""
+        """Moved, scaled and rotated; the timing is untouched."""
         return MinimumJerk(similarity.points(self.target_points), self.stroke_durations, self.passing)
 
     def stretched(self, factor: float) -> MinimumJerk:
-        """The movement `factor` times as slow."""
+        """`factor` times as slow."""
         return MinimumJerk(self.target_points, self.stroke_durations * factor, self.passing)
-
-
-def _via_spline(times: NDArray[np.float64], targets: NDArray[np.float64]) -> BSpline:
-    # The Euler-Poisson equation of the jerk says: sixth derivative zero between the points; free velocity
-    # and acceleration at a point to pass make everything up to the fourth derivative continuous there. At
-    # rest at both ends.
-    rest = [(1, np.zeros(3)), (2, np.zeros(3))]
-    return make_interp_spline(times, targets, k=5, bc_type=(rest, rest))

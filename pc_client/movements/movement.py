@@ -14,8 +14,9 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError, UnknownMovementError
 from pc_client.files import FILE_KINDS
 from pc_client.movements.durations import default_durations
@@ -38,7 +39,6 @@ from pc_client.movements.trajectory import (
     Trajectory,
     check_duration,
     check_name,
-    read_only,
 )
 from pc_client.movements.uniform import SETBACK, Corners, uniform_trajectory
 from pc_client.number_tables import parse_rows
@@ -58,8 +58,8 @@ _APART = 1e-6
 class MovementSample(NamedTuple):
     """Position (m) and velocity (m/s) of the TCP in the base frame, each (n, 3)."""
 
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
+    p: Array
+    v: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +78,7 @@ class Movement:
 
     name: str
     trajectory: Trajectory
-    stroke_durations: NDArray[np.float64]
+    stroke_durations: Array
     provenance: Mapping[str, str | int | float] = field(default_factory=lambda: MappingProxyType({}))
     may_be_moved: bool = False
 
@@ -238,7 +238,7 @@ class Movement:
         return self.trajectory.duration
 
     @property
-    def target_points(self) -> NDArray[np.float64]:
+    def target_points(self) -> Array:
         """Target points, (n, 3), m. Inner ones of a human-like movement are aimed at, not reached."""
         return self.trajectory.target_points
 
@@ -262,16 +262,16 @@ class Movement:
         motion = self.motion(t)
         return MovementSample(motion.p, motion.v)
 
-    def rotations(self, t: ArrayLike) -> NDArray[np.float64] | None:
+    def rotations(self, t: ArrayLike) -> Array | None:
         """R_base_tcp at the times t, s, (n, 3, 3); None: the TCP keeps the one that planning fixes."""
         if not isinstance(self.trajectory, SampledTrajectory):
             return None
         return self.trajectory.rotations(np.clip(t, 0.0, self.duration))
 
-    def speed(self, t: ArrayLike) -> NDArray[np.float64]:
+    def speed(self, t: ArrayLike) -> Array:
         """Speed of the TCP at the times t, m/s, (n,)."""
         velocity = self.motion(t).v
-        speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
+        speed: Array = np.linalg.norm(velocity, axis=1)
         return speed
 
     def transformed(self, similarity: Similarity) -> Self:
@@ -330,11 +330,7 @@ def load_movement(name_or_path: str | Path) -> Movement:
 
 
 def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
-    """What an arm can be sent along: as `load_movement`, or a .csv file of joint angles.
-
-    Raises:
-        MovementError: as `load_movement`.
-    """
+    """What an arm can be sent along: as `load_movement`, or a .csv file of joint angles."""
     found = library_path(name_or_path) if isinstance(name_or_path, str) else None
     if found:
         movement = _read(found)
@@ -349,7 +345,7 @@ def load_motion(name_or_path: str | Path) -> Movement | JointTrajectory:
     return _read(path)
 
 
-def load_targets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def load_targets(path: str | Path) -> tuple[Array, Array | None]:
     """Target points from a text file: columns x, y, z in m, base frame; and optionally t in s.
 
     t is when a point is reached; the times between are the durations of the strokes. The form is that of
@@ -405,15 +401,15 @@ def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
         raise MovementError(f"{path}: {error}") from error
 
 
-def _faults(points: NDArray[np.float64]) -> Iterator[tuple[int, str]]:
-    """What is wrong with points (n, 3), m: which of them, and what."""
+def _faults(points: Array) -> Iterator[tuple[int, str]]:
+    """Which points (n, 3), m, are wrong, and why."""
     for index in np.flatnonzero(np.abs(points).max(axis=1) > _FARTHEST).tolist():
         yield index, f"is {points[index].tolist()} m: that is beyond any arm; give metres, robot base frame"
     for index in np.flatnonzero(leg_lengths(points) < _APART).tolist():
         yield index + 1, f"is the same as target point {index + 1}: consecutive ones must be apart"
 
 
-def _checked(values: ArrayLike, what: str, dimensions: Literal[1, 2]) -> NDArray[np.float64]:
+def _checked(values: ArrayLike, what: str, dimensions: Literal[1, 2]) -> Array:
     """Finite numbers (n,) or (n, 3), or an error that says what is needed."""
     wanted = "a list of [x, y, z] in m" if dimensions == 2 else "a list of times in s, one a stroke"
     try:

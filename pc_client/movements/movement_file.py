@@ -12,8 +12,8 @@ from dataclasses import asdict, field, fields, is_dataclass
 from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 from pc_client.movements.lognormal import (
     FULL_COVERAGE,
@@ -162,7 +162,7 @@ def read_record(values: Mapping[str, Any], source: str) -> MovementFile:
 def file_text(
     name: str,
     trajectory: Trajectory,
-    stroke_durations: NDArray[np.float64],
+    stroke_durations: Array,
     provenance: Mapping[str, str | int | float],
 ) -> str:
     """The TOML file of a movement in closed form, complete and readable."""
@@ -201,12 +201,8 @@ def toml_value(value: Any) -> str:
     return repr(value)
 
 
-def trajectory_of(file: MovementFile) -> tuple[Trajectory, NDArray[np.float64]]:
-    """The trajectory of a file and the durations of its strokes, (n,), s.
-
-    Raises:
-        MovementError: the numbers make no movement.
-    """
+def trajectory_of(file: MovementFile) -> tuple[Trajectory, Array]:
+    """The trajectory of a file and the durations of its strokes, (n,), s; MovementError if there is none."""
     points, durations = np.array(file.target_points), np.array(file.stroke_durations or ())
     if isinstance(file, _LognormalFile):
         lognormal = SigmaLognormal(points, tuple(map(_stroke, file.strokes)), file.duration)

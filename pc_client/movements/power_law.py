@@ -24,16 +24,17 @@ on drawing in the air.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 from scipy.optimize import brentq
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
-from pc_client.movements.trajectory import Motion, Similarity, read_only
+from pc_client.movements.trajectory import Motion, Similarity
 from pc_client.movements.uniform import SmoothedSquareWave, check_ramps
 
 #: A path that is slower than this in its own parameter, against its mean, turns on the spot.
@@ -50,9 +51,9 @@ class PathBend(NamedTuple):
             pieces, where torsion is not.
     """
 
-    stretch: NDArray[np.float64]
-    curvature: NDArray[np.float64]
-    triple: NDArray[np.float64]
+    stretch: Array
+    curvature: Array
+    triple: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +68,8 @@ class SmoothPath:
         MovementError: target points of another shape, coinciding ones, or a path that turns on the spot.
     """
 
-    target_points: NDArray[np.float64]
-    knots: NDArray[np.float64] = field(init=False, compare=False)
+    target_points: Array
+    knots: Array = field(init=False, compare=False)
     _curve: BSpline = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -91,9 +92,9 @@ class SmoothPath:
                 "path that turns on the spot: these target points lead back on their own line; move one aside"
             )
 
-    def derivative(self, u: ArrayLike, order: int) -> NDArray[np.float64]:
+    def derivative(self, u: ArrayLike, order: int) -> Array:
         """The position (order 0) or its derivative in u at the parameters u (n,); (n, 3), m."""
-        values: NDArray[np.float64] = self._curve(np.atleast_1d(np.asarray(u, dtype=np.float64)), order)
+        values: Array = self._curve(np.atleast_1d(np.asarray(u, dtype=np.float64)), order)
         return values
 
     def bend(self, u: ArrayLike) -> PathBend:
@@ -107,12 +108,8 @@ class SmoothPath:
             np.einsum("ij,ij->i", across, third) / stretch**6,
         )
 
-    def transformed(self, similarity: Similarity) -> SmoothPath:
-        """The path moved, scaled and rotated."""
-        return SmoothPath(similarity.points(self.target_points))
 
-
-def _curve_through(knots: NDArray[np.float64], targets: NDArray[np.float64]) -> BSpline:
+def _curve_through(knots: Array, targets: Array) -> BSpline:
     if len(targets) == 2:
         # The natural spline through two points is not unique: the line, by six control points in a row.
         return BSpline(np.repeat([0.0, 1.0], 6), np.linspace(targets[0], targets[1], 6), 5)
@@ -148,7 +145,7 @@ class PowerLaw:
         MovementError: a number is outside its range, or the target points make no smooth path.
     """
 
-    target_points: NDArray[np.float64]
+    target_points: Array
     duration: float
     ramps: tuple[float, ...]
     largest_radius: float
@@ -157,7 +154,7 @@ class PowerLaw:
     path: SmoothPath = field(init=False, repr=False, compare=False)
     _parameter: CubicSpline = field(init=False, repr=False, compare=False)
     _wave: SmoothedSquareWave = field(init=False, repr=False, compare=False)
-    _targets_at: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+    _targets_at: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check_ramps(self.ramps)
@@ -186,7 +183,7 @@ class PowerLaw:
         object.__setattr__(self, "_wave", SmoothedSquareWave(window, level, self.ramps))
 
     @property
-    def passages(self) -> NDArray[np.float64]:
+    def passages(self) -> Array:
         """Times (n,), s, at which the target points are passed; 0 and the duration are the outer ones."""
         inner = [
             brentq(lambda t, at=at: float(self._wave.evaluate(t).s[0]) - at, 0.0, self.duration, xtol=1e-13)
@@ -209,37 +206,25 @@ class PowerLaw:
         )
 
     def transformed(self, similarity: Similarity) -> PowerLaw:
-        """The movement moved, scaled and rotated; its timing is untouched."""
-        return PowerLaw(
-            similarity.points(self.target_points),
-            self.duration,
-            self.ramps,
-            self.largest_radius * similarity.scale,
-            self.exponent,
-            self.torsion_exponent,
-        )
+        """Moved, scaled and rotated; the timing is untouched."""
+        points = similarity.points(self.target_points)
+        return replace(self, target_points=points, largest_radius=self.largest_radius * similarity.scale)
 
     def stretched(self, factor: float) -> PowerLaw:
-        """The movement `factor` times as slow, ramps included."""
-        return PowerLaw(
-            self.target_points,
-            self.duration * factor,
-            tuple(ramp * factor for ramp in self.ramps),
-            self.largest_radius,
-            self.exponent,
-            self.torsion_exponent,
-        )
+        """`factor` times as slow, ramps included."""
+        ramps = tuple(ramp * factor for ramp in self.ramps)
+        return replace(self, duration=self.duration * factor, ramps=ramps)
 
-    def _cost(self, path: SmoothPath, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _cost(self, path: SmoothPath, u: Array) -> Array:
         """dw/du at the parameters u, m: the path length, scaled up where the power law is slower."""
         bend = path.bend(u)
         radius = self.largest_radius
         torsion = bend.triple / (bend.curvature**2 + radius**-2)
-        slowing: NDArray[np.float64] = (1.0 + (radius * bend.curvature) ** 2) ** (0.5 * self.exponent)
+        slowing: Array = (1.0 + (radius * bend.curvature) ** 2) ** (0.5 * self.exponent)
         slowing = slowing * (1.0 + (radius * torsion) ** 2) ** (0.5 * self.torsion_exponent)
         return bend.stretch * slowing
 
-    def _table(self, path: SmoothPath, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _table(self, path: SmoothPath, u: Array) -> Array:
         """The integral w at the parameters u, by Gauss-Legendre quadrature of five points an interval."""
         nodes, weights = np.polynomial.legendre.leggauss(5)
         middle, half = 0.5 * (u[1:] + u[:-1]), 0.5 * np.diff(u)

@@ -25,15 +25,15 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 from pc_client.kinematics.arms import UR3_BOX, Box
 from pc_client.movements.durations import ISOCHRONY, TOP_SPEED, Isochrony
 from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, leg_lengths, literal_strokes
-from pc_client.movements.trajectory import Similarity
+from pc_client.movements.trajectory import Similarity, about_z
 
 #: Which rotations may be used: none, about the vertical, or any.
 _Rotate = Literal["none", "yaw", "any"]
@@ -100,11 +100,11 @@ def fit_movement(
     return Fit(fitted, similarity, stretch)
 
 
-def _candidates(path: NDArray[np.float64], box: Box, rotate: _Rotate) -> list[NDArray[np.float64]]:
+def _candidates(path: Array, box: Box, rotate: _Rotate) -> list[Array]:
     if rotate == "none":
         return [np.eye(3)]
     if rotate == "yaw":
-        return [_yaw(math.radians(0.5 * step)) for step in range(360)]
+        return [about_z(math.radians(0.5 * step)) for step in range(360)]
     if rotate == "any":
         _, axes = np.linalg.eigh(np.cov(path.T))
         R = np.empty((3, 3))
@@ -115,22 +115,13 @@ def _candidates(path: NDArray[np.float64], box: Box, rotate: _Rotate) -> list[ND
     raise MovementError(f'rotation "{rotate}": give "none", "yaw" or "any"')
 
 
-def _yaw(angle: float) -> NDArray[np.float64]:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _largest_scale(path: NDArray[np.float64], box: Box) -> float:
+def _largest_scale(path: Array, box: Box) -> float:
     extent = np.ptp(path.T.copy(), axis=1)  # six times as quick as along the columns
-    return float(
-        min(
-            (room / need for room, need in zip(box.size, extent, strict=True) if need > 1e-12),
-            default=math.inf,
-        )
-    )
+    scales = (room / need for room, need in zip(box.size, extent, strict=True) if need > 1e-12)
+    return float(min(scales, default=math.inf))
 
 
-def _needed_stretch(movement: Movement, t: NDArray[np.float64], max_speed: float | None) -> float:
+def _needed_stretch(movement: Movement, t: Array, max_speed: float | None) -> float:
     if max_speed is None:
         return 1.0
     if not max_speed > 0.0:
@@ -165,7 +156,7 @@ class TargetRules:
 
 def random_targets(
     n_targets: int, box: Box, source: random.Random, rules: TargetRules | None = None
-) -> NDArray[np.float64]:
+) -> Array:
     """Target points drawn evenly from a box and kept when they follow the rules.
 
     Args:
@@ -184,7 +175,7 @@ def random_targets(
         raise MovementError(f"{n_targets} target points: a movement needs at least 2")
     rules = rules or TargetRules()
     for _ in range(_TRIES):
-        points: list[NDArray[np.float64]] = []
+        points: list[Array] = []
         for _ in range(_TRIES_A_POINT * n_targets):
             point = np.array(
                 [low + (high - low) * source.random() for low, high in zip(box.low, box.high, strict=True)]
@@ -200,7 +191,7 @@ def random_targets(
     )
 
 
-def _follows_rules(points: list[NDArray[np.float64]], point: NDArray[np.float64], rules: TargetRules) -> bool:
+def _follows_rules(points: list[Array], point: Array, rules: TargetRules) -> bool:
     if not points:
         return True
     if any(math.dist(point, other) < rules.min_apart for other in points):
@@ -279,11 +270,11 @@ def recipe_movement(n_targets: int, seed: int, name: str, box: Box = UR3_BOX) ->
     return Movement(name, literal_strokes(points, rounded), rounded, facts)
 
 
-def _stroke_durations(targets: NDArray[np.float64], source: random.Random) -> NDArray[np.float64]:
+def _stroke_durations(targets: Array, source: random.Random) -> Array:
     low, high = HAND.variability
     rule = Isochrony(HAND.isochrony, HAND.stroke / HAND.leg**HAND.isochrony)
     factors = [low + (high - low) * source.random() for _ in pairwise(targets)]
-    durations: NDArray[np.float64] = rule.durations(leg_lengths(targets)) * np.array(factors)
+    durations: Array = rule.durations(leg_lengths(targets)) * np.array(factors)
     return durations
 
 
@@ -319,12 +310,9 @@ ARC_RULES = ArcRules()
 
 
 def arcs_movement(n_targets: int, seed: int, name: str) -> Movement:
-    """A movement of arcs between random target points in the UR3's box.
+    """A movement of arcs between random target points, at least 2, in the UR3's box.
 
-    Args:
-        n_targets: number of target points, at least 2.
-        seed: 0 or more; the same seed gives the same movement everywhere.
-        name: the movement's.
+    The same seed, 0 or more, gives the same movement everywhere.
     """
     source = random.Random(seed)
     targets = random_targets(n_targets, UR3_BOX.shrunk(_MARGIN), source)
@@ -333,13 +321,7 @@ def arcs_movement(n_targets: int, seed: int, name: str) -> Movement:
 
 
 def arcs_twin(movement: Movement, seed: int, name: str) -> Movement:
-    """Random arcs to the same target points in the same total time.
-
-    Args:
-        movement: any movement.
-        seed: of the arcs.
-        name: the twin's.
-    """
+    """Random arcs, by a seed, to the same target points in the same total time."""
     trajectory = _draw_strokes(movement.target_points, random.Random(seed), ARC_RULES)
     drawn = _movement(name, trajectory, {**movement.provenance, "twin": movement.name})
     return drawn.stretched(movement.duration / drawn.duration)
@@ -351,7 +333,7 @@ def _movement(name: str, trajectory: SigmaLognormal, facts: dict[str, str | int 
     return Movement(name, trajectory, np.array(durations), facts)
 
 
-def _draw_strokes(targets: NDArray[np.float64], source: random.Random, rules: ArcRules) -> SigmaLognormal:
+def _draw_strokes(targets: Array, source: random.Random, rules: ArcRules) -> SigmaLognormal:
     """Strokes between the targets, drawn from the rules; rounded to three decimals for readable files."""
 
     def draw(low: float, high: float) -> float:

@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
-from pc_client.movements.trajectory import Motion, Similarity, check_duration, check_name, read_only
+from pc_client.movements.trajectory import Motion, Similarity, check_duration, check_name
 from pc_client.number_tables import Rows
 
 #: Fewest samples of a movement: a cubic has four coefficients.
@@ -48,8 +49,8 @@ class SampledTrajectory:
         orientations: of the TCP in the base frame, n of them; None: the fixed one of planning.
     """
 
-    t: NDArray[np.float64]
-    points: NDArray[np.float64]
+    t: Array
+    points: Array
     orientations: Rotation | None = None
     _spline: CubicSpline = field(init=False, repr=False, compare=False)
     _rotations: RotationSpline | None = field(init=False, repr=False, compare=False)
@@ -102,7 +103,7 @@ class SampledTrajectory:
         return float(self.t[-1])
 
     @property
-    def target_points(self) -> NDArray[np.float64]:
+    def target_points(self) -> Array:
         """Samples name no targets: the first and the last point, (2, 3), m."""
         return read_only(self.points[[0, -1]])
 
@@ -111,20 +112,20 @@ class SampledTrajectory:
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         return Motion(self._spline(times), self._spline(times, 1), self._spline(times, 2))
 
-    def rotations(self, t: ArrayLike) -> NDArray[np.float64] | None:
+    def rotations(self, t: ArrayLike) -> Array | None:
         """R_base_tcp at the times t (n,), s, (n, 3, 3); None without orientations."""
         if self._rotations is None:
             return None
         return np.asarray(self._rotations(np.atleast_1d(t)).as_matrix(), dtype=np.float64)
 
     def transformed(self, similarity: Similarity) -> SampledTrajectory:
-        """The samples moved, scaled and rotated."""
+        """Moved, scaled and rotated."""
         turns = self.orientations
         rotated = None if turns is None else Rotation.from_matrix(similarity.R) * turns
         return SampledTrajectory(self.t, similarity.points(self.points), rotated)
 
     def stretched(self, factor: float) -> SampledTrajectory:
-        """The samples `factor` times as slow."""
+        """`factor` times as slow."""
         return SampledTrajectory(self.t * factor, self.points, self.orientations)
 
 
@@ -145,8 +146,8 @@ class JointTrajectory:
         MovementError: shapes, times or values make no sense, or there are fewer than 4 samples.
     """
 
-    t: NDArray[np.float64]
-    q: NDArray[np.float64]
+    t: Array
+    q: Array
     name: str = "joints"
 
     def __post_init__(self) -> None:
@@ -177,7 +178,7 @@ class JointTrajectory:
         return float(self.t[-1])
 
 
-def _check_turning(t: NDArray[np.float64], turns: Rotation) -> None:
+def _check_turning(t: Array, turns: Rotation) -> None:
     """Refuse orientations that no wrist follows; through them there is no spline either."""
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         speed = (turns[:-1].inv() * turns[1:]).magnitude() / np.diff(t)
@@ -212,11 +213,7 @@ def rotations_of(values: ArrayLike) -> Rotation:
 
 
 def samples_of(rows: Rows) -> SampledTrajectory:
-    """The movement that a table in one of `FORMS` holds.
-
-    Raises:
-        MovementError: the samples make no sense.
-    """
+    """The movement that a table in one of `FORMS` holds; MovementError if it makes no sense."""
     columns = rows.columns
     values = {name: rows.values[:, k] for k, name in enumerate(columns)}
     turn = next((names for names in (_VECTOR, _QUATERNION) if names[0] in columns), ())

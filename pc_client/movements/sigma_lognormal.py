@@ -21,18 +21,18 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
-from pc_client.movements.lognormal import LiteralTiming, Timing, evaluate_lognormals
-from pc_client.movements.trajectory import Motion, Similarity, read_only
+from pc_client.movements.lognormal import LiteralTiming, Lognormal, Timing, evaluate_lognormals
+from pc_client.movements.trajectory import Motion, Similarity
 
 
-def sinc(u: ArrayLike) -> NDArray[np.float64]:
+def sinc(u: ArrayLike) -> Array:
     """sin(u) / u, and 1 at 0 (numpy's sinc has a factor pi in it)."""
-    value: NDArray[np.float64] = np.sinc(np.asarray(u, dtype=np.float64) / math.pi)
-    return value
+    return np.sinc(np.asarray(u, dtype=np.float64) / math.pi)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +56,17 @@ class Stroke:
             raise MovementError(f"stroke with tilt {self.tilt} rad: give a finite angle")
         _chord_ratio(self.arc_angle)
 
+    def later(self, shift: float) -> Stroke:
+        """The same stroke, timed by its parameters, this much (s) later."""
+        timing = self.timing.lognormal
+        return Stroke(Lognormal(timing.t0 + shift, timing.mu, timing.sigma), self.arc_angle, self.tilt)
+
     def length(self, a: ArrayLike, b: ArrayLike) -> float:
         """Arc length D (m) of the stroke when it runs from a to b, each (3,), m."""
         return float(np.linalg.norm(np.subtract(b, a))) / _chord_ratio(self.arc_angle)
 
 
-def arc_frame(a: ArrayLike, b: ArrayLike, tilt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def arc_frame(a: ArrayLike, b: ArrayLike, tilt: float) -> tuple[Array, Array]:
     """The two unit vectors that span the plane of an arc from a to b.
 
     Args:
@@ -86,15 +91,15 @@ def arc_frame(a: ArrayLike, b: ArrayLike, tilt: float) -> tuple[NDArray[np.float
     return chord, math.cos(tilt) * normal + math.sin(tilt) * np.cross(chord, normal)
 
 
-def tilt_of_normal(chord: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
+def tilt_of_normal(chord: Array, normal: Array) -> float:
     """The tilt (rad) at which `arc_frame` would give this normal to this chord direction, both (3,)."""
     reference = _reference_normal(chord)
     return math.atan2(float(np.cross(chord, reference) @ normal), float(reference @ normal))
 
 
-def _reference_normal(chord: NDArray[np.float64]) -> NDArray[np.float64]:
+def _reference_normal(chord: Array) -> Array:
     up = np.array([0.0, 0.0, 1.0]) if abs(chord[2]) < 1.0 - 1e-9 else np.array([1.0, 0.0, 0.0])
-    normal: NDArray[np.float64] = up - (up @ chord) * chord
+    normal: Array = up - (up @ chord) * chord
     return normal / float(np.linalg.norm(normal))
 
 
@@ -117,34 +122,26 @@ class SigmaLognormal:
         duration: end of the movement, s; it begins at 0.
     """
 
-    target_points: NDArray[np.float64]
+    target_points: Array
     strokes: tuple[Stroke, ...]
     duration: float
-    _columns: NDArray[np.float64] = field(init=False, repr=False, compare=False)
-    _chords: NDArray[np.float64] = field(init=False, repr=False, compare=False)
-    _normals: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+    _columns: Array = field(init=False, repr=False, compare=False)
+    _chords: Array = field(init=False, repr=False, compare=False)
+    _normals: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         targets = read_only(self.target_points)
-        if (
-            targets.ndim != 2
-            or targets.shape[1] != 3
-            or len(targets) != len(self.strokes) + 1
-            or len(targets) < 2
-        ):
+        if targets.shape != (len(self.strokes) + 1, 3) or not self.strokes:
             raise MovementError(
                 f"{len(self.strokes)} strokes with target points of shape {targets.shape}: "
                 "give n >= 2 target points of x, y, z and n - 1 strokes"
             )
-        frames = [
-            arc_frame(a, b, s.tilt) for a, b, s in zip(targets[:-1], targets[1:], self.strokes, strict=True)
-        ]
-        lognormals = [stroke.timing.lognormal for stroke in self.strokes]
-        lengths = [s.length(a, b) for a, b, s in zip(targets[:-1], targets[1:], self.strokes, strict=True)]
-        columns = [
-            [b.t0, b.mu, b.sigma, d, s.arc_angle]
-            for b, d, s in zip(lognormals, lengths, self.strokes, strict=True)
-        ]
+        legs = list(zip(targets[:-1], targets[1:], self.strokes, strict=True))
+        frames = [arc_frame(a, b, stroke.tilt) for a, b, stroke in legs]
+        columns = []
+        for a, b, stroke in legs:
+            timing = stroke.timing.lognormal
+            columns.append([timing.t0, timing.mu, timing.sigma, stroke.length(a, b), stroke.arc_angle])
         object.__setattr__(self, "target_points", targets)
         object.__setattr__(self, "strokes", tuple(self.strokes))
         object.__setattr__(self, "_columns", read_only(np.transpose(columns)))
@@ -152,9 +149,9 @@ class SigmaLognormal:
         object.__setattr__(self, "_normals", read_only([m for _, m in frames]))
 
     @property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Array:
         """Arc lengths D of the strokes, m."""
-        lengths: NDArray[np.float64] = self._columns[3]
+        lengths: Array = self._columns[3]
         return lengths
 
     def evaluate(self, t: ArrayLike) -> Motion:
@@ -175,14 +172,14 @@ class SigmaLognormal:
             (along * cos - across * sin) @ c + (along * sin + across * cos) @ m,
         )
 
-    def stroke_speeds(self, t: ArrayLike) -> NDArray[np.float64]:
+    def stroke_speeds(self, t: ArrayLike) -> Array:
         """Speed of every stroke alone, D_j Lambda_j, (n, n_strokes), m/s."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))[:, None]
         t0, mu, sigma, length, _ = self._columns
-        speeds: NDArray[np.float64] = length * evaluate_lognormals(times, t0, mu, sigma).rate
+        speeds: Array = length * evaluate_lognormals(times, t0, mu, sigma).rate
         return speeds
 
-    def speed_minima(self) -> NDArray[np.float64]:
+    def speed_minima(self) -> Array:
         """Times (s) of the speed minimum between the peaks of consecutive strokes, (n_strokes - 1,).
 
         Where strokes overlap so much that there is no minimum between the two peaks, the end of that interval
@@ -192,7 +189,7 @@ class SigmaLognormal:
         return np.array([self._speed_minimum(min(a, b), max(a, b)) for a, b in pairwise(modes)])
 
     def transformed(self, similarity: Similarity) -> SigmaLognormal:
-        """The movement moved, scaled and rotated; its timing, so the shape of its speed, is untouched."""
+        """Moved, scaled and rotated; the timing, so the shape of the speed, is untouched."""
         normals = self._normals @ similarity.R.T
         chords = self._chords @ similarity.R.T
         strokes = tuple(
@@ -257,9 +254,7 @@ def literal_strokes(target_points: ArrayLike, durations: ArrayLike) -> SigmaLogn
     return SigmaLognormal(np.asarray(target_points, dtype=np.float64), strokes, edges[-1])
 
 
-def leg_lengths(target_points: ArrayLike) -> NDArray[np.float64]:
+def leg_lengths(target_points: ArrayLike) -> Array:
     """Distances (n - 1,), m, between consecutive target points (n, 3), m."""
-    lengths: NDArray[np.float64] = np.linalg.norm(
-        np.diff(np.asarray(target_points, dtype=np.float64), axis=0), axis=1
-    )
+    lengths: Array = np.linalg.norm(np.diff(np.asarray(target_points, dtype=np.float64), axis=0), axis=1)
     return lengths

@@ -1,6 +1,6 @@
 """What makes a movement: a closed form of position, velocity and acceleration in time; its transformations.
 
-The five forms are the modules beside this one: `sigma_lognormal`, `uniform`, `minimum_jerk`, `power_law`,
+The modules beside this one have the five forms: `sigma_lognormal`, `uniform`, `minimum_jerk`, `power_law`,
 `samples`.
 """
 
@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
 from pc_client.files import ALLOWED, MOST_BYTES, is_file_name
 
@@ -23,9 +24,9 @@ LONGEST_DURATION = 1200.0
 class Motion(NamedTuple):
     """Position (m), velocity (m/s) and acceleration (m/s^2), each (n, 2) or (n, 3)."""
 
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
+    p: Array
+    v: Array
+    a: Array
 
 
 class Trajectory(Protocol):
@@ -34,24 +35,19 @@ class Trajectory(Protocol):
     @property
     def duration(self) -> float:
         """Total time, s."""
-        ...
 
     @property
-    def target_points(self) -> NDArray[np.float64]:
+    def target_points(self) -> Array:
         """(n, 3), m."""
-        ...
 
     def evaluate(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t (n,), s."""
-        ...
 
     def transformed(self, similarity: Similarity) -> Trajectory:
         """The same movement elsewhere."""
-        ...
 
     def stretched(self, factor: float) -> Trajectory:
         """The same movement, slower."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +61,8 @@ class Similarity:
     """
 
     scale: float
-    R: NDArray[np.float64]
-    shift: NDArray[np.float64]
+    R: Array
+    shift: Array
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "R", read_only(self.R, (3, 3)))
@@ -80,30 +76,23 @@ class Similarity:
         if not np.all(np.isfinite(self.shift)):
             raise MovementError(f"shift {self.shift.tolist()} m: give finite numbers")
 
-    def points(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def points(self, p: Array) -> Array:
         """Points (n, 3), m, where they go."""
         return self.scale * p @ self.R.T + self.shift
 
-    def vectors(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def vectors(self, v: Array) -> Array:
         """Differences of points, velocities, accelerations (n, 3), where they go."""
         return self.scale * v @ self.R.T
 
 
-def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
-    """A read-only float64 copy."""
-    array = np.array(values, dtype=np.float64)
-    if shape is not None:
-        array = array.reshape(shape)
-    array.setflags(write=False)
-    return array
+def about_z(angle: float) -> Array:
+    """The rotation (3, 3) by an angle (rad) about z."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def check_name(name: str) -> None:
-    """Refuse a name that is no file name of the same folder on every system.
-
-    Raises:
-        MovementError: saying what is allowed.
-    """
+    """Raise MovementError for a name that is no file name of the same folder on every system."""
     if not is_file_name(name):
         raise MovementError(
             f"a movement is called {name[:MOST_BYTES]!r}: files are named after it, so give {ALLOWED}"
@@ -111,11 +100,7 @@ def check_name(name: str) -> None:
 
 
 def check_duration(duration: float, whose: str) -> None:
-    """Refuse a duration outside the range of movements.
-
-    Raises:
-        MovementError: saying what is allowed.
-    """
+    """Raise MovementError for a duration outside the range of movements."""
     if not 0.0 < duration <= LONGEST_DURATION:  # NaN is not
         raise MovementError(
             f"{whose} with a duration of {duration:g} s: it must last longer than 0 s, "

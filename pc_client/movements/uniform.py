@@ -15,15 +15,16 @@ Source: section II.C; a square wave of the levels l_j / T_j, "smoothed with real
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import fresnel
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
-from pc_client.movements.trajectory import Motion, Similarity, read_only
+from pc_client.movements.trajectory import Motion, Similarity
 
 #: Below this turn (rad) two lines are one: no blend is built.
 _STRAIGHT = 1e-6
@@ -34,18 +35,18 @@ _REVERSAL = math.radians(170.0)
 class PathPoints(NamedTuple):
     """Points of a path: position (m), unit tangent and curvature vector dT/ds (1/m), each (n, 3)."""
 
-    p: NDArray[np.float64]
-    tangent: NDArray[np.float64]
-    curvature: NDArray[np.float64]
+    p: Array
+    tangent: Array
+    curvature: Array
 
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    start: NDArray[np.float64]
-    direction: NDArray[np.float64]
+    start: Array
+    direction: Array
     length: float
 
-    def at(self, s: NDArray[np.float64]) -> PathPoints:
+    def at(self, s: Array) -> PathPoints:
         tangent = np.broadcast_to(self.direction, (len(s), 3))
         return PathPoints(self.start + s[:, None] * self.direction, tangent, np.zeros((len(s), 3)))
 
@@ -54,14 +55,14 @@ class _Line:
 class _Blend:
     """Two clothoids from `start` along `t_in` to `end` along `t_out`."""
 
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
-    t_in: NDArray[np.float64]
-    t_out: NDArray[np.float64]
+    start: Array
+    end: Array
+    t_in: Array
+    t_out: Array
     turn: float
     length: float
 
-    def at(self, s: NDArray[np.float64]) -> PathPoints:
+    def at(self, s: Array) -> PathPoints:
         # The curve is its own mirror image about the bisector: the second half is the first, run from the
         # end.
         n_in = (self.t_out - math.cos(self.turn) * self.t_in) / math.sin(self.turn)
@@ -88,13 +89,14 @@ class CornerPath:
         target_points: (n, 3), m, consecutive ones apart.
         blend: how far (m) before and after an inner target point the path leaves the straight lines; 0 keeps
             the corners sharp. A blend never takes more than half of a line.
+        targets_at: arc lengths (n,), m, of the target points, or of the middles of their blends.
     """
 
-    target_points: NDArray[np.float64]
+    target_points: Array
     blend: float = 0.0
     _pieces: tuple[_Line | _Blend, ...] = field(init=False, repr=False, compare=False)
-    _starts: NDArray[np.float64] = field(init=False, repr=False, compare=False)
-    _targets_at: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+    _starts: Array = field(init=False, repr=False, compare=False)
+    targets_at: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         targets = read_only(self.target_points)
@@ -117,17 +119,12 @@ class CornerPath:
         object.__setattr__(self, "target_points", targets)
         object.__setattr__(self, "_pieces", pieces)
         object.__setattr__(self, "_starts", read_only(starts))
-        object.__setattr__(self, "_targets_at", read_only(targets_at))
+        object.__setattr__(self, "targets_at", read_only(targets_at))
 
     @property
     def length(self) -> float:
         """Arc length of the whole path, m."""
         return float(self._starts[-1])
-
-    @property
-    def targets_at(self) -> NDArray[np.float64]:
-        """Arc lengths (n,), m, of the target points, or of the middles of their blends."""
-        return self._targets_at
 
     def at(self, s: ArrayLike) -> PathPoints:
         """Points at the arc lengths s (n,), m, held to [0, length]."""
@@ -142,13 +139,9 @@ class CornerPath:
                 out[chosen] = part
         return result
 
-    def transformed(self, similarity: Similarity) -> CornerPath:
-        """The path moved, scaled and rotated."""
-        return CornerPath(similarity.points(self.target_points), self.blend * similarity.scale)
-
 
 def _build_pieces(
-    targets: NDArray[np.float64], directions: NDArray[np.float64], lengths: NDArray[np.float64], blend: float
+    targets: Array, directions: Array, lengths: Array, blend: float
 ) -> tuple[tuple[_Line | _Blend, ...], list[float]]:
     """Lines and blends in order, and the arc length at each target point."""
     pieces: list[_Line | _Blend] = []
@@ -172,9 +165,7 @@ def _build_pieces(
     return tuple(pieces), targets_at
 
 
-def _build_blend(
-    corner: NDArray[np.float64], t_in: NDArray[np.float64], t_out: NDArray[np.float64], setback: float
-) -> _Blend | None:
+def _build_blend(corner: Array, t_in: Array, t_out: Array, setback: float) -> _Blend | None:
     turn = math.atan2(float(np.linalg.norm(np.cross(t_in, t_out))), float(t_in @ t_out))
     if turn < _STRAIGHT:
         return None
@@ -189,7 +180,7 @@ def _build_blend(
     return _Blend(corner - setback * t_in, corner + setback * t_out, t_in, t_out, turn, length)
 
 
-def _unit_clothoid(u: NDArray[np.float64], turn: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _unit_clothoid(u: Array, turn: float) -> tuple[Array, Array]:
     """Integrals of cos and sin of 2 turn u^2: the first half, u in [0, 1/2], of a blend of length 1."""
     scale = math.sqrt(math.pi / (4.0 * turn))
     sine, cosine = fresnel(u / scale)
@@ -206,9 +197,9 @@ _SHORTEST_RAMP = 1e-6
 class PathMotion(NamedTuple):
     """Length along the path (m), speed (m/s) and acceleration along the path (m/s^2), each (n,)."""
 
-    s: NDArray[np.float64]
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
+    s: Array
+    v: Array
+    a: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,8 +213,8 @@ class SmoothedSquareWave:
             the shorter one bounds the jerk.
     """
 
-    windows: NDArray[np.float64]
-    levels: NDArray[np.float64]
+    windows: Array
+    levels: Array
     ramps: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -252,8 +243,8 @@ class Uniform:
         blend: with "blend" corners, the setback of the blends, m.
     """
 
-    target_points: NDArray[np.float64]
-    stroke_durations: NDArray[np.float64]
+    target_points: Array
+    stroke_durations: Array
     ramps: tuple[float, ...]
     corners: Corners = "stop"
     blend: float = 0.0
@@ -301,19 +292,14 @@ class Uniform:
         return Motion(at.p, velocity, acceleration)
 
     def transformed(self, similarity: Similarity) -> Uniform:
-        """The movement moved, scaled and rotated; its timing is untouched."""
-        return Uniform(
-            similarity.points(self.target_points),
-            self.stroke_durations,
-            self.ramps,
-            self.corners,
-            self.blend * similarity.scale,
-        )
+        """Moved, scaled and rotated; the timing is untouched."""
+        points = similarity.points(self.target_points)
+        return replace(self, target_points=points, blend=self.blend * similarity.scale)
 
     def stretched(self, factor: float) -> Uniform:
-        """The movement `factor` times as slow, ramps included."""
+        """`factor` times as slow, ramps included."""
         ramps = tuple(ramp * factor for ramp in self.ramps)
-        return Uniform(self.target_points, self.stroke_durations * factor, ramps, self.corners, self.blend)
+        return replace(self, stroke_durations=self.stroke_durations * factor, ramps=ramps)
 
 
 def check_ramps(ramps: tuple[float, ...]) -> None:
@@ -326,7 +312,7 @@ def check_ramps(ramps: tuple[float, ...]) -> None:
 
 
 def _square_wave(
-    path: CornerPath, durations: NDArray[np.float64], ramps: tuple[float, ...], corners: Corners
+    path: CornerPath, durations: Array, ramps: tuple[float, ...], corners: Corners
 ) -> SmoothedSquareWave:
     """The square wave whose smoothed form runs each stroke's length within the stroke's time."""
     edges = np.concatenate(([0.0], np.cumsum(durations)))
@@ -345,7 +331,7 @@ def _square_wave(
     )
 
 
-def _smoothed_step(t: NDArray[np.float64], ramps: tuple[float, ...]) -> PathMotion:
+def _smoothed_step(t: Array, ramps: tuple[float, ...]) -> PathMotion:
     """A unit step at 0 convolved with the boxcars, its integral and its derivative.
 
     Outside the ramp the values are exact (0, or t, 1, 0), so that no rounding gathers with time.

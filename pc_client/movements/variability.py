@@ -32,8 +32,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 from pc_client.movements.lognormal import FULL_COVERAGE, Lognormal
 from pc_client.movements.movement import Movement
@@ -47,20 +47,11 @@ _MAX_ARC_ANGLE = 6.2
 
 @dataclass(frozen=True, slots=True)
 class VariabilityRanges:
-    """Least and greatest relative change of each parameter; drawn evenly between.
-
-    Attributes:
-        length: of D.
-        rhythm: of t0.
-        pace: of mu.
-        sigma: of sigma.
-        theta_start: of the direction at the start.
-        theta_end: of the direction at the end.
-    """
+    """Least and greatest relative change of each parameter; drawn evenly between."""
 
     length: tuple[float, float] = (-0.10, 0.10)
-    rhythm: tuple[float, float] = (-0.085, 0.0825)
-    pace: tuple[float, float] = (-0.3775, 0.395)
+    rhythm: tuple[float, float] = (-0.085, 0.0825)  # of t0
+    pace: tuple[float, float] = (-0.3775, 0.395)  # of mu
     sigma: tuple[float, float] = (-0.2875, 0.325)
     theta_start: tuple[float, float] = (-0.015, 0.03)
     theta_end: tuple[float, float] = (-0.015, 0.0275)
@@ -111,13 +102,13 @@ def duplicate(
     lognormals = _vary_timing(trajectory, float(np.median(movement.stroke_durations)), draw, ranges)
     targets, strokes = _vary_arcs(trajectory, lognormals, draw, ranges)
     varied = _framed(targets, strokes, trajectory)
-    provenance = {**movement.provenance, "duplicate_of": movement.name, "variation_seed": seed}
-    return Movement(
-        name or f"{movement.name}_v{seed}",
-        varied,
-        _durations(varied),
-        {**provenance, "variation_share": share},
-    )
+    facts: dict[str, str | int | float] = {
+        "duplicate_of": movement.name,
+        "variation_seed": seed,
+        "variation_share": share,
+    }
+    name = name or f"{movement.name}_v{seed}"
+    return Movement(name, varied, _durations(varied), {**movement.provenance, **facts})
 
 
 def _vary_timing(
@@ -145,7 +136,7 @@ def _vary_arcs(
     lognormals: list[Lognormal],
     draw: Callable[[tuple[float, float]], float],
     ranges: VariabilityRanges,
-) -> tuple[NDArray[np.float64], tuple[Stroke, ...]]:
+) -> tuple[Array, tuple[Stroke, ...]]:
     """New arcs, each in the plane of the old one, end to end from the same first point."""
     points = trajectory.target_points
     targets, strokes = [points[0]], []
@@ -164,23 +155,14 @@ def _vary_arcs(
     return np.array(targets), tuple(strokes)
 
 
-def _framed(
-    targets: NDArray[np.float64], strokes: tuple[Stroke, ...], trajectory: SigmaLognormal
-) -> SigmaLognormal:
+def _framed(targets: Array, strokes: tuple[Stroke, ...], trajectory: SigmaLognormal) -> SigmaLognormal:
     """The strokes shifted and the end set so that the rests before and after are those of the trajectory."""
     old_begin, old_end = _extent(trajectory.strokes)
     begin, end = _extent(strokes)
     rest_before, rest_after = max(old_begin, 0.0), max(trajectory.duration - old_end, 0.0)
     shift = rest_before - begin
-    moved = []
-    for stroke in strokes:
-        lognormal = stroke.timing.lognormal
-        moved.append(
-            Stroke(
-                Lognormal(lognormal.t0 + shift, lognormal.mu, lognormal.sigma), stroke.arc_angle, stroke.tilt
-            )
-        )
-    return SigmaLognormal(targets, tuple(moved), end + shift + rest_after)
+    moved = tuple(stroke.later(shift) for stroke in strokes)
+    return SigmaLognormal(targets, moved, end + shift + rest_after)
 
 
 def _extent(strokes: tuple[Stroke, ...]) -> tuple[float, float]:
@@ -192,7 +174,7 @@ def _extent(strokes: tuple[Stroke, ...]) -> tuple[float, float]:
     )
 
 
-def _durations(trajectory: SigmaLognormal) -> NDArray[np.float64]:
+def _durations(trajectory: SigmaLognormal) -> Array:
     """Times between speed minima; strokes that merged into one count as one."""
     inner = np.unique(trajectory.speed_minima())
     inner = inner[(inner > 1e-3) & (inner < trajectory.duration - 1e-3)]

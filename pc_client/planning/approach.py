@@ -15,8 +15,9 @@ from math import pi, sqrt
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array
 from pc_client.errors import PlanningError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
 from pc_client.kinematics.model import RobotModel
@@ -24,21 +25,13 @@ from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
 
-Array = NDArray[np.float64]
-
 
 class JointLines:
     """A joint reference along straight joint lines; on each the speed is a trapezoid, from rest to rest.
 
-    All joints begin and end a line together. The joint with the largest distance leads.
-
-    Args:
-        postures: at least one, (6,) each [rad].
-        v: largest speed of the leading joint [rad/s].
-        a: its acceleration [rad/s²].
+    All joints begin and end a line together. The joint with the largest distance leads, with a largest speed
+    v [rad/s] and an acceleration a [rad/s²]. There is at least one posture, (6,) each [rad].
     """
-
-    __slots__ = ("_a", "_ends", "_postures", "_v")
 
     def __init__(self, postures: Sequence[Array], v: float, a: float) -> None:
         self._postures = tuple(postures)
@@ -134,12 +127,7 @@ class Approach:
 
 
 def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Approach:
-    """Plan a slow joint move from the present posture to the start of a plan.
-
-    Args:
-        plan: the plan that shall begin afterwards.
-        q_now: (6,) present joint angles [rad].
-        model: nominal arm that the plan was made for.
+    """Plan a slow joint move from the present posture (6,) [rad] to the start of a plan.
 
     Returns:
         One waypoint, up to three if the direct line is not clear. Use `.plan` instead of `plan` from then on.
@@ -212,9 +200,8 @@ def _raised(q: Array) -> Array:
     """Return q with the arm straight up as in UR's home posture, each joint in its nearest possible turn."""
     posture = q.copy()
     for joint, angle in _RAISED.items():
-        options = np.array(
-            [option for option in (angle - _TURN, angle, angle + _TURN) if abs(option) < _TURN]
-        )
+        turns = (angle - _TURN, angle, angle + _TURN)
+        options = np.array([option for option in turns if abs(option) < _TURN])
         posture[joint] = options[np.abs(options - q[joint]).argmin()]
     return posture
 
@@ -230,11 +217,7 @@ def _check_route(
         lines.append(begin + np.linspace(0.0, 1.0, n)[:, None] * (end - begin))
     q = np.concatenate(lines)
     clearance = hulls.along(q)
-    for distances, least in zip(
-        clearance,
-        (limits.floor_clearance_min, limits.own_clearance_min, limits.cell_clearance_min),
-        strict=True,
-    ):
+    for distances, least in zip(clearance, limits.clearances_min, strict=True):
         bad = np.flatnonzero(distances.least < least)
         if bad.size:
             k = int(bad[0])
@@ -273,23 +256,16 @@ def plan_text(plan: JointPlan) -> str:
 
 def approach_text(approach: Approach) -> str:
     """Return the approach to the start as a few lines."""
-    names = ", ".join(JOINT_NAMES)
+    clear = f"{approach.floor_clearance * 1e3:.0f} mm clear of the floor"
+    if np.isfinite(approach.cell_clearance):
+        clear += f", {approach.cell_clearance * 1e3:.0f} mm of walls and solids of the cell"
     title = (
         f"first, slowly (at most {np.degrees(approach.v):.0f} deg/s, about {approach.duration:.1f} s,"
-        f" {_clear(approach)}), joints {names}:"
+        f" {clear}), joints {', '.join(JOINT_NAMES)}:"
     )
-    lines = (f"  from            {_degrees(approach.q_from)}",)
-    return "\n".join(
-        (title, *lines, *(f"  to              {_degrees(waypoint)}" for waypoint in approach.waypoints))
-    )
+    ways = (f"  to              {_degrees(waypoint)}" for waypoint in approach.waypoints)
+    return "\n".join((title, f"  from            {_degrees(approach.q_from)}", *ways))
 
 
-def _clear(approach: Approach) -> str:
-    floor = f"{approach.floor_clearance * 1e3:.0f} mm clear of the floor"
-    if not np.isfinite(approach.cell_clearance):
-        return floor
-    return f"{floor}, {approach.cell_clearance * 1e3:.0f} mm of walls and solids of the cell"
-
-
-def _degrees(q: np.typing.NDArray[np.float64]) -> str:
+def _degrees(q: Array) -> str:
     return "(" + ", ".join(f"{angle:.1f}" for angle in np.degrees(q)) + ") deg"

@@ -1,7 +1,7 @@
 """Every limit that a planned motion must keep, checked before anything moves; the figures as a report.
 
 All quantities are measured before any is judged, so the report of a good plan and the refusal of a bad one
-have the same numbers. Limits are in planning.limits, the arm's own in kinematics.robot_model.
+have the same numbers. Limits are in `planning.limits`, the arm's own in `kinematics.arms`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.kinematics.arms import JointLimits
 from pc_client.kinematics.cell import Cell
 from pc_client.kinematics.clearance import Distances, Nearest, clearance_model
@@ -20,8 +20,6 @@ from pc_client.planning.joint_path import JointPath
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits
 from protocol.ur_types import JOINT_NAMES
-
-Array = NDArray[np.float64]
 
 
 class Extreme(NamedTuple):
@@ -71,12 +69,6 @@ class PlanReport:
     """Figures of a plan, all in SI.
 
     Attributes:
-        robot: name of the nominal arm.
-        joint_limits: what the arm can do.
-        limits: what the plan was held against.
-        cell: what stands around the arm and what it carries.
-        duration: [s].
-        samples: number of samples.
         path_length: length of the TCP path [m].
         box_min: (3,) lower corner of the box that the TCP stays in [m].
         box_max: (3,) upper corner [m].
@@ -188,11 +180,6 @@ class CartesianSamples(NamedTuple):
 def check_samples(names: PathNames, samples: CartesianSamples, limits: PlanLimits) -> Extreme:
     """Check the movement itself, before any kinematics: finite, slow enough, at rest at both ends.
 
-    Args:
-        names: how to name a sample.
-        samples: the movement.
-        limits: what is allowed.
-
     Returns:
         The top TCP speed.
 
@@ -210,7 +197,7 @@ def check_samples(names: PathNames, samples: CartesianSamples, limits: PlanLimit
     top = _highest(speed, limits.tcp_speed_max)
     if top.share > 1.0:
         raise names.refuse(
-            _first(speed > limits.tcp_speed_max),
+            int((speed > limits.tcp_speed_max).argmax()),
             f"the TCP speed is {top.value:.3f} m/s at its highest, at most {limits.tcp_speed_max:g} m/s is"
             " allowed; give the movement more time or less size",
         )
@@ -243,9 +230,6 @@ def check_motion(
         path: its joint angles.
         spline: the spline through them.
         limits: what is allowed.
-
-    Returns:
-        The figures, all within limits.
 
     Raises:
         PlanningError: a limit is broken; names the sample where it is broken most, and the joint.
@@ -360,7 +344,3 @@ def _lowest(values: Array, limit: float) -> Extreme:
     joint = int(index[1]) if values.ndim == 2 else None
     lowest = float(values[index])
     return Extreme(lowest, int(index[0]), joint, limit, limit / lowest if lowest > 0.0 else np.inf)
-
-
-def _first(mask: NDArray[np.bool_]) -> int:
-    return int(mask.argmax())

@@ -11,9 +11,10 @@ from math import pi
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from pc_client.arrays import Array
 from pc_client.errors import PlanningError
 from pc_client.kinematics.model import (
     SINGULARITIES,
@@ -31,27 +32,19 @@ _TCP_RPY = (0.0, 0.75 * pi, 0.0)
 """Roll, pitch, yaw of the TCP in `base` [rad]. Source: paper section III, "RPY(0, 3/4 pi, 0)"."""
 
 
-def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
-    """Return R = Rz(yaw) @ Ry(pitch) @ Rx(roll), the convention of UR and ROS.
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Return R = Rz(yaw) @ Ry(pitch) @ Rx(roll), (3, 3), the convention of UR and ROS.
 
-    Args:
-        roll: turn about the fixed x axis [rad], first.
-        pitch: turn about the fixed y axis [rad], second.
-        yaw: turn about the fixed z axis [rad], last.
-
-    Returns:
-        (3, 3) rotation matrix.
+    Turns about the fixed x, y and z axis, in this order [rad].
     """
     # Lower-case axes are scipy's fixed (extrinsic) axes.
     return np.asarray(Rotation.from_euler("xyz", (roll, pitch, yaw)).as_matrix(), dtype=np.float64)
 
 
-def fixed_tcp_rotation() -> NDArray[np.float64]:
+def fixed_tcp_rotation() -> Array:
     """Return R_base_tcp of the experiment: tool z = (.7071, 0, -.7071), forward and 45 deg down."""
     return rotation_from_rpy(*_TCP_RPY)
 
-
-Array = NDArray[np.float64]
 
 # Between the solutions that carry the branch from its own posture to the first sample [m, rad].
 _LEAD_IN_STEP, _LEAD_IN_TURN = 0.01, 0.02
@@ -84,7 +77,7 @@ def follow_path(
     q_branch: ArrayLike | None = None,
     limits: PlanLimits,
 ) -> JointPath:
-    """Solve the inverse kinematics of a path.
+    """Solve the inverse kinematics of a path of finite positions.
 
     Args:
         model: nominal arm.
@@ -94,10 +87,9 @@ def follow_path(
         limits: which steps and singularity distance are allowed.
 
     Raises:
-        PlanningError: a sample is not finite, out of reach, too near a singularity, or on another branch; the
-            first such sample is named.
+        PlanningError: a sample is out of reach, too near a singularity, or on another branch; the first such
+            sample is named.
     """
-    _refuse_not_finite(names)
     branch = np.array(model.description.q_branch if q_branch is None else q_branch, dtype=np.float64)
     n = len(names.p)
     rotations = np.broadcast_to(R_base_tcp, (n, 3, 3))
@@ -161,29 +153,18 @@ def _lead_in(
     return q
 
 
-def _refuse_not_finite(names: PathNames) -> None:
-    """Raise for the first sample that has no finite position."""
-    bad = np.flatnonzero(~np.isfinite(names.p).all(axis=1))
-    if bad.size:
-        raise names.refuse(int(bad[0]), "the position is not finite; correct the movement")
-
-
 def _refuse_step(
     model: RobotModel, names: PathNames, k: int, solution: IkSolution, q_before: Array, limits: PlanLimits
 ) -> PlanningError | None:
     """Return the error of a sample that is out of reach or too far from the one before; None if good."""
-    if not (
-        solution.converged
-        or (
-            solution.position_error <= limits.position_error_max
-            and solution.rotation_error <= limits.rotation_error_max
-        )
-    ):
+    off = solution.position_error, solution.rotation_error
+    near = off[0] <= limits.position_error_max and off[1] <= limits.rotation_error_max
+    if not (solution.converged or near):
         joint = int(measure_singularity(tcp_jacobian(model, solution.q)[None]).critical_joint[0])
         return names.refuse(
             k,
-            f"out of reach: the nearest posture misses by {solution.position_error * 1e3:.2f} mm and"
-            f" {np.degrees(solution.rotation_error):.2f} deg; move or scale the movement into the box",
+            f"out of reach: the nearest posture misses by {off[0] * 1e3:.2f} mm and"
+            f" {np.degrees(off[1]):.2f} deg; move or scale the movement into the box",
             joint=joint,
         )
     step = np.abs(solution.q - q_before)

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
+from pc_client.arrays import Array
 from pc_client.errors import PlanningError
-
-Array = NDArray[np.float64]
 
 
 class JointSpline:
@@ -27,17 +26,6 @@ class JointSpline:
     Raises:
         PlanningError: no positive duration, fewer than two knots, or values that are not finite.
     """
-
-    __slots__ = (
-        "_at_end",
-        "_at_start",
-        "_coefficients",
-        "_intervals",
-        "_rate",
-        "_step",
-        "duration",
-        "q_knots",
-    )
 
     def __init__(self, duration: float, q: ArrayLike) -> None:
         knots = np.array(q, dtype=np.float64)

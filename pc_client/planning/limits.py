@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pc_client.arrays import Array
 from pc_client.errors import PlanningError
 from pc_client.kinematics.arms import Six
 from pc_client.kinematics.model import RobotModel
@@ -55,6 +53,11 @@ class PlanLimits:
     approach_speed: float
     approach_acceleration: float
 
+    @property
+    def clearances_min(self) -> tuple[float, float, float]:
+        """Distances to keep [m], in the order of `Clearance`: from the floor, itself, the cell."""
+        return self.floor_clearance_min, self.own_clearance_min, self.cell_clearance_min
+
 
 # Speed [m/s] and acceleration [m/s²] of the flange when the leading joint moves the stretched arm: UR's
 # recovery mode allows 250 mm/s.
@@ -92,17 +95,11 @@ def limits_of(arm: RobotModel) -> PlanLimits:
 
 @dataclass(frozen=True, slots=True)
 class PathNames:
-    """What is needed to name a sample of a path.
-
-    Attributes:
-        movement: name of the movement.
-        t: (n,) time of the samples [s].
-        p: (n, 3) TCP positions [m].
-    """
+    """What is needed to name a sample of a path: the movement, times (n,) [s], TCP positions (n, 3) [m]."""
 
     movement: str
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
+    t: Array
+    p: Array
 
     def refuse(self, sample: int, what: str, *, joint: int | None = None) -> PlanningError:
         """Return (not raise) the error for one sample.

@@ -8,9 +8,10 @@ from math import ceil
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from pc_client.arrays import Array
 from pc_client.errors import PlanningError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import (
@@ -34,8 +35,6 @@ from pc_client.planning.joint_path import JointPath, fixed_tcp_rotation, follow_
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits, limits_of
 
-Array = NDArray[np.float64]
-
 _DEFAULT_DT = 0.004
 """Time between samples of a plan [s]: half a control cycle; the spline between is then good to < 1 um."""
 
@@ -54,16 +53,13 @@ class PlannableMovement(Protocol):
     @property
     def name(self) -> str:
         """For messages and file names."""
-        ...
 
     @property
     def duration(self) -> float:
         """[s]."""
-        ...
 
     def sample(self, t: Array, /) -> tuple[Array, Array]:
         """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,) in [0, duration]."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,15 +150,11 @@ class Plan:
 def make_plan(motion: Motion, model: RobotModel) -> Plan:
     """Plan what the TCP, or what the joints shall do; one that may be moved where the arm can do it.
 
-    Args:
-        motion: a movement of the TCP, or joint angles over time.
-        model: nominal arm.
-
     Raises:
         PlanningError: the arm cannot do it.
     """
     if isinstance(motion, JointTrajectory):
-        joints = _plan_joints(motion, model=model)
+        joints = _plan_joints(motion, model)
         trajectory = SampledTrajectory(joints.t, joints.p)
         return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
     if motion.may_be_moved and any(shift := model.description.library_shift):
@@ -190,9 +182,6 @@ def plan_movement(
         rotations: gives R_base_tcp (n, 3, 3) at times (n,) [s], or None for the experiment's fixed one, as
             no function does.
 
-    Returns:
-        The plan, all limits kept.
-
     Raises:
         PlanningError: the movement cannot be done; names the sample, its time and point, and the joint.
     """
@@ -210,27 +199,10 @@ def plan_movement(
     return JointPlan(movement.name, _frozen(samples.t), _frozen(samples.p), _frozen(path.q), spline, report)
 
 
-def _plan_joints(
-    trajectory: JointTrajectory,
-    *,
-    model: RobotModel,
-    dt: float = _DEFAULT_DT,
-    limits: PlanLimits | None = None,
-) -> JointPlan:
-    """Plan a motion that is given in joint angles: a clamped cubic spline through them, checked as all plans.
-
-    Args:
-        trajectory: what the joints shall do.
-        model: nominal arm.
-        dt: wanted time between samples of the plan [s].
-        limits: what the plan must keep; by default what belongs to the arm.
-
-    Raises:
-        PlanningError: a limit is broken; names the sample, its time and point, and the joint.
-    """
-    limits = limits_of(model) if limits is None else limits
-    duration = float(trajectory.t[-1])
-    steps = max(2, ceil(duration / dt - 1e-9))
+def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> JointPlan:
+    """A clamped cubic spline through joint angles, checked as all plans."""
+    limits, duration = limits_of(model), trajectory.duration
+    steps = max(2, ceil(duration / _DEFAULT_DT - 1e-9))
     t = np.linspace(0.0, duration, steps + 1)
     q = np.asarray(CubicSpline(trajectory.t, trajectory.q, bc_type="clamped")(t), dtype=np.float64)
     spline = JointSpline(duration, q)

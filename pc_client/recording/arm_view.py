@@ -19,10 +19,9 @@ from collections.abc import Iterable, Sequence
 from math import cos, hypot, isfinite, sin
 from struct import Struct
 
-import numpy as np
 from mcap.writer import Writer
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.kinematics.arm_tree import ArmTree, Joint, Quaternion
 
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
@@ -111,12 +110,7 @@ _BASE, _ACTUAL_TCP, _DESIRED_TCP = text("base"), text("actual_tcp"), text("desir
 class _Publisher:
     """Writes the messages of one topic; the texts in them and their counts stay the same.
 
-    Args:
-        writer: of the file.
-        topic: name.
-        message: type.
-        schema_id: of the type.
-        is_latched: the topic has one message only.
+    A latched topic has one message only.
     """
 
     def __init__(
@@ -176,7 +170,7 @@ class ArmView:
         self,
         row: int,
         log_time: int,
-        frame: NDArray[np.float64],
+        frame: Array,
         ref_q: Iterable[float],
         ref_p: Iterable[float],
     ) -> None:

@@ -20,9 +20,14 @@ Source: TypeAlias = Mapping[str, str | bool | None]
 """Columns of a table that say whose data it holds: `robot`, `software`, `serial`, `simulated`."""
 
 
+def source_of(robot: str, software: str, serial: str, simulated: bool | None) -> Source:
+    """The columns of a table of data of a robot."""
+    return {"robot": robot, "software": software, "serial": serial, "simulated": simulated}
+
+
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """One of the three.
+    """The words for simulated, real or not known.
 
     Attributes:
         name: in one phrase.
@@ -114,12 +119,7 @@ class Provenance:
     @property
     def source(self) -> Source:
         """Columns of a table of the data: robot, software, serial, simulated."""
-        return {
-            "robot": self.robot_model,
-            "software": self.firmware,
-            "serial": self.serial,
-            "simulated": self.simulated,
-        }
+        return source_of(self.robot_model, self.firmware, self.serial, self.simulated)
 
     @property
     def origin(self) -> Origin:

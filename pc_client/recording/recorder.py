@@ -20,10 +20,9 @@ from struct import Struct
 from types import TracebackType
 from typing import IO, Self, cast
 
-import numpy as np
 from mcap.writer import CompressionType, Writer
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import RecordingError, one_line
 from pc_client.kinematics.arm_tree import ArmTree
 from pc_client.recording.arm_view import CDR_LITTLE_ENDIAN, ArmView
@@ -125,7 +124,7 @@ class Recorder:
 
     def append(
         self,
-        frame_values: NDArray[np.float64],
+        frame_values: Array,
         t_ref: float,
         ref_q: Iterable[float],
         ref_qd: Iterable[float],

@@ -1,8 +1,8 @@
 """Reads a recording back, also one whose end is missing, and writes its rows as CSV, Parquet or MATLAB's MAT.
 
 The reader goes through the file from its beginning and never needs the index at its end, so that a run that
-was killed loads up to its last whole row. It never guesses. Damage inside the file ends the reading
-there, and `Recording.complete` and `Recording.damage` say so.
+was killed loads up to its last whole row. Damage inside the file ends the reading there, and
+`Recording.complete` and `Recording.damage` say so.
 
 In a table, vectors become one column a component, `actual_q_0` .. `actual_q_5`, under the names of RTDE; the
 last columns say in every row whose data these are: robot, software, serial, simulated. In CSV the unit stands
@@ -30,6 +30,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 from scipy.io import savemat
 
+from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.files import FILE_KINDS
 from pc_client.recording.provenance import Provenance, Source
@@ -75,9 +76,9 @@ class Recording:
     summary: Mapping[str, Any]
     complete: bool
     damage: str
-    _columns: Mapping[str, NDArray[np.float64]] = field(repr=False)
+    _columns: Mapping[str, Array] = field(repr=False)
 
-    def column(self, name: str) -> NDArray[np.float64]:
+    def column(self, name: str) -> Array:
         """Return one signal: (n,) for a scalar, (n, count) otherwise; SI units.
 
         Args:
@@ -99,7 +100,7 @@ class Recording:
         return len(self.t)
 
     @property
-    def t(self) -> NDArray[np.float64]:
+    def t(self) -> Array:
         """Controller time of each row in s, (n,)."""
         return self._columns["timestamp"]
 
@@ -151,7 +152,7 @@ def load_recording(path: Path | str) -> Recording:
     )
 
 
-def _as_column(signal: Signal, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _as_column(signal: Signal, values: Array) -> Array:
     return values[:, 0] if signal.count == 1 else values
 
 
@@ -192,7 +193,7 @@ class _Scan:
                 return damage if whole else "cut off inside the end mark"
         return f"cut off at byte {len(data)}: the end mark is missing"
 
-    def columns(self) -> dict[Signal, NDArray[np.float64]]:
+    def columns(self) -> dict[Signal, Array]:
         """Return one array a signal; a row counts when all its messages are there."""
         n_rows = min((len(rows) // self.sizes[channel] for channel, rows in self.rows.items()), default=0)
         columns = {}
@@ -288,15 +289,12 @@ _MAT_VARIABLES = {
 
 
 def export(recording: Recording, path: Path | str, format: _ExportFormat = "csv") -> Path:
-    """Write all rows of a recording into one table.
+    """Write all rows of a recording into one table; an existing file is replaced.
 
     Args:
         recording: what to export.
-        path: file to write; an existing one is replaced.
+        path: file to write.
         format: "csv" (full float precision), "parquet" or "mat" (carry the provenance too).
-
-    Returns:
-        The path written.
 
     Raises:
         RecordingError: unknown format, or the file cannot be written.
@@ -333,7 +331,7 @@ def _mat_struct(facts: Mapping[str, object]) -> dict[str, object]:
     }
 
 
-def table_of(columns: Mapping[str, NDArray[np.float64]], source: Source) -> polars.DataFrame:
+def table_of(columns: Mapping[str, Array], source: Source) -> polars.DataFrame:
     """A table of columns (n,), with the columns of their source behind them."""
     import polars
 
@@ -342,7 +340,7 @@ def table_of(columns: Mapping[str, NDArray[np.float64]], source: Source) -> pola
     return polars.DataFrame(dict(columns)).with_columns(**constants)
 
 
-def flat_columns(recording: Recording) -> dict[str, NDArray[np.float64]]:
+def flat_columns(recording: Recording) -> dict[str, Array]:
     """Return every number of the rows as its own column (n,), in file order."""
     return split_columns({signal.name: recording.column(signal.name) for signal in recording.signals})
 
@@ -354,9 +352,9 @@ def _column_units(recording: Recording) -> dict[str, str]:
     return {name: unit for name, unit in zip(names, units, strict=True) if unit}
 
 
-def split_columns(signals: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def split_columns(signals: Mapping[str, Array]) -> dict[str, Array]:
     """Return every component of signals (n,) or (n, count) as its own column (n,), such as `actual_q_0`."""
-    columns: dict[str, NDArray[np.float64]] = {}
+    columns: dict[str, Array] = {}
     for name, values in signals.items():
         if values.ndim == 1:
             columns[name] = values

@@ -19,8 +19,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.results.sheet import (
     AXIS_GREY,
     GRID_GREY,
@@ -94,7 +94,12 @@ def draw(sheet: Sheet) -> Figure:
                     axes.text(*point, f"  {text}", path_effects=outline)
                 else:
                     axes.text(*point, text, ha="center", va="center", path_effects=outline)
-            _draw_legend(axes, panel)
+            if panel.legend == "above":
+                axes.legend(ncols=panel.columns, loc="lower right", bbox_to_anchor=(1.0, 0.99))
+            elif panel.legend == "right":
+                axes.legend(loc="upper left", bbox_to_anchor=(1.01, 0.98))
+            elif panel.legend == "inside":
+                axes.legend(ncols=panel.columns, loc="upper left")
     return page
 
 
@@ -162,29 +167,18 @@ def _draw_space(axes: Any, panel: Panel) -> None:
         axis.set_major_locator(MaxNLocator(4 if length > 0.6 else 2))
 
 
-def _draw_legend(axes: Any, panel: Panel) -> None:
-    if panel.legend == "above":
-        axes.legend(ncols=panel.columns, loc="lower right", bbox_to_anchor=(1.0, 0.99))
-    elif panel.legend == "right":
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 0.98))
-    elif panel.legend == "inside":
-        axes.legend(ncols=panel.columns, loc="upper left")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Bars:
     """One bar for each name.
 
     Attributes:
-        label: in the legend.
-        colour: of the bars.
         levels: (n,) their heights; nan where there is none.
         runs: single values of each, as circles on the bars; none where empty.
     """
 
     label: str
     colour: str
-    levels: NDArray[np.float64]
+    levels: Array
     runs: Sequence[Sequence[float]] = ()
 
 
@@ -194,7 +188,7 @@ def bars_of_levels(
     mark: str,
     *,
     title: str,
-    floors: NDArray[np.float64] | None = None,
+    floors: Array | None = None,
 ) -> Figure:
     """Draw groups of bars beside each other, in dB.
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from pc_client.results.sheet import Sheet
 
-__all__ = ["picture", "render", "require_report_libraries", "write_files", "zoomable"]
-
 
 def picture(figure: Figure, alt: str) -> Markup:
     """The element of a figure that does not move, as SVG; `alt` says what it shows."""
@@ -67,16 +65,19 @@ def render(template: str, *, scripts: bool = False, **values: Any) -> str:
     """
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    from pc_client.results.plotly_figures import plotly_script
-
+    folder = resources.files("pc_client")
     environment = Environment(
-        loader=FunctionLoader(_text_of),
+        loader=FunctionLoader(lambda name: folder.joinpath(name).read_text(encoding="utf-8")),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    plotly = plotly_script() if scripts else ""
+    plotly = ""
+    if scripts:
+        from plotly.offline import get_plotlyjs
+
+        plotly = str(get_plotlyjs())
     common: dict[str, Any] = {"plotly": plotly, "labels": (), "left_out": (), "seed": None, "facts": {}}
     return environment.get_template(template).render(common | values)
 
@@ -106,7 +107,3 @@ def _element(kind: str, image: bytes, alt: str, data: str = "") -> Markup:
         script = Markup('<script type="application/json">{}</script>').format(Markup(data))
         element = Markup('<div class="zoom">{}{}</div>').format(element, script)
     return Markup('<div class="wide">{}</div>').format(element)
-
-
-def _text_of(template: str) -> str:
-    return resources.files("pc_client").joinpath(template).read_text(encoding="utf-8")

@@ -17,8 +17,8 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.results.sheet import (
     AXIS_GREY,
     GRID_GREY,
@@ -61,17 +61,6 @@ _MARK = {
 """How the mark of a sheet looks."""
 
 
-def plotly_script() -> str:
-    """The text of plotly.js.
-
-    Raises:
-        ModuleNotFoundError: plotly is not installed (extra `report`).
-    """
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
-
-
 def plotly_figure(sheet: Sheet) -> Element:
     """Data and layout of a sheet as `Plotly.newPlot` takes them."""
     curves: list[Element] = []
@@ -83,7 +72,10 @@ def plotly_figure(sheet: Sheet) -> Element:
             layout[f"scene{number}"] = _scene(panel)
         else:
             layout[f"xaxis{number}"], layout[f"yaxis{number}"] = _axes(sheet.panels, index)
-            layout["shapes"] += _shades(panel, number)
+            layout["shapes"] += [  # over the whole height of the panel
+                {"xref": f"x{number}", "yref": f"y{number} domain", "x0": begin, "x1": end}
+                for begin, end in panel.shaded.tolist()
+            ]
             notes += _texts(panel, number)
         left, bottom, _, height = panel.box
         notes.append(_note(panel.title, left, bottom + height, bold=True))
@@ -161,14 +153,6 @@ def _scene(panel: Panel) -> Element:
     }
 
 
-def _shades(panel: Panel, number: str) -> list[Element]:
-    """The shaded times of a panel, over its whole height."""
-    return [
-        {"xref": f"x{number}", "yref": f"y{number} domain", "x0": begin, "x1": end}
-        for begin, end in panel.shaded.tolist()
-    ]
-
-
 def _texts(panel: Panel, number: str) -> list[Element]:
     """The texts of a panel in a plane, around their points."""
     place = {"xref": f"x{number}", "yref": f"y{number}", "xanchor": "center", "yanchor": "middle"}
@@ -238,9 +222,15 @@ def _curve(curve: Curve) -> Element:
     return drawn
 
 
-def _coordinates(points: NDArray[np.float64]) -> Element:
-    """Points (n, dim) by coordinate; a steady x in a plane, such as a clock, is two numbers."""
-    packed: Element = {name: _packed(values) for name, values in zip("xyz", points.T, strict=False)}
+def _coordinates(points: Array) -> Element:
+    """Points (n, dim) by coordinate; a steady x in a plane, such as a clock, is two numbers.
+
+    Other numbers are packed as plotly.js reads them from base64, nan too, in a third of the length of text.
+    """
+    packed: Element = {
+        name: {"dtype": "f4", "bdata": b64encode(values.astype("<f4").tobytes()).decode()}
+        for name, values in zip("xyz", points.T, strict=False)
+    }
     step = float(points[1, 0] - points[0, 0]) if len(points) > 2 else 0.0
     is_steady = step > 0.0 and np.abs(np.diff(points[:, 0], 2)).max() < 1e-6 * step
     if is_steady and points.shape[1] == 2:
@@ -249,12 +239,7 @@ def _coordinates(points: NDArray[np.float64]) -> Element:
     return packed
 
 
-def _packed(values: NDArray[np.float64]) -> dict[str, str]:
-    """Numbers as plotly.js reads them from base64, nan too, in a third of the length of text."""
-    return {"dtype": "f4", "bdata": b64encode(values.astype("<f4").tobytes()).decode()}
-
-
-def thinned(points: NDArray[np.float64], most: int = _MOST_POINTS) -> NDArray[np.float64]:
+def thinned(points: Array, most: int = _MOST_POINTS) -> Array:
     """At most so many points (n, dim) of a curve: of each stretch those that are extreme in a coordinate.
 
     No peak is lost: first and last point stay, and of every coordinate the smallest and the largest value of

@@ -14,7 +14,8 @@ from itertools import accumulate
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from pc_client.arrays import Array
 
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9"
 #: In the order in which series get them; the first two differ in lightness as well.
@@ -29,7 +30,6 @@ LETTERS = 9.0
 #: Inches of such a figure.
 WIDTH = 11.0
 
-Array = NDArray[np.float64]
 #: Left, bottom, width and height of a panel, as shares of the sheet.
 Box = tuple[float, float, float, float]
 #: Lower and upper end of an axis; None: as the curves need it.
@@ -50,11 +50,9 @@ class Curve:
         colour: as "#RRGGBB".
         label: in the legend; none where empty.
         width: of the line [points]; 0: no line.
-        style: of the line.
         marker: of the points, as matplotlib names it; none where empty.
         size: of the markers [points].
         hollow: whether markers are white inside.
-        opacity: 0 to 1.
         filled: whether the area between the line and zero is filled.
         stepped: whether a value holds until the next point.
     """
@@ -141,15 +139,11 @@ class Panel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """A figure.
+    """A figure; sizes are in inches, letters in points.
 
     Attributes:
-        height: [inches].
-        panels: on it.
         mark: what the data are, written on it; empty for those of a real arm, or none at all.
         title: at the top.
-        width: [inches].
-        letters: their size [points].
     """
 
     height: float
@@ -188,12 +182,9 @@ def boxes(
 
 
 def cube_around(points: Array, *, least: float = 1.0, margin: float = 0.0) -> list[Range]:
-    """Ranges (lower, upper) of axes around points (n, dim).
+    """Ranges (lower, upper) of axes around points (n, dim), and a margin as a share.
 
-    Args:
-        points: what they hold.
-        least: length of the shortest axis as a share of the longest; 1: a cube.
-        margin: beyond the points, as a share.
+    `least` is the length of the shortest axis as a share of the longest; 1 is a cube.
     """
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     longest = max(1e-9, float((high - low).max()))

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     import polars as pl
     from rich.table import Table as RichTable
 
-__all__ = ["Column", "cells", "finite", "frame_of", "to_csv", "to_html", "to_json", "to_markdown", "to_rich"]
-
 
 @dataclass(frozen=True, slots=True)
 class Column:
@@ -66,7 +64,7 @@ class Column:
 
 
 def frame_of(rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]) -> pl.DataFrame:
-    """Values by column name, in rows, as a frame with exactly these columns; what is not there is null."""
+    """Rows of values by column name as a frame with exactly these columns; what is not there is null."""
     import polars as pl  # here: columns are declared also where no table is made, as in worker processes
 
     return pl.DataFrame(list(rows), {column.name: column.kind for column in columns})
@@ -173,10 +171,5 @@ def finite(value: Any, digits: int | None = None) -> Any:
 
 
 def to_json(value: Any, digits: int | None = None) -> str:
-    """Nested data as the text of a JSON file; rows of a frame are `frame.to_dicts()`.
-
-    Args:
-        value: dictionaries, lists and numbers; those that are not finite become null.
-        digits: behind the point; None: all.
-    """
+    """The text of a JSON file: nested data, rounded to so many digits; what is not finite is null."""
     return json.dumps(finite(value, digits), indent=2, allow_nan=False) + "\n"

@@ -6,17 +6,12 @@ planned, as planned but sampled and filtered, and as executed. The last two go t
 at the control cycle with some rest at both ends, filtered, differentiated), so that they differ by what the
 robot did and by nothing else.
 
-One filter serves what was planned and what was measured, so that both can be differentiated and compared.
-The second derivative of the speed is the third of the position: the encoders' noise, some micrometres at
-the TCP, would drown it. A Butterworth filter of second order is run forwards and backwards over the
-positions, which shifts nothing in time and halves the amplitude at 5 Hz. Of noise of 5 micrometres it
-leaves less than .05 m/s^3, where executed movements have .3 to 6; what is lost are the corners of
-trapezoids, and they are lost from the plan, too. 5 Hz is far above the movements themselves: the speed
-profiles of a robot's strokes last a second or more.
-
-The figures are one frame, a row for each signal of each movement, in three forms: `compare.json`,
-`compare.md` and a table for the terminal. The picture shows the speed of every generator beside the others,
-and its path. Nothing here moves an arm.
+The second derivative of the speed is the third of the position: the encoders' noise, some micrometres at the
+TCP, would drown it. So a Butterworth filter of second order is run forwards and backwards over the positions,
+which shifts nothing in time and halves the amplitude at 5 Hz. Of noise of 5 micrometres it leaves less than
+.05 m/s^3, where executed movements have .3 to 6; what is lost are the corners of trapezoids, and they are
+lost from the plan, too. 5 Hz is far above the movements themselves: the speed profiles of a robot's strokes
+last a second or more.
 """
 
 from __future__ import annotations
@@ -29,10 +24,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pc_client.analysis.run import MeasuredRun
+from pc_client.arrays import Array
 from pc_client.control.loop import SAMPLING_TIME
 from pc_client.errors import ClientError
 from pc_client.movements.generate import GENERATORS, generate_movement
@@ -52,46 +47,20 @@ from pc_client.studies.signals import Trace, low_passed
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-__all__ = [
-    "COLUMNS",
-    "CUTOFF_HZ",
-    "EXECUTED_COLUMNS",
-    "Comparison",
-    "MovementSet",
-    "Sampled",
-    "build_comparison",
-    "comparison_sheet",
-    "executed_signal",
-    "filtered",
-    "filtered_signal",
-    "make_sets",
-    "measured",
-    "planned_signal",
-    "save_sets",
-]
-
 MovementSet = Mapping[str, Movement]
 """The movements of one seed by the generator's name, in the order of `GENERATORS`."""
 
 
 def make_sets(n_targets: int, seed: int, n_sets: int) -> list[MovementSet]:
-    """Make the movements of the seeds seed, seed + 1 ...
-
-    Args:
-        n_targets: number of target points, at least 2.
-        seed: the first, 0 or more.
-        n_sets: how many, at least 1.
-    """
+    """Make the movements of n_sets seeds: seed, seed + 1 ...; each through n_targets target points."""
     if n_sets < 1:
         raise ClientError(f"{n_sets} sets of movements is nothing to compare; give at least one")
-    return [
-        {kind: _make(kind, n_targets, number) for kind in GENERATORS} for number in range(seed, seed + n_sets)
-    ]
 
+    def make(kind: str, number: int) -> Movement:
+        made = generate_movement(kind, n_targets, number, name=f"{kind}_{n_targets}_seed{number}")
+        return replace(made, may_be_moved=True)
 
-def _make(kind: str, n_targets: int, seed: int) -> Movement:
-    made = generate_movement(kind, n_targets, seed, name=f"{kind}_{n_targets}_seed{seed}")
-    return replace(made, may_be_moved=True)
+    return [{kind: make(kind, number) for kind in GENERATORS} for number in range(seed, seed + n_sets)]
 
 
 def save_sets(sets: Sequence[MovementSet], folder: Path) -> None:
@@ -122,16 +91,12 @@ _REST = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampled(Trace):
-    """A movement from start to end, m and s since its start, with its accelerations.
+    """A movement from start to end, m and s since its start, with its accelerations a (n, 3), m/s^2."""
 
-    Attributes:
-        a: accelerations, (n, 3), m/s^2.
-    """
-
-    a: NDArray[np.float64]
+    a: Array
 
 
-def filtered(t: NDArray[np.float64], p: NDArray[np.float64], rate: float) -> Sampled:
+def filtered(t: Array, p: Array, rate: float) -> Sampled:
     """Positions through the filter, and their first two central differences.
 
     Args:
@@ -180,7 +145,7 @@ def _sampling_rate(run: MeasuredRun) -> float:
     return 1.0 / max(run.provenance.cycle_time_s, SAMPLING_TIME)
 
 
-def _grid(duration: float, rate: float) -> NDArray[np.float64]:
+def _grid(duration: float, rate: float) -> Array:
     before, after = round(_REST * rate), round((duration + _REST) * rate)
     return np.arange(-before, after + 1) / rate
 
@@ -388,12 +353,7 @@ _WIDTH = 12.0
 
 
 def comparison_sheet(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = None) -> Sheet:
-    """The movements of one seed.
-
-    Args:
-        one: the movements.
-        runs: their recordings by name, or None.
-    """
+    """The movements of one seed, and their recordings by name where they were executed."""
     n_rows = -(-len(one) // _COLUMNS)
     height = _PANEL_HEIGHT * n_rows + 0.75
     grid = boxes(

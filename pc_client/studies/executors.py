@@ -37,8 +37,8 @@ _DASK_TIMEOUT = "10s"
 def open_executor(workers: int | None = None, dask: str | None = None) -> Iterator[Executor]:
     """Open a place to run jobs; it is closed on leaving.
 
-    Left regularly, jobs that were submitted are finished first. Left by an exception (Ctrl-C, an
-    error of the caller) they are given up: waiting ones never begin, running processes are ended at once.
+    On a regular end, jobs that were submitted are finished first. After an exception (Ctrl-C, an error of
+    the caller) they are given up: waiting ones never begin, running processes are ended at once.
 
     Args:
         workers: processes on this machine; None: as many as this process may use cores.
@@ -64,7 +64,7 @@ def open_executor(workers: int | None = None, dask: str | None = None) -> Iterat
 
 
 def usable_cores() -> int:
-    """Return how many cores this process may use, at least 1."""
+    """How many cores this process may use, at least 1."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -21,21 +21,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array
 from pc_client.errors import ClientError
-
-__all__ = [
-    "Likeness",
-    "PowerLawFit",
-    "between_peaks",
-    "curvature_of",
-    "fit_power_law",
-    "log_dimensionless_jerk",
-    "peaks_of",
-    "sparc",
-    "speed_peaks",
-]
 
 #: Fewest samples that a figure is computed from.
 _MIN_SAMPLES = 8
@@ -162,7 +151,7 @@ def between_peaks(speed: ArrayLike) -> slice:
     return slice(peaks[0], peaks[-1] + 1) if peaks else slice(0, 0)
 
 
-def curvature_of(v: ArrayLike, a: ArrayLike) -> NDArray[np.float64]:
+def curvature_of(v: ArrayLike, a: ArrayLike) -> Array:
     """Curvature |v x a| / |v|^3 of a path in space, (n,), 1/m; nan where it stands still.
 
     Args:
@@ -218,7 +207,7 @@ def fit_power_law(v: ArrayLike, a: ArrayLike, *, max_radius: float = 1.0) -> Pow
     return PowerLawFit(-slope, slope**2 * spread / total if total > 0.0 else math.nan, n_used)
 
 
-def _checked(speed: ArrayLike, rate: float) -> NDArray[np.float64]:
+def _checked(speed: ArrayLike, rate: float) -> Array:
     values = np.asarray(speed, dtype=np.float64)
     if not (math.isfinite(rate) and rate > 0.0):
         raise ClientError(f"rate of {rate} Hz: give a number greater than 0")

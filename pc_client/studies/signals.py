@@ -8,11 +8,10 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
-__all__ = ["Trace", "decibels", "low_passed", "velocity"]
+from pc_client.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,9 +24,9 @@ class Trace:
         v: velocities, the same shape, per second.
     """
 
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
+    t: Array
+    p: Array
+    v: Array
 
     @property
     def step(self) -> float:
@@ -40,9 +39,9 @@ class Trace:
         return float(self.t[-1] - self.t[0])
 
     @property
-    def speed(self) -> NDArray[np.float64]:
+    def speed(self) -> Array:
         """Length of the velocity, (n,)."""
-        length: NDArray[np.float64] = np.sqrt(np.einsum("ij,ij->i", self.v, self.v))
+        length: Array = np.sqrt(np.einsum("ij,ij->i", self.v, self.v))
         return length
 
 
@@ -54,21 +53,21 @@ def decibels(signal: float, noise: float) -> float:
     return 10.0 * math.log10(signal / max(noise, 1e-30 * signal)) if signal > 0.0 else math.nan
 
 
-def velocity(t: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+def velocity(t: Array, p: Array) -> Array:
     """The derivative of the cubic spline through positions p (n, dim) at the times t (n,), (n, dim) per s."""
-    derivative: NDArray[np.float64] = CubicSpline(t, p)(t, 1)
+    derivative: Array = CubicSpline(t, p)(t, 1)
     return derivative
 
 
 def low_passed(
-    p: NDArray[np.float64],
+    p: Array,
     rate: float,
     *,
     cutoff: float,
     order: int,
     padding: int,
     ends: Literal["rest", "reflected"],
-) -> NDArray[np.float64]:
+) -> Array:
     """Low-pass positions by a Butterworth filter, run forwards and backwards so that nothing shifts in time.
 
     Args:
@@ -86,11 +85,11 @@ def low_passed(
     else:
         continued = np.pad(p, widths, mode="reflect", reflect_type="odd")
     filtered = sosfiltfilt(_sections(order, cutoff, rate), continued, axis=0, padtype=None, padlen=0)
-    low: NDArray[np.float64] = filtered[padding : padding + len(p)]
+    low: Array = filtered[padding : padding + len(p)]
     return low
 
 
 @lru_cache(maxsize=32)
-def _sections(order: int, cutoff: float, rate: float) -> NDArray[np.float64]:
-    sections: NDArray[np.float64] = butter(order, cutoff, fs=rate, output="sos")
+def _sections(order: int, cutoff: float, rate: float) -> Array:
+    sections: Array = butter(order, cutoff, fs=rate, output="sos")
     return sections

@@ -122,7 +122,7 @@ def entry(drawing):
 
 
 def test_pictures_are_svg_and_say_that_the_arm_is_simulated(entry):
-    sheets = sheets_of(Shown.of(entry.drawing, entry.executions[0]))
+    sheets = sheets_of(Shown(entry.drawing, entry.executions[0]))
     assert list(sheets) == list(FIGURES)
     for sheet in sheets.values():
         text = svg_text(draw(sheet))
@@ -132,7 +132,7 @@ def test_pictures_are_svg_and_say_that_the_arm_is_simulated(entry):
 
 
 def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
-    shown = Shown.of(entry.drawing, entry.executions[0])
+    shown = Shown(entry.drawing, entry.executions[0])
     np.testing.assert_array_equal(entry.drawing.drawn[-1], [50.0, 95.0, 0.0])
     page = shown.on_page(entry.drawing.drawn)
     np.testing.assert_allclose(page.max(axis=0), -page.min(axis=0))  # in its middle
@@ -142,7 +142,7 @@ def test_what_is_drawn_lies_on_the_page_and_dots_are_drawn(entry):
 
 
 def test_the_page_needs_no_network_and_holds_every_figure(entry):
-    sheets = {"sample": sheets_of(Shown.of(entry.drawing, entry.executions[0]))}
+    sheets = {"sample": sheets_of(Shown(entry.drawing, entry.executions[0]))}
     page = render_page([entry], sheets)
     assert page.count('class="zoom"') == len(FIGURES)
     check_needs_nothing(page)

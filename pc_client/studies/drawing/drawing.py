@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import find_peaks
 
 from pc_client.arm import Arm
+from pc_client.arrays import Array
 from pc_client.errors import MovementError, RecordingError
 from pc_client.kinematics.model import RobotModel
 from pc_client.movements.movement import Movement
@@ -25,8 +26,6 @@ from pc_client.studies.drawing.joining import Joined, factor_needed, least_facto
 from pc_client.studies.drawing.placement import Mark, Placement, PlacementOptions, inverse, marks_of, place
 from pc_client.studies.extraction.extract import Extraction, extract
 from pc_client.studies.extraction.pen import PenRecording, on_one_axis, ordered_part, read_recording
-
-__all__ = ["Drawing", "drawing", "make_drawing", "spatial"]
 
 
 def drawing(
@@ -99,7 +98,7 @@ class Drawing:
         return [index for index, mark in enumerate(self.marks) if mark.trajectory is not None]
 
     @property
-    def drawn(self) -> NDArray[np.float64]:
+    def drawn(self) -> Array:
         """What the pen draws, dots included, in the recording's frame and unit, (n, 3)."""
         return _drawn(self.extraction, self.marks)
 
@@ -109,26 +108,26 @@ class Drawing:
         return self.joined.trajectory.stretched(self.factor)
 
     @property
-    def delays(self) -> NDArray[np.float64]:
+    def delays(self) -> Array:
         """How much later after the first mark each one comes than recorded, (n_marks,), s of the hand."""
-        delays: NDArray[np.float64] = self.joined.shifts - self.joined.shifts[0]
-        return delays
+        at: Array = self.joined.shifts - self.joined.shifts[0]
+        return at
 
-    def arm_time(self, t: NDArray[np.float64], mark: int) -> NDArray[np.float64]:
+    def arm_time(self, t: Array, mark: int) -> Array:
         """Time of the movement (s, arm) at times of the recording (s) that belong to a mark."""
-        at: NDArray[np.float64] = (t + self.joined.shifts[mark]) * self.factor
+        at: Array = (t + self.joined.shifts[mark]) * self.factor
         return at
 
-    def recording_time(self, t: NDArray[np.float64], mark: int) -> NDArray[np.float64]:
+    def recording_time(self, t: Array, mark: int) -> Array:
         """Time of the recording (s) at times of the movement (s, arm), for a mark; inverse of `arm_time`."""
-        at: NDArray[np.float64] = t / self.factor - self.joined.shifts[mark]
+        at: Array = t / self.factor - self.joined.shifts[mark]
         return at
 
-    def points_back(self, p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def points_back(self, p: Array) -> Array:
         """Points of the base frame (n, 3), m, in the recording's frame and unit."""
         return inverse(self.placement.similarity).points(p)
 
-    def planned(self, t: NDArray[np.float64], mark: int) -> Motion:
+    def planned(self, t: Array, mark: int) -> Motion:
         """The plan at times of the recording that belong to a mark, in its frame, unit and time."""
         motion = self.joined.trajectory.evaluate(t + self.joined.shifts[mark])
         back = inverse(self.placement.similarity)
@@ -178,12 +177,12 @@ def make_drawing(
     return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
 
 
-def spatial(p: NDArray[np.float64]) -> NDArray[np.float64]:
+def spatial(p: Array) -> Array:
     """Points (n, 2) with a third coordinate 0; points (n, 3) as they are."""
     return p if p.shape[1] == 3 else np.column_stack((p, np.zeros(len(p))))
 
 
-def _drawn(extraction: Extraction, marks: Sequence[Mark]) -> NDArray[np.float64]:
+def _drawn(extraction: Extraction, marks: Sequence[Mark]) -> Array:
     lines = [spatial(part.p) for part in extraction.parts]
     return np.vstack([*lines, *(mark.first for mark in marks if mark.trajectory is None)])
 
@@ -203,7 +202,7 @@ def _facts(extraction: Extraction, placement: Placement, joined: Joined) -> dict
     }
 
 
-def _between_slow_moments(trajectory: SigmaLognormal) -> NDArray[np.float64]:
+def _between_slow_moments(trajectory: SigmaLognormal) -> Array:
     """Times (s) between the speed minima of a movement, its start and its end."""
     t = np.linspace(0.0, trajectory.duration, max(200, int(500 * trajectory.duration)))
     slow, _ = find_peaks(-np.linalg.norm(trajectory.evaluate(t).v, axis=1))

@@ -8,10 +8,12 @@ are larger than elsewhere: these figures are shown to audiences.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.results.sheet import (
     AXIS_GREY,
     BLUE,
@@ -29,10 +31,6 @@ from pc_client.studies.drawing.drawing import Drawing
 from pc_client.studies.drawing.judgement import Execution, signals
 from pc_client.studies.signals import Trace
 
-__all__ = ["COLOURS", "FIGURES", "Shown", "sheets_of"]
-
-Array = NDArray[np.float64]
-
 #: Colour of each signal; names as of `judgement.signals`.
 COLOURS = {"human": "#3A3A3A", "reconstructed": BLUE, "planned": GREEN, "executed": RED}
 #: Colours of what the pen does in the air, of the person's signal behind others, of the sheet.
@@ -41,22 +39,17 @@ _AIR, _FAINT, _PAPER_EDGE = "#A8A8A8", "#BDBDBD", "#C9B37E"
 _LETTERS, _SHEET_WIDTH = 11.0, 12.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Shown:
-    """What the pictures of a drawing are made of.
-
-    Attributes:
-        parts: the four signals, each with the parts that move.
-    """
+    """What the pictures of a drawing and a run are made of."""
 
     drawing: Drawing
     execution: Execution
-    parts: dict[str, tuple[Trace, ...]]
 
-    @classmethod
-    def of(cls, drawing: Drawing, execution: Execution) -> Shown:
-        """Take the signals of a drawing and a run."""
-        return cls(drawing, execution, signals(drawing, execution))
+    @cached_property
+    def parts(self) -> dict[str, tuple[Trace, ...]]:
+        """The four signals, each with the parts that move."""
+        return signals(self.drawing, self.execution)
 
     @property
     def unit(self) -> float:
@@ -104,14 +97,14 @@ class Shown:
             axes = np.array([[1.0, 0.0, 0.0], [0.0, 1.0 if self.drawing.placement.y_up else -1.0, 0.0]])
         else:
             axes = np.linalg.svd(drawn - drawn.mean(axis=0), full_matrices=False)[2][:2]
-        page: Array = self.unit * (p - middle) @ axes.T
-        return page
+        values: Array = self.unit * (p - middle) @ axes.T
+        return values
 
     def since_pen_down(self, t: Array, mark: int) -> Array:
         """Times of the recording that belong to a mark, as s of the hand since the pen first came down."""
         joined = self.drawing.joined
-        since: Array = t + joined.shifts[mark] - joined.pen_down[0, 0]
-        return since
+        values: Array = t + joined.shifts[mark] - joined.pen_down[0, 0]
+        return values
 
 
 def _pen_is_down(t: Array, pen_down: Array) -> NDArray[np.bool_]:

@@ -28,29 +28,16 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import PlanningError
 from pc_client.kinematics.model import RobotModel
-from pc_client.movements.lognormal import Lognormal, TwoSidedTiming
+from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
-from pc_client.movements.trajectory import read_only
 from pc_client.planning.limits import limits_of
 from pc_client.planning.plan import JointPlan, PlannableMovement, plan_movement
 from pc_client.studies.drawing.placement import Mark
-
-__all__ = [
-    "ACCURACY",
-    "TAIL",
-    "Joined",
-    "StretchedMovement",
-    "factor_needed",
-    "join",
-    "least_factor",
-    "least_gaps",
-    "paced",
-]
 
 #: Share of a lift's length outside its gap, and of the drawing's size that a mark moves beside its
 #: neighbours.
@@ -81,9 +68,9 @@ class Joined:
     """
 
     trajectory: SigmaLognormal
-    gaps: NDArray[np.float64]
-    shifts: NDArray[np.float64]
-    pen_down: NDArray[np.float64]
+    gaps: Array
+    shifts: Array
+    pen_down: Array
 
     def gap_intervals(self) -> list[tuple[float, float]]:
         """Start and end (s) of each gap."""
@@ -91,12 +78,10 @@ class Joined:
         return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def least_gaps(marks: Sequence[Mark], size: float) -> NDArray[np.float64]:
+def least_gaps(marks: Sequence[Mark], size: float) -> Array:
     """The gaps that the recording has, or longer where strokes need it; (n_marks + 1,), s.
 
-    Args:
-        marks: in order of time.
-        size: of the drawing, in the unit of the marks: tails are judged by it.
+    The marks are in order of time; tails are judged by the size of the drawing, in the unit of the marks.
     """
     first, last = marks[0], marks[-1]
     between = [
@@ -107,11 +92,11 @@ def least_gaps(marks: Sequence[Mark], size: float) -> NDArray[np.float64]:
     return np.array([max(before, _LOWERING_S), *between, max(after, _LOWERING_S)])
 
 
-def join(marks: Sequence[Mark], gaps: NDArray[np.float64], lift: NDArray[np.float64]) -> Joined:
-    """Join marks, in the frame of the arm, with the pen lifted between them.
+def join(marks: Sequence[Mark], gaps: Array, lift: Array) -> Joined:
+    """Join marks, m, in the frame of the arm, with the pen lifted between them.
 
     Args:
-        marks: in order of time, m, on the recording's time axis.
+        marks: in order of time, on the recording's time axis.
         gaps: (n_marks + 1,), s.
         lift: from the sheet to the lifted pen, (3,), m.
     """
@@ -127,7 +112,7 @@ def join(marks: Sequence[Mark], gaps: NDArray[np.float64], lift: NDArray[np.floa
         targets.append(mark.first)
         if mark.trajectory is not None:
             targets += list(mark.trajectory.target_points[1:])
-            strokes += [_later(stroke, float(shifts[row])) for stroke in mark.trajectory.strokes]
+            strokes += [stroke.later(float(shifts[row])) for stroke in mark.trajectory.strokes]
         up, gap = float(downs[row, 1]), float(gaps[row + 1])
         if row + 1 < len(marks):
             targets.append(0.5 * (mark.last + marks[row + 1].first) + lift / _pen_up_height())
@@ -142,13 +127,6 @@ def join(marks: Sequence[Mark], gaps: NDArray[np.float64], lift: NDArray[np.floa
 
 def _lift_stroke(start: float, duration: float) -> Stroke:
     return Stroke(TwoSidedTiming(start, duration, _LIFT_SIGMA, _COVERAGE))
-
-
-def _later(stroke: Stroke, shift: float) -> Stroke:
-    lognormal = stroke.timing.lognormal
-    return Stroke(
-        Lognormal(lognormal.t0 + shift, lognormal.mu, lognormal.sigma), stroke.arc_angle, stroke.tilt
-    )
 
 
 @lru_cache(maxsize=1)
@@ -172,13 +150,7 @@ _EASY_SPEED = 0.3
 
 
 class StretchedMovement:
-    """A trajectory in the form that planning takes, slowed down.
-
-    Args:
-        name: for messages.
-        joined: the movement.
-        factor: how many times as slow.
-    """
+    """A trajectory in the form that planning takes, `factor` times as slow."""
 
     def __init__(self, name: str, joined: Joined, factor: float = 1.0) -> None:
         self.name = name
@@ -189,21 +161,14 @@ class StretchedMovement:
         """[s]."""
         return self._trajectory.duration
 
-    def sample(self, t: NDArray[np.float64], /) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sample(self, t: Array, /) -> tuple[Array, Array]:
         """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,)."""
         motion = self._trajectory.evaluate(t)
         return motion.p, motion.v
 
 
-def factor_needed(
-    name: str, joined: Joined, arm: RobotModel
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The factor that each moment of a movement needs.
-
-    Args:
-        name: for messages.
-        joined: the movement, as fast as the hand was.
-        arm: who shall do it.
+def factor_needed(name: str, joined: Joined, arm: RobotModel) -> tuple[Array, Array]:
+    """The factor that each moment of a movement, as fast as the hand was, needs on an arm.
 
     Returns:
         Times (n,), s of the hand, and factors (n,); below 1 there is room.
@@ -223,9 +188,7 @@ def factor_needed(
     return plan.t / easy, easy * need
 
 
-def paced(
-    name: str, marks: Sequence[Mark], gaps: NDArray[np.float64], lift: NDArray[np.float64], arm: RobotModel
-) -> Joined:
+def paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: RobotModel) -> Joined:
     """Join marks with pen-up moves that ask no more of the arm than the marks do.
 
     Args:

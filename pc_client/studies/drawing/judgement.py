@@ -19,32 +19,20 @@ Source: docs/extraction.md, section 1.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pc_client.analysis.run import MeasuredRun
+from pc_client.arrays import Array, read_only
 from pc_client.errors import RecordingError
-from pc_client.movements.trajectory import read_only
 from pc_client.studies.drawing.drawing import Drawing, spatial
 from pc_client.studies.extraction.smoothing import CUTOFF_HZ, RATE_HZ
 from pc_client.studies.likeness import Likeness, fit_power_law, log_dimensionless_jerk, sparc, speed_peaks
 from pc_client.studies.signals import Trace, decibels, low_passed, velocity
-
-__all__ = [
-    "Agreement",
-    "ExecutedPart",
-    "Execution",
-    "RunVerdict",
-    "Verdict",
-    "executed",
-    "judge",
-    "signals",
-]
 
 #: Cut-off of the low-pass of what was executed, Hz in the time of the hand, and its order.
 _NOISE_HZ = 2.0 * CUTOFF_HZ
@@ -66,8 +54,8 @@ class ExecutedPart:
     """
 
     trace: Trace
-    frame_t: NDArray[np.float64]
-    frame_p: NDArray[np.float64]
+    frame_t: Array
+    frame_p: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,12 +74,9 @@ class Execution:
 
 
 def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Execution:
-    """Map a run back.
+    """Map a run of a drawing back.
 
-    Args:
-        drawing: what the run executed.
-        run: the recording.
-        shift: take the arm's positions this much later, s of the arm; 0 judges it as it was.
+    With `shift` the arm's positions are taken this much later, s of the arm; 0 judges the run as it was.
 
     Raises:
         RecordingError: the run ended before the drawing did.
@@ -109,10 +94,10 @@ def executed(drawing: Drawing, run: MeasuredRun, shift: float = 0.0) -> Executio
     return Execution(run, parts, Trace(read_only(whole), read_only(p), read_only(velocity(whole, p))))
 
 
-def _executed_part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path: CubicSpline) -> ExecutedPart:
+def _executed_part(drawing: Drawing, mark: int, grid: Array, path: CubicSpline) -> ExecutedPart:
     """A part on its grid (s of the recording), from the path of the arm over its own time."""
 
-    def positions(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def positions(t: Array) -> Array:
         """Positions of the arm at times of the recording; outside the run it rests."""
         at = np.clip(drawing.arm_time(t, mark), path.x[0], path.x[-1])
         return drawing.points_back(path(at))
@@ -128,7 +113,7 @@ def _executed_part(drawing: Drawing, mark: int, grid: NDArray[np.float64], path:
     return ExecutedPart(trace, read_only(frame_t), read_only(positions(frame_t)))
 
 
-def _less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+def _less_noise(p: Array, rate: float) -> Array:
     """Positions (n, 3) at a uniform rate, Hz of the hand, without frequencies above those of a hand."""
     padding = round(_MARGIN_S * rate)
     return low_passed(p, rate, cutoff=_NOISE_HZ, order=_ORDER, padding=padding, ends="reflected")
@@ -264,9 +249,9 @@ def _judge_run(drawing: Drawing, execution: Execution) -> RunVerdict:
 class _Pair(NamedTuple):
     """Two signals of one part: times (n,), s, and positions (n, 3), in the recording's frame and unit."""
 
-    t: NDArray[np.float64]
-    reference: NDArray[np.float64]
-    actual: NDArray[np.float64]
+    t: Array
+    reference: Array
+    actual: Array
 
 
 def _against_plan(drawing: Drawing, execution: Execution) -> list[_Pair]:
@@ -285,7 +270,7 @@ def _against_human(drawing: Drawing, execution: Execution) -> list[_Pair]:
     ]
 
 
-def _agreement(pairs: Iterable[_Pair], offset: NDArray[np.float64] | float = 0.0) -> Agreement:
+def _agreement(pairs: Iterable[_Pair], offset: Array | float = 0.0) -> Agreement:
     """SNR_v and SNR_t over all parts, after an offset of the actual positions, (3,), is taken off."""
     v_signal = v_noise = p_signal = p_noise = 0.0
     for t, reference, reported in pairs:
@@ -304,32 +289,27 @@ def _likeness(parts: Sequence[Trace], metres: float) -> Likeness:
     """How human-like a signal is while the pen is down.
 
     Peaks are those of all parts, smoothness is the mean over the parts by their durations (nan when all are
-    too short), and one power law is fitted to all parts.
-
-    Args:
-        parts: of the signal.
-        metres: metres per unit: the power law is fitted where the path bends by less than 1 m radius.
+    too short). One power law is fitted to all parts, where the path bends by less than 1 m radius; a unit has
+    so many metres.
     """
     long = [part for part in parts if len(part.t) >= _MIN_SAMPLES and part.speed.max() > 0.0]
-    weights = [part.duration for part in long]
-    rates = [(len(part.t) - 1) / part.duration for part in long]
+
+    def mean(figure: Callable[[Array, float], float]) -> float:
+        """The mean of a figure of the speed over the parts, by their durations."""
+        if not long:
+            return math.nan
+        values = [figure(part.speed, (len(part.t) - 1) / part.duration) for part in long]
+        weighted = math.fsum(v * part.duration for v, part in zip(values, long, strict=True))
+        return weighted / math.fsum(part.duration for part in long)
+
     law = fit_power_law(
         np.vstack([metres * part.v for part in parts]),
         np.vstack([metres * np.gradient(part.v, part.t, axis=0) for part in parts]),
     )
     return Likeness(
         peaks=sum(speed_peaks(part.speed) for part in parts),
-        sparc=_mean([sparc(part.speed, rate) for part, rate in zip(long, rates, strict=True)], weights),
-        log_jerk=_mean(
-            [log_dimensionless_jerk(part.speed, rate) for part, rate in zip(long, rates, strict=True)],
-            weights,
-        ),
+        sparc=mean(sparc),
+        log_jerk=mean(log_dimensionless_jerk),
         exponent=law.exponent,
         r_squared=law.r_squared,
     )
-
-
-def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
-    if not values:
-        return math.nan
-    return math.fsum(v * w for v, w in zip(values, weights, strict=True)) / math.fsum(weights)

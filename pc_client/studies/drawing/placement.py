@@ -22,17 +22,15 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import bisect
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
 from pc_client.kinematics.arms import UR3_BOX, Box
 from pc_client.movements.sigma_lognormal import SigmaLognormal
-from pc_client.movements.trajectory import Similarity, read_only
+from pc_client.movements.trajectory import Similarity, about_z
 from pc_client.studies.extraction.extract import Extraction
 from pc_client.studies.extraction.pen import PenPart
-
-__all__ = ["PLANES", "Mark", "Placement", "PlacementOptions", "inverse", "marks_of", "place", "sheet_frame"]
 
 #: Deviation at which a speed profile is over for every purpose: 1e-9 of its length is left.
 _OVER = 6.0
@@ -54,8 +52,8 @@ class Mark:
 
     begin: float
     end: float
-    first: NDArray[np.float64]
-    last: NDArray[np.float64]
+    first: Array
+    last: Array
     trajectory: SigmaLognormal | None
 
     def transformed(self, similarity: Similarity) -> Mark:
@@ -92,7 +90,7 @@ class Mark:
             return most
         return float(bisect(lambda u: self.length_after(u) - tolerance, 0.0, most, xtol=_TIME_ACCURACY))
 
-    def path(self, tolerance: float, n: int = 801) -> NDArray[np.float64]:
+    def path(self, tolerance: float, n: int = 801) -> Array:
         """The whole path of the strokes, up to a path length at both ends, and its end points; (m, 3)."""
         ends = np.vstack((self.first, self.last))
         if self.trajectory is None:
@@ -200,22 +198,20 @@ class Placement:
     """
 
     similarity: Similarity
-    lift: NDArray[np.float64]
+    lift: Array
     rotation: float
     plane: str
     y_up: bool
 
 
-def sheet_frame(plane: str, *, y_up: bool) -> NDArray[np.float64]:
+def sheet_frame(plane: str, *, y_up: bool) -> Array:
     """The axes of a flat recording in the base frame: columns x (right), y and x cross y; (3, 3)."""
     into = np.array(PLANES[plane])
     down = np.cross(into, _RIGHT)
     return np.column_stack((_RIGHT, -down, -into) if y_up else (_RIGHT, down, into))
 
 
-def place(
-    marks: Sequence[Mark], drawn: NDArray[np.float64], options: PlacementOptions, *, flat: bool = True
-) -> Placement:
+def place(marks: Sequence[Mark], drawn: Array, options: PlacementOptions, *, flat: bool = True) -> Placement:
     """Find the similarity of a drawing.
 
     Args:
@@ -241,7 +237,7 @@ def place(
         angles = [math.radians(0.5 * step) for step in range(360)]
     else:
         angles = [options.rotation]
-    rotations = [(angle, frame @ _about_third(sense * angle)) for angle in angles]
+    rotations = [(angle, frame @ about_z(sense * angle)) for angle in angles]
     scales = [_largest_scale(path @ R.T, lift, options.box) for _, R in rotations]
     best = int(np.argmax(scales))
     angle, R = rotations[best]
@@ -260,12 +256,7 @@ def inverse(similarity: Similarity) -> Similarity:
     return Similarity(1.0 / similarity.scale, back, -(back @ similarity.shift) / similarity.scale)
 
 
-def _about_third(angle: float) -> NDArray[np.float64]:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _largest_scale(path: NDArray[np.float64], lift: NDArray[np.float64], box: Box) -> float:
+def _largest_scale(path: Array, lift: Array, box: Box) -> float:
     room, need = box.size - np.abs(lift), np.ptp(path, axis=0)
     wide = need > 1e-12 * need.max()
     return float((room[wide] / need[wide]).min())

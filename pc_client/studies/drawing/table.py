@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from pc_client.analysis.report import provenance_facts
 from pc_client.recording.provenance import Provenance
@@ -26,16 +25,6 @@ from pc_client.studies.drawing.judgement import Agreement, Execution, Verdict
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
-
-__all__ = [
-    "COLUMNS",
-    "Entry",
-    "drawing_rich",
-    "drawings_json",
-    "drawings_markdown",
-    "render_page",
-    "table_of",
-]
 
 COLUMNS = (
     Column("signal", align="left", kind=str),
@@ -69,13 +58,7 @@ _COMMON_FACTS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
-    """One drawing of a report.
-
-    Attributes:
-        drawing: what was done.
-        executions: the runs.
-        verdict: the figures.
-    """
+    """One drawing of a report: what was done, the runs, the figures."""
 
     drawing: Drawing
     executions: tuple[Execution, ...]
@@ -123,7 +106,8 @@ def _facts_of(entry: Entry) -> dict[str, str]:
         "marks": f"{len(drawing.marks)}" + (f", {dots} of them dots" if dots else ""),
         "strokes": f"{drawing.extraction.n_strokes} for {drawing.extraction.n_speed_peaks} speed peaks, "
         f"SNR_v per stroke {drawing.extraction.lognormality or math.nan:.2f} dB",
-        "scale": f"{1e3 * scale:.3f} mm per unit of the recording; drawn {_sizes(drawn)} mm",
+        "scale": f"{1e3 * scale:.3f} mm per unit of the recording; drawn "
+        f"{' x '.join(f'{value:.0f}' for value in drawn)} mm",
         "place": _place(drawing),
         "slower than the hand": f"{drawing.factor:.3f} times, all strokes alike",
         "duration": f"{drawing.movement.duration:.2f} s, lifts of {lift:.0f} mm included",
@@ -221,10 +205,6 @@ def _place(drawing: Drawing) -> str:
     return f"{placement.plane} sheet before the robot{turned}; y of the recording points {y}; not mirrored"
 
 
-def _sizes(drawn: NDArray[np.float64]) -> str:
-    return " x ".join(f"{value:.0f}" for value in drawn)
-
-
 def _agreement(**agreements: Agreement) -> dict[str, Any]:
     """Cells of SNR_v and SNR_t by what is agreed with: human, plan."""
     return {
@@ -242,11 +222,7 @@ _TEMPLATE = "studies/drawing/draw.html.j2"
 
 
 def render_page(entries: Sequence[Entry], sheets: Mapping[str, Mapping[str, Sheet]]) -> str:
-    """Return the text of `report.html`.
-
-    Args:
-        entries: the drawings, at least one.
-        sheets: `figures.sheets_of` each drawing, by its name.
+    """Return the text of `report.html`: the drawings, at least one, and `figures.sheets_of` each by its name.
 
     Raises:
         ModuleNotFoundError: matplotlib, jinja2 or plotly is not installed (extra `report`).
@@ -268,6 +244,6 @@ def render_page(entries: Sequence[Entry], sheets: Mapping[str, Mapping[str, Shee
         sections=sections,
         colours=COLOURS,
         facts=_common_facts(entries),
-        origin=entries[0].executions[0].run.provenance.origin,
-        seed=entries[0].executions[0].run.provenance.seed,
+        origin=_provenance(entries[0]).origin,
+        seed=_provenance(entries[0]).seed,
     )

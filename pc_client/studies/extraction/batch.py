@@ -30,19 +30,6 @@ from ur_hil.input_files import MIB
 if TYPE_CHECKING:
     import polars as pl
 
-__all__ = [
-    "COLUMNS",
-    "STROKE_COLUMNS",
-    "ExtractionOutcome",
-    "Row",
-    "extract_many",
-    "figures_of",
-    "strokes_of",
-    "table_of",
-    "to_json",
-]
-
-
 Row = Mapping[str, Any]
 """Values by column name."""
 

@@ -22,20 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.movements.lognormal import Lognormal
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, tilt_of_normal
-
-__all__ = [
-    "Bounds",
-    "Chain",
-    "in_order",
-    "inserted",
-    "normals_across",
-    "sigma_lognormal",
-    "with_chords",
-    "without",
-]
-
 
 #: Most width of a stroke over the duration of its part; a stroke that fills it has 1/6.
 _WIDEST = 0.35
@@ -75,48 +64,40 @@ class Chain:
         targets: (s + 1, 2) or (s + 1, 3).
     """
 
-    median: NDArray[np.float64]
-    width: NDArray[np.float64]
-    sigma: NDArray[np.float64]
-    arc_angle: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    targets: NDArray[np.float64]
+    median: Array
+    width: Array
+    sigma: Array
+    arc_angle: Array
+    normal: Array
+    targets: Array
 
     def __len__(self) -> int:
         return len(self.median)
 
     @property
-    def chords(self) -> NDArray[np.float64]:
+    def chords(self) -> Array:
         """From the start of each stroke to its end, (s, dim)."""
-        chords: NDArray[np.float64] = np.diff(self.targets, axis=0)
-        return chords
+        return np.diff(self.targets, axis=0)
 
     @property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Array:
         """Arc lengths D, (s,)."""
-        lengths: NDArray[np.float64] = np.linalg.norm(self.chords, axis=1) / np.sinc(
-            self.arc_angle / (2 * math.pi)
-        )
+        lengths: Array = np.linalg.norm(self.chords, axis=1) / np.sinc(self.arc_angle / (2 * math.pi))
         return lengths
 
-    def picked(self, which: NDArray[np.bool_ | np.intp], targets: NDArray[np.float64]) -> Chain:
+    def picked(self, which: NDArray[np.bool_ | np.intp], targets: Array) -> Chain:
         """Some of the strokes, or all in another order, from target to target of these."""
-        return Chain(
-            self.median[which],
-            self.width[which],
-            self.sigma[which],
-            self.arc_angle[which],
-            self.normal[which],
-            targets,
+        median, width, sigma, arc_angle, normal = (
+            values[which] for values in (self.median, self.width, self.sigma, self.arc_angle, self.normal)
         )
+        return Chain(median, width, sigma, arc_angle, normal, targets)
 
-    def time_at_deviation(self, z: float) -> NDArray[np.float64]:
+    def time_at_deviation(self, z: float) -> Array:
         """Times (s,) at which each stroke has done Phi(z) of its length."""
-        times: NDArray[np.float64] = self.median + self.width * np.expm1(self.sigma * z) / self.sigma
-        return times
+        return self.median + self.width * np.expm1(self.sigma * z) / self.sigma
 
 
-def normals_across(chords: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def normals_across(chords: Array, normals: Array) -> Array:
     """The unit vectors at right angles to the chords that are nearest to given ones, both (s, 3).
 
     Where the two are parallel (or a chord is nothing) any right angle will do.
@@ -129,11 +110,11 @@ def normals_across(chords: NDArray[np.float64], normals: NDArray[np.float64]) ->
         axis = np.eye(3)[int(np.argmin(np.abs(unit[index])))]
         across[index] = axis - (axis @ unit[index]) * unit[index]
         sizes[index] = np.linalg.norm(across[index])
-    nearest: NDArray[np.float64] = across / sizes[:, None]
+    nearest: Array = across / sizes[:, None]
     return nearest
 
 
-def inserted(chain: Chain, median: NDArray[np.float64], width: NDArray[np.float64], sigma: float) -> Chain:
+def inserted(chain: Chain, median: Array, width: Array, sigma: float) -> Chain:
     """The chain with further strokes that do not move anything yet (chord 0), each put in by its median.
 
     A fit gives them their chords in its first, linear step; an insertion changes no error.
@@ -193,11 +174,9 @@ def in_order(chain: Chain) -> Chain:
 
 
 def sigma_lognormal(chain: Chain, duration: float) -> SigmaLognormal:
-    """The chain as a movement of the package; flat ones lie in z = 0.
+    """The chain, no chord of which is nothing, as a movement of the package; flat ones lie in z = 0.
 
-    Args:
-        chain: at least one stroke; no chord is nothing.
-        duration: end of the movement, s.
+    The movement ends at `duration`, s.
     """
     targets = np.zeros((len(chain.targets), 3))
     targets[:, : chain.targets.shape[1]] = chain.targets

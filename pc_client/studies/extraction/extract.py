@@ -22,16 +22,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.studies.extraction.chain import Bounds, Chain, sigma_lognormal
 from pc_client.studies.extraction.fitting import FitOptions, fit_parts, left_over
 from pc_client.studies.extraction.pen import PenPart, PenRecording
 from pc_client.studies.extraction.smoothing import moves, smooth_part, speed_peaks
 from pc_client.studies.signals import Trace, decibels
-
-__all__ = ["ExtractOptions", "Extraction", "PartExtraction", "extract"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,7 @@ class ExtractOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartExtraction:
-    """The strokes of one pen-down part.
+    """The strokes of one pen-down part; the ratios are of this part alone.
 
     Attributes:
         t: uniform times, (n,), s, on the recording's axis.
@@ -63,15 +61,11 @@ class PartExtraction:
         v: their velocities, the same shape, per second.
         trajectory: the reconstruction, on the same time axis (t0 of a stroke may be negative); flat parts lie
             in z = 0.
-        snr_v_db: of this part alone.
-        snr_t_db: of this part alone.
-        n_strokes: number of strokes.
-        n_speed_peaks: number of speed peaks.
     """
 
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
-    v: NDArray[np.float64]
+    t: Array
+    p: Array
+    v: Array
     trajectory: SigmaLognormal
     snr_v_db: float
     snr_t_db: float
@@ -86,10 +80,7 @@ class Extraction:
     Attributes:
         name: of the recording.
         parts: those that move, in order of time.
-        snr_v_db: over all parts, or None when nothing moves.
-        snr_t_db: over all parts, or None when nothing moves.
-        n_strokes: of all parts.
-        n_speed_peaks: of all parts.
+        snr_v_db: over all parts, or None when nothing moves; so the next.
         lognormality: SNR_v per stroke, dB, or None when nothing moves.
         remarks: what was mended in the recording, and what to know about the strokes.
         still: parts without a movement: dots and touches. They have no strokes.
@@ -144,9 +135,7 @@ def extract(recording: PenRecording, options: ExtractOptions | None = None) -> E
     )
 
 
-def _judge(
-    part: Trace, chain: Chain, n_peaks: int, through: bool
-) -> tuple[PartExtraction, NDArray[np.float64]]:
+def _judge(part: Trace, chain: Chain, n_peaks: int, through: bool) -> tuple[PartExtraction, Array]:
     """A part's result, and its powers: of velocity and its error, of position and its error."""
     p_left, v_left = left_over(chain, part, through=through)
     moved = part.p - part.p.mean(axis=0)

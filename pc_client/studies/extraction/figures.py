@@ -10,8 +10,8 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.errors import printable
 from pc_client.movements.trajectory import Motion
 from pc_client.results.matplotlib_figures import draw, figure, image_bytes
@@ -20,8 +20,6 @@ from pc_client.studies.extraction.extract import Extraction, PartExtraction
 
 if TYPE_CHECKING:
     import polars as pl
-
-__all__ = ["draw_extraction", "draw_overview"]
 
 _SIZE = (12.0, 4.6)
 #: A part of more strokes is drawn without its single strokes; a longer one at no more than so many times.
@@ -109,11 +107,11 @@ def _title(extraction: Extraction) -> str:
     )
 
 
-def _over(t: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+def _over(t: Array, v: Array) -> Array:
     return np.column_stack((t, np.linalg.norm(v, axis=1)))
 
 
-def _reconstruction(part: PartExtraction) -> tuple[NDArray[np.float64], Motion]:
+def _reconstruction(part: PartExtraction) -> tuple[Array, Motion]:
     """The movement of the strokes at up to `_MOST_TIMES` times, computed for a few hundred at a time."""
     t = part.t[:: 1 + len(part.t) // _MOST_TIMES]
     blocks = [part.trajectory.evaluate(block) for block in np.array_split(t, 1 + len(t) // 250)]

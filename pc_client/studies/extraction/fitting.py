@@ -16,15 +16,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.studies.extraction.chain import Bounds, Chain, inserted, with_chords, without
 from pc_client.studies.extraction.initial import TYPICAL_SIGMA, initial_chain
 from pc_client.studies.extraction.refine import Fit, Goal, refine, residuals
 from pc_client.studies.extraction.smoothing import CUTOFF_HZ, less_noise
 from pc_client.studies.signals import Trace, velocity
-
-__all__ = ["Candidate", "FitOptions", "Fitted", "best_candidates", "fit_parts", "left_over"]
 
 #: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
 _DECIMATION = 4
@@ -84,10 +82,10 @@ class Fitted:
 
 
 def fit_parts(parts: Sequence[Trace], budget: int, options: FitOptions) -> Fitted:
-    """Strokes for all parts.
+    """Strokes for all parts, of which there is at least one; all move.
 
     Args:
-        parts: at least one; all move.
+        parts: of a recording.
         budget: most strokes of all parts together, unless these would reconstruct too little, see
             `FitOptions`. Every part gets one for each of its speed peaks in any case.
         options: effort.
@@ -112,13 +110,10 @@ def fit_parts(parts: Sequence[Trace], budget: int, options: FitOptions) -> Fitte
     return Fitted(fitting.chains(fitting.given_back() if is_clean else fitting.fits), through=is_clean)
 
 
-def left_over(chain: Chain, part: Trace, *, through: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Residual positions and velocities of a part, (n, dim) each.
+def left_over(chain: Chain, part: Trace, *, through: bool) -> tuple[Array, Array]:
+    """Residual positions and velocities of a low-passed part, (n, dim) each.
 
-    Args:
-        chain: the strokes.
-        part: low-passed.
-        through: the strokes go through the same low-pass first.
+    With `through` the strokes go through the same low-pass first.
     """
     # What trajectory.evaluate leaves, but piece by piece: all strokes at all times are too many in a long
     # recording.
@@ -221,7 +216,7 @@ class _Fitting:
             for fit, part in zip(fits, self._parts, strict=True)
         ]
 
-    def _goal(self, part: Trace, p: NDArray[np.float64], v: NDArray[np.float64]) -> Goal:
+    def _goal(self, part: Trace, p: Array, v: Array) -> Goal:
         """What the strokes of a part shall approximate: some of the samples of p and v."""
         decimation = max(1, min(_DECIMATION, len(part.t) // _LEAST_SAMPLES))
         rows = np.arange(0, len(part.t), decimation)
@@ -263,13 +258,10 @@ class Candidate(NamedTuple):
     energy: float
 
 
-def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: int) -> list[Candidate]:
-    """The lognormals that reduce the energy of a residual velocity most, best first.
+def best_candidates(t: Array, v_left: Array, count: int) -> list[Candidate]:
+    """The lognormals that reduce the energy of a residual velocity (n, dim) most: the best ones, in order.
 
-    Args:
-        t: uniform times, (n,), s.
-        v_left: residual velocity, (n, dim).
-        count: how many at most.
+    The times (n,), s, are uniform.
     """
     step = float(t[1] - t[0])
     left = np.array(v_left)
@@ -297,26 +289,25 @@ def best_candidates(t: NDArray[np.float64], v_left: NDArray[np.float64], count: 
     return found
 
 
-def _kernel(width: float) -> NDArray[np.float64]:
+def _kernel(width: float) -> Array:
     """A lognormal with energy 1, width in samples."""
     reach = max(1, round(_REACH * width))
     shape = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
-    scaled: NDArray[np.float64] = shape / np.sqrt(shape @ shape)
+    scaled: Array = shape / np.sqrt(shape @ shape)
     return scaled
 
 
-def _gains(left: NDArray[np.float64], kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+def _gains(left: Array, kernel: Array) -> Array:
     """Energy that the kernel, centred at each sample, explains; near the ends a cut kernel, rescaled."""
     n, reach = len(left), len(kernel) // 2
     power = np.convolve(np.ones(n), kernel**2)[reach : reach + n]
     total = np.zeros(n)
     for column in left.T:
         total += np.convolve(column, kernel)[reach : reach + n] ** 2
-    gains: NDArray[np.float64] = total / power
-    return gains
+    return total / power
 
 
-def _subtract(left: NDArray[np.float64], kernel: NDArray[np.float64], at: int) -> None:
+def _subtract(left: Array, kernel: Array, at: int) -> None:
     reach = len(kernel) // 2
     low, high = max(0, at - reach), min(len(left), at + reach + 1)
     piece = kernel[low - at + reach : high - at + reach]

@@ -20,22 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from pc_client.arrays import Array
 from pc_client.errors import MovementError
 from pc_client.movements.lognormal import Lognormal, evaluate_lognormals
 from pc_client.studies.extraction.chain import Bounds, Chain, normals_across
 from pc_client.studies.signals import Trace
-
-__all__ = [
-    "CharacteristicPoints",
-    "ScaledLognormal",
-    "initial_chain",
-    "lognormal_from_points",
-    "salient_points",
-    "sigma_from_peak_ratio",
-    "sigma_from_slope_ratio",
-    "turn_rate",
-]
-
 
 #: Peaks that stand out by less than this share of the top speed are ripples on their neighbours at first;
 #: strokes for those that deserve one are added where the refined residual is worst.
@@ -78,7 +67,7 @@ def initial_chain(part: Trace) -> Chain:
     return Chain(median, width, sigma, sizes, normals_across(chords, normals), targets)
 
 
-def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
+def _timing(t: Array, speed: Array) -> tuple[float, float, float]:
     """Median, width and sigma for a speed profile between two minima: the best of the candidates."""
     candidates = [_by_area(t, speed), *_by_closed_forms(t, speed)]
     errors = []
@@ -90,7 +79,7 @@ def _timing(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, 
     return candidates[int(np.argmin(errors))]
 
 
-def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float, float, float]:
+def _by_area(t: Array, speed: Array) -> tuple[float, float, float]:
     """The lognormal with the area and the peak of the measured speed profile; it always exists."""
     top = int(np.argmax(speed))
     area = float(np.sum(0.5 * (speed[1:] + speed[:-1]))) * float(t[1] - t[0])
@@ -99,7 +88,7 @@ def _by_area(t: NDArray[np.float64], speed: NDArray[np.float64]) -> tuple[float,
     return float(t[top]) + width * TYPICAL_SIGMA, width, TYPICAL_SIGMA
 
 
-def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list[tuple[float, float, float]]:
+def _by_closed_forms(t: Array, speed: Array) -> list[tuple[float, float, float]]:
     points = characteristic_points(t, speed)
     if points is None:
         return []
@@ -116,7 +105,7 @@ def _by_closed_forms(t: NDArray[np.float64], speed: NDArray[np.float64]) -> list
     return found
 
 
-def _arc_angle(part: Trace, path_length: NDArray[np.float64], a: int, b: int) -> NDArray[np.float64]:
+def _arc_angle(part: Trace, path_length: Array, a: int, b: int) -> Array:
     """Arc angle of the stroke between two salient points as a vector along its axis, (3,), rad."""
     length = float(path_length[b] - path_length[a])
     if length <= 0.0:
@@ -131,8 +120,7 @@ def _arc_angle(part: Trace, path_length: NDArray[np.float64], a: int, b: int) ->
         return np.zeros(3)
     angle = math.atan2(size, float(v[0] @ v[1]))
     total = turn_rate((0.0, angle), (float(path_length[i]), float(path_length[k]))) * length
-    turned: NDArray[np.float64] = min(total, _MAX_FIRST_TURN) * axis / size
-    return turned
+    return min(total, _MAX_FIRST_TURN) * axis / size
 
 
 def _clipped(value: float, bounds: tuple[float, float]) -> float:
@@ -156,9 +144,8 @@ class ScaledLognormal(NamedTuple):
 def sigma_from_peak_ratio(ratio: float) -> float:
     """Sigma from the speed at one inflection over the speed at the peak.
 
-    Args:
-        ratio: v2/v3, in (0, e^-1/2), or v4/v3, in [e^-1/2, 1): a Gaussian has e^-1/2 on both sides, a
-            lognormal less before the peak and more behind it.
+    The ratio is v2/v3, in (0, e^-1/2), or v4/v3, in [e^-1/2, 1): a Gaussian has e^-1/2 on both sides, a
+    lognormal less before the peak and more behind it.
     """
     if not 0.0 < ratio < 1.0:
         raise MovementError(f"inflection at {ratio} of the peak: the ratio must lie in (0, 1)")
@@ -198,7 +185,7 @@ def turn_rate(directions: tuple[float, float], distances: tuple[float, float]) -
     return (directions[1] - directions[0]) / (distances[1] - distances[0])
 
 
-def characteristic_points(t: NDArray[np.float64], speed: NDArray[np.float64]) -> CharacteristicPoints | None:
+def characteristic_points(t: Array, speed: Array) -> CharacteristicPoints | None:
     """Inflections and peak of a speed profile, or None where one of them is not inside."""
     top = int(np.argmax(speed))
     if top < 2 or top > len(speed) - 3:

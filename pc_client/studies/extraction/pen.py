@@ -1,9 +1,9 @@
 """Recorded movements of a pen or a hand in files, folders and archives, as other recorders wrote them.
 
-A line is a sample; columns are apart by commas, semicolons, tabs or blanks. A first line of names says which
-column is x, y, z and t (others are passed over); without it the order is x, y, t or x, y, z, t. `START` and
-`BREAK` lines, as Omniglot has them, stand between pen-down parts; without them all is one part. Empty lines
-and lines that begin with # are skipped. Cells that are empty or nan make a sample that is left out.
+A line is a sample; columns are separated by commas, semicolons, tabs or blanks. A first line of names says
+which column is x, y, z and t (others are ignored); without it the order is x, y, t or x, y, z, t. `START` and
+`BREAK` lines, as Omniglot has them, separate pen-down parts; without them all is one part. Empty lines and
+lines that begin with # are skipped. Samples with cells that are empty or nan are left out.
 
 The unit of time is taken, in this order, from the caller, from the header ("t_ms", "time [s]") or from the
 typical step between samples: a recorder takes a sample every 0.5 ms to 0.5 s, so a step of .008 is in s, of 8
@@ -24,25 +24,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pc_client.arrays import Array, read_only
 from pc_client.errors import RecordingError
 from pc_client.files import FILE_KINDS
-from pc_client.movements.trajectory import read_only
 from ur_hil.input_files import MIB
-
-__all__ = [
-    "TIME_UNITS",
-    "PenPart",
-    "PenRecording",
-    "PenSource",
-    "contents",
-    "ordered_part",
-    "parse_pen",
-    "pen_sources",
-    "read_pen",
-    "read_recording",
-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +41,8 @@ class PenPart:
         p: positions, (n, 2) or (n, 3), in the unit of the recording.
     """
 
-    t: NDArray[np.float64]
-    p: NDArray[np.float64]
+    t: Array
+    p: Array
 
     def __post_init__(self) -> None:
         t, p = read_only(self.t), read_only(self.p)
@@ -204,11 +191,7 @@ class _Table:
 
 
 def read_pen(path: str | Path, time_unit: str | None = None) -> PenRecording:
-    """Read one file.
-
-    Args:
-        path: a text file.
-        time_unit: as of `parse_pen`.
+    """Read one text file; the unit of time is as of `parse_pen`.
 
     Raises:
         RecordingError: the file cannot be read or makes no sense; the message names file and line.
@@ -322,7 +305,7 @@ def _number(field: str, name: str, line: int) -> float:
     return value
 
 
-def _unit_of(parts: Sequence[NDArray[np.float64]], marked: bool) -> str:
+def _unit_of(parts: Sequence[Array], marked: bool) -> str:
     with np.errstate(invalid="ignore"):
         steps = np.concatenate([np.diff(part[:, -1]) for part in parts])
         steps = steps[np.isfinite(steps) & (steps > 0.0)]
@@ -333,7 +316,7 @@ def _unit_of(parts: Sequence[NDArray[np.float64]], marked: bool) -> str:
     return next((unit for unit in units if step * TIME_UNITS[unit] < _LONGEST_STEP_S), units[-1])
 
 
-def _recording(arrays: Sequence[NDArray[np.float64]], second: float, name: str) -> PenRecording:
+def _recording(arrays: Sequence[Array], second: float, name: str) -> PenRecording:
     parts: list[PenPart] = []
     remarks: list[str] = []
     shifted = 0
@@ -429,11 +412,7 @@ def contents(sources: Iterable[PenSource]) -> Iterator[tuple[PenSource, bytes | 
 
 
 def read_recording(given: str | Path, time_unit: str | None = None) -> PenRecording:
-    """The one recording in a file, or at `ARCHIVE.zip:PATH`.
-
-    Args:
-        given: which.
-        time_unit: of `TIME_UNITS`; None: found from the times.
+    """The one recording in a file, or at `ARCHIVE.zip:PATH`; the unit of time is as of `parse_pen`.
 
     Raises:
         RecordingError: it cannot be read, or is a folder or an archive of many.

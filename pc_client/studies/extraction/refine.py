@@ -44,21 +44,9 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 from scipy.special import ndtr
 
+from pc_client.arrays import Array
 from pc_client.studies.extraction.chain import Bounds, Chain, in_order, normals_across
 from pc_client.studies.signals import Trace
-
-__all__ = [
-    "Fit",
-    "Goal",
-    "Linearisation",
-    "linearise",
-    "moved",
-    "refine",
-    "residuals",
-    "variables_per_stroke",
-]
-
-_Array = NDArray[np.float64]
 
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e6
 #: Longest step of median/width, ln width, sigma, arc angle and bending in one iteration.
@@ -125,7 +113,7 @@ def refine(chain: Chain, goal: Goal, iterations: int, tolerance: float = 3e-3) -
     return Fit(in_order(chain), now.error)
 
 
-def residuals(chain: Chain, signal: Trace) -> tuple[_Array, _Array]:
+def residuals(chain: Chain, signal: Trace) -> tuple[Array, Array]:
     """Positions and velocities of a signal less those of the strokes, each (n, dim)."""
     p_left, v_left = np.array(signal.p), np.array(signal.v)
     for rows, first, last in _pieces(chain, signal.t):
@@ -135,7 +123,7 @@ def residuals(chain: Chain, signal: Trace) -> tuple[_Array, _Array]:
     return p_left, v_left
 
 
-def moved(chain: Chain, step: _Array, bounds: Bounds) -> Chain:
+def moved(chain: Chain, step: Array, bounds: Bounds) -> Chain:
     """The chain after a step of all variables (columns of `linearise`), kept inside the bounds."""
     dim = chain.targets.shape[1]
     table = step[dim:].reshape(len(chain), -1)
@@ -155,7 +143,7 @@ def moved(chain: Chain, step: _Array, bounds: Bounds) -> Chain:
     )
 
 
-def _bent(chain: Chain, arc_angle: _Array, bending: _Array, chords: _Array) -> tuple[_Array, _Array]:
+def _bent(chain: Chain, arc_angle: Array, bending: Array, chords: Array) -> tuple[Array, Array]:
     """Arc angles and normals after a step: arc angle x normal is a vector, and bending moves it sideways."""
     sideways = np.cross(chain.normal, chain.chords)
     norms = np.linalg.norm(sideways, axis=1, keepdims=True)
@@ -185,9 +173,9 @@ class Linearisation(NamedTuple):
         jacobian: derivatives, (columns, 2, dim, n): of p, then of v, by each variable.
     """
 
-    p: _Array
-    v: _Array
-    jacobian: _Array
+    p: Array
+    v: Array
+    jacobian: Array
 
 
 def variables_per_stroke(dim: int) -> int:
@@ -195,7 +183,7 @@ def variables_per_stroke(dim: int) -> int:
     return 6 if dim == 2 else 8
 
 
-def linearise(chain: Chain, t: _Array, first: int, last: int) -> Linearisation:
+def linearise(chain: Chain, t: Array, first: int, last: int) -> Linearisation:
     """Evaluate strokes first .. last - 1 at the times t (n,), when all before are done and none after begun.
 
     The columns of the Jacobian: the target at which stroke `first` begins, then the variables of each stroke.
@@ -208,7 +196,7 @@ def linearise(chain: Chain, t: _Array, first: int, last: int) -> Linearisation:
     arc_angle = chain.arc_angle[first:last, None]
     done, rate, done_by, log_rate_by = _profiles(chain, t, first, last)
 
-    def vectors(along: _Array, sideways: _Array) -> _Array:
+    def vectors(along: Array, sideways: Array) -> Array:
         """(strokes, dim, n), from components along the chord and across it."""
         return along[:, None] * chord[:, :, None] + sideways[:, None] * across[:, :, None]
 
@@ -253,13 +241,13 @@ def linearise(chain: Chain, t: _Array, first: int, last: int) -> Linearisation:
 class _Profiles(NamedTuple):
     """F and Lambda of strokes; derivatives of F and of ln Lambda by median/width, ln width and sigma."""
 
-    done: _Array
-    rate: _Array
-    done_by: tuple[_Array, _Array, _Array]
-    log_rate_by: tuple[_Array, _Array, _Array]
+    done: Array
+    rate: Array
+    done_by: tuple[Array, Array, Array]
+    log_rate_by: tuple[Array, Array, Array]
 
 
-def _profiles(chain: Chain, t: _Array, first: int, last: int) -> _Profiles:
+def _profiles(chain: Chain, t: Array, first: int, last: int) -> _Profiles:
     m, w, sigma = (values[first:last, None] for values in (chain.median, chain.width, chain.sigma))
     u = (t - m) / w
     x = 1.0 + sigma * u
@@ -279,7 +267,7 @@ def _profiles(chain: Chain, t: _Array, first: int, last: int) -> _Profiles:
     )
 
 
-def _turning(normal: _Array, dim: int) -> _Array:
+def _turning(normal: Array, dim: int) -> Array:
     """The matrices that turn a chord by 90 degrees about the normals, (strokes or 1, dim, dim)."""
     if dim == 2:
         return np.array([[[0.0, -1.0], [1.0, 0.0]]])
@@ -288,20 +276,19 @@ def _turning(normal: _Array, dim: int) -> _Array:
     return np.array([[o, -z, y], [z, o, -x], [-y, x, o]]).transpose(2, 0, 1)
 
 
-def _across(normal: _Array, chord: _Array) -> _Array:
+def _across(normal: Array, chord: Array) -> Array:
     """The vectors n x c, (strokes, dim)."""
     if chord.shape[1] == 2:
         return np.column_stack((-chord[:, 1], chord[:, 0]))
     return np.cross(normal, chord)
 
 
-def _sinc(angle: _Array) -> _Array:
+def _sinc(angle: Array) -> Array:
     nonzero = np.where(angle == 0.0, 1e-20, angle)
-    value: _Array = np.sin(nonzero) / nonzero
-    return value
+    return np.sin(nonzero) / nonzero
 
 
-def _log_slope(arc_angle: _Array, straight: float = _STRAIGHT) -> _Array:
+def _log_slope(arc_angle: Array, straight: float = _STRAIGHT) -> Array:
     """The derivative of ln k by the arc angle; near 0 by its series."""
     small = np.abs(arc_angle) < straight
     safe = np.where(small, 1.0, arc_angle)
@@ -309,8 +296,8 @@ def _log_slope(arc_angle: _Array, straight: float = _STRAIGHT) -> _Array:
 
 
 def _arc_integrals(
-    arc_angle: _Array, done: _Array, cos: _Array, sin: _Array, k: _Array
-) -> tuple[_Array, _Array, _Array, _Array]:
+    arc_angle: Array, done: Array, cos: Array, sin: Array, k: Array
+) -> tuple[Array, Array, Array, Array]:
     """The integrals k C and k S, and k dC/dd and k dS/dd; cos and sin are those of the tangent, times k."""
     half = 0.5 * arc_angle
     reach = k * done * _sinc(half * done)
@@ -352,13 +339,13 @@ class _Equations(NamedTuple):
         error: squared errors alone.
     """
 
-    band: _Array
-    gradient: _Array
+    band: Array
+    gradient: Array
     cost: float
     error: float
 
 
-def _pieces(chain: Chain, t: _Array) -> list[tuple[slice, int, int]]:
+def _pieces(chain: Chain, t: Array) -> list[tuple[slice, int, int]]:
     """Pieces of the time axis: rows, first stroke that is not done before, last that begins in it, plus 1."""
     begins, ends = chain.time_at_deviation(-_TAIL), chain.time_at_deviation(_TAIL)
     # Up to stroke j all are done at done_by[j]; from stroke j on none begins before begun_from[j].
@@ -422,7 +409,7 @@ def _regularized(data: _Equations, chain: Chain, weight: float, top_speed: float
     return _Equations(data.band, data.gradient, data.error + float(np.sum(value**2)), data.error)
 
 
-def _regularizer(chain: Chain, weight: float, top_speed: float) -> tuple[_Array, _Array]:
+def _regularizer(chain: Chain, weight: float, top_speed: float) -> tuple[Array, Array]:
     """What the regularizer squares for each stroke, (strokes, dim + 1), and its derivatives.
 
     Its values are the vector of the peak speed and the logarithm of sigma. The derivatives, (strokes,
@@ -444,13 +431,12 @@ def _regularizer(chain: Chain, weight: float, top_speed: float) -> tuple[_Array,
     return np.column_stack((peak, skew)), jacobian
 
 
-def _diagonal(equations: _Equations) -> _Array:
+def _diagonal(equations: _Equations) -> Array:
     diagonal = equations.band[:, 0]
-    floored: _Array = diagonal + 1e-9 * float(diagonal.max())
-    return floored
+    return diagonal + 1e-9 * float(diagonal.max())
 
 
-def _damped_step(equations: _Equations, chain: Chain, bounds: Bounds, damping: float) -> _Array | None:
+def _damped_step(equations: _Equations, chain: Chain, bounds: Bounds, damping: float) -> Array | None:
     """The damped step; variables that stand at a bound and are pushed over it stay where they are."""
     band = equations.band.T.copy()
     diagonal = _diagonal(equations)
@@ -458,14 +444,14 @@ def _damped_step(equations: _Equations, chain: Chain, bounds: Bounds, damping: f
     pinned = _pinned(chain, bounds, equations.gradient)
     band[0, pinned] += _PINNED * float(diagonal.max())
     try:
-        step: _Array = solveh_banded(band, equations.gradient, lower=True, check_finite=False)
+        step: Array = solveh_banded(band, equations.gradient, lower=True, check_finite=False)
     except LinAlgError:
         return None
     step[pinned] = 0.0
     return step if np.isfinite(step).all() else None
 
 
-def _pinned(chain: Chain, bounds: Bounds, downhill: _Array) -> NDArray[np.bool_]:
+def _pinned(chain: Chain, bounds: Bounds, downhill: Array) -> NDArray[np.bool_]:
     dim = chain.targets.shape[1]
     pinned = np.zeros(len(downhill), dtype=bool)
     table = pinned[dim:].reshape(len(chain), -1)

@@ -23,11 +23,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.signal import find_peaks
 
-from pc_client.movements.trajectory import read_only
+from pc_client.arrays import Array, read_only
 from pc_client.studies.extraction.pen import PenPart
 from pc_client.studies.signals import Trace, low_passed, velocity
-
-__all__ = ["CUTOFF_HZ", "RATE_HZ", "less_noise", "moves", "smooth_part", "speed_peaks"]
 
 #: Uniform rate of the signal, Hz.
 RATE_HZ = 200.0
@@ -87,14 +85,14 @@ def speed_peaks(part: Trace) -> NDArray[np.intp]:
     return found
 
 
-def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
+def _interpolated(part: PenPart, t: Array) -> Array:
     """Positions at the times t: cubic splines where the clock is steady, straight lines elsewhere.
 
     A cubic spline is exact to the fourth order, but swings out where two time stamps lie close together and
     the clock is not to be trusted, or where few samples jump. There only the straight line is known
     between two samples.
     """
-    points: NDArray[np.float64] = make_interp_spline(part.t, part.p, k=1)(t)
+    points: Array = make_interp_spline(part.t, part.p, k=1)(t)
     steps = np.diff(part.t)
     typical = float(np.median(steps))
     steady = (steps > typical / _STEADY_RATIO) & (steps < typical * _STEADY_RATIO)
@@ -112,13 +110,13 @@ def _interpolated(part: PenPart, t: NDArray[np.float64]) -> NDArray[np.float64]:
     return points
 
 
-def less_noise(p: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+def less_noise(p: Array, rate: float) -> Array:
     """Positions (n, dim) at a uniform rate (Hz), low-passed at 12 Hz."""
     # A straight line passes as it is; without it the filter starts and ends nearly at rest.
     line = np.linspace(p[0], p[-1], len(p))
     # A part may be shorter than the filter takes to settle: then it is reflected again and again.
     padding = math.ceil(_SETTLED_S * rate)
-    low: NDArray[np.float64] = line + low_passed(
+    low: Array = line + low_passed(
         p - line, rate, cutoff=CUTOFF_HZ, order=_ORDER, padding=padding, ends="reflected"
     )
     return low

@@ -43,13 +43,7 @@ _OFFSETS = range(-19_980, -400, 20)
 
 @dataclass(frozen=True, slots=True)
 class SimulatedBox:
-    """A box that is ready.
-
-    Attributes:
-        host: its address.
-        ports: its ports.
-        folder: a scratch folder that goes away with it.
-    """
+    """A box that is ready: its address and ports, and a scratch folder that goes away with it."""
 
     host: str
     ports: Ports
@@ -58,11 +52,7 @@ class SimulatedBox:
 
 @contextmanager
 def simulated_box(arm: SimulatedArm) -> Iterator[SimulatedBox]:
-    """Start a box and end it on leaving.
-
-    Raises:
-        SweepError: it does not start, or it died while it was used.
-    """
+    """Start a box and end it on leaving; SweepError if it does not start, or dies while it is used."""
     for _ in range(_ATTEMPTS - 1):
         offset = _free_offset()
         try:
@@ -126,11 +116,7 @@ def _command(arm: SimulatedArm, offset: int, ready: Path) -> list[str]:
 
 
 def _wait_until_ready(ready: Path, folder: Path, guard: subprocess.Popen[bytes]) -> None:
-    """Wait for the ready file.
-
-    Raises:
-        SweepError: the box ended, or takes too long.
-    """
+    """Wait for the ready file; SweepError if the box ended, or takes too long."""
     deadline = time.monotonic() + _START_TIMEOUT
     while not ready.exists():
         if (folder / ENDED_FILE).exists() or guard.poll() is not None:
@@ -164,11 +150,7 @@ def _last_words(folder: Path) -> str:
 
 
 def _free_offset() -> int:
-    """A port offset at which nothing listens.
-
-    Raises:
-        SweepError: there is none.
-    """
+    """A port offset at which nothing listens; SweepError if there is none."""
     offsets = list(_OFFSETS)
     random.Random(os.urandom(8)).shuffle(offsets)  # workers beside this one look at the same moment
     for offset in offsets:

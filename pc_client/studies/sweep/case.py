@@ -74,14 +74,7 @@ class GivenRobot:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One experiment of a sweep.
-
-    Attributes:
-        movement: what to do.
-        arm: with which arm.
-        controller: by which controller.
-        repeat: how often, in one session.
-    """
+    """One experiment: what to do, with which arm, by which controller, how often in one session."""
 
     movement: MovementFile
     arm: SimulatedArm | GivenRobot

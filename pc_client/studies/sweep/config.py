@@ -90,7 +90,6 @@ class SweepConfig:
     """What a sweep's file asks for.
 
     Attributes:
-        source: the file.
         file: its keys.
         movements: what to do.
         arms: simulated arms; empty when the file names a robot.
@@ -98,7 +97,6 @@ class SweepConfig:
         axes: the values of the controller's fields.
     """
 
-    source: Path
     file: SweepFile
     movements: tuple[MovementFile, ...]
     arms: tuple[SimulatedArm, ...]
@@ -152,7 +150,6 @@ def read_config(path: Path) -> SweepConfig:
     elif not axes and len(file.controllers) == 1:
         raise SweepError(f"{path}: search: there is nothing to choose; give fields in a table [controller]")
     config = SweepConfig(
-        path,
         file,
         tuple(_movement(name, path) for name in file.movements),
         () if file.robot is not None else _arms(file),

@@ -13,8 +13,8 @@ import numpy as np
 import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pc_client.arrays import Array
 from pc_client.control.controller import FIELDS
 from pc_client.results.matplotlib_figures import draw, figure
 from pc_client.results.pages import picture, render
@@ -43,11 +43,7 @@ _MOST_TICKS = 10
 
 
 def render_page(name: str, table: pl.DataFrame) -> str:
-    """Return the text of `sweep.html`.
-
-    Args:
-        name: of the sweep.
-        table: of the sweep, at least one row.
+    """Return the text of `sweep.html`: the name of the sweep, and its table of at least one row.
 
     Raises:
         ModuleNotFoundError: jinja2 is not installed (extra `report`).
@@ -94,12 +90,10 @@ def map_axes(table: pl.DataFrame) -> tuple[str, str] | None:
 
 
 def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
-    """The SNR of all runs over one axis, and its mean by kind of movement, controller and fidelity.
+    """The SNR of all runs that are done over an axis that varies.
 
-    Args:
-        rows: runs that are done.
-        axis: a column that varies.
-        connect: whether lines join the means of numbers; random samples differ in more than this axis.
+    The means are by kind of movement, controller and fidelity. Lines join the means of numbers if `connect`:
+    random samples differ in more than this axis.
     """
     values = _in_order(rows, axis)
     # Seeds are numbers, but there is no more or less of a seed.
@@ -136,12 +130,8 @@ def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
 def _map_figure(rows: _Rows, x: str, y: str) -> Figure:
     """The mean SNR over two numeric axes, one panel a fidelity, each with its own colours.
 
-    A full grid becomes tiles, with a cross where not all cases could be run; anything else becomes dots.
-
-    Args:
-        rows: all of the table, done or not.
-        x: column across.
-        y: column upwards.
+    Of all rows, done or not, a full grid becomes tiles, with a cross where not all cases could be run.
+    Anything else becomes dots.
     """
     panels = _in_order(rows, "fidelity")
     xs, ys = _in_order(rows, x), _in_order(rows, y)
@@ -170,7 +160,7 @@ def _draw_tiles(
     ys: list[Any],
     colours: dict[str, Any],
 ) -> Any:
-    values = np.array([[_nan_for_none(points[a, b]) for a in xs] for b in ys])
+    values = np.array([[points[a, b] for a in xs] for b in ys], dtype=np.float64)  # nan for None
     tiles = axes.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), values, **colours)
     axes.set_facecolor(_NOT_DONE)
     middle = 0.5 * (colours["vmin"] + colours["vmax"])
@@ -195,7 +185,7 @@ def _draw_dots(axes: Axes, points: Mapping[tuple[Any, Any], float | None], colou
     known = {point: mean for point, mean in points.items() if mean is not None}
     unknown = np.array([point for point, mean in points.items() if mean is None]).reshape(-1, 2)
     axes.plot(*unknown.T, "x", color="#888888", ms=5)
-    where: NDArray[np.float64] = np.array(list(known)).reshape(-1, 2)
+    where: Array = np.array(list(known)).reshape(-1, 2)
     levels = list(known.values())
     return axes.scatter(
         where[:, 0], where[:, 1], c=levels, s=42, edgecolors="black", linewidths=0.4, **colours
@@ -211,10 +201,6 @@ def _means(rows: _Rows, x: str, y: str) -> dict[tuple[Any, Any], float | None]:
         point: None if None in levels else float(np.mean([level for level in levels if level is not None]))
         for point, levels in points.items()
     }
-
-
-def _nan_for_none(value: float | None) -> float:
-    return np.nan if value is None else value
 
 
 def _in_order(rows: _Rows, column: str) -> list[Any]:

@@ -211,11 +211,7 @@ def run_case(case: Case, keep_recordings: bool) -> Outcome:
 
 
 def plan_case(case: Case, out: Path = Path()) -> Experiment:
-    """The experiment of a case, checked and planned.
-
-    Args:
-        case: what to do.
-        out: folder of its recordings.
+    """The experiment of a case, checked and planned; its recordings go to a folder.
 
     Raises:
         PlanningError: the arm cannot do the movement.

@@ -55,14 +55,7 @@ Axis = tuple[Value, ...] | Range
 
 
 def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
-    """Check the table [controller].
-
-    Args:
-        table: as `tomllib` gives it.
-        source: the file's name, for messages.
-
-    Returns:
-        One axis a field, in the order of the file.
+    """Check the table [controller] of a file: an axis a field, in the order of the file.
 
     Raises:
         SweepError: unknown field, or a range or list that makes no sense.
@@ -120,11 +113,7 @@ RANKING = (
 
 
 def judge(table: pl.DataFrame, by: Sequence[str]) -> pl.DataFrame:
-    """What came of each setting.
-
-    Args:
-        table: rows of a sweep.
-        by: columns that distinguish settings.
+    """What came of each setting, distinguished by some columns of the rows of a sweep.
 
     Returns:
         These columns and those of `RANKING` but the first, in the order of the table: mean over the runs that
@@ -161,9 +150,7 @@ def rank_settings(table: pl.DataFrame) -> pl.DataFrame:
 def edge_of(table: pl.DataFrame, settings: pl.DataFrame) -> str:
     """Where the best setting lies at the edge of what was tried, in one sentence; empty where it does not.
 
-    Args:
-        table: rows of a sweep.
-        settings: as `rank_settings` returns them.
+    The table has the rows of a sweep, the settings are as `rank_settings` returns them.
     """
     best = settings.row(0, named=True)
     ends = []

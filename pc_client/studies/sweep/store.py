@@ -111,10 +111,7 @@ class ResultStore:
         )
 
     def write_table(self, format: Literal["parquet", "csv"]) -> Path:
-        """Write the table; the same rows give the same bytes.
-
-        Args:
-            format: of the file; Parquet carries the texts of `COLUMNS` as its metadata.
+        """Write the table; the same rows give the same bytes. Parquet has the texts of `COLUMNS` as metadata.
 
         Raises:
             SweepError: it cannot be written.
@@ -127,18 +124,7 @@ class ResultStore:
         return self.write("sweep.parquet", page.getvalue())
 
     def write(self, name: str, content: bytes) -> Path:
-        """Write one file in one step.
-
-        Args:
-            name: within the folder.
-            content: all of it.
-
-        Returns:
-            Its path.
-
-        Raises:
-            SweepError: it cannot be written.
-        """
+        """Write one file of the folder in one step; returns its path, SweepError if it cannot be written."""
         path = self.path / name
         partial = path.with_name(f"{path.name}.{os.getpid()}.part")
         try:
