@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from pc_client.commands import compare, doctor, draw, experiment, extract, movements, recordings, sweep
+from pc_client.commands import doctor, draw, experiment, extract, movements, recordings, sweep
 from pc_client.errors import ClientError, InterruptedByUserError, UnknownMovementError, full_message, one_line
 from protocol.errors import ProtocolError
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
@@ -41,7 +41,7 @@ for _command, _examples in (
     ),
     (draw.draw, ("ur-client draw drawing.txt --robot 127.0.0.1 --out out/draw",)),
     (
-        compare.compare,
+        experiment.compare,
         (
             "ur-client compare --out out/compare",
             "ur-client compare --robot 127.0.0.1 --out out/compare --targets 5",

@@ -34,7 +34,7 @@ MAY_HAVE_EFFECTS = {
         "studies/sweep/guard.py",
         "studies/sweep/store.py",
         "cli.py",
-        "recording/outbox.py",
+        "recording/recorder.py",
     },
 }
 # Inside a package: each part imports those before it, also for types only; those on one line import each other.

@@ -50,8 +50,8 @@ def sweep(
 ) -> None:
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
     from pc_client.studies.sweep.case import GivenRobot
-    from pc_client.studies.sweep.config import read_config
     from pc_client.studies.sweep.schedule import Sweep, in_turn, run_case, side_by_side
+    from pc_client.studies.sweep.settings import read_config
     from pc_client.studies.sweep.store import ResultStore
 
     check_workers(workers, dask)

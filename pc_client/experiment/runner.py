@@ -27,10 +27,10 @@ from pc_client.experiment.experiment import Experiment, clear_folder
 from pc_client.experiment.identification import Identification, check_excitation, identify
 from pc_client.experiment.preflight import preflight, require
 from pc_client.experiment.repetitions import Repetitions, RunLog
-from pc_client.kinematics.arm_tree import arm_tree
 from pc_client.kinematics.model import RobotModel
 from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan, Plan
+from pc_client.recording.arm_view import arm_tree
 from pc_client.recording.provenance import Provenance
 from pc_client.recording.recorder import Recorder
 from protocol.realtime.layout import RealtimeFrame

@@ -7,5 +7,4 @@ arms       one row an arm: geometry, limits, reach, working box; needs no Pinocc
 model      the arm in Pinocchio: forward, inverse, singularities, agreement with what a robot reports
 cell       what stands around an arm and what it carries; cell files
 clearance  distances of the links from themselves, the floor and the cell
-arm_tree   links and joints for viewers
 """

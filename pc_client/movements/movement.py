@@ -28,6 +28,7 @@ from pc_client.movements.samples import (
     MIN_SAMPLES,
     JointTrajectory,
     SampledTrajectory,
+    parse_rows,
     rotations_of,
     samples_of,
     write_samples,
@@ -41,7 +42,6 @@ from pc_client.movements.trajectory import (
     check_name,
 )
 from pc_client.movements.uniform import SETBACK, Corners, uniform_trajectory
-from pc_client.number_tables import parse_rows
 from ur_hil.records import nearest
 
 #: "human": straight strokes by the paper's recipe; "robot": a smoothed square wave on the same lines.
@@ -349,7 +349,7 @@ def load_targets(path: str | Path) -> tuple[Array, Array | None]:
     """Target points from a text file: columns x, y, z in m, base frame; and optionally t in s.
 
     t is when a point is reached; the times between are the durations of the strokes. The form is that of
-    `number_tables`.
+    `samples`.
 
     Raises:
         MovementError: unreachable file, or content that makes no sense, naming file and line.

@@ -32,7 +32,7 @@ from pc_client.movements.library_sets import LIBRARY_FOLDER
 from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.studies.extraction.pen import contents, parse_pen, pen_sources
-from pc_client.studies.sweep.config import read_config
+from pc_client.studies.sweep.settings import read_config
 from ur_emulator.controller.clock import Clock
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.loop.event_loop import EventLoop

@@ -247,7 +247,7 @@ def test_memory_for_held_rows_is_bounded(tmp_path: Path, head: int, monkeypatch:
 def test_a_disk_that_stands_still_delays_no_row_and_is_an_error(
     tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pc_client.recording.outbox.MOST_WAITING", 1)
+    monkeypatch.setattr("pc_client.recording.recorder.MOST_WAITING", 1)
     goes_on = Event()
 
     class StandingDisk(FullDisk):

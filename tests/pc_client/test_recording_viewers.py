@@ -18,9 +18,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from scipy.spatial.transform import Rotation
 
-from pc_client.kinematics.arm_tree import arm_tree
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import robot_model, tcp_pose
+from pc_client.recording.arm_view import arm_tree
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase

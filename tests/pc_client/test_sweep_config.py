@@ -20,9 +20,8 @@ from pc_client.control.controller import CONTROLLERS
 from pc_client.errors import ClientError
 from pc_client.movements.library_sets import library_path
 from pc_client.studies.sweep.case import Case, GivenRobot, SimulatedArm, all_cases, failed
-from pc_client.studies.sweep.config import FIDELITIES, SweepFile, read_config
 from pc_client.studies.sweep.schedule import plan_case
-from pc_client.studies.sweep.settings import Range, Search, searched
+from pc_client.studies.sweep.settings import FIDELITIES, Range, Search, SweepFile, read_config, searched
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples" / "sweeps").glob("*.toml"))

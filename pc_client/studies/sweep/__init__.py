@@ -1,13 +1,12 @@
 """Many experiments from one file: gains x fidelity x movements, side by side, resumable.
 
-    config            the TOML file, read strictly
-    settings          what is tried: grids and searches of [controller]; which setting is the best
-    case              one experiment, with an identity that depends on nothing but its content; its outcome
-    box               a simulated arm of a case's own, in a process that never outlives its user
-    guard             the little program between the two
-    schedule          does a case and measures it; all cases over processes or a Dask cluster
-    store             which cases are settled: one small file a case, and the table as Parquet or CSV
-    page              plots and the page that shows them
+    settings   the TOML file; what is tried: grids and searches of [controller]; which setting is the best
+    case       one experiment, with an identity that depends on nothing but its content; its outcome
+    box        a simulated arm of a case's own, in a process that never outlives its user
+    guard      the little program between the two
+    schedule   does a case and measures it; all cases over processes or a Dask cluster
+    store      which cases are settled: one small file a case, and the table as Parquet or CSV
+    page       plots and the page that shows them
 
 A case is a pure function of its content: the box runs in lockstep and starts afresh, so the same case gives
 the same figures to the last bit, wherever it runs. Hence a result that is there needs no second run.

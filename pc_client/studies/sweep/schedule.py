@@ -44,7 +44,7 @@ from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 
 if TYPE_CHECKING:  # both load polars, which workers do without
-    from pc_client.studies.sweep.config import SweepConfig
+    from pc_client.studies.sweep.settings import SweepConfig
     from pc_client.studies.sweep.store import ResultStore
 
 _Job = Callable[[Case], Outcome]

@@ -1,4 +1,7 @@
-"""The settings of a sweep: what is tried, how a search chooses, and which setting is the best.
+"""The settings of a sweep: its file, what a search chooses from it, and which setting is the best.
+
+The file is TOML, read strictly; `docs/sweeps.md` explains every key. What is wrong in it is one line that
+names the file, the key and what is allowed; nothing has been started then.
 
 The table [controller] has for each field of the controller a value, a list of values, or a range. Lists span
 a grid. From lists and ranges optuna chooses, in batches, from the results so far (the table [search]).
@@ -14,20 +17,35 @@ import dataclasses
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import prod
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import polars as pl
 
-from pc_client.control.controller import FIELDS, Controller, Value
-from pc_client.errors import ControllerError, SweepError
+from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, Value
+from pc_client.errors import ControllerError, MovementError, SweepError
+from pc_client.files import FILE_KINDS
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
+from pc_client.movements.library_sets import library_names, library_path
+from pc_client.movements.movement import load_movement
 from pc_client.results.tables import Column
-from pc_client.studies.sweep.case import FACTORS
-from ur_hil.records import Finite, Flag, checked, nearest, record, whole, word
+from pc_client.studies.sweep.case import FACTORS, MovementFile, SimulatedArm
+from ur_hil.records import Finite, Flag, Items, checked, nearest, record, text, whole, word
 
 if TYPE_CHECKING:
     from optuna.distributions import BaseDistribution
     from optuna.samplers import BaseSampler
+
+FIDELITIES = ("exact", "ideal", "typical", "poor")
+"""What `ur-emulator serve --fidelity` knows."""
+
+_MOST_CASES = 100_000
+"""More than this is a slip of the pen: weeks on a large cluster."""
+
+Text = Annotated[str, text()]
 
 
 @record
@@ -52,6 +70,182 @@ class Range:
 
 
 Axis = tuple[Value, ...] | Range
+
+
+_MOST_TRIALS = 100_000
+
+
+@record
+class Search:
+    """How the best setting is searched.
+
+    The settings depend on these fields, on the results and on the version of optuna, not on how many workers
+    there are.
+
+    Attributes:
+        trials: settings to try.
+        batch: settings that are chosen together, before any of them has a result.
+        sampler: "tpe": optuna's tree-structured Parzen estimator; "random": without regard to the results.
+        seed: of the sampler.
+    """
+
+    trials: Annotated[int, whole(1, _MOST_TRIALS)]
+    batch: Annotated[int, whole(1, 1000)] = 8
+    sampler: Annotated[str, word(("tpe", "random"))] = "tpe"
+    seed: Annotated[int, whole(0, 2**32 - 1)] = 0
+
+
+@record
+class SweepFile:
+    """The keys of the file.
+
+    Attributes:
+        movements: names of the library, or movement files beside the configuration.
+        controllers: named controllers, the settings that [controller] starts from.
+        robots: types of simulated arms.
+        fidelities: how imperfect they are.
+        seeds: which arms of their kind.
+        robot: host of a control box that is there already, instead of robots, fidelities and seeds.
+        port_base: offset of the ports of `robot`.
+        reverse_port: port of this computer that `robot` calls; 0: any free one.
+        cell: cell file of `robot`, beside the configuration: what stands around it and what it carries.
+        repeat: runs of each case in one session.
+        search: let optuna choose settings from [controller] instead of taking every combination.
+        keep_recordings: whether the recordings (MCAP) stay in the folder.
+        output: folder of the results, as seen from where the command is given; --out goes before it.
+        controller: fields of the controller, each with a value, a list of values or a range.
+    """
+
+    movements: Annotated[tuple[Text, ...], Items()]
+    controllers: Annotated[tuple[Annotated[str, word(CONTROLLERS)], ...], Items()] = (DEFAULT,)
+    robots: Annotated[tuple[Annotated[str, word(ROBOTS)], ...], Items()] | None = None
+    fidelities: Annotated[tuple[Annotated[str, word(FIDELITIES)], ...], Items()] | None = None
+    seeds: Annotated[tuple[Annotated[int, whole(0)], ...], Items()] | None = None
+    robot: Text | None = None
+    port_base: Annotated[int, whole(-65535, 65535)] | None = None
+    reverse_port: Annotated[int, whole(0, 65535)] | None = None
+    cell: Text | None = None
+    repeat: Annotated[int, whole(1, 99)] = 1
+    search: Search | None = None
+    keep_recordings: Flag = False
+    output: Text | None = None
+    controller: dict[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("movements", "controllers", "robots", "fidelities", "seeds"):
+            if problem := repeated(getattr(self, key) or ()):
+                raise ValueError(f"{key}: {problem}")
+        for key in ("port_base", "reverse_port", "cell") if self.robot is None else ():
+            if getattr(self, key) is not None:
+                raise ValueError(
+                    f"{key}: goes with robot = HOST; simulated arms have ports of their own, and nothing "
+                    "around them"
+                )
+        for key in () if self.robot is None else ("robots", "fidelities", "seeds"):
+            if getattr(self, key) is not None:
+                raise ValueError(f"{key}: is for simulated arms, but robot = {self.robot!r} is there already")
+
+
+@dataclass(frozen=True, slots=True)
+class SweepConfig:
+    """What a sweep's file asks for.
+
+    Attributes:
+        file: its keys.
+        movements: what to do.
+        arms: simulated arms; empty when the file names a robot.
+        cell: what stands around that robot and what it carries.
+        axes: the values of the controller's fields.
+    """
+
+    file: SweepFile
+    movements: tuple[MovementFile, ...]
+    arms: tuple[SimulatedArm, ...]
+    cell: Cell
+    axes: dict[str, Axis]
+
+    @property
+    def n_cases(self) -> int:
+        """Cases in all; a search that proposes a setting twice has fewer."""
+        search = self.file.search
+        spanned = prod(0 if isinstance(axis, Range) else len(axis) for axis in self.axes.values())
+        n_settings = search.trials if search else len(self.file.controllers) * spanned
+        return len(self.movements) * max(1, len(self.arms)) * n_settings
+
+    def batches(self, results: Callable[[], pl.DataFrame]) -> Iterator[list[Controller]]:
+        """The settings to try: a grid in one batch, those of a search in several.
+
+        Args:
+            results: gives the table of the batch before, when its cases are settled.
+
+        Raises:
+            ModuleNotFoundError: a search without optuna (extra `search`).
+        """
+        bases = [CONTROLLERS[name] for name in self.file.controllers]
+        if self.file.search is not None:
+            yield from searched(bases, self.axes, self.file.search, results)
+        else:
+            yield grid(bases, {k: axis for k, axis in self.axes.items() if not isinstance(axis, Range)})
+
+
+def read_config(path: Path) -> SweepConfig:
+    """Read the file of a sweep.
+
+    Raises:
+        SweepError: the file cannot be read, or what it says makes no sense.
+        ControllerError: a field of the controller cannot hold a value.
+        MovementError: a movement file makes no sense.
+    """
+    values = FILE_KINDS["sweep"].read_toml(path)
+    for key in values:
+        if key in FIELDS:
+            raise SweepError(f"{path}: {key}: is a field of the controller; put it under [controller]")
+    file = checked(SweepFile, values, str(path), SweepError)
+    axes = read_axes(file.controller or {}, str(path))
+    if file.search is None:
+        for name, axis in axes.items():
+            if isinstance(axis, Range):
+                raise SweepError(
+                    f"{path}: controller.{name}: a range is searched; give a table [search], or a list"
+                )
+    elif not axes and len(file.controllers) == 1:
+        raise SweepError(f"{path}: search: there is nothing to choose; give fields in a table [controller]")
+    config = SweepConfig(
+        file,
+        tuple(_movement(name, path) for name in file.movements),
+        () if file.robot is not None else _arms(file),
+        NO_CELL if file.cell is None else load_cell(path.parent / file.cell),
+        axes,
+    )
+    if problem := repeated([movement.name for movement in config.movements]):
+        raise SweepError(f"{path}: movements: {problem}")
+    if config.n_cases > _MOST_CASES:
+        raise SweepError(
+            f"{path}: {config.n_cases} cases, at most {_MOST_CASES} are allowed; make the lists shorter"
+        )
+    return config
+
+
+def _arms(file: SweepFile) -> tuple[SimulatedArm, ...]:
+    return tuple(
+        SimulatedArm(robot, fidelity, seed)
+        for robot in file.robots or ("ur3",)
+        for fidelity in file.fidelities or ("typical",)
+        for seed in file.seeds or (0,)
+    )
+
+
+def _movement(word: str, config: Path) -> MovementFile:
+    """A movement, read and checked; files lie beside the configuration."""
+    path = library_path(word) or config.parent / word
+    if not path.suffix:
+        raise SweepError(
+            f"{config}: movements: no movement is called {word!r}; {nearest(word, library_names())}"
+        )
+    try:
+        return MovementFile(load_movement(path).name, path.name, FILE_KINDS["samples"].read_text(path))
+    except MovementError as error:
+        raise MovementError(f"{config}: movements: {error}") from error
 
 
 def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
@@ -196,30 +390,8 @@ def _short(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-_MOST_TRIALS = 100_000
-
 _KEY = ("controller", *FIELDS)
 """The columns that distinguish all settings."""
-
-
-@record
-class Search:
-    """How the best setting is searched.
-
-    The settings depend on these fields, on the results and on the version of optuna, not on how many workers
-    there are.
-
-    Attributes:
-        trials: settings to try.
-        batch: settings that are chosen together, before any of them has a result.
-        sampler: "tpe": optuna's tree-structured Parzen estimator; "random": without regard to the results.
-        seed: of the sampler.
-    """
-
-    trials: Annotated[int, whole(1, _MOST_TRIALS)]
-    batch: Annotated[int, whole(1, 1000)] = 8
-    sampler: Annotated[str, word(("tpe", "random"))] = "tpe"
-    seed: Annotated[int, whole(0, 2**32 - 1)] = 0
 
 
 def searched(
