@@ -44,8 +44,6 @@ def levels_figure(
     Args:
         frame: a row a movement: its name, the paper's figure, and the noise floor.
         experiments: label and table of each.
-        mark: as of `Sheet`.
-        floors: whether the noise floors are shown.
     """
     names = frame["name"].to_list()
     series = [Bars("paper, real UR3", PAPER_GREY, frame["paper_snr_db"].to_numpy())]

@@ -54,7 +54,6 @@ class Report:
     """What was made of a folder of recordings.
 
     Attributes:
-        table: Table I of the runs.
         paths: the files written: table1.json, table1.md and, with a page, report.html.
         left_out: one line for each recording that is not in the table, with the reason.
     """

@@ -171,7 +171,6 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
 
     Args:
         reports: of their folders; the page links to those that have pages.
-        out: the page.
 
     Raises:
         RecordingError: there is no experiment, matplotlib or jinja2 is missing, or the page cannot be

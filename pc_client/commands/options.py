@@ -149,11 +149,6 @@ class RunSettings:
 
     Attributes:
         controller: the same for all runs.
-        cell: what stands around the arm and what it carries.
-        ports: where the control box listens.
-        reverse_port: where its programs dial back; see `ReverseServer`.
-        overwrite: replace simulated recordings of the same names.
-        yes: do not ask before a real arm moves.
         dry_run: end where the arm would begin to move.
     """
 

@@ -101,9 +101,6 @@ def _work(outcomes: Iterator[Outcome], n_cases: int, n_settled: int, *, live: bo
     """Run the cases, and show how far it is.
 
     Args:
-        outcomes: as they come.
-        n_cases: cases in all.
-        n_settled: those that were done before.
         live: True: the clock ticks. False: redrawn when a case is done; the thread that lets it tick would
             take the interpreter from a control loop in this process.
     """

@@ -113,7 +113,6 @@ class Controller:
         """This controller with other values in some fields.
 
         Args:
-            values: by field of `FIELDS`.
             where: file and key, or option, that gave a field its value, for messages.
 
         Raises:

@@ -86,7 +86,6 @@ class DelayEstimate:
         delay: the delay [s].
         residual: rms of what the delayed commands do not explain [rad].
         motion: rms of the commanded motion about its mean [rad].
-        n_samples: frames used.
     """
 
     delay: float

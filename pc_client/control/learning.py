@@ -145,10 +145,8 @@ def learn(
 
     Args:
         run: the last run, complete and without gaps.
-        loop: the identified loop.
         weight: Q.
         gain: of learning, 0..1.
-        bounds: cut off what is beyond.
         quiet: stretches at the beginning and at the end of the run in which nothing is added, since the arm
             rests there [s].
         period: control cycle [s].

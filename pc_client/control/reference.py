@@ -62,7 +62,6 @@ class ReferenceTable:
     """A reference sampled on the control grid, with its feed-forward.
 
     Args:
-        joints: the joint reference.
         period: control cycle of the robot [s].
         lead: time before the movement that is needed [s].
         settle: time after it [s].

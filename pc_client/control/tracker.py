@@ -62,7 +62,6 @@ def step_pi(
     further into the limit (conditional integration); besides, the integral itself is bounded.
 
     Args:
-        config: gains and limits.
         qd_max: (6,) largest commanded speeds [rad/s].
         state: memory of the controller; changed in place.
         q_ref: (6,) desired positions [rad].
@@ -127,7 +126,6 @@ class ToolGuard:
     by the angle a have matrices that differ by 2 sqrt(2) sin(a / 2).
 
     Args:
-        reference: what the joints shall do.
         model: the nominal arm; the tool is its flange.
         path_tolerance: largest distance of the tool from its path [m].
         angle_tolerance: largest angle of the tool to its orientation there [rad].
@@ -223,7 +221,6 @@ class TrackerStep(NamedTuple):
 
     Attributes:
         t: time since the movement began [s], negative before it.
-        phase: settle before, movement or settle after.
         point: the reference at t.
         qd_cmd: (6,) velocities to send, or in force [rad/s].
         finished: True: the run is over, send the stop word instead of `qd_cmd`.
@@ -242,8 +239,6 @@ class Tracker:
     Time is the robot's own: the first time stamp is `reference.lead` seconds before the movement begins.
 
     Args:
-        reference: what to follow.
-        config: the controller.
         model: the nominal arm: what its tool does is guarded, and the controller uses its share of the joint
             speed limits.
         law: computes the commands in place of the built-in controller; None: that computes them.

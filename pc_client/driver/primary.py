@@ -49,11 +49,6 @@ _OLDEST = SoftwareVersion(3, 3)
 class PackageStream:
     """One connection to a primary or secondary port.
 
-    Args:
-        transport: the connected port.
-        network: its clock.
-        name: the port's name for messages, e.g. "primary".
-
     Attributes:
         version: software of the controller, once its version message came.
     """

@@ -46,9 +46,6 @@ def ask_dashboard(network: Network, host: str, port: int, questions: tuple[str, 
     """Ask what the dashboard server knows.
 
     Args:
-        network: makes the connection.
-        host: the robot.
-        port: its dashboard port.
         questions: commands that only ask, e.g. `get serial number`.
 
     Returns:
@@ -128,7 +125,6 @@ class RtdeAnswer:
     """What the RTDE port says.
 
     Attributes:
-        version: of its controller's software.
         values: of the variables that this software knows, all of one cycle.
     """
 

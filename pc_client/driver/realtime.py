@@ -59,8 +59,6 @@ class RealtimeClient:
     """Reads one realtime connection.
 
     Args:
-        transport: the connected port.
-        network: its clock, for the time-outs.
         time_waits: the robot says that its time waits for its clients, as in lockstep.
 
     Attributes:
@@ -218,9 +216,6 @@ def wait_until(
     """Read frames until one meets a condition.
 
     Args:
-        condition: what to wait for.
-        frames: the realtime port.
-        network: the clock.
         timeout: [s]; of a robot whose time runs by itself.
         complaint: message of the error when it takes longer.
         check: called with the newest frame before the condition is looked at; raises what ends the waiting.

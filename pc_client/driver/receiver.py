@@ -111,16 +111,11 @@ class ReverseServer:
     """A listening port for the calls of the robot's programs, open for a whole session.
 
     Args:
-        network: opens the port.
         address: our own address as the robot sees it; the port opens on no other.
         robot_address: the only address that may call. An emulated robot on this machine may call from any
             of this machine's loopback addresses.
         port: which one; 0: any free one; None: REVERSE_PORT, or any free one if it is taken and the robot is
             on this machine, where no firewall lies between and many emulated robots may be used at once.
-
-    Attributes:
-        address: to dial.
-        port: to dial.
 
     Raises:
         DriverError: the port is taken, or may not be used.

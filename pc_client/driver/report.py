@@ -56,7 +56,6 @@ class RobotInfo:
     """What a robot says about itself.
 
     Attributes:
-        version: controller software.
         model: e.g. `UR3` or `UR5e`, or "unknown" when the robot does not report it.
         serial: serial number, or "unknown" when the dashboard server does not report it.
         simulated: True when the robot says so; False when its serial number is that of a real arm and it has
@@ -102,7 +101,6 @@ class RobotReport:
     """What a robot reports. None stands for what it does not report.
 
     Attributes:
-        info: which robot it is.
         configured: the arm by the configuration data of port 30001, e.g. `UR3` or `UR5e`.
         frame: its state on port 30003.
         slider: speed slider, 0 to 1, from port 30001.
@@ -136,9 +134,6 @@ class StatePorts:
     `close` must follow, also when connecting has failed. As a context manager it connects, and closes.
 
     Args:
-        network: makes the connections.
-        host: the robot's name or address.
-        ports: its ports.
         timeout: for each connection [s].
 
     Attributes:
@@ -285,7 +280,6 @@ class FrameRhythm:
     """How the realtime frames came in.
 
     Attributes:
-        frame_size: bytes of a frame.
         n_new: frames with a new time stamp.
         n_heartbeats: frames that repeated one: the robot's time stands still between programs.
         cycle: median step of the time stamps [s]; None when time stood still.
@@ -326,9 +320,6 @@ def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosi
     """Look at everything that a session would need.
 
     Args:
-        network: makes the connections.
-        host: the robot.
-        ports: its ports.
         seconds: how long to listen to the frames [s].
 
     Raises:

@@ -60,13 +60,10 @@ class UrDriver:
     Use as a context manager; leaving it stops the arm if it is still moving and closes all connections.
 
     Args:
-        host: the robot's name or address.
-        ports: its ports.
         reverse_port: where its programs dial back; see ReverseServer.
         network: tests hand in a network in memory.
 
     Attributes:
-        info: which robot answered.
         layout: columns of its realtime frames.
     """
 

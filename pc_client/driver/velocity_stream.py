@@ -100,7 +100,6 @@ class VelocityStream:
     """Streams velocities to a program that has just connected.
 
     Attributes:
-        frames: the realtime port.
         reverse: the program's connection.
         network: the clock that bounds standstill.
         period: control cycle of the robot [s].
@@ -115,10 +114,6 @@ class VelocityStream:
 
     def run(self, source: CommandSource[S], on_row: RowSink[S]) -> StreamReport:
         """Stream until the source has finished; then the stop word is sent.
-
-        Args:
-            source: a fresh one.
-            on_row: takes every row; what it raises ends the run.
 
         Returns:
             What happened on the wire. The arm may still be coming to rest.

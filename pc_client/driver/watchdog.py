@@ -20,8 +20,6 @@ class Condition:
     Attributes:
         name: of the quantity, as on the pendant or in UR's manuals.
         reported: what it is; empty when the robot does not report it.
-        needed: what it must be.
-        remedy: what to do when it is not.
         holds: whether it is; None when the robot does not report it.
     """
 

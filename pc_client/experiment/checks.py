@@ -87,7 +87,6 @@ def broken_limit(
         plan: where the run begins, and the limits.
         commands: (n, 6) feed-forward of all cycles [rad/s].
         learned: (m, 6) the part of it that was learned from the run before [rad/s], or None.
-        model: the nominal arm.
         config: its shares of the limits.
         period: control cycle [s].
     """

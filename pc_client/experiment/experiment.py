@@ -33,10 +33,6 @@ class Experiment:
     """What is to be done.
 
     Attributes:
-        model: the nominal arm that the plans were made for.
-        planned: the movements, in order.
-        repeat: runs of each.
-        out: folder of the recordings.
         overwrite: replace simulated recordings of the same names.
 
     Raises:

@@ -49,7 +49,6 @@ class Identification:
     Attributes:
         estimate: dead time and lag as one delay.
         loop: dead time and lag apart, for a controller that uses them; else the delay alone.
-        margins: of the feedback on this loop.
         learning: the filter of a controller with ILC; None without.
     """
 
@@ -94,7 +93,6 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> Identif
     Args:
         driver: a session; the arm rests.
         config: the controller that will be used: its acceleration is part of the loop, its gains are checked.
-        model: the nominal arm.
 
     Raises:
         DriverError: the excitation leads out of the limits, the stream broke, or the arm did not follow.

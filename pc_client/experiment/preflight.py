@@ -45,7 +45,6 @@ def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition,
     """Hold everything that a robot reports against what is needed.
 
     Args:
-        report: what the robot reports.
         model: nominal arm of the plan; None when there is no model of the arm that answers.
 
     Returns:

@@ -18,12 +18,7 @@ from pc_client.planning.approach import Approach
 
 
 class Progress(Observer):
-    """An observer that draws one progress bar.
-
-    Args:
-        console: where.
-        n_runs: runs in all.
-    """
+    """An observer that draws one progress bar."""
 
     def __init__(self, console: Console, n_runs: int) -> None:
         # Redrawn by hand: rich's own refresh thread would take the interpreter from the control loop.

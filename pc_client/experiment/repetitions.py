@@ -76,10 +76,7 @@ class Repetitions:
     """The memory of one movement.
 
     Args:
-        config: the controller.
-        loop: the identified loop.
         learning: Q; None for a controller that does not learn.
-        model: the nominal arm.
         period: control cycle [s].
 
     Attributes:
@@ -127,9 +124,6 @@ class Repetitions:
         """Learn from a run that came to its end.
 
         Args:
-            repetition: its number.
-            log: its frames.
-            stream: what happened on the wire.
             lead: time of the run before the movement [s]; in its first half nothing is learned.
             settle: time of the run after it [s]; in its second half nothing is learned.
         """

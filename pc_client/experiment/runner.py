@@ -71,8 +71,6 @@ class ExperimentReport:
 
     Attributes:
         delay: the identified loop and its margins.
-        paths: recordings, in order.
-        streams: what happened on the wire in each run.
         remarks: one line for each run in which nothing could be learned or used.
     """
 
@@ -87,9 +85,6 @@ class ExperimentRunner:
 
     Args:
         driver: a session with the robot; it stays open.
-        experiment: what to do.
-        config: the controller, the same for all runs.
-        observer: gets the progress.
         law: computes the commands in place of the controller.
     """
 

@@ -130,7 +130,6 @@ class RobotDescription:
     Attributes:
         name: short name, e.g. `ur3`.
         geometry: file below `example-robot-data/robots/`, or the lengths of the arm.
-        limits: joint limits.
         reach: distance from the base axis to the flange of the stretched arm [m].
         position_tolerance: between the flange that a real arm reports and this model's [m].
         working_box: where the tool at RPY(0, 3/4 pi, 0) runs .35 m/s in every direction below the joint speed
@@ -223,11 +222,8 @@ def _arm(
     """A row of the table, in SI units but for the rated speeds [deg/s].
 
     Args:
-        name: of the arm.
         lengths: None: its URDF is in example-robot-data.
-        speeds: of the joints, as rated.
         accelerations: of shoulder and elbow.
-        reach: of the stretched arm.
         position_tolerance: of the reported flange.
         box: working box: x from, x to, y to both sides, z from, z to.
         shift: of the movements of the library, forwards.

@@ -30,7 +30,6 @@ class Solid:
     """A convex body.
 
     Attributes:
-        name: for messages.
         kind: a key of _NOUNS.
         sizes: x, y, z of a box; the radius, and the length of a cylinder or capsule [m].
         centre: in `base`, or in the flange's frame for a part of a tool [m].
@@ -54,7 +53,6 @@ class Wall:
     """A half space: the arm must stay at normal . p > offset.
 
     Attributes:
-        name: for messages.
         normal: unit vector from the wall to the arm, in `base`.
         offset: normal . p of the wall's points [m]; below 0, since the base stands on the free side.
     """
@@ -86,9 +84,7 @@ class Cell:
     Attributes:
         name: for messages; empty: nothing is known, the bare arm stands on a plane.
         floor_z: height of the surface under the arm in `base`; forearm, wrists and tool stay above it [m].
-        walls: half spaces.
         solids: bodies, in `base`.
-        tool: what the flange carries.
         text: the file that it was read from.
     """
 

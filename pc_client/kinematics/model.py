@@ -45,8 +45,6 @@ class RobotModel:
     `pin_data` is scratch memory that every computation overwrites: give each thread a model of its own.
 
     Attributes:
-        description: names, limits, preferred branch.
-        cell: what stands around it and what it carries.
         pin_model: Pinocchio model whose world frame is UR's `base`.
         tcp_frame: index of the frame `tool0`.
     """
@@ -224,7 +222,6 @@ class IkSolution(NamedTuple):
         q: (6,) joint angles [rad]; the best found when not converged. Not wrapped to any turn.
         position_error: distance between reached and wanted TCP [m].
         rotation_error: angle between reached and wanted orientation [rad].
-        iterations: steps taken.
         converged: both errors are within tolerance.
     """
 
@@ -378,7 +375,6 @@ def flange_difference(
     """How far the reported flange is from the model's [m, rad]; endless where a value is no number.
 
     Args:
-        model: nominal arm.
         q: (6,) reported joint angles [rad].
         pose: (6,) reported pose of the TCP in the base frame [m, rad].
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad].

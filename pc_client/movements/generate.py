@@ -86,7 +86,6 @@ class Generator:
 
     Attributes:
         make: from the movement of the paper's recipe, a seed and the new movement's name.
-        says: what it is, for tables and help.
         same_strokes: whether the strokes last as long as those of the recipe; the whole always does.
         same_targets: whether the target points are those of the recipe.
     """

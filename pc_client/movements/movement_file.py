@@ -148,10 +148,6 @@ def kind_of(trajectory: Trajectory) -> str:
 def read_record(values: Mapping[str, Any], source: str) -> MovementFile:
     """The record of a file.
 
-    Args:
-        values: as `tomllib` gives them.
-        source: the file's name, for messages.
-
     Raises:
         MovementError: a field is wrong.
     """

@@ -139,7 +139,6 @@ class PowerLaw:
         largest_radius: R, m: a path straighter than this is run at one speed.
         exponent: beta, 0 to 1; 1/3 is the two-thirds power law, 0 a constant speed.
         torsion_exponent: gamma, 0 to 1; 0 is the power law in the plane, 1/6 that in space.
-        path: the smooth path through the target points.
 
     Raises:
         MovementError: a number is outside its range, or the target points make no smooth path.

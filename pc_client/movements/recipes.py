@@ -61,7 +61,6 @@ def fit_movement(
     """The movement as large as it fits into the box, in its middle.
 
     Args:
-        movement: where and as large as it may be.
         box: where its path must lie, base frame, m.
         rotate: "none"; "yaw": the angle about the vertical, of 360 half degrees, that allows the largest
             scale; "any": the principal axes of the path are laid along the box's axes, the longest along the
@@ -251,7 +250,6 @@ def recipe_movement(n_targets: int, seed: int, name: str, box: Box = UR3_BOX) ->
     Args:
         n_targets: number of target points, at least 2.
         seed: 0 or more; the same seed gives the same movement everywhere.
-        name: the movement's.
         box: where, base frame, m.
     """
     source = random.Random(seed)

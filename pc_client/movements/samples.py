@@ -232,8 +232,6 @@ def parse_rows(text: str, source: str, forms: Sequence[tuple[str, ...]], wanted:
     """Rows of finite numbers; a column t must increase.
 
     Args:
-        text: the file's content.
-        source: the file's name, for messages.
         forms: the columns that the table may have; without a first line of names, the only one with as many
             columns.
         wanted: what the columns are, for messages.

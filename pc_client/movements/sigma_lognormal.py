@@ -40,7 +40,6 @@ class Stroke:
     """A stroke in space between two target points that its movement names.
 
     Attributes:
-        timing: when.
         arc_angle: how much the direction turns over the whole stroke, rad, in (-2 pi, 2 pi); 0 is a straight
             line.
         tilt: which plane the arc lies in: angle about the chord, rad, from the upright reference plane of

@@ -78,7 +78,6 @@ def duplicate(
         seed: 0 or more; the same seed gives the same duplicate everywhere.
         name: the duplicate's; made from name and seed if None.
         share: how much of the ranges is used: 0 gives the movement itself, 1 all of them.
-        ranges: what may change by how much.
 
     Raises:
         MovementError: another kind of movement, or a share outside of 0 to 1.

@@ -89,7 +89,6 @@ class PlanReport:
         position_error: largest error of the inverse kinematics [m].
         rotation_error: the same for the orientation [rad].
         interpolation_error: largest distance of the spline from the movement half way between samples [m].
-        ik_iterations: steps of the inverse kinematics per sample.
     """
 
     robot: str
@@ -223,13 +222,7 @@ def check_motion(
     """Measure a planned motion and compare it with its limits.
 
     Args:
-        model: nominal arm.
-        names: how to name a sample.
-        samples: the movement.
         tcp_speed: what `check_samples` returned.
-        path: its joint angles.
-        spline: the spline through them.
-        limits: what is allowed.
 
     Raises:
         PlanningError: a limit is broken; names the sample where it is broken most, and the joint.

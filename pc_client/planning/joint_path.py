@@ -58,8 +58,6 @@ class JointPath:
         q: (n, 6) joint angles [rad].
         position_error: (n,) distance between reached and wanted TCP [m].
         rotation_error: (n,) angle between reached and wanted orientation [rad].
-        singularity: measures per sample.
-        iterations: total steps of the inverse kinematics.
     """
 
     q: Array
@@ -80,7 +78,6 @@ def follow_path(
     """Solve the inverse kinematics of a path of finite positions.
 
     Args:
-        model: nominal arm.
         names: time and TCP positions of the samples.
         R_base_tcp: orientation of the TCP at all samples (3, 3), or at each (n, 3, 3).
         q_branch: (6,) posture whose branch is followed [rad]; the arm's preferred one by default.

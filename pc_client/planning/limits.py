@@ -105,9 +105,7 @@ class PathNames:
         """Return (not raise) the error for one sample.
 
         Args:
-            sample: index of the offending sample.
             what: what is wrong, what is allowed, what to do.
-            joint: index of the offending joint, named in the text.
         """
         x, y, z = self.p[sample]
         where = f"t = {self.t[sample]:.3f} s, TCP at ({x:.4f}, {y:.4f}, {z:.4f}) m"

@@ -67,7 +67,6 @@ class JointPlan:
     """A checked motion of the joints.
 
     Attributes:
-        name: name of the movement.
         t: (n,) sample times [s].
         p: (n, 3) TCP positions at the samples [m].
         q: (n, 6) joint angles at the samples [rad].
@@ -174,7 +173,6 @@ def plan_movement(
     """Plan a movement of the TCP.
 
     Args:
-        movement: what the TCP shall do.
         model: nominal arm; a UR3 by default.
         dt: wanted time between samples [s]; shortened a little to make the duration a whole number of steps.
         limits: what the plan must keep; by default what belongs to the arm.

@@ -54,7 +54,6 @@ class Joint:
     Attributes:
         name: as ROS drivers of UR arms call it, e.g. `shoulder_pan_joint`.
         parent: the link that it is fixed to.
-        child: the link that it moves.
         origin: where the child's frame begins, in the parent's frame [m].
         rpy: roll, pitch, yaw of the child's frame against the parent's at angle 0 [rad].
         rotation: the same as a quaternion.
@@ -320,8 +319,6 @@ class ArmView:
     """Writes the view of one recording.
 
     Args:
-        arm: links and joints.
-        writer: of the file, begun.
         columns: names of the numbers of a frame, in order.
         cycle_time: control cycle [s].
     """

@@ -172,7 +172,6 @@ class Recorder:
                 ...stop the arm; leaving the block raises the error
 
     Attributes:
-        path: the file.
         n_rows: rows appended so far.
     """
 
@@ -255,7 +254,6 @@ class Recorder:
             ref_p: (3,) reference TCP position, base frame, m.
             ref_v: (3,) reference TCP velocity, base frame, m/s.
             cmd_qd: (6,) joint velocities sent in answer to this frame, rad/s.
-            phase: a `Phase`.
         """
         n, log_time = self.n_rows, self._log_time(float(frame_values[self._stamp_at]))
         self.n_rows += 1

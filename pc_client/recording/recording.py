@@ -62,8 +62,6 @@ class Recording:
     """A recording in memory; all rows, one array a signal.
 
     Attributes:
-        path: the file it came from.
-        provenance: where the data come from.
         signals: every column, in file order.
         summary: results that the recorder's `close` was given; empty when the file is cut off.
         complete: True when the file was closed properly and all of it could be read.
@@ -292,8 +290,6 @@ def export(recording: Recording, path: Path | str, format: _ExportFormat = "csv"
     """Write all rows of a recording into one table; an existing file is replaced.
 
     Args:
-        recording: what to export.
-        path: file to write.
         format: "csv" (full float precision), "parquet" or "mat" (carry the provenance too).
 
     Raises:

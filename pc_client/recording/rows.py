@@ -38,7 +38,6 @@ class Signal:
 
     Attributes:
         name: RTDE spelling where RTDE has the signal, e.g. `actual_TCP_pose`.
-        count: how many numbers it has.
         unit: unit for people, e.g. "rad/s"; may be empty.
         type: ROS 2 primitive type of one number.
     """

@@ -193,10 +193,7 @@ def bars_of_levels(
     """Draw groups of bars beside each other, in dB.
 
     Args:
-        names: of the groups.
         series: the bars of a group, from left to right.
-        mark: as of `Sheet`.
-        title: above the figure, at the left.
         floors: (n,) a level for each group, as a line over its bars; nan where there is none.
     """
     series = [bars for bars in series if not np.isnan(bars.levels).all()]

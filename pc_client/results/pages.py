@@ -58,7 +58,6 @@ def render(template: str, *, scripts: bool = False, **values: Any) -> str:
     Args:
         template: its path within `pc_client`, as templates name each other, e.g. "analysis/report.html.j2".
         scripts: whether the page has figures that can be zoomed.
-        values: what it uses.
 
     Raises:
         ModuleNotFoundError: jinja2 or plotly is not installed (extra `report`).

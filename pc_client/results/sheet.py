@@ -76,12 +76,9 @@ class Panel:
 
     Attributes:
         box: its place on the sheet.
-        curves: the first is drawn first.
-        title: above it, at the left.
         labels: of its axes, with units; an axis without one has no numbers either.
         ranges: of its axes; panels of a sheet with the same range of x are zoomed together.
         legend: where it stands; "inside": at the top, for which the axis gets room.
-        columns: of the legend.
         texts: around points (2,), in space at the right of points (3,).
         shaded: (n, 2) begins and ends on x.
         ticks: texts by place on x, where they are not numbers.
@@ -143,7 +140,6 @@ class Sheet:
 
     Attributes:
         mark: what the data are, written on it; empty for those of a real arm, or none at all.
-        title: at the top.
     """
 
     height: float

@@ -34,7 +34,6 @@ class Column:
         header: its heading; empty: the name.
         unit: stands in brackets behind the heading.
         format: of its values, as Python's `format` takes it; empty: as `str` writes them.
-        align: of heading and cells.
         missing: the cell of a missing value.
         narrow: the heading on a terminal, with line breaks; empty: the unit stands below the heading.
         kind: type of its values; any of them may be missing.
@@ -97,13 +96,9 @@ def to_rich(
     """A table for a terminal.
 
     Args:
-        frame: the values.
-        columns: those that are shown.
         bold: a column of truth values: these rows are bold.
         section: a column: where its value changes, an empty line follows.
         padding: of the cells: top, right, bottom, left.
-        title: above it.
-        caption: below it.
     """
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape as as_it_is
@@ -131,8 +126,6 @@ def to_html(frame: pl.DataFrame, columns: Sequence[Column], *, bold: str = "", l
     """A table for a page, escaped.
 
     Args:
-        frame: the values.
-        columns: those that are shown.
         bold: a column of truth values: these rows are bold (class `mean`).
         links: the first cell of each row that is not bold is a link to the section that it names.
     """

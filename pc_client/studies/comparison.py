@@ -202,7 +202,6 @@ class Comparison:
         frame: a row for each signal of each movement ("planned", "filtered" and, where it was, "executed"):
             generator, movement, duration [s], signal, the figures of `Likeness` (nan where there is nothing
             to fit) and of executed ones the SNR of Eq. 10, raw and after the best time shift.
-        n_strokes: of each movement.
         rate: of the control cycle, Hz.
         robot: e.g. "SIMULATED UR3 3.15.8, seed 7, controller preview"; None where nothing was executed.
     """
@@ -295,7 +294,6 @@ def build_comparison(
     """Measure all movements.
 
     Args:
-        sets: what was planned.
         runs: the recordings by the movement's name; None where nothing was executed.
         rate: of the samples, Hz, where nothing was executed.
 

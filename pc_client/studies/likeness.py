@@ -171,7 +171,6 @@ class PowerLawFit(NamedTuple):
     Attributes:
         exponent: beta; nan when the path has no bend to fit.
         r_squared: share of the variance of ln speed that the power law explains, 0 to 1; nan likewise.
-        n_samples: samples that were used.
     """
 
     exponent: float

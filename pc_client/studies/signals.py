@@ -72,7 +72,6 @@ def low_passed(
 
     Args:
         p: positions at equal steps of time, (n, dim).
-        rate: samples a second, Hz.
         cutoff: frequency that keeps half of its amplitude (-6 dB), Hz.
         order: of the filter, before it is doubled by the way back.
         padding: samples by which the positions are continued at both ends, so that the filter has settled.

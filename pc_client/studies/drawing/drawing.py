@@ -72,9 +72,7 @@ class Drawing:
     """A drawing as the arm executes it.
 
     Attributes:
-        extraction: the recording as strokes.
         marks: its parts and dots, in the recording's frame and time.
-        placement: where it is done.
         joined: all of it in one movement, base frame, as fast as the hand was.
         factor: how many times slower than the hand the arm is.
         movement: what the arm shall do.
@@ -144,10 +142,6 @@ def make_drawing(
     """Make a drawing ready for an arm.
 
     Args:
-        extraction: the recording as strokes.
-        name: of the movement: for file names and tables.
-        arm: who shall do it.
-        options: where and how large.
         slower: times slower than the arm's limits ask, >= 1: leaves room for a controller's corrections.
 
     Raises:

@@ -192,11 +192,9 @@ def paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: Robot
     """Join marks with pen-up moves that ask no more of the arm than the marks do.
 
     Args:
-        name: for messages.
         marks: in order of time, m, base frame.
         gaps: the least ones, (n_marks + 1,), s of the hand.
         lift: from the sheet to the lifted pen, (3,), m.
-        arm: who shall do it.
 
     Raises:
         PlanningError: the path itself cannot be done, at any speed.
@@ -224,8 +222,6 @@ def least_factor(
 
     Args:
         make: the movement, slowed down by a factor.
-        guess: where to look first.
-        arm: who shall do it.
 
     Raises:
         PlanningError: it is refused although it is slow; the message is planning's.

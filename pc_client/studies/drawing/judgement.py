@@ -151,7 +151,6 @@ class RunVerdict:
     """One run; its fields are keys of `draw.json`.
 
     Attributes:
-        repetition: its number.
         planned: executed against planned.
         human: executed against the recording.
         planned_aligned: executed against planned, after the best time shift and without the constant offset
@@ -187,7 +186,6 @@ class Verdict:
         plan: the plan, with tails of neighbours and lifts, against the recording.
         human: how human-like the recording is.
         reconstructed: how human-like the strokes are.
-        runs: what the arm did.
     """
 
     reconstruction: Agreement

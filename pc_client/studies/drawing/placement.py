@@ -194,7 +194,6 @@ class Placement:
         lift: from the sheet to the lifted pen, (3,), m, base frame.
         rotation: turn on the sheet, rad.
         plane: a key of `PLANES`, or "space".
-        y_up: whether the recording's y axis points up the sheet.
     """
 
     similarity: Similarity
@@ -217,8 +216,6 @@ def place(marks: Sequence[Mark], drawn: Array, options: PlacementOptions, *, fla
     Args:
         marks: in the recording's frame; their whole path must lie in the box.
         drawn: (n, 3), what the pen draws in the same frame: it has the size that is asked for.
-        options: what is asked.
-        flat: whether the recording is flat.
 
     Raises:
         MovementError: all of the drawing is one point.

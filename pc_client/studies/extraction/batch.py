@@ -104,9 +104,7 @@ class ExtractionOutcome:
     """The result of one recording.
 
     Attributes:
-        name: of the recording.
         row: its figures (`figures_of`), or None when it could not be used.
-        strokes: its strokes.
         remarks: what was mended, and what to know about the strokes.
         picture: a PNG file's bytes, where one was wanted and something moves.
         error: one line, when it could not be used.
@@ -132,8 +130,6 @@ def extract_many(
 
     Args:
         sources: what to extract from, as `pen.pen_sources` finds it in files, folders and .zip archives.
-        executor: where.
-        options: of each extraction.
         time_unit: a key of `pen.TIME_UNITS`, or None: from each file.
         n_pictures: how many of the first recordings get a picture.
         on_outcome: called with every outcome as it comes in, in any order.

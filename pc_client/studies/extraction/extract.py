@@ -39,7 +39,6 @@ class ExtractOptions:
     Attributes:
         strokes_per_peak: most strokes per speed peak of a recording. Every moving part gets one stroke in any
             case, and a recording as many as `fit.least_db` takes.
-        fit: effort of the fit.
     """
 
     strokes_per_peak: float = 1.2
@@ -78,7 +77,6 @@ class Extraction:
     """The strokes of a recording.
 
     Attributes:
-        name: of the recording.
         parts: those that move, in order of time.
         snr_v_db: over all parts, or None when nothing moves; so the next.
         lognormality: SNR_v per stroke, dB, or None when nothing moves.

@@ -72,7 +72,6 @@ class Fitted:
     """The result of a fit.
 
     Attributes:
-        chains: the strokes of each part.
         through: True: the signal is so clean that the strokes were fitted through the low-pass: the filtered
             strokes give the recording, and are compared with it.
     """
@@ -85,10 +84,8 @@ def fit_parts(parts: Sequence[Trace], budget: int, options: FitOptions) -> Fitte
     """Strokes for all parts, of which there is at least one; all move.
 
     Args:
-        parts: of a recording.
         budget: most strokes of all parts together, unless these would reconstruct too little, see
             `FitOptions`. Every part gets one for each of its speed peaks in any case.
-        options: effort.
     """
     fitting = _Fitting(parts, options)
     if fitting.unexplained() < _share(_PERHAPS_CLEAN_DB):

@@ -166,7 +166,6 @@ def lognormal_from_points(
     """The lognormal of a known sigma through two of the three points.
 
     Args:
-        points: the characteristic points.
         sigma: from one of the formulas of this module, > 0.
         i: the point whose time and speed are met, 0..2.
         k: the other point whose time is met, 0..2.

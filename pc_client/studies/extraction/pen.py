@@ -74,7 +74,6 @@ class PenRecording:
     """A whole recording.
 
     Attributes:
-        name: of the file, for messages and tables.
         parts: in order of time, on one time axis that begins at 0; none is empty.
         remarks: what had to be mended or left out, one sentence each.
     """
@@ -203,8 +202,6 @@ def parse_pen(content: bytes, name: str, time_unit: str | None = None) -> PenRec
     """A recording from the bytes of a text file.
 
     Args:
-        content: the file.
-        name: of the file, for messages.
         time_unit: a key of `TIME_UNITS`; None: from the file.
 
     Raises:

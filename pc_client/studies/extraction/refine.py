@@ -58,11 +58,9 @@ class Goal:
     """What a fit approximates.
 
     Attributes:
-        signal: positions and velocities.
         p_scale: by which position errors are multiplied before they are squared and summed.
         v_scale: by which velocity errors are.
         freedom: how many independent numbers the signal holds.
-        bounds: of the strokes.
     """
 
     signal: Trace

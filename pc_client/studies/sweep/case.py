@@ -26,9 +26,7 @@ class MovementFile:
     """A movement as text, so that it can travel to other machines.
 
     Attributes:
-        name: the movement's name.
         file_name: name of its file, without folders; the suffix says what the text is.
-        text: content of the file.
     """
 
     name: str
@@ -56,11 +54,8 @@ class GivenRobot:
     """A control box that is there already, real or not.
 
     Attributes:
-        host: its name or address.
-        port_base: offset of its ports.
         robot: a name such as "ur3" or "ur5e", as it reported.
         serial: its serial number: this is who it is, wherever it answers.
-        cell: what stands around it and what it carries.
         reverse_port: where its programs dial back; see `ReverseServer`.
     """
 

@@ -58,9 +58,7 @@ class Sweep:
     """All cases of a sweep, batch by batch.
 
     Args:
-        config: the file.
         arms: simulated ones, or the robot that is there.
-        store: knows what is settled, and takes the outcomes.
 
     Attributes:
         waiting: cases of the first batch that is not settled; empty: nothing is left to run.
@@ -82,9 +80,6 @@ class Sweep:
 
         The first failure of a robot that is there ends the sweep: somebody has to look at the arm before it
         moves again.
-
-        Args:
-            run: runs cases.
 
         Yields:
             Each outcome, when it is on disk.
@@ -125,8 +120,6 @@ def side_by_side(job: _Job, *, workers: int | None, dask: str | None) -> Iterato
 
     Args:
         job: does one case; must be picklable and raise nothing for errors of the case.
-        workers: as `open_executor`.
-        dask: as `open_executor`.
     """
     # The pool hands a job more than it has workers to its queue.
     n_begun = 1 + (usable_cores() if workers is None else workers)
@@ -181,7 +174,6 @@ def run_case(case: Case, keep_recordings: bool) -> Outcome:
     """Do one case.
 
     Args:
-        case: what to do.
         keep_recordings: True: the recordings are part of the answer.
 
     Returns:

@@ -151,11 +151,8 @@ class SweepConfig:
     """What a sweep's file asks for.
 
     Attributes:
-        file: its keys.
-        movements: what to do.
         arms: simulated arms; empty when the file names a robot.
         cell: what stands around that robot and what it carries.
-        axes: the values of the controller's fields.
     """
 
     file: SweepFile
@@ -406,9 +403,6 @@ def searched(
     search that was interrupted therefore goes on as if it had not been.
 
     Args:
-        bases: named controllers to choose from.
-        axes: values of their fields to choose from.
-        search: how many, and how they are chosen.
         results: gives the table of the batch before, when its cases are settled.
 
     Raises:

@@ -37,7 +37,6 @@ class ResultStore:
     """The cases of one sweep and their outcomes.
 
     Args:
-        path: folder of the files.
         keep_recordings: whether a case that is done must have its recordings there.
     """
 
