@@ -11,19 +11,8 @@ from dataclasses import dataclass
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
+from protocol.rtde import codec
 from protocol.rtde.client_connection import ClientEvent, DataReceived, RtdeClientConnection
-from protocol.rtde.codec import (
-    GetControllerVersion,
-    GetControllerVersionReply,
-    Request,
-    RequestProtocolVersion,
-    RequestProtocolVersionReply,
-    RtdeTextMessage,
-    SetupOutputs,
-    SetupOutputsReply,
-    Start,
-    StartReply,
-)
 from protocol.rtde.types import REFUSALS, RtdeValue
 from protocol.ur_types import SoftwareVersion
 from ur_hil.patience import LONGEST_STEP, Patience
@@ -150,16 +139,18 @@ def ask_rtde(network: Network, host: str, port: int, names: tuple[str, ...]) -> 
 
 
 def _answer(events: _Events, names: tuple[str, ...]) -> RtdeAnswer | None:
-    if events.reply(RequestProtocolVersion(2)) != RequestProtocolVersionReply(True):
+    if events.reply(codec.RequestProtocolVersion(2)) != codec.RequestProtocolVersionReply(True):
         return None
-    version = events.reply(GetControllerVersion())
-    types = events.reply(SetupOutputs(names, _RATE))
-    if not isinstance(version, GetControllerVersionReply) or not isinstance(types, SetupOutputsReply):
+    version = events.reply(codec.GetControllerVersion())
+    types = events.reply(codec.SetupOutputs(names, _RATE))
+    if not isinstance(version, codec.GetControllerVersionReply) or not isinstance(
+        types, codec.SetupOutputsReply
+    ):
         return None
     known = tuple(name for name, word in zip(names, types.types, strict=True) if word not in REFUSALS)
     if known != names:  # one refused variable refuses the recipe
-        events.reply(SetupOutputs(known, _RATE))
-    if events.reply(Start()) == StartReply(True):
+        events.reply(codec.SetupOutputs(known, _RATE))
+    if events.reply(codec.Start()) == codec.StartReply(True):
         for _ in range(_MOST_PACKAGES):
             if isinstance(event := events.next(), DataReceived):
                 return RtdeAnswer(version.version, dict(zip(event.names, event.values, strict=True)))
@@ -174,7 +165,7 @@ class _Events:
         self._network = network
         self._rtde = RtdeClientConnection()
 
-    def reply(self, request: Request) -> ClientEvent:
+    def reply(self, request: codec.Request) -> ClientEvent:
         """Ask, and wait for the answer."""
         self._connection.send(self._rtde.send(request))
         return self.next()
@@ -189,7 +180,7 @@ class _Events:
         deadline = self._network.now() + _PACKAGE_TIMEOUT
         while self._network.now() <= deadline:
             event = self._rtde.next_event()
-            if event is not None and not isinstance(event, RtdeTextMessage):
+            if event is not None and not isinstance(event, codec.RtdeTextMessage):
                 return event
             if event is None:
                 data = self._connection.receive(_PACKAGE_TIMEOUT)

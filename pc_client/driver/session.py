@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import Self
 
 from pc_client.arrays import Array
+from pc_client.driver import watchdog
 from pc_client.driver.primary import PackageStream, raise_on_error
 from pc_client.driver.realtime import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.receiver import DIAL_TIMEOUT, STOP_DECELERATION, ReverseServer, receiver_script
@@ -25,17 +26,6 @@ from pc_client.driver.velocity_stream import (
     StreamReport,
     VelocityStream,
     collector_paused,
-)
-from pc_client.driver.watchdog import (
-    ProgramEndedError,
-    check_angles,
-    check_idle,
-    check_safety,
-    check_slider,
-    control,
-    has_ended,
-    is_stopped,
-    software,
 )
 from pc_client.errors import DriverError, RobotStoppedError, full_message
 from protocol.primary.messages import ErrorCodeMessage, TextMessage
@@ -109,7 +99,7 @@ class UrDriver:
             DriverError: no frames come, or one reports what is no angle.
         """
         frame = self._robot.read_frame()
-        check_angles(frame)
+        watchdog.check_angles(frame)
         q: Array = frame.actual_q
         return q.copy()
 
@@ -168,8 +158,8 @@ class UrDriver:
         """
         robot, model = self._robot, self.info.model
         frame = robot.read_frame()
-        check_safety(frame)
-        check_idle(frame)
+        watchdog.check_safety(frame)
+        watchdog.check_idle(frame)
         robot.primary.poll()
         configured = robot.configured
         if configured is not None and model not in (UNKNOWN, configured):
@@ -177,7 +167,7 @@ class UrDriver:
                 f"the robot's arm is {model} (dashboard), {configured} (port 30001), must be one of them; "
                 "look which arm it is, and set it so in the installation"
             )
-        check_slider(robot.slider)
+        watchdog.check_slider(robot.slider)
         return frame
 
     def _stream_and_stop(
@@ -197,9 +187,11 @@ class UrDriver:
             try:
                 with collector_paused():
                     report = stream.run(source, on_row)
-            except ProgramEndedError as error:
+            except watchdog.ProgramEndedError as error:
                 raise watch.explain(error) from error
-            watch.wait(is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word")
+            watch.wait(
+                watchdog.is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word"
+            )
             wait_for_rest(frames, robot.network)
         except BaseException as error:
             try:
@@ -217,7 +209,7 @@ class UrDriver:
     def _raise_safety_stop(self, error: DriverError) -> None:
         """Raise a safety stop that the robot reports now: it may be the cause of an error, or its effect."""
         try:
-            check_safety(self._robot.read_frame())
+            watchdog.check_safety(self._robot.read_frame())
         except RobotStoppedError as stop:
             raise RobotStoppedError(f"{stop}; before that: {full_message(error)}") from error
         except DriverError:
@@ -244,7 +236,7 @@ class _SessionPorts(StatePorts):
         Raises:
             DriverError: a port does not answer, or the robot's software is not one that we drive.
         """
-        if not (condition := software(self.identify().version)).holds:
+        if not (condition := watchdog.software(self.identify().version)).holds:
             raise DriverError(condition.complaint)
         self.scripts = self._open_packages(self.ports.secondary, "secondary")
         self.open_frames()
@@ -289,7 +281,7 @@ class _ProgramWatch:
         """Wait for a frame; raise on safety stops and on errors that the robot reports."""
 
         def check(frame: RealtimeFrame) -> None:
-            check_safety(frame)
+            watchdog.check_safety(frame)
             self.check()
 
         wait_until(condition, self._robot.frames, self._robot.network, timeout, complaint, check)
@@ -308,14 +300,14 @@ class _ProgramWatch:
                 self._last_text = message.text
             self._is_read_only |= isinstance(message, ErrorCodeMessage) and message.code == _READ_ONLY
         raise_on_error(messages, self._program)
-        check_slider(self._robot.slider)
+        watchdog.check_slider(self._robot.slider)
 
     def look_after(self) -> None:
         """Read everything that has come, while waiting for something else; at least one frame comes."""
-        check_safety(self._robot.frames.receive().latest)
+        watchdog.check_safety(self._robot.frames.receive().latest)
         self.check()
 
-    def explain(self, error: ProgramEndedError) -> DriverError:
+    def explain(self, error: watchdog.ProgramEndedError) -> DriverError:
         """Say why our program has ended, as far as the robot reports it."""
         try:
             self.check()
@@ -324,20 +316,22 @@ class _ProgramWatch:
         said = "the pendant or another client stopped it"
         if self._last_text:
             said = f'the robot\'s last message is "{self._last_text}"'
-        return ProgramEndedError(f"{error}; {said}")
+        return watchdog.ProgramEndedError(f"{error}; {said}")
 
     def _has_started(self, frame: RealtimeFrame) -> bool:
         if self._is_read_only:
-            raise RobotStoppedError(control(remote=False).complaint)
-        return not is_stopped(frame)
+            raise RobotStoppedError(watchdog.control(remote=False).complaint)
+        return not watchdog.is_stopped(frame)
 
 
 def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:
     """Try one method to stop; True when the arm then rests and no program runs."""
     try:
         act()
-        wait_until(has_ended, robot.frames, robot.network, REST_TIMEOUT, "the robot's program goes on")
-        if not is_stopped(wait_for_rest(robot.frames, robot.network)):
+        wait_until(
+            watchdog.has_ended, robot.frames, robot.network, REST_TIMEOUT, "the robot's program goes on"
+        )
+        if not watchdog.is_stopped(wait_for_rest(robot.frames, robot.network)):
             _end_paused_program(robot)
     except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
         return False
@@ -351,7 +345,7 @@ def _end_paused_program(robot: _SessionPorts) -> None:
     """
     with suppress(DriverError):
         robot.scripts.send_program(_STOP_WORD)
-        wait_until(is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
+        wait_until(watchdog.is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
 
 
 def _send_stop_program(robot: _SessionPorts) -> None:

@@ -124,47 +124,29 @@ def safety_mode(frame: RealtimeFrame) -> Condition:
 
 def robot_mode(frame: RealtimeFrame) -> Condition:
     """The arm has power and its brakes are open."""
-    return Condition(
-        "mode",
-        _name(RobotMode, frame.robot_mode),
-        "RUNNING",
-        "power it on and release the brakes",
-        frame.robot_mode == RUNNING,
-    )
+    mode, remedy = _name(RobotMode, frame.robot_mode), "power it on and release the brakes"
+    return Condition("mode", mode, "RUNNING", remedy, frame.robot_mode == RUNNING)
 
 
 def program_state(frame: RealtimeFrame) -> Condition:
     """No program of somebody else runs, or stands paused."""
-    return Condition(
-        "program",
-        _name(ProgramState, frame.runtime_state),
-        "STOPPED",
-        "stop it before streaming",
-        is_stopped(frame),
-    )
+    state = _name(ProgramState, frame.runtime_state)
+    return Condition("program", state, "STOPPED", "stop it before streaming", is_stopped(frame))
 
 
 def speed_slider(fraction: float | None) -> Condition:
     """The speed slider stands at its end; `fraction` of full speed, None when it is not reported."""
-    return Condition(
-        "speed slider",
-        "" if fraction is None else _percent(fraction),
-        "100 %",
-        "set it to 100 % on the pendant and leave it there",
-        None if fraction is None else fraction >= _FULL_SPEED,
-    )
+    reported, holds = ("", None) if fraction is None else (_percent(fraction), fraction >= _FULL_SPEED)
+    remedy = "set it to 100 % on the pendant and leave it there"
+    return Condition("speed slider", reported, "100 %", remedy, holds)
 
 
 def speed_scaling(frame: RealtimeFrame) -> Condition:
     """The controller does not slow the arm down; 0 without a program is allowed."""
     scaling = frame.speed_scaling
-    return Condition(
-        "speed scaling",
-        _percent(scaling),
-        "100 %",
-        "end reduced mode on the robot, or give the movement more time",
-        is_at_full_speed(frame) or (scaling == 0.0 and is_stopped(frame)),
-    )
+    holds = is_at_full_speed(frame) or (scaling == 0.0 and is_stopped(frame))
+    remedy = "end reduced mode on the robot, or give the movement more time"
+    return Condition("speed scaling", _percent(scaling), "100 %", remedy, holds)
 
 
 def check_safety(frame: RealtimeFrame) -> None:

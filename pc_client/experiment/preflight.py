@@ -11,17 +11,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from pc_client.driver import watchdog
 from pc_client.driver.report import UNKNOWN, RobotReport
-from pc_client.driver.watchdog import (
-    Condition,
-    control,
-    program_state,
-    robot_mode,
-    safety_mode,
-    software,
-    speed_scaling,
-    speed_slider,
-)
+from pc_client.driver.watchdog import Condition
 from pc_client.errors import DriverError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.cell import NO_CELL, Cell
@@ -50,7 +42,7 @@ def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition,
     Returns:
         All conditions; only the first for software of another generation, whose reports mean something else.
     """
-    generation = software(report.info.version)
+    generation = watchdog.software(report.info.version)
     if not generation.holds:
         return (generation,)
     conditions = _E_SERIES_CONDITIONS + CONDITIONS if report.info.version.major == 5 else CONDITIONS
@@ -170,7 +162,7 @@ def _joint_angles(report: RobotReport, model: RobotModel | None) -> Condition:
 
 def _control(report: RobotReport, model: RobotModel | None) -> Condition:
     """Clients may command the robot; the maker's simulator obeys them in local control, too."""
-    return control(report.remote_control, obeys_in_local=not report.info.has_calibration)
+    return watchdog.control(report.remote_control, obeys_in_local=not report.info.has_calibration)
 
 
 def operational_mode(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -191,11 +183,11 @@ _E_SERIES_CONDITIONS: tuple[Check, ...] = (_control, operational_mode)
 
 CONDITIONS: tuple[Check, ...] = (
     _arm_type,
-    lambda report, model: safety_mode(report.frame),
-    lambda report, model: robot_mode(report.frame),
-    lambda report, model: program_state(report.frame),
-    lambda report, model: speed_slider(report.slider),
-    lambda report, model: speed_scaling(report.frame),
+    lambda report, model: watchdog.safety_mode(report.frame),
+    lambda report, model: watchdog.robot_mode(report.frame),
+    lambda report, model: watchdog.program_state(report.frame),
+    lambda report, model: watchdog.speed_slider(report.slider),
+    lambda report, model: watchdog.speed_scaling(report.frame),
     tcp_offset,
     _forward_kinematics,
     payload,

@@ -143,11 +143,6 @@ class Lognormal:
         return math.exp(-self.mu + 0.5 * self.sigma**2) / (self.sigma * _SQRT_TWO_PI)
 
     @property
-    def done_at_mode(self) -> float:
-        """Share of the length done at the mode, Phi(-sigma): below one half always."""
-        return float(ndtr(-self.sigma))
-
-    @property
     def power(self) -> float:
         """Integral of Lambda^2 over all time, 1/s."""
         return math.exp(-self.mu + 0.25 * self.sigma**2) / (2.0 * self.sigma * math.sqrt(math.pi))
@@ -266,13 +261,6 @@ class TwoSidedTiming:
         """The lognormal that has both tails in the window."""
         mu = math.log(self.duration / (2.0 * math.sinh(self.coverage * self.sigma)))
         return Lognormal(self.start - math.exp(mu - self.coverage * self.sigma), mu, self.sigma)
-
-    @property
-    def mode_fraction(self) -> float:
-        """Where in the window the peak is, 0 to 1/2."""
-        # exp(-s^2) - exp(-c s), by expm1: both terms tend to 1 for small sigma.
-        s, c = self.sigma, self.coverage
-        return (math.expm1(-s * s) - math.expm1(-c * s)) / (2.0 * math.sinh(c * s))
 
     def stretched(self, factor: float) -> TwoSidedTiming:
         """The same in a window `factor` times as long and as late."""

@@ -226,19 +226,14 @@ class HandRules:
 
     box: Box
     targets: TargetRules
-    stroke: float
-    leg: float
-    isochrony: float
-    variability: tuple[float, float]
+    stroke: float = 0.1
+    leg: float = 0.0375
+    isochrony: float = ISOCHRONY
+    variability: tuple[float, float] = (0.92, 1.08)
 
 
 HAND = HandRules(
-    box=Box((0.0, 0.0, 0.0), (0.10, 0.05, 0.05)),
-    targets=TargetRules(min_leg=0.025, max_leg=0.05, min_apart=0.0125),
-    stroke=0.1,
-    leg=0.0375,
-    isochrony=ISOCHRONY,
-    variability=(0.92, 1.08),
+    Box((0.0, 0.0, 0.0), (0.10, 0.05, 0.05)), TargetRules(min_leg=0.025, max_leg=0.05, min_apart=0.0125)
 )
 
 
@@ -315,12 +310,12 @@ def arcs_movement(n_targets: int, seed: int, name: str) -> Movement:
     source = random.Random(seed)
     targets = random_targets(n_targets, UR3_BOX.shrunk(_MARGIN), source)
     facts: dict[str, str | int | float] = {"generator": "pc_client.movements.generate", "seed": seed}
-    return _movement(name, _draw_strokes(targets, source, ARC_RULES), facts)
+    return _movement(name, _draw_strokes(targets, source), facts)
 
 
 def arcs_twin(movement: Movement, seed: int, name: str) -> Movement:
     """Random arcs, by a seed, to the same target points in the same total time."""
-    trajectory = _draw_strokes(movement.target_points, random.Random(seed), ARC_RULES)
+    trajectory = _draw_strokes(movement.target_points, random.Random(seed))
     drawn = _movement(name, trajectory, {**movement.provenance, "twin": movement.name})
     return drawn.stretched(movement.duration / drawn.duration)
 
@@ -331,8 +326,9 @@ def _movement(name: str, trajectory: SigmaLognormal, facts: dict[str, str | int 
     return Movement(name, trajectory, np.array(durations), facts)
 
 
-def _draw_strokes(targets: Array, source: random.Random, rules: ArcRules) -> SigmaLognormal:
-    """Strokes between the targets, drawn from the rules; rounded to three decimals for readable files."""
+def _draw_strokes(targets: Array, source: random.Random) -> SigmaLognormal:
+    """Strokes between the targets, drawn from ARC_RULES; rounded to three decimals for readable files."""
+    rules = ARC_RULES
 
     def draw(low: float, high: float) -> float:
         return round(low + (high - low) * source.random(), 3)

@@ -53,11 +53,6 @@ class JointSpline:
         self._at_start = (knots[0], rest)
         self._at_end = (knots[-1], rest)
 
-    @property
-    def t_knots(self) -> Array:
-        """(n,) times of the knots [s]."""
-        return np.linspace(0.0, self.duration, self._intervals + 1)
-
     def at(self, t: float) -> tuple[Array, Array]:
         """Return q (6,) [rad] and qd (6,) [rad/s] at one time; outside [0, duration] an end at rest."""
         if t <= 0.0:

@@ -27,7 +27,7 @@ DURATIONS = st.floats(0.01, 60.0)
 @given(KNOTS, DURATIONS)
 def test_it_passes_through_its_knots_and_rests_at_both_ends(knots, duration):
     spline = JointSpline(duration, knots)
-    q, qd = spline.sample(spline.t_knots)
+    q, qd = spline.sample(np.linspace(0.0, duration, len(knots)))
     np.testing.assert_allclose(q, knots, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(qd[[0, -1]], 0.0)
 
@@ -36,7 +36,7 @@ def test_it_passes_through_its_knots_and_rests_at_both_ends(knots, duration):
 def test_position_velocity_and_acceleration_are_continuous_at_knots(knots, duration):
     spline = JointSpline(duration, knots)
     h = duration / (len(knots) - 1)
-    t = spline.t_knots[1:-1]
+    t = np.linspace(0.0, duration, len(knots))[1:-1]
     eps = 1e-7 * h
     scale = max(1.0, float(np.abs(knots).max())) * 30
     (q_a, qd_a), (q_b, qd_b) = spline.sample(t - eps), spline.sample(t + eps)

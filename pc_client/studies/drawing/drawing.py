@@ -167,7 +167,7 @@ def make_drawing(
             name, trajectory, _between_slow_moments(trajectory), {**facts, "slower_than_the_hand": factor}
         )
 
-    factor = slower * least_factor(slowed, guess, arm)[0]
+    factor = slower * least_factor(slowed, guess, arm)
     return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
 
 

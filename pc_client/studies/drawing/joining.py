@@ -36,7 +36,7 @@ from pc_client.kinematics.model import RobotModel
 from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.planning.limits import limits_of
-from pc_client.planning.plan import JointPlan, PlannableMovement, plan_movement
+from pc_client.planning.plan import PlannableMovement, plan_movement
 from pc_client.studies.drawing.placement import Mark
 
 #: Share of a lift's length outside its gap, and of the drawing's size that a mark moves beside its
@@ -215,10 +215,8 @@ def paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: Robot
     return joined
 
 
-def least_factor(
-    make: Callable[[float], PlannableMovement], guess: float, arm: RobotModel
-) -> tuple[float, JointPlan]:
-    """The least factor, at least 1, at which planning accepts a movement, and its plan.
+def least_factor(make: Callable[[float], PlannableMovement], guess: float, arm: RobotModel) -> float:
+    """The least factor, at least 1, at which planning accepts a movement; looked for from a guess on.
 
     Args:
         make: the movement, slowed down by a factor.
@@ -227,32 +225,27 @@ def least_factor(
         PlanningError: it is refused although it is slow; the message is planning's.
     """
 
-    def attempt(factor: float) -> JointPlan | None:
+    def is_accepted(factor: float) -> bool:
         try:
-            return plan_movement(make(factor), model=arm)
+            plan_movement(make(factor), model=arm)
         except PlanningError:
-            return None
+            return False
+        return True
 
-    high = max(1.0, guess)
-    step = ACCURACY
-    while (plan := attempt(high)) is None:
+    high, step = max(1.0, guess), ACCURACY
+    while not is_accepted(high):
         if high > 2.0 * max(1.0, guess):
-            return high, plan_movement(make(high), model=arm)  # raises, and says what is wrong
+            plan_movement(make(high), model=arm)  # raises, and says what is wrong
         step *= 2.0
         high *= 1.0 + step
     low, step = high, ACCURACY
     while low > 1.0:
         step *= 2.0
         low = max(1.0, high * (1.0 - step))
-        better = attempt(low)
-        if better is None:
+        if not is_accepted(low):
             break
-        high, plan = low, better
+        high = low
     while high > 1.0 and high / low > 1.0 + ACCURACY:
         middle = 0.5 * (low + high)
-        better = attempt(middle)
-        if better is None:
-            low = middle
-        else:
-            high, plan = middle, better
-    return high, plan
+        low, high = (low, middle) if is_accepted(middle) else (middle, high)
+    return high

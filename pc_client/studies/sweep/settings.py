@@ -13,11 +13,10 @@ mean over something else.
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -207,10 +206,15 @@ def read_config(path: Path) -> SweepConfig:
                 )
     elif not axes and len(file.controllers) == 1:
         raise SweepError(f"{path}: search: there is nothing to choose; give fields in a table [controller]")
+    arms: Iterable[tuple[str, str, int]] = (
+        ()
+        if file.robot is not None
+        else product(file.robots or ("ur3",), file.fidelities or ("typical",), file.seeds or (0,))
+    )
     config = SweepConfig(
         file,
         tuple(_movement(name, path) for name in file.movements),
-        () if file.robot is not None else _arms(file),
+        tuple(SimulatedArm(*arm) for arm in arms),
         NO_CELL if file.cell is None else load_cell(path.parent / file.cell),
         axes,
     )
@@ -221,15 +225,6 @@ def read_config(path: Path) -> SweepConfig:
             f"{path}: {config.n_cases} cases, at most {_MOST_CASES} are allowed; make the lists shorter"
         )
     return config
-
-
-def _arms(file: SweepFile) -> tuple[SimulatedArm, ...]:
-    return tuple(
-        SimulatedArm(robot, fidelity, seed)
-        for robot in file.robots or ("ur3",)
-        for fidelity in file.fidelities or ("typical",)
-        for seed in file.seeds or (0,)
-    )
 
 
 def _movement(word: str, config: Path) -> MovementFile:
@@ -285,9 +280,9 @@ def repeated(values: Iterable[object]) -> str:
 def grid(bases: Sequence[Controller], axes: Mapping[str, tuple[Value, ...]]) -> list[Controller]:
     """All combinations of the values, controller by controller; the last field changes first."""
     return [
-        dataclasses.replace(base, **dict(zip(axes, values, strict=True)))  # type: ignore[arg-type]
+        replace(base, **dict(zip(axes, values, strict=True)))  # type: ignore[arg-type]
         for base in bases
-        for values in itertools.product(*axes.values())
+        for values in product(*axes.values())
     ]
 
 
@@ -424,7 +419,7 @@ def searched(
         settings = []
         for trial in trials:
             values = dict(trial.params)
-            settings.append(dataclasses.replace(named[values.pop("controller")], **values))
+            settings.append(replace(named[values.pop("controller")], **values))
         yield settings
         judged = judge(results(), _KEY).rows_by_key(_KEY, named=True, unique=True)
         for trial, setting in zip(trials, settings, strict=True):
