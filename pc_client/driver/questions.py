@@ -143,9 +143,9 @@ def _answer(events: _Events, names: tuple[str, ...]) -> RtdeAnswer | None:
         return None
     version = events.reply(codec.GetControllerVersion())
     types = events.reply(codec.SetupOutputs(names, _RATE))
-    if not isinstance(version, codec.GetControllerVersionReply) or not isinstance(
-        types, codec.SetupOutputsReply
-    ):
+    if not isinstance(version, codec.GetControllerVersionReply):
+        return None
+    if not isinstance(types, codec.SetupOutputsReply):
         return None
     known = tuple(name for name, word in zip(names, types.types, strict=True) if word not in REFUSALS)
     if known != names:  # one refused variable refuses the recipe

@@ -189,9 +189,8 @@ class UrDriver:
                     report = stream.run(source, on_row)
             except watchdog.ProgramEndedError as error:
                 raise watch.explain(error) from error
-            watch.wait(
-                watchdog.is_stopped, REST_TIMEOUT, "the robot's program did not end after the stop word"
-            )
+            complaint = "the robot's program did not end after the stop word"
+            watch.wait(watchdog.is_stopped, REST_TIMEOUT, complaint)
             wait_for_rest(frames, robot.network)
         except BaseException as error:
             try:
@@ -328,9 +327,8 @@ def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:
     """Try one method to stop; True when the arm then rests and no program runs."""
     try:
         act()
-        wait_until(
-            watchdog.has_ended, robot.frames, robot.network, REST_TIMEOUT, "the robot's program goes on"
-        )
+        complaint = "the robot's program goes on"
+        wait_until(watchdog.has_ended, robot.frames, robot.network, REST_TIMEOUT, complaint)
         if not watchdog.is_stopped(wait_for_rest(robot.frames, robot.network)):
             _end_paused_program(robot)
     except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
