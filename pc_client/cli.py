@@ -73,11 +73,7 @@ _EXTRAS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and leave the process with its exit code.
-
-    Args:
-        arguments: instead of those of the process.
-    """
+    """Run the command line, with the arguments of the process, and leave it with the exit code."""
     # A request to end is answered like Ctrl-C: the arm is stopped first.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(run(list(arguments) if arguments is not None else None))

@@ -1,21 +1,4 @@
-"""What can go wrong on the PC side, as one tree.
-
-ClientError
-├── MovementError      a movement file or its parameters make no sense
-│   └── UnknownMovementError  the library has no movement of that name
-├── ControllerError    the numbers of a controller, or its file, make no sense
-├── CellError          a cell file makes no sense
-├── PlanningError      a path leaves reach or limits; nothing has moved
-├── DriverError        the robot cannot be reached, or the stream broke
-│   ├── UnknownHostError   there is no such name or address
-│   ├── RobotStoppedError  the robot stopped itself (protective stop, program error)
-│   └── GainMarginError    the gains are too large for the delay of the loop; no movement has begun
-├── InterruptedByUserError  Ctrl-C or SIGTERM; the message says what is kept
-├── RecordingError     a recording cannot be written or read
-└── SweepError         the configuration of a sweep makes no sense, or its folder cannot be used
-
-Every message is one line: what was given, what is allowed, what to do.
-"""
+"""What can go wrong on the PC side. Each message is one line: what was given, what is allowed, what to do."""
 
 from __future__ import annotations
 

@@ -56,11 +56,6 @@ def is_file_name(name: str) -> bool:
 
 
 def as_file_name(path: str, otherwise: str) -> str:
-    """Return a file name like the last part of a path, without its ending.
-
-    Args:
-        path: of a file, or of a part of an archive.
-        otherwise: taken if nothing is left of it.
-    """
+    """A file name like the last part of a path, without its ending; another where nothing is left of it."""
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", PurePath(path).stem).lstrip("-")[:_MOST_TAKEN].strip("_")
     return name if is_file_name(name) else otherwise

@@ -205,10 +205,7 @@ def controller_of_law(name: str) -> Controller:
 
 
 def load_controller(name_or_file: str) -> Controller:
-    """Return a named controller, or the one of a file.
-
-    Args:
-        name_or_file: a name of `CONTROLLERS`, or a path that ends in .toml.
+    """A named controller, or the one of a file whose name ends in .toml.
 
     Raises:
         ControllerError: no such controller, an unreadable file, or content that makes no sense.

@@ -149,11 +149,7 @@ class ToolGuard:
         self._trail = 0
 
     def check(self, t: float, q: Sequence[float]) -> None:
-        """Compare the tool with its path.
-
-        Args:
-            t: time since the movement began [s].
-            q: (6,) reported joint positions [rad].
+        """Compare the tool, at the reported joint positions (6,) [rad], with its path around the time t [s].
 
         Raises:
             DriverError: it is further away than allowed, or nowhere (NaN).

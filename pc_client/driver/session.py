@@ -133,10 +133,7 @@ class UrDriver:
             raise
 
     def stop(self, reverse: Transport | None) -> None:
-        """Bring the arm to rest, by every available method.
-
-        Args:
-            reverse: connection to the receiver program, when one runs.
+        """Bring the arm to rest, by every available method; one needs the connection to the receiver program.
 
         Raises:
             DriverError: the arm could not be seen to come to rest.
@@ -286,12 +283,7 @@ class _ProgramWatch:
         wait_until(condition, self._robot.frames, self._robot.network, timeout, complaint, check)
 
     def check(self) -> None:
-        """Read both script ports; raise what the robot reports about our program, or a moved speed slider.
-
-        Raises:
-            RobotStoppedError: the program failed.
-            DriverError: the speed slider was moved, or a connection broke.
-        """
+        """Read both script ports; raise what the robot reports about our program, or a moved speed slider."""
         self._robot.scripts.poll()
         messages = self._robot.primary.poll()
         for message in messages:

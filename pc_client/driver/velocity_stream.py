@@ -113,7 +113,7 @@ class VelocityStream:
     housekeeping: Callable[[], None]
 
     def run(self, source: CommandSource[S], on_row: RowSink[S]) -> StreamReport:
-        """Stream until the source has finished; then the stop word is sent.
+        """Stream until a fresh source has finished; then the stop word is sent. `on_row` takes every row.
 
         Returns:
             What happened on the wire. The arm may still be coming to rest.

@@ -30,7 +30,7 @@ _SHORTEST_HEAD = 1024
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """What is to be done.
+    """What is to be done: the movements in order, runs of each, the folder of the recordings.
 
     Attributes:
         overwrite: replace simulated recordings of the same names.

@@ -157,13 +157,9 @@ class Repetitions:
     def may_use(self, plan: JointPlan, table: ReferenceTable) -> bool:
         """Hold the whole of what would be sent against the limits, before anything is sent.
 
-        Args:
-            plan: in the turns where the arm is.
-            table: of the coming run, with what was learned.
-
-        Returns:
-            False when a limit would be broken; what was learned is forgotten then, the gears are left out
-            for the rest of this movement, and the table must be made again without both.
+        The plan is in the turns where the arm is; the table is that of the coming run, with what was learned.
+        It is False when a limit would be broken. What was learned is forgotten then, the gears are left out for
+        the rest of this movement, and the table must be made again without both.
         """
         if self.learned is None and self.gear is None:
             return True

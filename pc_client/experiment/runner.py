@@ -85,7 +85,7 @@ class ExperimentRunner:
 
     Args:
         driver: a session with the robot; it stays open.
-        law: computes the commands in place of the controller.
+        law: computes the commands in place of the controller, which is the same for all runs.
     """
 
     def __init__(

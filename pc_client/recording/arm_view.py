@@ -316,12 +316,7 @@ class _Publisher:
 
 
 class ArmView:
-    """Writes the view of one recording.
-
-    Args:
-        columns: names of the numbers of a frame, in order.
-        cycle_time: control cycle [s].
-    """
+    """Writes the view of one recording; the columns are the names of the numbers of a frame, in order."""
 
     def __init__(self, arm: ArmTree, writer: Writer, columns: Sequence[str], cycle_time: float) -> None:
         self._arm = arm

@@ -158,14 +158,13 @@ def boxes(
     margins: tuple[float, float, float, float],
     gaps: tuple[float, float],
 ) -> list[list[Box]]:
-    """The boxes of a grid of panels, row by row from the top.
+    """The boxes of a grid of panels, row by row from the top; sizes in inches.
 
     Args:
-        size: width and height of the sheet [inches].
-        widths: of the columns, relative to each other.
-        heights: of the rows, likewise.
-        margins: left, right, top and bottom [inches].
-        gaps: between columns and between rows [inches].
+        size: width and height of the sheet.
+        widths: of the columns, relative to each other; heights of the rows likewise.
+        margins: left, right, top and bottom.
+        gaps: between columns and between rows.
     """
     left, right, top, bottom = margins
     shares_x = np.array(widths) * (size[0] - left - right - gaps[0] * (len(widths) - 1)) / sum(widths)

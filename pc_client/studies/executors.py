@@ -44,9 +44,6 @@ def open_executor(workers: int | None = None, dask: str | None = None) -> Iterat
         workers: processes on this machine; None: as many as this process may use cores.
         dask: address of a Dask scheduler, "tcp://host:8786"; the cluster has its own number of workers.
 
-    Yields:
-        The executor.
-
     Raises:
         ClientError: no workers, both kinds at once, or no scheduler answers at the address.
         ModuleNotFoundError: `dask` is given and the extra `cluster` is not installed.

@@ -154,9 +154,7 @@ def between_peaks(speed: ArrayLike) -> slice:
 def curvature_of(v: ArrayLike, a: ArrayLike) -> Array:
     """Curvature |v x a| / |v|^3 of a path in space, (n,), 1/m; nan where it stands still.
 
-    Args:
-        v: velocities, (n, 3), m/s.
-        a: accelerations, (n, 3), m/s^2.
+    The velocities are (n, 3), m/s, the accelerations (n, 3), m/s^2.
     """
     velocity, acceleration = np.asarray(v, dtype=np.float64), np.asarray(a, dtype=np.float64)
     speed = np.linalg.norm(velocity, axis=1)

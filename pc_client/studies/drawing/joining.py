@@ -218,9 +218,6 @@ def paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: Robot
 def least_factor(make: Callable[[float], PlannableMovement], guess: float, arm: RobotModel) -> float:
     """The least factor, at least 1, at which planning accepts a movement; looked for from a guess on.
 
-    Args:
-        make: the movement, slowed down by a factor.
-
     Raises:
         PlanningError: it is refused although it is slow; the message is planning's.
     """

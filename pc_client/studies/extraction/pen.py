@@ -93,15 +93,11 @@ class PenRecording:
 
 
 def ordered_part(t: ArrayLike, p: ArrayLike) -> tuple[PenPart | None, tuple[str, ...]]:
-    """Make a part of samples as a recorder left them.
+    """Make a part of samples as a recorder left them: times (n,), s, and positions (n, 2) or (n, 3).
 
     Samples that are not numbers are left out. Samples with the same time stamp are replaced by their mean. A
     sample earlier than one before it is left out: a clock that was set back looks like a mixed-up order, and
     only leaving out keeps every position that is used at the time that was written beside it.
-
-    Args:
-        t: times, (n,), s.
-        p: positions, (n, 2) or (n, 3).
 
     Returns:
         The part, or None when no sample is left, and remarks on what was done.

@@ -57,9 +57,6 @@ _Runner = Callable[[Sequence[Case]], Iterator[tuple[Case, Outcome]]]
 class Sweep:
     """All cases of a sweep, batch by batch.
 
-    Args:
-        arms: simulated ones, or the robot that is there.
-
     Attributes:
         waiting: cases of the first batch that is not settled; empty: nothing is left to run.
     """
@@ -116,10 +113,7 @@ def side_by_side(job: _Job, *, workers: int | None, dask: str | None) -> Iterato
 
     When a worker process dies (out of memory, killed), the others are lost with it. The cases that may have
     killed it, the first ones that got no outcome, are then run alone: one that kills its worker again has
-    failed, the others go on.
-
-    Args:
-        job: does one case; must be picklable and raise nothing for errors of the case.
+    failed, the others go on. The job must be picklable and raise nothing for errors of the case.
     """
     # The pool hands a job more than it has workers to its queue.
     n_begun = 1 + (usable_cores() if workers is None else workers)
@@ -171,13 +165,9 @@ def _round(
 
 
 def run_case(case: Case, keep_recordings: bool) -> Outcome:
-    """Do one case.
+    """Do one case; with `keep_recordings` the recordings are part of the answer.
 
-    Args:
-        keep_recordings: True: the recordings are part of the answer.
-
-    Returns:
-        What came of it; errors of robot, plan or disk are in it, and the recordings of a case that failed.
+    Errors of robot, plan or disk are in the outcome, and the recordings of a case that failed.
     """
     incident: tuple[tuple[str, bytes], ...] = ()
     try:

@@ -171,8 +171,7 @@ class SweepConfig:
     def batches(self, results: Callable[[], pl.DataFrame]) -> Iterator[list[Controller]]:
         """The settings to try: a grid in one batch, those of a search in several.
 
-        Args:
-            results: gives the table of the batch before, when its cases are settled.
+        `results` gives the table of the batch before, when its cases are settled.
 
         Raises:
             ModuleNotFoundError: a search without optuna (extra `search`).
@@ -395,10 +394,7 @@ def searched(
     """The settings of a search, batch by batch.
 
     Nothing of the search itself is stored: with the same results the sampler proposes the same settings. A
-    search that was interrupted therefore goes on as if it had not been.
-
-    Args:
-        results: gives the table of the batch before, when its cases are settled.
+    search that was interrupted therefore goes on as if it had not been. `results` is as of `batches`.
 
     Raises:
         ModuleNotFoundError: optuna is not installed (extra `search`).
