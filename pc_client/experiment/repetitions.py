@@ -158,8 +158,8 @@ class Repetitions:
         """Hold the whole of what would be sent against the limits, before anything is sent.
 
         The plan is in the turns where the arm is; the table is that of the coming run, with what was learned.
-        It is False when a limit would be broken. What was learned is forgotten then, the gears are left out for
-        the rest of this movement, and the table must be made again without both.
+        It is False when a limit would be broken. Then what was learned is forgotten, the gears are left out
+        for the rest of this movement, and the table must be made again without both.
         """
         if self.learned is None and self.gear is None:
             return True
