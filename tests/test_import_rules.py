@@ -30,7 +30,7 @@ MAY_HAVE_EFFECTS = {
         "experiment",
         "commands",
         "studies/executors.py",
-        "studies/sweep/box.py",
+        "studies/sweep/schedule.py",
         "studies/sweep/guard.py",
         "studies/sweep/store.py",
         "cli.py",

@@ -15,15 +15,16 @@ from pc_client.kinematics.arms import UR3_BOX, Box
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import load_movement
 from pc_client.planning.plan import plan_movement
-from pc_client.studies.drawing.drawing import make_drawing, spatial
-from pc_client.studies.drawing.joining import (
+from pc_client.studies.drawing.drawing import (
     ACCURACY,
     TAIL,
     factor_needed,
     join,
     least_factor,
     least_gaps,
+    make_drawing,
     paced,
+    spatial,
 )
 from pc_client.studies.drawing.placement import (
     PLANES,

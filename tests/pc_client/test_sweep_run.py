@@ -14,14 +14,12 @@ from pathlib import Path
 import pytest
 from sweep_samples import case, deadly, faulty, interrupted, invented, process_id
 
-import pc_client.studies.sweep.box as box_module
 import pc_client.studies.sweep.schedule as schedule
 from pc_client.errors import SweepError
 from pc_client.movements.movement import Movement
 from pc_client.studies.executors import open_executor
-from pc_client.studies.sweep.box import HOST, simulated_box
 from pc_client.studies.sweep.case import MovementFile, Outcome, SimulatedArm, failed
-from pc_client.studies.sweep.schedule import in_turn, run_case, side_by_side
+from pc_client.studies.sweep.schedule import HOST, in_turn, run_case, side_by_side, simulated_box
 from protocol.ur_types import Ports
 
 CASES = [case(seed=seed) for seed in (1, 2, 13, 3, 4, 5)]
@@ -88,7 +86,7 @@ def test_ctrl_c_goes_through():
 
 def test_without_the_box_every_case_fails_in_one_line(monkeypatch):
     monkeypatch.setattr(
-        "pc_client.studies.sweep.box._command", lambda *a: [sys.executable, "-m", "ur_emulator_not_here"]
+        "pc_client.studies.sweep.schedule._command", lambda *a: [sys.executable, "-m", "ur_emulator_not_here"]
     )
     outcome = run_case(case(), False)
     assert outcome.status == "failed"
@@ -100,7 +98,7 @@ def test_a_folder_without_room_is_a_failed_case(monkeypatch):
     def full(*args, **options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pc_client.studies.sweep.box.tempfile.mkdtemp", full)
+    monkeypatch.setattr("pc_client.studies.sweep.schedule.tempfile.mkdtemp", full)
     assert run_case(case(), False) == Outcome("failed", "[Errno 28] No space left on device")
 
 
@@ -163,8 +161,8 @@ def test_a_port_that_somebody_took_in_between_is_no_trouble(monkeypatch):
     with socket.create_server((HOST, 0)) as somebody:
         taken = somebody.getsockname()[1] - Ports().dashboard
         offsets = iter([taken, taken])
-        find = box_module._free_offset
-        monkeypatch.setattr(box_module, "_free_offset", lambda: next(offsets, None) or find())
+        find = schedule._free_offset
+        monkeypatch.setattr(schedule, "_free_offset", lambda: next(offsets, None) or find())
         with simulated_box(ARM) as box:
             connect(box).close()
     assert next(offsets, None) is None
@@ -196,7 +194,7 @@ def test_a_box_that_dies_in_the_middle_is_named(monkeypatch):
 
 def test_a_box_ends_with_a_user_that_is_killed():
     code = (
-        "from pc_client.studies.sweep.box import simulated_box; from pc_client.studies.sweep.case import SimulatedArm\n"
+        "from pc_client.studies.sweep.schedule import simulated_box; from pc_client.studies.sweep.case import SimulatedArm\n"
         "with simulated_box(SimulatedArm('ur3', 'typical', 7)) as box:\n"
         "    print(box.ports.dashboard, box.folder, flush=True)\n"
         "    input()"

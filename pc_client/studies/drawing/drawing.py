@@ -1,28 +1,50 @@
 """`drawing`: what a hand drew, as a movement of an arm.
 
 The strokes of a recording are extracted, placed in the workspace, joined with lifts between them, and slowed
-down as far as the arm needs it.
+down as far as the arm needs it. Strokes of marks and of lifts add up alike, so all stand in one chain of
+target points:
+
+    lowered pen   one stroke from above the start of the first mark
+    mark 1        its own strokes
+    pen-up move   two strokes over a via point above the sheet, to the start of mark 2, overlapping in time
+    mark 2 ...
+    lifted pen    one stroke to above the end of the last mark
+
+Each mark keeps its strokes, shape and timing. Only the gaps between marks may become longer: where a tail
+of a mark's strokes would reach into its neighbour, or where a pen-up move needs more time. Strokes of lifts
+lie in the gaps but for `TAIL` of their length at either end; `TAIL` of the drawing's size is also what a mark
+may move while its neighbour is drawn.
+
+One factor says how slow the whole must be. Slowed down by a factor a, on the same path, joint speeds fall by
+a and joint accelerations by a^2; so one plan gives the factor that each moment needs. Marks come first: they
+are what is drawn. A pen-up move that would need a larger factor than they do gets more time instead, and the
+marks behind it come later. The factor itself is found by bisection, by the checks of planning.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import find_peaks
+from scipy.special import ndtri
 
 from pc_client.arm import Arm
-from pc_client.arrays import Array
-from pc_client.errors import MovementError, RecordingError
+from pc_client.arrays import Array, read_only
+from pc_client.errors import MovementError, PlanningError, RecordingError
 from pc_client.kinematics.model import RobotModel
+from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.movement import Movement
-from pc_client.movements.sigma_lognormal import SigmaLognormal
+from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.movements.trajectory import Motion
-from pc_client.studies.drawing.joining import Joined, factor_needed, least_factor, least_gaps, paced
+from pc_client.planning.limits import limits_of
+from pc_client.planning.plan import PlannableMovement, plan_movement
 from pc_client.studies.drawing.placement import Mark, Placement, PlacementOptions, inverse, marks_of, place
 from pc_client.studies.extraction.extract import Extraction, extract
 from pc_client.studies.extraction.pen import PenRecording, on_one_axis, ordered_part, read_recording
@@ -201,3 +223,231 @@ def _between_slow_moments(trajectory: SigmaLognormal) -> Array:
     t = np.linspace(0.0, trajectory.duration, max(200, int(500 * trajectory.duration)))
     slow, _ = find_peaks(-np.linalg.norm(trajectory.evaluate(t).v, axis=1))
     return np.diff(np.concatenate(([0.0], t[slow], [trajectory.duration])))
+
+
+#: Share of a lift's length outside its gap, and of the drawing's size that a mark moves beside its
+#: neighbours.
+TAIL = 1e-3
+
+
+#: Share of the drawing's size that may be left to do before the movement begins and after it ends.
+_REST = 1e-4
+
+
+#: Least time, s of the hand, to lower the pen at the start and to lift it at the end.
+_LOWERING_S = 0.4
+
+
+#: Least time, s of the hand, between two marks.
+_LEAST_GAP_S = 0.1
+
+
+#: Of each of the two strokes of a pen-up move, as a share of the gap: they overlap in its middle.
+_PEN_UP_SHARE = 0.7
+
+
+#: Sigma of the lognormals of lifts; people show .1 to .35 in reaches.
+_LIFT_SIGMA = 0.15
+
+
+_COVERAGE = -float(ndtri(TAIL))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joined:
+    """Marks and lifts in one movement.
+
+    Attributes:
+        trajectory: all strokes; the movement begins at 0 at rest, the pen lifted.
+        gaps: (n_marks + 1,), s: before the first mark, between the marks, after the last.
+        shifts: (n_marks,), s: time of the movement less time of the recording, for each mark.
+        pen_down: (n_marks, 2), s: when in the movement the pen comes down and goes up.
+    """
+
+    trajectory: SigmaLognormal
+    gaps: Array
+    shifts: Array
+    pen_down: Array
+
+    def gap_intervals(self) -> list[tuple[float, float]]:
+        """Start and end (s) of each gap."""
+        edges = [0.0, *self.pen_down.ravel().tolist(), self.trajectory.duration]
+        return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def least_gaps(marks: Sequence[Mark], size: float) -> Array:
+    """The gaps that the recording has, or longer where strokes need it; (n_marks + 1,), s.
+
+    The marks are in order of time; tails are judged by the size of the drawing, in the unit of the marks.
+    """
+    first, last = marks[0], marks[-1]
+    between = [
+        max(b.begin - a.end, a.lag(TAIL * size), b.lead(TAIL * size), _LEAST_GAP_S)
+        for a, b in pairwise(marks)
+    ]
+    before, after = first.lead(_REST * size), last.lag(_REST * size)
+    return np.array([max(before, _LOWERING_S), *between, max(after, _LOWERING_S)])
+
+
+def join(marks: Sequence[Mark], gaps: Array, lift: Array) -> Joined:
+    """Join marks, m, in the frame of the arm, with the pen lifted between them.
+
+    Args:
+        marks: in order of time, on the recording's time axis.
+        gaps: (n_marks + 1,), s.
+        lift: from the sheet to the lifted pen, (3,), m.
+    """
+    downs = np.empty((len(marks), 2))
+    now = 0.0
+    for row, (gap, mark) in enumerate(zip(gaps[:-1], marks, strict=True)):
+        downs[row] = now + gap, now + gap + mark.end - mark.begin
+        now = float(downs[row, 1])
+    shifts = downs[:, 0] - np.array([mark.begin for mark in marks])
+
+    targets, strokes = [marks[0].first + lift], [_lift_stroke(0.0, float(gaps[0]))]
+    for row, mark in enumerate(marks):
+        targets.append(mark.first)
+        if mark.trajectory is not None:
+            targets += list(mark.trajectory.target_points[1:])
+            strokes += [stroke.later(float(shifts[row])) for stroke in mark.trajectory.strokes]
+        up, gap = float(downs[row, 1]), float(gaps[row + 1])
+        if row + 1 < len(marks):
+            targets.append(0.5 * (mark.last + marks[row + 1].first) + lift / _pen_up_height())
+            share = _PEN_UP_SHARE * gap
+            strokes += [_lift_stroke(up, share), _lift_stroke(up + gap - share, share)]
+        else:
+            targets.append(mark.last + lift)
+            strokes.append(_lift_stroke(up, gap))
+    trajectory = SigmaLognormal(np.array(targets), tuple(strokes), now + float(gaps[-1]))
+    return Joined(trajectory, read_only(gaps), read_only(shifts), read_only(downs))
+
+
+def _lift_stroke(start: float, duration: float) -> Stroke:
+    return Stroke(TwoSidedTiming(start, duration, _LIFT_SIGMA, _COVERAGE))
+
+
+@lru_cache(maxsize=1)
+def _pen_up_height() -> float:
+    """Height of a pen-up move over that of its via point: its two strokes cut the corner there."""
+    t = np.linspace(0.0, 1.0, 20001)
+    up = _lift_stroke(0.0, _PEN_UP_SHARE).timing.lognormal.evaluate(t).done
+    down = _lift_stroke(1.0 - _PEN_UP_SHARE, _PEN_UP_SHARE).timing.lognormal.evaluate(t).done
+    return float((up - down).max())
+
+
+#: Relative accuracy of the factor.
+ACCURACY = 1e-3
+
+
+#: Pen-up moves with this time, s of the hand, hold nothing up.
+_WIDE_GAP_S = 3.0
+
+
+#: A pen-up move that is too fast gets this much more time at least and at most, per attempt.
+_LONGER = (1.03, 1.5)
+
+
+_ATTEMPTS = 40
+
+
+#: Speed, m/s, at which a path is planned first: far from any limit, so that its samples lie close.
+_EASY_SPEED = 0.3
+
+
+class StretchedMovement:
+    """A trajectory in the form that planning takes, `factor` times as slow."""
+
+    def __init__(self, name: str, joined: Joined, factor: float = 1.0) -> None:
+        self.name = name
+        self._trajectory = joined.trajectory.stretched(factor)
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self._trajectory.duration
+
+    def sample(self, t: Array, /) -> tuple[Array, Array]:
+        """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,)."""
+        motion = self._trajectory.evaluate(t)
+        return motion.p, motion.v
+
+
+def factor_needed(name: str, joined: Joined, arm: RobotModel) -> tuple[Array, Array]:
+    """The factor that each moment of a movement, as fast as the hand was, needs on an arm.
+
+    Returns:
+        Times (n,), s of the hand, and factors (n,); below 1 there is room.
+
+    Raises:
+        PlanningError: the path itself cannot be done, at any speed.
+    """
+    t = np.linspace(0.0, joined.trajectory.duration, 2001)
+    easy = max(1.0, float(np.linalg.norm(joined.trajectory.evaluate(t).v, axis=1).max()) / _EASY_SPEED)
+    limits = limits_of(arm)
+    no_speeds = replace(limits, speed_fraction=1e6, qdd_max=(1e9,) * 6, tcp_speed_max=1e6, rest_speed_max=1e6)
+    plan = plan_movement(StretchedMovement(name, joined, easy), model=arm, limits=no_speeds)
+    qd = np.abs(plan.spline.sample(plan.t)[1]) / (limits.speed_fraction * np.array(arm.limits.qd_max))
+    qdd = np.abs(plan.spline.qdd(plan.t)) / np.array(limits.qdd_max)
+    tcp = np.linalg.norm(joined.trajectory.stretched(easy).evaluate(plan.t).v, axis=1) / limits.tcp_speed_max
+    need = np.maximum(np.maximum(qd.max(axis=1), np.sqrt(qdd.max(axis=1))), tcp)
+    return plan.t / easy, easy * need
+
+
+def paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: RobotModel) -> Joined:
+    """Join marks with pen-up moves that ask no more of the arm than the marks do.
+
+    Args:
+        marks: in order of time, m, base frame.
+        gaps: the least ones, (n_marks + 1,), s of the hand.
+        lift: from the sheet to the lifted pen, (3,), m.
+
+    Raises:
+        PlanningError: the path itself cannot be done, at any speed.
+    """
+    slow = join(marks, np.maximum(gaps, _WIDE_GAP_S), lift)
+    allowed = max(1.0, float(factor_needed(name, slow, arm)[1].max()))
+    gaps = gaps.copy()
+    for _ in range(_ATTEMPTS):
+        joined = join(marks, gaps, lift)
+        t, need = factor_needed(name, joined, arm)
+        worst = np.array(
+            [need[(t >= begin) & (t <= end)].max(initial=0.0) for begin, end in joined.gap_intervals()]
+        )
+        late = (worst > allowed * (1.0 + ACCURACY)) & (gaps < _WIDE_GAP_S)
+        if not late.any():
+            break
+        gaps[late] *= np.clip(worst[late] / allowed, *_LONGER)
+    return joined
+
+
+def least_factor(make: Callable[[float], PlannableMovement], guess: float, arm: RobotModel) -> float:
+    """The least factor, at least 1, at which planning accepts a movement; looked for from a guess on.
+
+    Raises:
+        PlanningError: it is refused although it is slow; the message is planning's.
+    """
+
+    def is_accepted(factor: float) -> bool:
+        try:
+            plan_movement(make(factor), model=arm)
+        except PlanningError:
+            return False
+        return True
+
+    high, step = max(1.0, guess), ACCURACY
+    while not is_accepted(high):
+        if high > 2.0 * max(1.0, guess):
+            plan_movement(make(high), model=arm)  # raises, and says what is wrong
+        step *= 2.0
+        high *= 1.0 + step
+    low, step = high, ACCURACY
+    while low > 1.0:
+        step *= 2.0
+        low = max(1.0, high * (1.0 - step))
+        if not is_accepted(low):
+            break
+        high = low
+    while high > 1.0 and high / low > 1.0 + ACCURACY:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if is_accepted(middle) else (middle, high)
+    return high

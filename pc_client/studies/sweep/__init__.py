@@ -2,9 +2,8 @@
 
     settings   the TOML file; what is tried: grids and searches of [controller]; which setting is the best
     case       one experiment, with an identity that depends on nothing but its content; its outcome
-    box        a simulated arm of a case's own, in a process that never outlives its user
-    guard      the little program between the two
-    schedule   does a case and measures it; all cases over processes or a Dask cluster
+    schedule   does a case, on a simulated arm of its own, and measures it; all cases, side by side
+    guard      the little program that ends the process of a simulated arm with its user
     store      which cases are settled: one small file a case, and the table as Parquet or CSV
     page       plots and the page that shows them
 
