@@ -321,13 +321,11 @@ def six_velocities(qd: Sequence[float] | Array) -> list[float]:
 
 
 def predict_run(reference: ReferenceTable, config: Controller, model: RobotModel, loop: LoopModel) -> Array:
-    """Where the joints go when the controller follows a reference on an ideal arm with this loop.
+    """Where the joints go, (n, 6) [rad], when the controller follows a reference on an ideal arm.
 
     Beside the loop's dead time and lag the robot's `speedj` counts: all joints change their velocities
-    together, the leading one with the acceleration of the controller.
-
-    Returns:
-        (n, 6) positions at the cycles from `reference.lead` before the movement to `settle` after it [rad].
+    together, the leading one with the acceleration of the controller. The cycles are those from
+    `reference.lead` before the movement to `settle` after it.
     """
     period, lead = reference.period, reference.lead
     n = round((lead + reference.duration + reference.settle) / period) + 1

@@ -32,13 +32,9 @@ _GREETING = "Universal Robots Dashboard Server"
 
 
 def ask_dashboard(network: Network, host: str, port: int, questions: tuple[str, ...]) -> dict[str, str]:
-    """Ask what the dashboard server knows.
+    """Ask what the dashboard server knows by commands that only ask, e.g. `get serial number`.
 
-    Args:
-        questions: commands that only ask, e.g. `get serial number`.
-
-    Returns:
-        The answers that came; empty when there is no dashboard server.
+    The answers that came are returned; none when there is no dashboard server.
 
     Raises:
         DriverError: the server sends what are no lines.

@@ -34,13 +34,10 @@ Check = Callable[[RobotReport, RobotModel | None], Condition]
 
 
 def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition, ...]:
-    """Hold everything that a robot reports against what is needed.
+    """Hold everything that a robot reports against what is needed; without a model when the arm has none.
 
-    Args:
-        model: nominal arm of the plan; None when there is no model of the arm that answers.
-
-    Returns:
-        All conditions; only the first for software of another generation, whose reports mean something else.
+    All conditions are returned; only the first for software of another generation, whose reports mean
+    something else.
     """
     generation = watchdog.software(report.info.version)
     if not generation.holds:

@@ -179,8 +179,7 @@ class CartesianSamples(NamedTuple):
 def check_samples(names: PathNames, samples: CartesianSamples, limits: PlanLimits) -> Extreme:
     """Check the movement itself, before any kinematics: finite, slow enough, at rest at both ends.
 
-    Returns:
-        The top TCP speed.
+    It returns the top TCP speed.
 
     Raises:
         PlanningError: naming the first sample that is wrong.

@@ -110,13 +110,10 @@ def log_dimensionless_jerk(speed: ArrayLike, rate: float) -> float:
 
 
 def peaks_of(speed: ArrayLike) -> list[int]:
-    """Samples at which the speed (n,) has a peak; a plateau is one peak.
+    """Samples, in order, at which the speed (n,) has a peak; of a plateau the first of its highest samples.
 
     A peak counts when the speed has risen by 5 % of the highest from the dip before it and falls by as much
     after it.
-
-    Returns:
-        Indices in order; of a plateau, the first of its highest samples.
     """
     values = np.asarray(speed, dtype=np.float64).tolist()
     step = _PROMINENCE * max(values, default=0.0)

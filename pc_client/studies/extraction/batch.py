@@ -126,16 +126,13 @@ def extract_many(
     n_pictures: int = 0,
     on_outcome: Callable[[ExtractionOutcome], None] = lambda outcome: None,
 ) -> list[ExtractionOutcome]:
-    """Extract recordings.
+    """Extract recordings; returns an outcome for each, in the order of the sources.
 
     Args:
         sources: what to extract from, as `pen.pen_sources` finds it in files, folders and .zip archives.
         time_unit: a key of `pen.TIME_UNITS`, or None: from each file.
         n_pictures: how many of the first recordings get a picture.
         on_outcome: called with every outcome as it comes in, in any order.
-
-    Returns:
-        One outcome a recording, in the order of the sources.
 
     Raises:
         ClientError: the executor broke down.

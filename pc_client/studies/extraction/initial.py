@@ -2,7 +2,7 @@
 
 The minima are the salient points; in time they divide the part into intervals, in space they are the first
 virtual targets. The heights of the inflections (2, 4) and of the peak (3) give sigma, by one formula each,
-and with sigma any two of their times the rest; docs/extraction.md, section 4, has the equations. Of the
+and with sigma their times the rest; docs/extraction.md, section 4, has the equations. Of the
 candidates the one that fits the measured speed best is taken; the arc angle is from the directions at the
 inflections. Their errors, overlap above all, are corrected by the joint refinement.
 
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from pc_client.arrays import Array
-from pc_client.errors import MovementError
 from pc_client.movements.lognormal import Lognormal, evaluate_lognormals
 from pc_client.studies.extraction.chain import Bounds, Chain, normals_across
 from pc_client.studies.signals import Trace
@@ -99,7 +98,7 @@ def _by_closed_forms(t: Array, speed: Array) -> list[tuple[float, float, float]]
         sigma_from_peak_ratio(v4 / v3),
         sigma_from_slope_ratio(v4 / v2),
     ):
-        lognormal = lognormal_from_points(points, _clipped(sigma, Bounds().sigma)).lognormal
+        lognormal = lognormal_from_points(points, _clipped(sigma, Bounds().sigma))
         width = _clipped(math.exp(lognormal.mu) * lognormal.sigma, Bounds().width)
         found.append((lognormal.median, width, lognormal.sigma))
     return found
@@ -119,7 +118,7 @@ def _arc_angle(part: Trace, path_length: Array, a: int, b: int) -> Array:
     if size == 0.0 or path_length[k] <= path_length[i]:
         return np.zeros(3)
     angle = math.atan2(size, float(v[0] @ v[1]))
-    total = turn_rate((0.0, angle), (float(path_length[i]), float(path_length[k]))) * length
+    total = angle / (float(path_length[k]) - float(path_length[i])) * length
     return min(total, _MAX_FIRST_TURN) * axis / size
 
 
@@ -134,54 +133,27 @@ class CharacteristicPoints(NamedTuple):
     speeds: tuple[float, float, float]
 
 
-class ScaledLognormal(NamedTuple):
-    """A lognormal and its area D, the length of a stroke."""
-
-    lognormal: Lognormal
-    length: float
-
-
 def sigma_from_peak_ratio(ratio: float) -> float:
     """Sigma from the speed at one inflection over the speed at the peak.
 
     The ratio is v2/v3, in (0, e^-1/2), or v4/v3, in [e^-1/2, 1): a Gaussian has e^-1/2 on both sides, a
     lognormal less before the peak and more behind it.
     """
-    if not 0.0 < ratio < 1.0:
-        raise MovementError(f"inflection at {ratio} of the peak: the ratio must lie in (0, 1)")
     b = math.log(ratio)
     return math.sqrt(max(0.0, -2.0 - 2.0 * b - 1.0 / (2.0 * b)))
 
 
 def sigma_from_slope_ratio(ratio: float) -> float:
     """Sigma from the speed at the inflection behind the peak over that at the one before, v4/v2, >= 1."""
-    if not (math.isfinite(ratio) and ratio > 0.0):
-        raise MovementError(f"inflections with speeds at ratio {ratio}: the ratio must be greater than 0")
     return math.sqrt(2.0 * math.sqrt(1.0 + math.log(ratio) ** 2) - 2.0)
 
 
-def lognormal_from_points(
-    points: CharacteristicPoints, sigma: float, i: int = 0, k: int = 2
-) -> ScaledLognormal:
-    """The lognormal of a known sigma through two of the three points.
-
-    Args:
-        sigma: from one of the formulas of this module, > 0.
-        i: the point whose time and speed are met, 0..2.
-        k: the other point whose time is met, 0..2.
-    """
+def lognormal_from_points(points: CharacteristicPoints, sigma: float) -> Lognormal:
+    """The lognormal of a known sigma, > 0, that has its inflections at the times of the points."""
     root = sigma * math.sqrt(0.25 * sigma * sigma + 1.0)
-    a = (1.5 * sigma**2 + root, sigma**2, 1.5 * sigma**2 - root)
-    mu = math.log((points.times[i] - points.times[k]) / (math.exp(-a[i]) - math.exp(-a[k])))
-    t0 = points.times[i] - math.exp(mu - a[i])
-    exponent = mu - a[i] + a[i] ** 2 / (2.0 * sigma**2)
-    length = math.sqrt(2.0 * math.pi) * sigma * points.speeds[i] * math.exp(exponent)
-    return ScaledLognormal(Lognormal(t0, mu, sigma), length)
-
-
-def turn_rate(directions: tuple[float, float], distances: tuple[float, float]) -> float:
-    """Change of direction per length: (phi_4 - phi_2) / (s_4 - s_2), rad per length."""
-    return (directions[1] - directions[0]) / (distances[1] - distances[0])
+    before, after = 1.5 * sigma**2 + root, 1.5 * sigma**2 - root
+    mu = math.log((points.times[0] - points.times[2]) / (math.exp(-before) - math.exp(-after)))
+    return Lognormal(points.times[0] - math.exp(mu - before), mu, sigma)
 
 
 def characteristic_points(t: Array, speed: Array) -> CharacteristicPoints | None:

@@ -319,10 +319,9 @@ def judge(table: pl.DataFrame, by: Sequence[str]) -> pl.DataFrame:
 
 
 def rank_settings(table: pl.DataFrame) -> pl.DataFrame:
-    """All settings of the controller, the best first, incomplete ones last; equals as in the table.
+    """All settings of the controller as `judge` has them, and the values of each in one phrase, as `setting`.
 
-    Returns:
-        What `judge` returns, and the values of a setting in one phrase, as `setting`.
+    The best is first, incomplete ones are last; equals are in the order of the table.
     """
     axes = _controller_axes(table) or ["controller"]
     judged = judge(table, axes)
