@@ -111,6 +111,10 @@ class FakeNetwork:
         return unit
 
 
+def printed(events):
+    return [event.text for event in events if type(event).__name__ == "TextPrinted"]
+
+
 class Bench:
     """A controller on the bench: ticks when the test says so, remembers what was said."""
 
@@ -150,7 +154,12 @@ class Bench:
             self.tick()
         else:
             raise AssertionError("the program did not end")
-        return [event.text for event in self.events[first:] if type(event).__name__ == "TextPrinted"]
+        return printed(self.events[first:])
+
+    @property
+    def texts(self):
+        """What programs have printed so far."""
+        return printed(self.events)
 
 
 class BareBox(ServedBox):

@@ -3,7 +3,7 @@
 import numpy as np
 from box_support import Bench
 
-from ur_emulator.controller.events import ErrorReported, ScriptFailed, TextPrinted
+from ur_emulator.controller.events import ErrorReported
 
 TABLE = -0.02  # m, height of the table
 DOWN = "p[0.3,0,{z},3.14159265,0,0]"  # tool down, far from singularities
@@ -38,11 +38,3 @@ def push(bench, *force):
 
 def reported(bench):
     return [(e.code, e.argument) for e in bench.events if isinstance(e, ErrorReported)]
-
-
-def said(bench):
-    return [e.text for e in bench.events if isinstance(e, TextPrinted)]
-
-
-def failures(bench):
-    return [e.text for e in bench.events if isinstance(e, ScriptFailed)]

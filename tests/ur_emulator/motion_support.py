@@ -1,6 +1,7 @@
 """What the motion tests share: an arm, a starting pose, and functions that run generators to their ends."""
 
 import itertools
+import math
 
 import numpy as np
 
@@ -73,6 +74,25 @@ def distance_to_polyline(points, corners):
         share = np.clip((points - a) @ way / max(way @ way, 1e-30), 0.0, 1.0)
         best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * way, axis=1))
     return best
+
+
+def run_cycles(motion, n):
+    """The targets of n cycles of an ArmMotion."""
+    return [motion.step(DT, 1.0) for _ in range(n)]
+
+
+class Swing:
+    """Displaces the tool along base z, smoothly from rest."""
+
+    tool = TOOL
+
+    def __init__(self, reach=0.02, rate=2.0):
+        self.time, self.reach, self.rate = 0.0, reach, rate
+
+    def displace(self, tool_pose, dt):
+        self.time += dt
+        lift = self.reach * (1.0 - math.cos(self.rate * self.time))
+        return (tool_pose[0], tool_pose[1], tool_pose[2] + lift, *tool_pose[3:])
 
 
 class RecordedMove(Move):

@@ -1,4 +1,4 @@
-"""Driving a plant in tests: holding, speed ramps, smooth moves."""
+"""Driving a plant in tests: holding, speed ramps, smooth moves; and link frames by the textbook."""
 
 from __future__ import annotations
 
@@ -14,6 +14,24 @@ HOME = np.array(UR3.home_q)
 
 def target(q, qd=ZERO, qdd=ZERO):
     return JointTarget(tuple(map(float, q)), tuple(map(float, qd)), tuple(map(float, qdd)))
+
+
+def dh_frames(rows, q):
+    """Frames of all links by plain matrix products, (n, 4, 4)."""
+    frame, frames = np.eye(4), []
+    for row, angle in zip(rows, q, strict=True):
+        c, s = np.cos(angle + row.theta), np.sin(angle + row.theta)
+        ca, sa = np.cos(row.alpha), np.sin(row.alpha)
+        frame = frame @ np.array(
+            [
+                [c, -s * ca, s * sa, row.a * c],
+                [s, c * ca, -c * sa, row.a * s],
+                [0, sa, ca, row.d],
+                [0, 0, 0, 1],
+            ]
+        )
+        frames.append(frame)
+    return np.array(frames)
 
 
 def hold(plant, q, n):

@@ -157,10 +157,6 @@ class Box(Bench):
         return self.texts
 
     @property
-    def texts(self):
-        return [event.text for event in self.events if type(event).__name__ == "TextPrinted"]
-
-    @property
     def failures(self):
         """Run-time errors, `line:column text`."""
         found = [event for event in self.events if type(event).__name__ == "ScriptFailed"]

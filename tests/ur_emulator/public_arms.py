@@ -1,8 +1,8 @@
-"""Numbers of the e-Series arms in public URDF and MJCF models, as facts, in the frames of their files.
+"""Numbers of the e-Series arms in public URDF models, as facts, in the frames of their files.
 
 Sources: ur_description in ros-industrial/universal_robot and UniversalRobots/Universal_Robots_ROS2_Description
 (config/*/default_kinematics.yaml and physical_parameters.yaml, read 2026-11-22, some through the fork of
-RocketfarmAS); google-deepmind/mujoco_menagerie (universal_robots_ur5e/ur5e.xml, universal_robots_ur10e/ur10e.xml).
+RocketfarmAS).
 """
 
 from math import pi
@@ -141,41 +141,6 @@ def ros_model(arm):
         model.appendBodyToJoint(
             parent, pin.Inertia(body.mass, np.array(body.com), tensor), pin.SE3.Identity()
         )
-    return model
-
-
-# Of the MJCF models, a link a row: axis of its joint, where it is in the frame before [m], whether it is turned
-# by pi/2 about y, its body.
-_Y, _Z = "y", "z"
-MENAGERIE = {
-    "ur5e": (
-        (_Z, (0.0, 0.0, 0.163), False, Body(3.7, _NONE, (0.0102675, 0.0102675, 0.00666, *_NONE))),
-        (_Y, (0.0, 0.138, 0.0), True, Body(8.393, (0.0, 0.0, 0.2125), (0.133886, 0.133886, 0.0151074, *_NONE))),
-        (_Y, (0.0, -0.131, 0.425), False, Body(2.275, (0.0, 0.0, 0.196), (0.0311796, 0.0311796, 0.004095, *_NONE))),
-        (_Y, (0.0, 0.0, 0.392), True, Body(1.219, (0.0, 0.127, 0.0), (0.0025599, 0.0025599, 0.0021942, *_NONE))),
-        (_Z, (0.0, 0.127, 0.0), False, Body(1.219, (0.0, 0.0, 0.1), (0.0025599, 0.0025599, 0.0021942, *_NONE))),
-        (_Y, (0.0, 0.0, 0.1), False, Body(0.1889, (0.0, 0.0771683, 0.0), (0.0000990863, 0.000132134, 0.0000990863, *_NONE))),
-    ),
-    "ur10e": (
-        (_Z, (0.0, 0.0, 0.181), False, Body(7.778, _NONE, (0.0314743, 0.0314743, 0.0218756, *_NONE))),
-        (_Y, (0.0, 0.176, 0.0), True, Body(12.93, (0.0, 0.0, 0.3065), (0.423074, 0.423074, 0.0363656, *_NONE))),
-        (_Y, (0.0, -0.137, 0.613), False, Body(3.87, (0.0, 0.0, 0.2855), (0.11059, 0.11059, 0.0108844, *_NONE))),
-        (_Y, (0.0, 0.0, 0.571), True, Body(1.96, (0.0, 0.135, 0.0), (0.00510825, 0.0055125, 0.00510825, *_NONE))),
-        (_Z, (0.0, 0.135, 0.0), False, Body(1.96, (0.0, 0.0, 0.12), (0.00510825, 0.00510825, 0.0055125, *_NONE))),
-        (_Y, (0.0, 0.0, 0.12), False, Body(0.202, (0.0, 0.092, 0.0), (0.000144346, 0.000204525, 0.000144346, *_NONE))),
-    ),
-}  # fmt: skip
-
-
-def menagerie_model(name):
-    """A Pinocchio model of the MJCF file: joints about y and z, upper arm and wrist 1 turned by pi/2 about y."""
-    model, parent = pin.Model(), 0
-    for axis, place, is_turned, body in MENAGERIE[name]:
-        frame = pin.SE3(pin.utils.rotate("y", pi / 2 * is_turned), np.array(place))
-        joint = pin.JointModelRY() if axis == _Y else pin.JointModelRZ()
-        parent = model.addJoint(parent, joint, frame, f"joint {parent}")
-        inertia = pin.Inertia(body.mass, np.array(body.com), _tensor(body.inertia))
-        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
     return model
 
 

@@ -21,7 +21,7 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.events import ErrorReported, ScriptFailed
+from ur_emulator.controller.events import ErrorReported, SafetyModeChanged, ScriptFailed
 from ur_emulator.controller.modbus_map import read_coil, read_register
 from ur_emulator.controller.safety.modes import SafetyEvent
 from ur_emulator.ports.primary.robot_state import state_records
@@ -74,6 +74,11 @@ def moving(*, loaded=False, **kwargs):
 
 def infos(bench):
     return [event.text for event in bench.events if isinstance(event, ErrorReported) and event.code == 0]
+
+
+def modes(bench):
+    """Names of the safety modes that the box has entered."""
+    return [SafetyMode(e.safety_mode).name for e in bench.events if isinstance(e, SafetyModeChanged)]
 
 
 def failures(bench):

@@ -1,23 +1,33 @@
-"""Contacts: a move into the table, detecting one, the zero of the wrench; and what the plant does for them."""
+"""Contacts: with the table, with obstacles that come and go, what finds them, and what the plant does for them."""
+
+import math
 
 import numpy as np
 import pytest
-from compliance_support import DOWN, TABLE, above_table, failures, place, push, reported, said, truth
+from box_support import Bench
+from compliance_support import DOWN, TABLE, above_table, place, push, reported, truth
 from plant_support import HOME, hold, target
+from states_support import infos
 
 from protocol.ur_types import ControlMode, SafetyMode
 from ur_emulator.commands.client_writes import WriteInputs
 from ur_emulator.commands.programs import StopProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
+from ur_emulator.commands.surroundings import AddObstacle, RemoveObstacle
+from ur_emulator.controller.events import ErrorReported
+from ur_emulator.errors import EmulatorError
 from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.plant.obstacles import SLOTS
 from ur_emulator.plant.plant import Plant
 
 DEEP = DOWN.format(z=-0.15)
 
 
-@pytest.mark.parametrize("fidelity", ["ideal", "typical", "poor"])
-@pytest.mark.parametrize("speed", [0.05, 0.25, 1.0])
+@pytest.mark.parametrize(
+    ("fidelity", "speed"),
+    [("ideal", 1.0), ("typical", 0.05), ("typical", 0.25), ("typical", 1.0), ("poor", 0.05), ("poor", 1.0)],
+)
 def test_a_move_into_the_table_is_a_protective_stop(fidelity, speed):
     bench = above_table(f"  movel({DEEP}, a=1.2, v={speed})", z=0.1, fidelity=fidelity)
     forces, places = truth(bench, 600)
@@ -69,14 +79,17 @@ def search(speed, direction):
   sleep(100)"""
 
 
-@pytest.mark.parametrize("fidelity", ["ideal", "typical", "poor"])
 @pytest.mark.parametrize(
-    "direction", ["direction=[0,0,-1,0,0,0]", "get_target_tcp_speed()", "[0,0,0,0,0,0]", ""]
+    ("fidelity", "direction"),
+    [
+        *((fidelity, "direction=[0,0,-1,0,0,0]") for fidelity in ("ideal", "typical", "poor")),
+        *(("typical", direction) for direction in ("get_target_tcp_speed()", "[0,0,0,0,0,0]", "")),
+    ],
 )
 def test_the_tool_finds_the_table(fidelity, direction):
     bench = above_table(search(0.03, direction), fidelity=fidelity)
     bench.tick(450)
-    assert said(bench) == ["found"]
+    assert bench.texts == ["found"]
     assert place(bench)[2] == pytest.approx(TABLE, abs=1.5e-3)
     assert reported(bench) == []
 
@@ -86,10 +99,10 @@ def test_a_contact_in_another_direction_does_not_count():
     bench.tick(150)
     push(bench, 0.0, 0.0, 40.0)
     bench.tick(30)
-    assert set(said(bench)) == {"0"}
+    assert set(bench.texts) == {"0"}
     push(bench, 0.0, -40.0, 0.0)
     bench.tick(30)
-    assert int(said(bench)[-1]) in range(27, 32)
+    assert int(bench.texts[-1]) in range(27, 32)
 
 
 @pytest.mark.parametrize("fidelity", ["typical", "poor"])
@@ -103,41 +116,6 @@ def test_moves_without_contact_are_none(fidelity):
     for _ in range(1000):
         bench.tick()
         assert bench.controller.state.force_sense.steps_since_contact((0.0, 0.0, 0.0)) == 0
-
-
-@pytest.mark.parametrize(
-    ("call", "text"),
-    [
-        (
-            'tool_contact([0,0,to_num("nan"),0,0,0])',
-            "tool_contact: Parameter 'direction' must be finite, got [0, 0, nan, 0, 0, 0]",
-        ),
-        (
-            "tool_contact([])",
-            "tool_contact: Parameter 'direction' must be a list of 6 numbers or a Pose, got a list of 0",
-        ),
-    ],
-)
-def test_absurd_directions_are_errors(call, text):
-    bench = above_table(f"  {call}", z=0.2)
-    bench.tick(3)
-    assert failures(bench) == [text]
-
-
-def test_zero_ftsensor_takes_the_present_wrench_as_zero():
-    bench = above_table("  sleep(1)\n  zero_ftsensor()\n  sleep(100)", z=0.2)
-    push(bench, 5.0, 0.0, -12.0)
-    bench.tick(120)
-    force = np.mean([s.actual_tcp_force for s in bench.snapshots[-50:]], axis=0)
-    assert np.abs(force[:3]).max() > 7.0
-    bench.tick(80)
-    rest = np.mean([s.actual_tcp_force for s in bench.snapshots[-50:]], axis=0)
-    assert np.abs(rest[:3]).max() < 1.5
-    assert np.abs(rest[3:]).max() < 0.3
-    push(bench, 0.0, 0.0, 0.0)
-    bench.tick(60)
-    force = np.mean([s.actual_tcp_force for s in bench.snapshots[-50:]], axis=0)
-    assert force[:3] == pytest.approx([-5.0, 0.0, 12.0], abs=1.5)
 
 
 def test_force_mode_trusts_a_zero_that_the_program_has_set():
@@ -217,4 +195,142 @@ def test_another_sensor_begins_without_zero_and_past():
         bench.tick(1, WriteInputs((("external_force_torque", (0.0, 0.0, 40.0, 0.0, 0.0, 0.0)),)))
     assert np.hypot.reduce(bench.now.actual_tcp_force[:3]) == pytest.approx(40.0)
     # The first reading was there before the first cycle with the sensor was over: no contact came.
-    assert set(said(bench)) == {"0"}
+    assert set(bench.texts) == {"0"}
+
+
+# The tool points down at (.3, 0, .15) and goes 0.3 m along y.
+APPROACH = "movej(p[0.3,0,0.15,3.14159265,0,0], a=3, v=2)"
+PUSH_ON = "def f():\n  movel(p[0.3,0.3,0.15,3.14159265,0,0], a=1, v=0.2)\nend\n"
+UPRIGHT = (0.0, 0.0, 0.0)
+ON_ITS_SIDE = (-math.pi / 2, 0.0, 0.0)
+# Each begins at y = .2 on the way of the wrist, which reaches about 0.04 m around the tool's axis.
+OBSTACLES = {
+    "box": AddObstacle("it", "box", (0.4, 0.1, 0.4), (0.3, 0.25, 0.15, *UPRIGHT)),
+    "turned box": AddObstacle("it", "box", (0.4, 0.4, 0.1), (0.3, 0.25, 0.15, *ON_ITS_SIDE)),
+    "sphere": AddObstacle("it", "sphere", (0.15,), (0.3, 0.35, 0.15, *UPRIGHT)),
+    "capsule": AddObstacle("it", "capsule", (0.05, 0.3), (0.3, 0.25, 0.2, *UPRIGHT)),
+    "plane": AddObstacle("it", "plane", (), (0.0, 0.2, 0.0, math.pi / 2, 0.0, 0.0)),
+}
+
+
+@pytest.fixture
+def bench():
+    bench = Bench(fidelity="ideal")
+    bench.run(f"def a():\n  {APPROACH}\nend\n")
+    bench.events.clear()
+    return bench
+
+
+def y(bench):
+    return bench.controller.plant.flange_position[1]
+
+
+@pytest.mark.parametrize("kind", OBSTACLES)
+def test_the_arm_is_stopped(bench, kind):
+    bench.tick(1, OBSTACLES[kind])
+    assert bench.controller.plant.obstacles.names == ("it",)
+    bench.start(PUSH_ON)
+    reached = []
+    for _ in range(400):
+        bench.tick()
+        reached.append(y(bench))
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    codes = [event.code for event in bench.events if isinstance(event, ErrorReported)]
+    assert codes[0] in (153, 157)
+    assert 0.1 < max(reached) < 0.205
+    assert bench.now.target_qd == (0.0,) * 6
+
+
+def test_after_the_obstacle_is_gone_the_path_is_free(bench):
+    bench.tick(1, OBSTACLES["box"])
+    bench.start(PUSH_ON)
+    bench.tick(400)
+    bench.tick(1, RemoveObstacle("it"), UnlockProtectiveStop())
+    assert bench.controller.plant.obstacles.names == ()
+    bench.run(PUSH_ON)
+    assert y(bench) == pytest.approx(0.3, abs=1e-3)
+
+
+def test_the_touch_is_felt_as_a_force_that_pushes_back(bench):
+    bench.tick(1, OBSTACLES["box"])
+    bench.start(PUSH_ON)
+    forces = []
+    for _ in range(300):
+        bench.tick()
+        forces.append(bench.controller.plant.contact_wrench[:3])
+    assert min(force[1] for force in forces) < -50.0
+
+
+def test_an_obstacle_of_the_same_name_is_replaced(bench):
+    bench.tick(1, OBSTACLES["box"])
+    bench.tick(1, AddObstacle("it", "sphere", (0.05,), (0.3, -0.4, 0.15, *UPRIGHT)))
+    assert bench.controller.plant.obstacles.names == ("it",)
+    bench.run(PUSH_ON)
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+    assert y(bench) == pytest.approx(0.3, abs=1e-3)
+
+
+def test_what_would_stand_in_the_arm_is_refused_and_nothing_moves(bench):
+    before = bench.now.actual_q
+    bench.tick(1, AddObstacle("it", "box", (0.2, 0.2, 0.2), (0.3, 0.0, 0.2, *UPRIGHT)))
+    bench.tick(20)
+    assert bench.controller.plant.obstacles.names == ()
+    assert infos(bench) == ["obstacle it: the arm is where it should stand, move one of them"]
+    assert bench.now.actual_q == pytest.approx(before, abs=1e-4)
+    assert bench.now.safety_mode == SafetyMode.NORMAL
+
+
+def test_a_move_into_the_arm_leaves_the_old_one_where_it_was(bench):
+    for i in range(SLOTS):
+        bench.tick(1, AddObstacle(f"{i}", "sphere", (0.01,), (0.3, 0.4, 0.1 + 0.03 * i, *UPRIGHT)))
+    assert len(bench.controller.plant.obstacles.names) == SLOTS
+    bench.tick(1, AddObstacle("more", "sphere", (0.01,), (0.5, 0.4, 0.1, *UPRIGHT)))
+    assert infos(bench) == [f"obstacle more: there are {SLOTS} already, remove one first"]
+    bench.tick(1, AddObstacle("3", "box", (0.2, 0.2, 0.2), (0.3, 0.0, 0.2, *UPRIGHT)))
+    assert "the arm is where it should stand" in infos(bench)[-1]
+    bench.tick(1, AddObstacle("3", "box", (0.4, 0.1, 0.4), (0.3, 0.25, 0.15, *UPRIGHT)))
+    assert len(bench.controller.plant.obstacles.names) == SLOTS
+    bench.start(PUSH_ON)
+    bench.tick(400)
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+
+
+def test_an_obstacle_that_nothing_touches_changes_no_bit(bench):
+    other = Bench(fidelity="ideal")
+    other.run(f"def a():\n  {APPROACH}\nend\n")
+    other.tick(1, AddObstacle("far", "box", (0.1, 0.1, 0.1), (-0.5, -0.5, 0.5, *UPRIGHT)))
+    bench.tick(1)
+    for one in (bench, other):
+        one.run(PUSH_ON)
+    a, b = ([s.actual_q for s in one.snapshots] for one in (bench, other))
+    assert a == b
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "text"),
+    [
+        ({"name": ""}, "needs one"),
+        ({"shape": "cone"}, "allowed is box, sphere, capsule or plane"),
+        ({"size": (0.1,)}, "a box needs 3 numbers"),
+        ({"size": (0.1, 0.1, 0.0)}, "0.001 to 5 m"),
+        ({"size": (0.1, 0.1, math.nan)}, "up to three numbers"),
+        ({"size": (0.1, 0.1, math.inf)}, "up to three numbers"),
+        ({"pose": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}, "six numbers"),
+        ({"pose": (9.0, 0.0, 0.0, 0.0, 0.0, 0.0)}, "at most 5 m away"),
+        ({"pose": (0.0,) * 5}, "six numbers"),
+        ({"shape": "plane"}, "a plane needs 0 numbers"),
+    ],
+)
+def test_absurd_obstacles_are_refused_in_one_line(kwargs, text):
+    good = {"name": "it", "shape": "box", "size": (0.1, 0.1, 0.1), "pose": (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)}
+    with pytest.raises(EmulatorError, match=text) as caught:
+        AddObstacle(**{**good, **kwargs})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_resting_arm_stays_where_it_is_among_obstacles(bench):
+    before = np.array(bench.now.actual_q)
+    for obstacle in OBSTACLES.values():
+        bench.tick(1, obstacle)
+        bench.tick(10)
+    assert np.abs(np.array(bench.now.actual_q) - before).max() < 1e-4

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from box_support import Bench
-from compliance_support import TABLE, above_table, failures, place, push, reported, said, truth
+from compliance_support import TABLE, above_table, place, push, reported, truth
 
 from protocol.ur_types import ControlMode
 from ur_emulator.commands.power import PowerOff
@@ -27,7 +27,7 @@ def pressing(force, *, frame=BASE, sign=-1, limits=LIMITS):
 # --- on the table
 
 
-@pytest.mark.parametrize(("seed", "force"), [(1, 20), (2, 50), (3, 20), (5, 50), (8, 20)])
+@pytest.mark.parametrize(("seed", "force"), [(1, 20), (2, 50), (8, 20)])
 def test_the_true_force_on_the_table_comes_within_a_tenth_of_the_one_asked(seed, force):
     bench = above_table(pressing(force) + "  sleep(100)", seed=seed)
     forces, _ = truth(bench, 750)
@@ -37,7 +37,7 @@ def test_the_true_force_on_the_table_comes_within_a_tenth_of_the_one_asked(seed,
 
 @pytest.mark.parametrize(
     ("fidelity", "scaling"),
-    [("ideal", 2.0), ("typical", 0.5), ("typical", 1.0), ("typical", 2.0), ("poor", 0.5), ("poor", 2.0)],
+    [("ideal", 2.0), ("typical", 0.5), ("typical", 2.0), ("poor", 0.5), ("poor", 2.0)],
 )
 def test_pressing_is_stable(fidelity, scaling):
     bench = above_table(
@@ -51,16 +51,11 @@ def test_pressing_is_stable(fidelity, scaling):
     assert reported(bench) == []
 
 
-def test_without_noise_the_force_is_exact():
-    bench = above_table(pressing(25) + "  sleep(100)", fidelity="ideal")
+@pytest.mark.parametrize(("frame", "sign"), [(BASE, -1), ("tool_pose()", 1)])
+def test_without_noise_the_force_is_exact_in_the_frame_of_the_base_and_of_the_tool(frame, sign):
+    bench = above_table(pressing(25, frame=frame, sign=sign) + "  sleep(100)", fidelity="ideal")
     forces, _ = truth(bench, 750)
     assert forces[-100:, 2].mean() == pytest.approx(25.0, abs=0.1)
-
-
-def test_the_tool_frame_presses_as_well():
-    bench = above_table(pressing(20, frame="tool_pose()", sign=1) + "  sleep(100)")
-    forces, _ = truth(bench, 750)
-    assert forces[-250:, 2].mean() == pytest.approx(20.0, rel=0.1)
 
 
 def test_calling_it_again_and_again_changes_nothing():
@@ -102,7 +97,7 @@ def test_a_move_on_top_follows_its_path_and_keeps_the_force(fidelity):
         fidelity=fidelity,
     )
     forces, places = truth(bench, 850)
-    assert said(bench) == ["there"]
+    assert bench.texts == ["there"]
     sliding = forces[620:760, 2]
     assert sliding.mean() == pytest.approx(20.0, abs=3.0)
     assert (sliding > 0.0).all()
@@ -130,7 +125,7 @@ def test_joint_positions_along_the_path_know_nothing_of_the_displacement():
         fidelity="ideal",
     )
     bench.tick(600)
-    along, displaced = (float(text.split(",")[2]) for text in said(bench))
+    along, displaced = (float(text.split(",")[2]) for text in bench.texts)
     assert along == pytest.approx(0.03, abs=1e-4)
     assert displaced < TABLE
 
@@ -150,8 +145,8 @@ def test_no_selected_axis_means_the_program_is_followed():
 # --- in free space
 
 
-@pytest.mark.parametrize("limit", [0.02, 0.08])
-def test_in_free_space_it_moves_at_the_limit_speed(limit):
+def test_in_free_space_it_moves_at_the_limit_speed():
+    limit = 0.08
     bench = above_table(pressing(20, limits=f"[0.1,0.1,{limit},0.2,0.2,0.2]") + "  sleep(100)", z=0.25)
     bench.tick(260)
     speeds = [-s.target_tcp_speed[2] for s in bench.snapshots[-20:]]
@@ -174,16 +169,15 @@ def free_bench(robot, generation, seconds, *forces, damping, scaling=1.0):
     return bench, start
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.005, 0.025])
 @pytest.mark.parametrize(
-    ("robot", "generation"),
+    ("robot", "generation", "damping"),
     [
-        *(("ur5", replace(CB3, period_us=period)) for period in (8_000, 4_000, 2_000)),
-        ("ur10", CB3),
-        ("ur3e", E_SERIES),
-        ("ur20", E_SERIES),
+        *(("ur5", CB3, damping) for damping in (0.0, 0.005, 0.025)),
+        *(("ur5", replace(CB3, period_us=period), 0.005) for period in (4_000, 2_000)),
+        ("ur10", CB3, 0.005),
+        *((robot, E_SERIES, damping) for robot in ("ur3e", "ur20") for damping in (0.0, 0.025)),
     ],
-    ids=lambda x: x if isinstance(x, str) else f"{x.period_us}us",
+    ids=lambda x: str(getattr(x, "period_us", x)),
 )
 def test_the_free_speed_follows_one_law_in_seconds(robot, generation, damping):
     """A mass under the force less 1.5 N, whose damping takes a share of the speed in 2 ms."""
@@ -262,19 +256,6 @@ def test_a_moment_is_regulated_too():
 # --- types of frames
 
 
-def test_type_1_points_y_at_the_origin_of_the_frame():
-    bench = above_table(
-        WAIT
-        + f"  force_mode(p[0.3,0.2,0.2,0.3,0.1,0.2], [0,1,0,0,0,0], [0,20,0,0,0,0], 1, {LIMITS})\n  sleep(100)",
-        z=0.2,
-    )
-    before = place(bench)
-    bench.tick(400)
-    way = place(bench) - before
-    assert way[1] > 0.03
-    assert np.abs(way[[0, 2]]).max() < 2e-3
-
-
 def test_type_3_has_compliant_axes_once_the_tool_moves():
     bench = above_table(
         WAIT + f"  force_mode({BASE}, [0,1,0,0,0,0], [0,20,0,0,0,0], 3, {LIMITS})\n  sleep(2)\n"
@@ -322,7 +303,7 @@ def test_after_the_end_moves_start_from_where_the_arm_is():
         '  movel(pose_add(get_target_tcp_pose(), p[0,0,0.05,0,0,0]), v=0.1)\n  textmsg("up")\n  sleep(100)'
     )
     bench.tick(650)
-    assert said(bench) == ["up"]
+    assert bench.texts == ["up"]
     bench.tick(100)
     assert place(bench)[2] == pytest.approx(TABLE + 0.05, abs=2e-3)
 
@@ -372,16 +353,6 @@ def test_hand_guiding_takes_its_place():
     assert np.abs(place(bench) - before).max() < 1e-4
 
 
-def test_is_steady_is_false_meanwhile():
-    bench = above_table(
-        f"  sleep(1)\n  textmsg(is_steady())\n  force_mode({BASE}, [0,0,0,0,0,0], [0,0,0,0,0,0], 2, {LIMITS})\n"
-        "  sleep(1)\n  textmsg(is_steady())\n  end_force_mode()\n  sleep(1)\n  textmsg(is_steady())",
-        z=0.2,
-    )
-    bench.tick(500)
-    assert said(bench) == ["True", "False", "True"]
-
-
 def test_a_pause_holds_the_arm_and_the_force():
     bench = above_table(pressing(20) + "  sleep(100)")
     bench.tick(600)
@@ -427,79 +398,6 @@ def test_an_arm_that_is_led_out_of_its_reach_stops():
 
 
 # --- arguments
-
-GOOD = [BASE, "[0,0,1,0,0,0]", "[0,0,-20,0,0,0]", "2", LIMITS]
-NAN = 'to_num("nan")'
-
-
-@pytest.mark.parametrize(
-    ("index", "value", "text"),
-    [
-        (
-            0,
-            f"p[{NAN},0,0,0,0,0]",
-            "force_mode: Parameter 'task_frame' must be finite, got [nan, 0.0, 0.0, 0.0, 0.0, 0.0]",
-        ),
-        (0, "[0,0,0,0,0,0]", "force_mode: Parameter must be a Pose on the form p[x,y,z,a,b,c]"),
-        (1, "[]", "force_mode: Parameter 'selection_vector' must be a list of 6 numbers, got a list of 0"),
-        (
-            1,
-            "[0,0,1]",
-            "force_mode: Parameter 'selection_vector' must be a list of 6 numbers, got a list of 3",
-        ),
-        (1, "[0,0,2,0,0,0]", "force_mode: selection_vector must hold only 0 and 1, got [0,0,2,0,0,0]"),
-        (1, "[0,0,0.5,0,0,0]", "force_mode: selection_vector must hold only 0 and 1, got [0,0,0.5,0,0,0]"),
-        (
-            1,
-            "[True,False,False,False,False,False]",
-            "force_mode: Parameter 'selection_vector' must be a list of 6 numbers, got a list of 6 with a bool in it",
-        ),
-        (2, f"[0,0,{NAN},0,0,0]", "force_mode: Parameter 'wrench' must be finite, got [0, 0, nan, 0, 0, 0]"),
-        (3, "0", "force_mode: Parameter 'type' must be in the range 1 to 3, got 0"),
-        (3, "2.5", "force_mode: Parameter 'type' must be an integer, got the float 2.5"),
-        (4, "[0,0,-0.1,0,0,0]", "force_mode: limits must not be below 0, got [0,0,-0.1,0,0,0]"),
-        (4, f"[0,0,{NAN},0,0,0]", "force_mode: Parameter 'limits' must be finite, got [0, 0, nan, 0, 0, 0]"),
-    ],
-)
-def test_absurd_arguments_are_one_line_errors_and_move_nothing(index, value, text):
-    arguments = list(GOOD)
-    arguments[index] = value
-    bench = above_table(f"  force_mode({', '.join(arguments)})\n  sleep(100)", z=0.2)
-    before = bench.now.target_q
-    bench.tick(10)
-    assert failures(bench) == [text]
-    assert bench.now.control_mode == ControlMode.POSITION
-    assert bench.now.target_q == before
-    assert not any(bench.now.target_qd)
-
-
-def test_a_point_too_near_is_refused():
-    bench = above_table(
-        f"  force_mode(get_target_tcp_pose(), [0,1,0,0,0,0], [0,9,0,0,0,0], 1, {LIMITS})", z=0.2
-    )
-    bench.tick(3)
-    assert failures(bench) == [
-        "force_mode: the tool is 0.0 mm from the origin of the task frame, type 1 needs at least 10 mm"
-    ]
-
-
-@pytest.mark.parametrize(
-    ("call", "text"),
-    [
-        (
-            "force_mode_set_damping(1.5)",
-            "force_mode_set_damping: Parameter 'damping' must be in the range 0 to 1, got 1.5",
-        ),
-        (
-            "force_mode_set_gain_scaling(-1)",
-            "force_mode_set_gain_scaling: Parameter 'scaling' must be in the range 0 to 2, got -1",
-        ),
-    ],
-)
-def test_absurd_settings_are_errors(call, text):
-    bench = above_table(f"  {call}", z=0.2)
-    bench.tick(3)
-    assert failures(bench) == [text]
 
 
 @pytest.mark.parametrize("wrench", ["[0,0,-1e6,0,0,0]", "[1e6,1e6,1e6,1e6,1e6,1e6]"])

@@ -308,9 +308,8 @@ def test_what_is_loaded_stays_when_a_program_begins_while_another_is_read(tmp_pa
         assert box.state.program_state == "PLAYING"
 
 
-@pytest.mark.parametrize("robot", ["ur3", "ur5"])
-def test_an_arm_keeps_the_tool_speed_of_its_installation(robot):
-    bench = Bench(robot=robot, fidelity="ideal")
+def test_an_arm_keeps_the_tool_speed_of_its_installation():
+    bench = Bench(fidelity="ideal")
     set_up(bench, arm=ArmLimits(tool_speed=0.25))
     bench.run("movej([-1.0, -1.7, -1.7, -0.1, 1.2, 1.8], a=1.5, v=3)\n")
     speeds = [math.hypot(*s.target_tcp_speed[:3]) for s in bench.snapshots]
@@ -358,8 +357,7 @@ XML = (
 )
 
 
-@pytest.mark.parametrize("packed", [False, True])
-@pytest.mark.parametrize("text", [PROPERTIES, XML], ids=["properties", "XML"])
+@pytest.mark.parametrize(("text", "packed"), [(PROPERTIES, True), (XML, False)], ids=["properties", "XML"])
 def test_variables_survive_a_run(box, dashboard, tmp_path, text, packed):
     file = tmp_path / "cell.variables"
     file.write_bytes(gzip.compress(text.encode()) if packed else text.encode())

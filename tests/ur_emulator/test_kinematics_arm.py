@@ -6,6 +6,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from plant_support import dh_frames
 
 from protocol.pose import pose_to_T, pose_trans, rotvec_from_flat
 from ur_emulator.errors import KinematicsError
@@ -16,21 +17,6 @@ from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import TYPICAL
 
 TCP = (0.01, -0.02, 0.13, 0.3, -0.2, 0.7)
-
-
-def dh_matrix(row, angle):
-    c, s = np.cos(angle + row.theta), np.sin(angle + row.theta)
-    ca, sa = np.cos(row.alpha), np.sin(row.alpha)
-    return np.array(
-        [[c, -s * ca, s * sa, row.a * c], [s, c * ca, -c * sa, row.a * s], [0, sa, ca, row.d], [0, 0, 0, 1]]
-    )
-
-
-def dh_product(rows, q):
-    product = np.eye(4)
-    for row, angle in zip(rows, q, strict=False):
-        product = product @ dh_matrix(row, angle)
-    return product
 
 
 def random_angles(n, seed=0, reach=pi):
@@ -47,7 +33,7 @@ def arm(request):
 def test_forward_kinematics_is_the_product_of_dh_matrices(arm, tcp):
     rows = calibrated_dh(UR3, arm.calibration)
     for q in random_angles(50, reach=2 * pi):
-        expected = dh_product(rows, q) @ (np.eye(4) if tcp is None else pose_to_T(tcp))
+        expected = dh_frames(rows, q)[-1] @ (np.eye(4) if tcp is None else pose_to_T(tcp))
         assert pose_to_T(arm.fk(q, tcp)) == pytest.approx(expected, abs=1e-12)
 
 
@@ -77,8 +63,8 @@ def test_state_agrees_with_forward_kinematics_and_jacobian(arm, tcp):
         pose, speed, elbow, elbow_velocity, *_ = arm.state(q.tolist(), qd.tolist(), tcp)
         assert pose == pytest.approx(arm.fk(q, tcp), abs=1e-14)
         assert speed == pytest.approx(arm.jacobian(q, tcp) @ qd, abs=1e-12)
-        assert elbow == pytest.approx(dh_product(rows[:2], q)[:3, 3], abs=1e-12)
-        moved = dh_product(rows[:2], q + h * qd)[:3, 3] - dh_product(rows[:2], q - h * qd)[:3, 3]
+        assert elbow == pytest.approx(dh_frames(rows, q)[1, :3, 3], abs=1e-12)
+        moved = dh_frames(rows, q + h * qd)[1, :3, 3] - dh_frames(rows, q - h * qd)[1, :3, 3]
         assert elbow_velocity == pytest.approx(moved / (2 * h), abs=1e-7)
 
 
@@ -148,7 +134,7 @@ def test_inverse_at_the_wrist_singularity_keeps_joint_6():
 
 
 def closed_form(q):
-    flange = dh_product(UR3.dh, q)
+    flange = dh_frames(UR3.dh, q)[-1]
     branches = closed_form_inverse(
         UR3.dh, flange[:3, :3].ravel().tolist(), tuple(flange[:3, 3].tolist()), 0.0
     )
@@ -159,7 +145,7 @@ def test_closed_form_gives_eight_different_exact_branches_at_home():
     flange, branches = closed_form(UR3.home_q)
     assert len(branches) == 8
     for i, branch in enumerate(branches):
-        assert dh_product(UR3.dh, branch) == pytest.approx(flange, abs=1e-12)
+        assert dh_frames(UR3.dh, branch)[-1] == pytest.approx(flange, abs=1e-12)
         others = np.delete(branches, i, axis=0)
         assert np.abs(others - branch).max(axis=1).min() > 0.1
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motion_support import DT, HOME, START, TOOL, at, distance_to_polyline, line, positions
+from motion_support import DT, HOME, START, TOOL, Swing, at, distance_to_polyline, line, positions, run_cycles
 
 from ur_emulator.models.robot_model import ZERO6
 from ur_emulator.motion.arm_motion import ArmMotion
@@ -81,12 +81,10 @@ def test_with_and_without_pauses_the_path_is_the_same(make, pauses):
 def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_asked_for():
     motion = ArmMotion(HOME, 20.0)
     motion.command("me", straight()[0])
-    for _ in range(20):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 20)
     motion.pause()
     assert not motion.is_paused
-    for _ in range(32):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 32)
     assert motion.is_paused
     assert not motion.is_moving
     held = motion.target
@@ -124,8 +122,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(stream):
         assert motion.target.qd == pytest.approx((0.5,) * 6)
     else:
         assert motion.target.q[0] == pytest.approx(0.5, abs=1e-3)
-    for _ in range(100):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 100)
     assert not motion.is_moving
 
 
@@ -136,12 +133,10 @@ def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest():
         motion.renew()
         motion.step(DT, 1.0)
     motion.pause()
-    for _ in range(60):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 60)
     q = motion.target.q
     motion.resume()
-    for _ in range(60):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 60)
     assert not motion.is_moving
     assert motion.target.q == pytest.approx(q, abs=1e-3)
 
@@ -151,8 +146,7 @@ def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(pushed):
     motion = ArmMotion(HOME, 20.0)
     move, _ = straight()
     motion.command("me", move)
-    for _ in range(20):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 20)
     left_at = motion.path.q
     motion.interrupt()
     while not motion.is_paused:
@@ -180,14 +174,12 @@ def test_a_move_that_was_not_accepted_is_taken_back():
     motion = ArmMotion(HOME, 20.0)
     move, _ = straight()
     motion.command("me", move)
-    for _ in range(20):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 20)
     before = motion.target
     motion.step(DT, 1.0)
     motion.retract(before)
     motion.interrupt()
-    for _ in range(30):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 30)
     motion.resume()
     targets = [motion.target]
     while motion.is_moving:
@@ -201,14 +193,11 @@ def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
     motion = ArmMotion(HOME, 20.0)
     move, _ = straight()
     motion.command("me", move)
-    for _ in range(20):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 20)
     motion.pause()
-    for _ in range(10):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 10)
     motion.stop() if end == "stop" else motion.release("me")
-    for _ in range(30):
-        motion.step(DT, 1.0)
+    run_cycles(motion, 30)
     assert not motion.is_moving
     assert not motion.is_paused
     assert motion.owner is None
@@ -216,29 +205,18 @@ def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
     assert motion.target.qd == ZERO6
 
 
-class Lift:
-    tool = TOOL
-    time = 0.0
-
-    def displace(self, tool_pose, dt):
-        assert dt > 0.0
-        self.time += dt
-        z = tool_pose[2] + 0.02 * (1.0 - math.cos(2.0 * self.time))
-        return (*tool_pose[:2], z, *tool_pose[3:])
-
-
 def test_overlays_stand_still_in_a_pause():
     motion = ArmMotion(HOME, 20.0)
-    lift = Lift()
+    lift = Swing()
     motion.add_overlay(lift)
-    targets = [motion.step(DT, 1.0) for _ in range(60)]
+    targets = run_cycles(motion, 60)
     motion.pause()
-    targets += [motion.step(DT, 1.0) for _ in range(60)]
+    targets += run_cycles(motion, 60)
     assert motion.is_paused
     held = targets[-1]
     assert motion.step(DT, 1.0) == held
     motion.resume()
-    targets += [motion.step(DT, 1.0) for _ in range(60)]
+    targets += run_cycles(motion, 60)
     assert TOOL.pose(motion.target.q)[2] == pytest.approx(
         START[2] + 0.02 * (1.0 - math.cos(2.0 * lift.time)), abs=1e-8
     )
@@ -247,7 +225,7 @@ def test_overlays_stand_still_in_a_pause():
 
 def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump():
     motion = ArmMotion(HOME, 20.0)
-    motion.add_overlay(Lift())
+    motion.add_overlay(Swing())
     motion.command("me", SpeedJ((1.5, 0, 0, 0, 0, 0), 4.0))
     for _ in range(60):
         motion.renew()
@@ -256,8 +234,8 @@ def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump():
     motion.pause()
     while not motion.is_paused:
         targets.append(motion.step(DT, 1.0))
-    targets += [motion.step(DT, 1.0) for _ in range(10)]
+    targets += run_cycles(motion, 10)
     motion.resume()
-    targets += [motion.step(DT, 1.0) for _ in range(60)]
+    targets += run_cycles(motion, 60)
     assert np.abs(np.diff([t.qd for t in targets], axis=0)).max() < 0.06
     assert np.abs(np.diff([t.q for t in targets], axis=0)).max() < 1.6 * DT

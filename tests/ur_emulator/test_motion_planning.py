@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.controller.settings import PlanningSettings, ToolWrenchLimit
 from ur_emulator.models.generations import E_SERIES
 from ur_emulator.motion.speed_plan import Interval, SmoothPlan, plan
 from urscript import compile_program
@@ -209,13 +208,3 @@ def test_a_move_keeps_the_limits_in_their_frame(move):
 def test_axes_without_a_limit_are_free():
     free = wrenches("movel")
     assert np.array_equal(wrenches("movel", "  tool_wrench_limit_set(p[0, 0, 0, 0, 0, 0], Fx=1000)\n"), free)
-
-
-def test_a_limit_stays_until_it_is_removed():
-    planning = PlanningSettings()
-    limit = ToolWrenchLimit((0.0,) * 6, (1.0,) * 6)
-    planning.limit_tool_wrench(limit)
-    planning.set_motion_version(2)
-    assert planning.tool_wrench_limit is limit
-    planning.limit_tool_wrench(None)
-    assert planning.tool_wrench_limit is None

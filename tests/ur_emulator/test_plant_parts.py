@@ -9,6 +9,7 @@ import itertools
 
 import numpy as np
 import pytest
+from plant_support import dh_frames
 
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
 from ur_emulator.models.cb3_arms import UR3
@@ -28,33 +29,15 @@ Q = np.array([0.4, -1.3, 1.1, -0.6, 0.9, 2.0])
 STILL = np.zeros(6)
 
 
-def link_frames(rows, q):
-    """DH frames of all links, (6, 4, 4), by plain matrix products."""
-    frame, frames = np.eye(4), []
-    for row, angle in zip(rows, q, strict=True):
-        c, s = np.cos(angle + row.theta), np.sin(angle + row.theta)
-        ca, sa = np.cos(row.alpha), np.sin(row.alpha)
-        frame = frame @ np.array(
-            [
-                [c, -s * ca, s * sa, row.a * c],
-                [s, c * ca, -c * sa, row.a * s],
-                [0, sa, ca, row.d],
-                [0, 0, 0, 1],
-            ]
-        )
-        frames.append(frame)
-    return np.array(frames)
-
-
 def potential_energy(rows, q):
-    frames = link_frames(rows, q)
+    frames = dh_frames(rows, q)
     heights = [(frame @ (*link.com, 1.0))[2] for frame, link in zip(frames, UR3.links, strict=True)]
     return GRAVITY * sum(link.mass * z for link, z in zip(UR3.links, heights, strict=True))
 
 
 def kinetic_energy(rows, q, qd, h=1e-5):
     """From differences of the frames: masses, tensors and rotors."""
-    before, after = link_frames(rows, q - h * qd), link_frames(rows, q + h * qd)
+    before, after = dh_frames(rows, q - h * qd), dh_frames(rows, q + h * qd)
     energy = 0.5 * np.dot(UR3.armature, qd**2)
     for one, two, link in zip(before, after, UR3.links, strict=True):
         com = np.array([*link.com, 1.0])
@@ -101,7 +84,7 @@ def test_a_declared_payload_is_in_the_model():
     h = 1e-6
 
     def height(q):
-        return (link_frames(UR3.dh, q)[5] @ (0.0, 0.0, 0.1, 1.0))[2]
+        return (dh_frames(UR3.dh, q)[5] @ (0.0, 0.0, 0.1, 1.0))[2]
 
     slope = [2.0 * GRAVITY * (height(Q + h * e) - height(Q - h * e)) / (2 * h) for e in np.eye(6)]
     assert loaded - alone == pytest.approx(slope, abs=1e-6)

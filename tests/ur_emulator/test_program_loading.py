@@ -195,12 +195,6 @@ def test_a_packed_file_ends_at_its_end(tmp_path):
     assert load(tmp_path, data + bytes(100)).script(str) == load(tmp_path, data).script(str)
 
 
-def test_installations_are_bounded_as_well(tmp_path):
-    inner = '<Contributed ownerId="com.fzi.externalcontrol">' * 10_000 + "</Contributed>" * 10_000
-    (tmp_path / "default.installation").write_bytes(gzip.compress(f"<I>{inner}</I>".encode()))
-    assert "nested more than 200 deep" in refused(tmp_path, urp(script_line("x = 1")))
-
-
 def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path):
     (tmp_path / "s.urp").write_bytes(urp("<Comment/>" * 20_000))
     call = "<CallSubProgram><subprogram><programFile>s.urp</programFile></subprogram></CallSubProgram>"

@@ -410,14 +410,3 @@ def test_the_lines_of_a_python_client():
     assert box.now.target_q == pytest.approx([0.1, -1.5, -1.2, -1.6, 1.1, 0.2])
     assert box.controller.state.io.digital_out & 0b100
     assert box.controller.state.tool.payload.mass == 1.2
-
-
-def test_secondary_programs_run_beside_the_primary_one():
-    box = Box()
-    box.send(b"def main():\n  i = 0\n  while i < 50:\n    i = i + 1\n    sync()\n  end\n  textmsg(i)\nend\n")
-    box.send(b"sec setOut():\n  set_standard_digital_out(5, True)\n  set_flag(3, True)\nend\n")
-    box.send(b"sec io_fun():\nset_digital_out(6,True)\nend\n")
-    box.send(b"sec late():\n  sleep(1)\nend\n")
-    assert box.finish() == ["50"]
-    assert box.controller.state.io.digital_out & 0b1100000 == 0b1100000
-    assert len(box.failures) == 1, "only the one that takes time"

@@ -464,11 +464,6 @@ def test_the_pc_of_external_control_has_a_name_in_the_installation(tmp_path):
     ]
 
 
-def test_pose_trans_of_the_inverse_is_the_pose_in_the_feature():
-    base, pose = (0.1, 0.2, 0.0, 0.0, 0.0, 1.5), ArmModel(UR5).fk(Q, OFFSET)
-    assert pose_trans(base, pose_trans(pose_inv(base), pose)) == pytest.approx(pose, abs=1e-12)
-
-
 # Variables that waypoints and popups name.
 VARIABLES = "global part=1\nglobal Home=p[0, 0, 0, 0, 0, 0]\nglobal a=Home\nglobal b=Home\n"
 

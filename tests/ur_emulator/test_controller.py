@@ -1,0 +1,283 @@
+"""The controller: what a frame says agrees with everything else it says; what programs do, ask and set."""
+
+import math
+
+import numpy as np
+import pytest
+from box_support import Bench
+from plant_support import dh_frames
+
+from protocol.pose import pose_to_T
+from protocol.realtime.layout import SNAPSHOT_FIELDS
+from protocol.ur_types import ProgramState, RobotMode
+from ur_emulator.commands.programs import AnswerRequest, ClosePopup, SetSpeedSlider, StopProgram
+from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION
+from ur_emulator.controller.settings import ErrorSettings
+from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.errors import ArgumentError
+from ur_emulator.models.calibration import calibrated_dh
+
+MOVE = "def move():\n  movej([0.6,-1.2,-1.9,-0.5,1.0,1.2], a=1.4, v=1.05)\nend\n"
+
+
+@pytest.fixture(scope="module")
+def moved():
+    bench = Bench()
+    bench.run(MOVE)
+    return bench
+
+
+def test_the_snapshot_has_every_column_of_the_realtime_interface():
+    assert all(hasattr(Snapshot, name) for name in SNAPSHOT_FIELDS)
+    assert set(SNAPSHOT_FIELDS) <= set(Bench().now.as_dict())
+
+
+def test_every_value_is_finite_in_motion(moved):
+    for snapshot in moved.snapshots:
+        for name, value in snapshot.as_dict().items():
+            if name not in ("program_name", "registers"):
+                assert np.isfinite(value).all(), name
+
+
+def test_tcp_pose_is_the_forward_kinematics_of_the_same_frame(moved):
+    arm = moved.controller.state.arm
+    rows = calibrated_dh(arm.robot, arm.calibration)
+    for snapshot in moved.snapshots[::20]:
+        for q, pose in (
+            (snapshot.actual_q, snapshot.actual_tcp_pose),
+            (snapshot.target_q, snapshot.target_tcp_pose),
+        ):
+            assert np.allclose(pose_to_T(pose), dh_frames(rows, q)[-1], atol=1e-9)
+
+
+def test_tcp_speed_is_the_derivative_of_the_tcp_pose(moved):
+    dt = moved.controller.period_s
+    targets = moved.snapshots
+    for k in range(40, 120, 10):
+        difference = np.subtract(targets[k + 1].target_tcp_pose[:3], targets[k - 1].target_tcp_pose[:3]) / (
+            2 * dt
+        )
+        assert np.allclose(difference, targets[k].target_tcp_speed[:3], atol=2e-3)
+
+
+def test_target_velocity_is_the_derivative_of_the_target_position(moved):
+    dt = moved.controller.period_s
+    for before, after in zip(moved.snapshots[:-1], moved.snapshots[1:], strict=True):
+        mean = np.add(before.target_qd, after.target_qd) / 2
+        step = np.subtract(after.target_q, before.target_q) / dt
+        assert np.allclose(step, mean, atol=1.4 * dt)
+
+
+def test_elbow_lies_where_the_second_dh_frame_is(moved):
+    arm = moved.controller.state.arm
+    rows = calibrated_dh(arm.robot, arm.calibration)
+    snapshot = moved.snapshots[100]
+    assert np.allclose(snapshot.elbow_position, dh_frames(rows, snapshot.actual_q)[1, :3, 3], atol=1e-9)
+
+
+def test_time_stamps_are_whole_cycles(moved):
+    for snapshot in moved.snapshots[:100]:
+        assert snapshot.timestamp == snapshot.tick * 8 / 1000
+
+
+def test_tcp_offset_moves_the_pose_and_the_speed():
+    bench = Bench()
+    flange = pose_to_T(bench.now.actual_tcp_pose)
+    bench.run("def t():\n  set_tcp(p[0,0,0.1,0,0,0])\n  sync()\nend\n")
+    tcp = pose_to_T(bench.now.actual_tcp_pose)
+    assert np.allclose(tcp[:3, 3], flange[:3, 3] + 0.1 * flange[:3, 2], atol=1e-4)
+    assert bench.now.tcp_offset == (0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
+
+
+def test_same_seed_same_numbers_other_seed_other_numbers():
+    def run(seed):
+        bench = Bench(seed=seed)
+        bench.run(MOVE)
+        return bench.snapshots
+
+    first, again, other = run(3), run(3), run(4)
+    assert first == again
+    assert len(other) == len(first)
+    assert all(a.actual_q != b.actual_q for a, b in zip(first[50:100], other[50:100], strict=True))
+
+
+def test_momentum_is_mass_times_the_velocity_of_the_centres_of_mass(moved):
+    arm = moved.controller.state.arm
+    rows = calibrated_dh(arm.robot, arm.calibration)
+    links = arm.robot.links
+    snapshot = moved.snapshots[60]
+    step = 1e-6
+
+    def centres(q):
+        return [(frame @ [*link.com, 1.0])[:3] for frame, link in zip(dh_frames(rows, q), links, strict=True)]
+
+    q, qd = np.array(snapshot.actual_q), np.array(snapshot.actual_qd)
+    before, after = centres(q - step * qd), centres(q + step * qd)
+    momentum = sum(link.mass * (b - a) / (2 * step) for link, a, b in zip(links, before, after, strict=True))
+    assert snapshot.actual_momentum == pytest.approx(np.linalg.norm(momentum), rel=1e-6)
+
+
+SPIN = "def spin():\n  while True:\n    speedj([0.2,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
+
+
+@pytest.fixture
+def bench():
+    return Bench(fidelity="ideal")
+
+
+def test_even_the_shortest_program_is_seen_to_run(bench):
+    bench.start("textmsg(1)\n")
+    assert bench.now.runtime_state == ProgramState.PLAYING
+    assert bench.tick().runtime_state == ProgramState.STOPPED
+
+
+def test_when_a_program_is_stopped_the_arm_ramps_to_rest(bench):
+    bench.start(SPIN)
+    bench.tick(60)
+    motion = bench.controller.state.motion
+    before = motion.target.qd[0]
+    assert before == pytest.approx(0.2)
+    states = []
+    bench.tick(1, StopProgram())
+    while motion.target.qd[0] > 0:
+        assert before - motion.target.qd[0] <= motion.stop_deceleration * 0.008 * (1 + 1e-9)
+        before = motion.target.qd[0]
+        states.append(bench.now.runtime_state)
+        bench.tick()
+    bench.tick()
+    assert set(states) == {ProgramState.STOPPING}
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    assert bench.now.target_qdd == (0.0,) * 6
+
+
+def test_stopping_a_program_also_stops_a_move_that_it_has_left_behind(bench):
+    bench.start(
+        'def m():\n  movej([1.4,-1.5,-1.8,0,1.2,1.5], a=1.4, v=1.0, r=0.1)\n  textmsg("left")\n  sleep(5)\nend\n'
+    )
+    while not bench.texts:
+        bench.tick()
+    assert bench.now.target_qd[0] > 0.1
+    bench.tick(1, StopProgram())
+    bench.tick(20)
+    assert bench.now.target_qd == (0.0,) * 6
+    assert bench.now.target_q[0] < 1.39
+
+
+def test_speed_slider_slows_a_move(bench):
+    bench.tick(1, SetSpeedSlider(0.5))
+    bench.run("def m():\n  movej([0.5,-1.5,-1.8,0,1.2,1.5], a=1.4, v=0.4)\nend\n")
+    assert max(abs(x) for s in bench.snapshots for x in s.target_qd) == pytest.approx(0.2)
+    assert bench.now.target_speed_fraction == 0.5
+    assert bench.now.speed_scaling == 1.0, "clients multiply the two"
+
+
+def test_a_program_reads_whatever_comes_at_once_without_using_too_much_time():
+    bench = Bench(fidelity="ideal")
+    n = 20_000
+    bench.start(f"""def prog():
+      socket_open("127.0.0.1", 5000)
+      sync()
+      i = 0
+      while i < {n}:
+        v = socket_read_binary_integer(1)
+        if v[1] != i:
+          textmsg("wrong ", i)
+          halt
+        end
+        i = i + 1
+      end
+      textmsg("all")
+    end""")
+    bench.network.sockets[0].inbox += b"".join(i.to_bytes(4, "big") for i in range(n))
+    cycles = 0
+    while bench.controller.is_active and cycles < 100:
+        bench.tick()
+        cycles += 1
+    assert bench.texts == ["all"]
+    assert not [event for event in bench.events if type(event).__name__ == "ScriptFailed"]
+
+
+@pytest.mark.parametrize(("answer", "text"), [("\u20acuro", "6"), ("", "0")])
+def test_a_text_has_one_character_for_each_byte_of_utf_8(answer, text):
+    bench = Bench()
+    bench.start('def p():\n  textmsg(str_len(request_string_from_primary_client("?")))\nend\n')
+    bench.tick(2, AnswerRequest(answer))
+    assert bench.texts == [text]
+
+
+@pytest.mark.parametrize("answer", ["\ud800", "x" * 1001, math.nan, None])
+def test_what_is_no_answer_at_all_cannot_be_given(answer):
+    with pytest.raises(ArgumentError, match=r"^value .* given: allowed is true, false, number or text$"):
+        AnswerRequest(answer)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [AnswerRequest(True), AnswerRequest(1.5), AnswerRequest(10**12), AnswerRequest(1, 99), ClosePopup()],
+)
+def test_wrong_answers_change_nothing(wrong):
+    bench = Bench()
+    bench.start('def p():\n  textmsg("got ", request_integer_from_primary_client("how many?"))\nend\n')
+    bench.tick(3, wrong)
+    assert bench.controller.programs.is_running
+    assert bench.controller.waits_outside
+    bench.tick(1, AnswerRequest(4))
+    assert bench.texts == ["got 4"]
+
+
+def test_answers_go_to_the_oldest_question_of_their_type():
+    bench = Bench()
+    bench.start(
+        'def p():\n  thread t():\n    y = request_integer_from_primary_client("b")\n    textmsg("b ", y)\n  end\n'
+        '  h = run t()\n  x = request_integer_from_primary_client("a")\n  textmsg("a ", x)\n  join h\nend\n'
+    )
+    bench.tick(2)
+    bench.tick(1, AnswerRequest(1))
+    bench.tick(1, AnswerRequest(2))
+    assert bench.texts == ["a 1", "b 2"]
+
+
+@pytest.mark.parametrize("kind", ["def", "sec"])
+def test_powerdown_ends_the_program_and_cuts_the_power(kind):
+    bench = Bench()
+    bench.start("def other():\n  while True:\n    sync()\n  end\nend\n")
+    bench.start(f'{kind} p():\n  powerdown()\n  textmsg("never")\nend\n')
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    assert not bench.controller.programs.is_running
+    assert not [event for event in bench.events if type(event).__name__ in ("TextPrinted", "ScriptFailed")]
+
+
+def test_powerdown_in_motion_holds_the_arm_where_it_is():
+    bench = Bench()
+    bench.start(
+        "def p():\n  thread t():\n    sleep(0.4)\n    powerdown()\n  end\n  run t()\n"
+        "  q = get_actual_joint_positions()\n  movej([q[0] + 1, q[1], q[2], q[3], q[4], q[5]])\nend\n"
+    )
+    start = bench.now.actual_q[0]
+    bench.tick(100)
+    assert bench.now.robot_mode == RobotMode.POWER_OFF
+    assert start < bench.now.actual_q[0] < start + 0.5
+    assert bench.tick(10).actual_q[0] == pytest.approx(bench.snapshots[-20].actual_q[0], abs=1e-4)
+
+
+def test_settings_are_kept():
+    bench = Bench()
+    bench.start(
+        "def p():\n  pause_on_error_code(153)\n  pause_on_error_code(204, 3)\n  set_safety_mode_transition_hardness(1)\n"
+        "  reset_revolution_counter([0, 0, 0, 0, 0, 1])\n  while True:\n    sync()\n  end\nend\n"
+    )
+    settings = bench.controller.state.error_settings
+    assert settings.pause_codes == {(153, None), (204, 3)}
+    assert settings.transition_hardness == 1
+    assert settings.revolution_reference == (0, 0, 0, 0, 0, 1)
+    bench.start("def q():\n  reset_revolution_counter()\nend\n")
+    assert settings.pause_codes == set()
+    assert settings.revolution_reference == bench.snapshots[-2].actual_q
+
+
+def test_a_deviation_is_reported_once_until_it_is_over():
+    settings = ErrorSettings(warns_of_deviation=True, deviation_threshold=0.5)
+    small, large = (0.0,) * 6, (0.0, 0.0, -0.6 * MAX_POSITION_DEVIATION, 0.0, 0.0, 0.0)
+    reports = [settings.deviation_warning(error) for error in (small, large, large, small, large)]
+    assert [report is not None for report in reports] == [False, True, False, False, True]
+    assert reports[1].argument == 2
