@@ -133,7 +133,10 @@ class UrDriver:
             raise
 
     def stop(self, reverse: Transport | None) -> None:
-        """Bring the arm to rest, by every available method; one needs the connection to the receiver program.
+        """Bring the arm to rest, by every available method.
+
+        Args:
+            reverse: connection to the receiver program; None if none runs.
 
         Raises:
             DriverError: the arm could not be seen to come to rest.

@@ -393,7 +393,8 @@ def searched(
     """The settings of a search, batch by batch.
 
     Nothing of the search itself is stored: with the same results the sampler proposes the same settings. A
-    search that was interrupted therefore goes on as if it had not been. `results` is as of `batches`.
+    search that was interrupted therefore goes on as if it had not been. `results` gives the table of the
+    batch before, when its cases are settled.
 
     Raises:
         ModuleNotFoundError: optuna is not installed (extra `search`).
