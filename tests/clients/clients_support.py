@@ -23,7 +23,6 @@ TIMEOUT = 20.0  # s
 BOTH_GENERATIONS = pytest.mark.parametrize(
     "box", [(), ("--robot", "ur5e", "--software", "5.25.1")], indirect=True, ids=["cb3", "e-series"]
 )
-PERIOD = 0.008  # s
 
 
 def is_free(host, port):

@@ -4,13 +4,13 @@ import pytest
 from clients_support import served_box
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="module", params=[()], ids=["cb3"])
 def box(tmp_path_factory, request):
     """A box in real time, shared: a test leaves it able to run the next one.
 
     A CB3 with software 3.15, unless the parameter has other options.
     """
-    with served_box(tmp_path_factory.mktemp("box"), *getattr(request, "param", ())) as served:
+    with served_box(tmp_path_factory.mktemp("box"), *request.param) as served:
         yield served
 
 
@@ -25,13 +25,6 @@ def old_box(tmp_path_factory):
 def lockstep_box(tmp_path):
     """A box whose time stands still while a program waits for its PC."""
     with served_box(tmp_path, "--pace", "lockstep") as served:
-        yield served
-
-
-@pytest.fixture
-def fresh_box(tmp_path):
-    """A box for one test alone."""
-    with served_box(tmp_path) as served:
         yield served
 
 

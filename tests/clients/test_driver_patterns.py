@@ -1,28 +1,27 @@
-"""Two drivers in C++ that no package index has, as own small programs with their wire formats and habits."""
+"""Two drivers in C++ that no package index has, as own small programs with their wire formats and habits.
+
+`headless_driver` is in the manner of Universal_Robots_Client_Library: functions used before they are defined,
+lists added and multiplied, a blocking socket read inside a critical section, servo and trajectory threads, a
+socket each for set-points (8 integers), trajectories (21) and commands (28), all times 1e6. `reverse_driver` is in
+the manner of ur_modern_driver: an unnamed socket, messages of 7 integers, locals shared with a nested thread.
+"""
 
 import socket
 import struct
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
-from clients_support import BOTH_GENERATIONS, TIMEOUT, connect
-from driver_patterns import (
-    CANCELLED,
-    DONE,
-    IDLE,
-    REVERSE,
-    SCALE,
-    SERVOJ,
-    SPEEDJ,
-    SPEEDL,
-    STOP,
-    TRAJECTORY_START,
-    DriverServers,
-    headless_driver,
-)
+from clients_support import BOTH_GENERATIONS, TIMEOUT, connect, receive_exactly
 from strict_clients import VERSION_MESSAGE, PrimaryWire, StrictRtde
 
+SCALE = 1_000_000
+STOP, UNINITIALIZED, IDLE, SERVOJ, SPEEDJ, TRAJECTORY, SPEEDL = -2, -1, 0, 1, 2, 3, 4
+TRAJECTORY_START = 1
+DONE, CANCELLED, FAILED = 0, 1, 2
+MOVEJ = 0
+PROGRAMS = Path(__file__).parents[1] / "programs"
 OUTPUTS = (
     "timestamp",
     "target_q",
@@ -34,6 +33,77 @@ OUTPUTS = (
     "payload",
 )
 STOPPED, PLAYING = 1, 2
+
+
+def fill(template, **values):
+    """Return one of the programs with its values."""
+    text = (PROGRAMS / template).read_text(encoding="utf-8")
+    for name, value in values.items():
+        text = text.replace("{" + name + "}", str(value))
+    return text
+
+
+def headless_driver(host, reverse, trajectory, command):
+    """Return what one write on the primary port uploads: a stop, then the program with tabs."""
+    body = fill(
+        "headless_driver.template", host=host, reverse=reverse, trajectory=trajectory, command=command,
+        stop=STOP, uninitialized=UNINITIALIZED, idle=IDLE, servoj=SERVOJ, speedj=SPEEDJ, forward=TRAJECTORY,
+        speedl=SPEEDL, done=DONE, cancelled=CANCELLED, failed=FAILED, movej=MOVEJ,
+    )  # fmt: skip
+    lines = "".join(f"\t{line}\n" for line in body.splitlines())
+    return f"stop program\ndef externalControl():\n{lines}end\n"
+
+
+class DriverServers:
+    """The servers of the PC that a headless driver's program dials."""
+
+    def __init__(self):
+        self._stack = ExitStack()
+        self.servers = [self._stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(3)]
+        for server in self.servers:
+            server.settimeout(TIMEOUT)
+        self.ports = [server.getsockname()[1] for server in self.servers]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self._stack.close()
+
+    def accept(self):
+        """Wait for the three connections."""
+        sockets = [self._stack.enter_context(server.accept()[0]) for server in self.servers]
+        for sock in sockets:
+            sock.settimeout(TIMEOUT)
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.reverse, self.trajectory, self.command = sockets
+
+    def send(self, mode, values=(0,) * 6, timeout_ms=200):
+        """Send a set-point; values in rad or m and their rates."""
+        scaled = [round(v * SCALE) for v in values]
+        self.reverse.sendall(struct.pack(">8i", timeout_ms, *scaled, mode))
+
+    def forward(self, action, points, timeout_ms=0):
+        """Announce a trajectory: plain integers, not scaled."""
+        self.reverse.sendall(struct.pack(">8i", timeout_ms, action, points, 0, 0, 0, 0, TRAJECTORY))
+
+    def point(self, q, duration, blend=0.0, kind=MOVEJ):
+        scaled = [round(v * SCALE) for v in (*q, *(0.0,) * 12, duration, blend)]
+        self.trajectory.sendall(struct.pack(">21i", *scaled, kind))
+
+    def result(self):
+        return struct.unpack(">i", receive_exactly(self.trajectory, 4))[0]
+
+    def tell(self, number, *values):
+        """Send a script command: numbers as they are."""
+        self.command.sendall(struct.pack(">28i", number, *values, *(0,) * (27 - len(values))))
+
+    def is_dropped(self):
+        """Wait until the program has closed the reverse socket."""
+        try:
+            return self.reverse.recv(1) == b""
+        except ConnectionResetError:
+            return True
 
 
 @contextmanager
@@ -179,17 +249,13 @@ def test_its_first_read_holds_the_version(box):
         assert len(data[16 + length + 10 :]) <= 20
 
 
-@pytest.mark.parametrize(
-    ("version", "port", "size"), [("3.15.8", "realtime", 1140), ("3.4.0", "realtime", 1060)]
-)
-def test_one_read_is_one_realtime_package(box, old_box, version, port, size):
-    served = box if version == "3.15.8" else old_box
-    with connect(served, port) as sock:
+def test_one_read_is_one_realtime_package(box):
+    with connect(box, "realtime") as sock:
         for _ in range(50):
             # A read that comes late finds more than one package, but always whole ones.
             data = sock.recv(1 << 16)
-            assert len(data) % size == 0
-            assert struct.unpack_from(">i", data)[0] == size
+            assert len(data) % 1140 == 0
+            assert struct.unpack_from(">i", data)[0] == 1140
 
 
 def test_a_stream_of_one_line_programs_is_one_motion(box):
@@ -234,7 +300,7 @@ def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_
         rtde.want(*OUTPUTS)
         rtde.start()
         start = np.array(rtde.data()["target_q"])
-        text = REVERSE.replace("{host}", "127.0.0.1").replace("{port}", str(server.getsockname()[1]))
+        text = fill("reverse_driver.template", host="127.0.0.1", port=server.getsockname()[1])
         with connect(box, "realtime") as sock:
             sock.sendall(text.encode())
             reverse, _ = server.accept()

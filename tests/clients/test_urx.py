@@ -163,9 +163,3 @@ def test_the_realtime_monitor_sees_what_the_secondary_port_reports(robot):
     cycles = np.diff(stamps) / 0.008
     assert np.allclose(cycles, np.round(cycles), atol=1e-3)
     at_rest(robot)
-
-
-def test_an_old_client_on_a_new_box_as_on_the_real_one(box):
-    """From 3.5 on the robot's mode is one byte longer and urx believes that the robot does not run."""
-    with connected(urx.urrobot.URRobot, box.host) as client:
-        assert not client.is_running()

@@ -25,7 +25,7 @@ SCRIPTS = sorted(
         "pc_client",
         "examples",
         "tests/programs",
-        "tests/urscript",
+        "tests/urscript/chunks",
         "docs",
     )
     for file in (ROOT / folder).rglob("*.script")
