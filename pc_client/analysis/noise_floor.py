@@ -83,13 +83,8 @@ def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:
     """Return half the mean square difference [(m/s)2] of the speeds of two runs, as if driven alike.
 
     What the commands of the second differ by from those of the first (learned or fed back) is taken out
-    through the loop that the client identified.
-
-    Args:
-        runs: repetitions of one movement; neighbours are compared.
-
-    Returns:
-        The mean over all pairs; None for a single run, an unknown arm or old recordings without a loop.
+    through the loop that the client identified. It is the mean over all neighbours among the repetitions of
+    one movement; None for a single run, an unknown arm or old recordings without a loop.
     """
     halves = []
     for first, second in pairwise(runs):

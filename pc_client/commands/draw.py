@@ -18,6 +18,7 @@ from pc_client.commands.options import (
     RunSettings,
     TimeUnitOption,
     console,
+    progress_bar,
     reach,
     say,
     takes_run_settings,
@@ -143,23 +144,15 @@ def _make(
     settings: RunSettings,
 ) -> list[Drawing]:
     """Extract the strokes of recordings and make them ready for the arm that answers."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeElapsedColumn
 
     from pc_client.studies.drawing.drawing import make_drawing
     from pc_client.studies.extraction.extract import extract
 
     model = reach(robot, settings.ports, settings.cell).model
     options = replace(options, box=model.description.working_box)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    )
     drawings = []
-    with bar:
+    with progress_bar("{task.description}", TimeElapsedColumn()) as bar:
         task = bar.add_task("", total=2 * len(recordings))
         for recording, name in zip(recordings, _names(recordings), strict=True):
             bar.update(task, description=f"{name}: strokes")

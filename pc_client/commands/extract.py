@@ -15,6 +15,7 @@ from pc_client.commands.options import (
     WorkersOption,
     check_workers,
     console,
+    progress_bar,
     say,
 )
 from pc_client.errors import RecordingError, one_line
@@ -116,7 +117,7 @@ def _run(
     workers: int | None,
     dask: str | None,
 ) -> list[ExtractionOutcome]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import TimeRemainingColumn
 
     from pc_client.studies.executors import open_executor, usable_cores
     from pc_client.studies.extraction.batch import extract_many
@@ -126,15 +127,7 @@ def _run(
     if dask is None:
         # One process more than there are recordings would only cost its start.
         workers = min(workers or usable_cores(), len(sources))
-    bar = Progress(
-        TextColumn("extracting"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
-    with bar, open_executor(workers, dask) as executor:
+    with progress_bar("extracting", TimeRemainingColumn()) as bar, open_executor(workers, dask) as executor:
         task = bar.add_task("extracting", total=len(sources))
         return extract_many(
             sources, executor, options, time_unit, n_pictures, lambda outcome: bar.advance(task)

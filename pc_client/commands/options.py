@@ -20,6 +20,8 @@ from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 
 if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
+
     from pc_client.analysis.report import Report
     from pc_client.arm import Arm
 
@@ -107,6 +109,14 @@ YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before 
 def say(text: str) -> None:
     """Print text as it is: no markup, no line breaks of our own, nothing that the terminal obeys."""
     console.print(printable(text), markup=False, soft_wrap=True)
+
+
+def progress_bar(text: str, time: ProgressColumn) -> Progress:
+    """A bar with a text, a count and a time, which is gone when all is done."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (TextColumn(text), BarColumn(), MofNCompleteColumn(), time)
+    return Progress(*columns, console=console, transient=True)
 
 
 def show_report(folder: Path, *, include_aborted: bool = False) -> Report:

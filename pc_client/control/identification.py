@@ -12,8 +12,8 @@ cubic in the displacement of each joint takes it up, and with it any error of sc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -78,20 +78,11 @@ _WORST_RESIDUAL = 0.25
 """Share of the commanded motion that may stay unexplained before the estimate is refused."""
 
 
-@dataclass(frozen=True, slots=True)
-class DelayEstimate:
-    """An identified loop delay.
-
-    Attributes:
-        delay: the delay [s].
-        residual: rms of what the delayed commands do not explain [rad].
-        motion: rms of the commanded motion about its mean [rad].
-    """
+class DelayEstimate(NamedTuple):
+    """An identified loop delay [s], and the rms of what the delayed commands do not explain [rad]."""
 
     delay: float
     residual: float
-    motion: float
-    n_samples: int
 
 
 def estimate_delay(t: Array, qd_cmd: Array, q: Array, period: float) -> DelayEstimate:
@@ -141,7 +132,7 @@ def estimate_delay(t: Array, qd_cmd: Array, q: Array, period: float) -> DelayEst
             f"{residual:.1e} rad rms, allowed is {_WORST_RESIDUAL:.0%} of {motion:.1e} rad; "
             "is another program moving it, or is it blocked?"
         )
-    return DelayEstimate(max(delay, 0.0), residual, motion, len(t))
+    return DelayEstimate(max(delay, 0.0), residual)
 
 
 _LONGEST_LAG = 0.06

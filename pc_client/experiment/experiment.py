@@ -16,11 +16,10 @@ import numpy as np
 
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.arms import ROBOTS
-from pc_client.kinematics.cell import NO_CELL, Cell
-from pc_client.kinematics.model import RobotModel, robot_model
+from pc_client.kinematics.model import RobotModel
 from pc_client.movements.movement import load_motion
 from pc_client.planning.checks import PlanReport
-from pc_client.planning.plan import Motion, Plan, make_plan
+from pc_client.planning.plan import Motion, Plan
 from pc_client.recording.recording import load_recording
 from protocol.ur_types import JOINT_NAMES
 
@@ -67,11 +66,6 @@ class Experiment:
         """The file of one run; repetitions count from 1."""
         return self.out / f"{planned.movement.name}_r{repetition}.mcap"
 
-    @property
-    def n_runs(self) -> int:
-        """Runs in all."""
-        return len(self.planned) * self.repeat
-
 
 def load_movements(sources: Sequence[str | Path]) -> list[Motion]:
     """Load movements of one experiment, by their names in the library or their files.
@@ -83,27 +77,6 @@ def load_movements(sources: Sequence[str | Path]) -> list[Motion]:
     if not sources:
         raise ClientError("no movement is given; name at least one")
     return [load_motion(source) for source in sources]
-
-
-def prepare_experiment(
-    movements: Sequence[Motion], *, repeat: int, out: Path, robot: str = "ur3", cell: Cell = NO_CELL
-) -> Experiment:
-    """Plan all movements for an arm.
-
-    Args:
-        movements: from `load_movements`.
-        repeat: runs of each, at least 1.
-        out: folder of the recordings; need not exist.
-        robot: nominal arm.
-        cell: what stands around it and what it carries.
-
-    Raises:
-        PlanningError: a movement cannot be done by the arm, or there is no model of it.
-        ClientError: nothing to repeat, or two movements of one name.
-    """
-    model = robot_model(robot, cell)
-    planned = tuple(make_plan(movement, model) for movement in movements)
-    return Experiment(model, planned, repeat, out)
 
 
 def check_folder(experiment: Experiment) -> list[Path]:

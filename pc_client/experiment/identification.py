@@ -16,7 +16,6 @@ from pc_client.control.controller import Controller
 from pc_client.control.identification import (
     BRISK_PULSE,
     PULSE,
-    DelayEstimate,
     Excitation,
     estimate_delay,
     identify_loop,
@@ -47,20 +46,15 @@ class Identification:
     """What is known of the loop, and what the controller uses of it.
 
     Attributes:
-        estimate: dead time and lag as one delay.
+        delay: dead time and lag as one [s].
         loop: dead time and lag apart, for a controller that uses them; else the delay alone.
         learning: the filter of a controller with ILC; None without.
     """
 
-    estimate: DelayEstimate
+    delay: float
     loop: LoopModel
     margins: LoopMargins
     learning: LearningFilter | None
-
-    @property
-    def delay(self) -> float:
-        """The loop delay [s]."""
-        return self.estimate.delay
 
     def facts(self) -> Mapping[str, float | str]:
         """Return what belongs into provenance and report, by name; what was not identified is absent."""
@@ -131,7 +125,7 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> Identif
             margin=margins.gain,
             delay=estimate.delay,
         )
-    return Identification(estimate, loop, margins, learning_filter(config, loop, period))
+    return Identification(estimate.delay, loop, margins, learning_filter(config, loop, period))
 
 
 def check_excitation(q_start: Array, config: Controller, model: RobotModel) -> None:

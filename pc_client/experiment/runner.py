@@ -272,14 +272,10 @@ def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> Non
         return
     table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
     tracker = Tracker(table, APPROACH, model)
-    driver.stream(tracker, _ignore, acceleration=APPROACH.speedj_acceleration)
+    driver.stream(tracker, lambda frame, step: None, acceleration=APPROACH.speedj_acceleration)
     error = float(np.abs(driver.actual_q() - goal).max())
     if not error <= _ARRIVAL_TOLERANCE:
         raise DriverError(
             f"the arm is {error:.4f} rad away from the posture it was sent to, allowed is "
             f"{_ARRIVAL_TOLERANCE} rad: is it blocked?"
         )
-
-
-def _ignore(frame: RealtimeFrame, step: TrackerStep) -> None:
-    """Nothing of an approach is kept."""

@@ -29,11 +29,8 @@ def source_of(robot: str, software: str, serial: str, simulated: bool | None) ->
 class Origin:
     """The words for simulated, real or not known.
 
-    Attributes:
-        name: in one phrase.
-        mark: stands on every figure; empty for a real arm.
-        prefix: stands before a robot in titles.
-        says: a sentence for the page.
+    `name` is a phrase, `mark` stands on every figure (empty for a real arm), `prefix` before a robot in
+    titles; `says` is a sentence for the page.
     """
 
     name: str

@@ -23,8 +23,10 @@ from wire_story import MODBUS, Story  # noqa: E402
 
 from pc_client.control.controller import CONTROLLERS  # noqa: E402
 from pc_client.driver.session import UrDriver  # noqa: E402
-from pc_client.experiment.experiment import load_movements, prepare_experiment  # noqa: E402
+from pc_client.experiment.experiment import Experiment, load_movements  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
+from pc_client.kinematics.model import robot_model  # noqa: E402
+from pc_client.planning.plan import make_plan  # noqa: E402
 from protocol.primary.messages import encode_message  # noqa: E402
 from protocol.realtime.layout import layout_for_version  # noqa: E402
 from protocol.rtde.fields import output_fields  # noqa: E402
@@ -104,7 +106,9 @@ def demo():
             tempfile.TemporaryDirectory() as folder,
             ControlBox(pace="lockstep", seed=7, port_base=None) as box,
         ):
-            experiment = prepare_experiment(load_movements(DEMO), repeat=2, out=Path(folder))
+            model = robot_model("ur3")
+            plans = tuple(make_plan(movement, model) for movement in load_movements(DEMO))
+            experiment = Experiment(model, plans, 2, Path(folder))
             with UrDriver(box.host, box.ports) as driver:
                 ExperimentRunner(driver, experiment, CONTROLLERS[controller]).run()
             for path in sorted(Path(folder).glob("*.mcap")):

@@ -339,3 +339,13 @@ def serving(folder, *options, **process_options):
         if process.poll() is None:
             process.terminate()
         finish(process)
+
+
+def prepare_experiment(movements, *, repeat, out):
+    """Plan movements for a UR3."""
+    from pc_client.experiment.experiment import Experiment
+    from pc_client.kinematics.model import robot_model
+    from pc_client.planning.plan import make_plan
+
+    model = robot_model("ur3")
+    return Experiment(model, tuple(make_plan(movement, model) for movement in movements), repeat, out)

@@ -21,6 +21,7 @@ from integration_support import (
     finish,
     free_port_base,
     in_background,
+    prepare_experiment,
     programs_since,
     run_in_movement,
     send,
@@ -36,7 +37,7 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import guarded
-from pc_client.experiment.experiment import load_movements, prepare_experiment
+from pc_client.experiment.experiment import load_movements
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model

@@ -19,6 +19,7 @@ from integration_support import (
     Frames,
     at,
     finish,
+    prepare_experiment,
     run_in_movement,
 )
 
@@ -28,7 +29,6 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.watchdog import REST_SPEED
 from pc_client.errors import DriverError
-from pc_client.experiment.experiment import prepare_experiment
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements.movement import Movement
 from pc_client.recording.recording import load_recording

@@ -6,6 +6,11 @@ from math import pi
 
 import numpy as np
 
+from pc_client.experiment.experiment import Experiment
+from pc_client.kinematics.cell import NO_CELL
+from pc_client.kinematics.model import robot_model
+from pc_client.planning.plan import make_plan
+
 
 def min_jerk(u):
     """Return the way 0..1 and its derivative at u in 0..1."""
@@ -67,3 +72,9 @@ class Spoiled:
 
 INSIDE_THE_BOX = ((0.30, -0.15, 0.20), (0.40, 0.10, 0.30), (0.35, 0.18, 0.17), (0.29, 0.0, 0.34))
 """Points of the box recommended for a UR3 (.275-.425, -.2-.2, .15-.35 m)."""
+
+
+def prepare_experiment(movements, *, repeat, out, cell=NO_CELL):
+    """Plan movements for a UR3 in a cell."""
+    model = robot_model("ur3", cell)
+    return Experiment(model, tuple(make_plan(movement, model) for movement in movements), repeat, out)

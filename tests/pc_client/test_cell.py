@@ -11,10 +11,9 @@ import pytest
 from closed_form_ik import dh_pose
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planning_paths import INSIDE_THE_BOX, StraightStrokes
+from planning_paths import INSIDE_THE_BOX, StraightStrokes, prepare_experiment
 
 from pc_client.errors import CellError, PlanningError
-from pc_client.experiment.experiment import prepare_experiment
 from pc_client.kinematics.cell import MOST_BODIES, NO_CELL, Cell, Solid, Tool, Wall, load_cell, parse_cell
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from planning_paths import prepare_experiment
 
 from pc_client.control.controller import APPROACH, CONTROLLERS
 from pc_client.driver.receiver import MISSED_ALLOWED, REVERSE_PORT
@@ -23,7 +24,7 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import CellError
-from pc_client.experiment.experiment import experiment_text, load_movements, prepare_experiment
+from pc_client.experiment.experiment import experiment_text, load_movements
 from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
 from pc_client.kinematics.cell import load_cell, parse_cell
 from pc_client.kinematics.model import robot_model

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from fake_robot import PERIOD, FakeRobot
+from planning_paths import prepare_experiment
 
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.gear import GearModel
@@ -19,7 +20,7 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import LEAD, SETTLE, broken_limit
-from pc_client.experiment.experiment import load_movements, prepare_experiment
+from pc_client.experiment.experiment import load_movements
 from pc_client.experiment.identification import learning_filter
 from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
 from pc_client.experiment.runner import ExperimentRunner

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fake_robot import PERIOD, FakeRobot
 from mcap.reader import make_reader
+from planning_paths import prepare_experiment
 from recording_samples import SIGNALS, provenance
 
 from pc_client.analysis.run import Run
@@ -28,7 +29,6 @@ from pc_client.errors import (
 from pc_client.experiment.experiment import (
     clear_folder,
     load_movements,
-    prepare_experiment,
     scratch_folder,
 )
 from pc_client.experiment.identification import identify

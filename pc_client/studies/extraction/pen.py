@@ -86,11 +86,6 @@ class PenRecording:
         if len({part.p.shape[1] for part in self.parts}) > 1:
             raise RecordingError(f"{self.name}: some parts are flat and others in space; give one kind")
 
-    @property
-    def n_samples(self) -> int:
-        """Samples of all parts."""
-        return sum(len(part.t) for part in self.parts)
-
 
 def ordered_part(t: ArrayLike, p: ArrayLike) -> tuple[PenPart | None, tuple[str, ...]]:
     """Make a part of samples as a recorder left them: times (n,), s, and positions (n, 2) or (n, 3).
