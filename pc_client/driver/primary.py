@@ -32,7 +32,7 @@ from ur_hil.patience import LONGEST_STEP, Patience
 
 S = TypeVar("S", bound=SubPackage)
 
-VERSION_TIMEOUT = 5.0
+_VERSION_TIMEOUT = 5.0
 """The version message is the first package of a connection; a box sends it at once."""
 
 _HEADER_SIZE = 5
@@ -122,9 +122,9 @@ class PackageStream:
         self._transport.close()
 
     def _read_until(self, condition: Callable[[], bool]) -> None:
-        """Read until a condition holds, or until VERSION_TIMEOUT is over."""
+        """Read until a condition holds, or until _VERSION_TIMEOUT is over."""
         waited = Patience()
-        while not condition() and waited.spent(self._network.now()) <= VERSION_TIMEOUT:
+        while not condition() and waited.spent(self._network.now()) <= _VERSION_TIMEOUT:
             self._early += self._read(LONGEST_STEP) or []
 
     def _read(self, timeout: float) -> list[RobotMessage] | None:

@@ -18,7 +18,7 @@ from protocol.ur_types import SoftwareVersion
 from ur_hil.patience import LONGEST_STEP, Patience
 
 _CONNECT_TIMEOUT = 2.0
-DASHBOARD_TIMEOUT = 60.0
+_DASHBOARD_TIMEOUT = 60.0
 """A server that takes the connection answers within milliseconds; one that is stopped is waited for, or the
 recording would call the serial number unknown."""
 
@@ -87,7 +87,7 @@ class _Lines:
                     f"has at most {LONGEST_LINE}, and comes within {_LINE_TIMEOUT:g} s: "
                     "is this a control box?"
                 )
-            data = self._connection.receive(LONGEST_STEP if self._pending else DASHBOARD_TIMEOUT)
+            data = self._connection.receive(LONGEST_STEP if self._pending else _DASHBOARD_TIMEOUT)
             if data == b"" or (data is None and not self._pending):
                 return None
             self._pending += data or b""

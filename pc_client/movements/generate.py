@@ -20,7 +20,7 @@ import numpy as np
 
 from pc_client.errors import MovementError
 from pc_client.movements.durations import DurationRule, Fitts, Isochrony, retimed
-from pc_client.movements.library_sets import LIBRARY_FOLDER, LIBRARY_SETS, library_names
+from pc_client.movements.library_sets import LIBRARY_FOLDER, library_names
 from pc_client.movements.minimum_jerk import MinimumJerk, Passing
 from pc_client.movements.movement import Movement
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS, PowerLaw
@@ -193,31 +193,17 @@ def generate_movement(
     return GENERATORS[kind].make(human, seed, name)
 
 
-def generate_library(set_name: str, seed: int = _LIBRARY_SEED) -> dict[str, Movement]:
-    """The ten movements of a set by their library names, made afresh.
-
-    Args:
-        set_name: as of `library_names`.
-        seed: of the first pair; the other four take the next four. With the default the movements are those
-            of the package's files.
-    """
-    names = library_names(set_name)
-    make, prefix = _SETS[set_name]
-    made: dict[str, Movement] = {}
-    for pair, (human_name, robot_name) in enumerate(zip(names[5:], names[:5], strict=True)):
-        number = human_name[-3:]
-        human = make(int(number[0]), seed + pair, f"{prefix}lognorm_{number}")
-        made[human_name] = human
-        made[robot_name] = uniform_twin(human, f"{prefix}uniform_{number}")
-    return {name: made[name] for name in names}
-
-
 def write_library(folder: Path = LIBRARY_FOLDER) -> None:
-    """Write the files of all sets, each set in a folder of its name."""
-    for set_name in LIBRARY_SETS:
+    """Make the movements of all sets afresh and write their files, each set in a folder of its name."""
+    for set_name, (make, prefix) in _SETS.items():
         (folder / set_name).mkdir(parents=True, exist_ok=True)
-        for name, movement in generate_library(set_name).items():
-            movement.save(folder / set_name / f"{Path(name).name}.toml")
+        names = library_names(set_name)
+        for pair, (human_name, robot_name) in enumerate(zip(names[5:], names[:5], strict=True)):
+            number = human_name[-3:]
+            human = make(int(number[0]), _LIBRARY_SEED + pair, f"{prefix}lognorm_{number}")
+            robot = uniform_twin(human, f"{prefix}uniform_{number}")
+            for name, movement in ((human_name, human), (robot_name, robot)):
+                movement.save(folder / set_name / f"{Path(name).name}.toml")
 
 
 if __name__ == "__main__":

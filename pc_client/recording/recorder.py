@@ -1,7 +1,7 @@
 """The recorder: takes one row a control cycle and appends them to a file, a chunk at a time.
 
 It runs inside the control loop, so `append` costs some microseconds and neither waits for the disk nor raises
-for its sake: the thread of an `Outbox` writes, its first error is kept in `error` for the loop to see, rows
+for its sake: the thread of an `_Outbox` writes, its first error is kept in `error` for the loop to see, rows
 go on into memory, and `close` reports what was saved. Truth about time is the controller's stamp in the row;
 nothing here reads a clock.
 
@@ -44,7 +44,7 @@ MOST_WAITING = 120
 """Chunks that may wait for a disk that stands still: a minute at 125 Hz, 15 s at 500 Hz, 15 MB."""
 
 
-class RawFile(Protocol):
+class _RawFile(Protocol):
     """The part of an unbuffered binary file that is used."""
 
     def write(self, data: memoryview, /) -> int | None:
@@ -54,15 +54,15 @@ class RawFile(Protocol):
         """Close the file."""
 
 
-Opener = Callable[[Path], RawFile]
+_Opener = Callable[[Path], _RawFile]
 
 
-def open_unbuffered(path: Path) -> RawFile:
+def _open_unbuffered(path: Path) -> _RawFile:
     """Open for writing without Python's own buffer: what `write` returned is out of this process."""
     return open(path, "wb", buffering=0)
 
 
-class Outbox:
+class _Outbox:
     """A stream that takes all bytes at once; a thread writes them to a file.
 
     Whoever makes the bytes never waits for the disk and gets no error from it: the first one is kept.
@@ -71,7 +71,7 @@ class Outbox:
         error: the first one of the file, or that it is too slow; nothing is written from then on to `close`.
     """
 
-    def __init__(self, file: RawFile) -> None:
+    def __init__(self, file: _RawFile) -> None:
         self.error: OSError | None = None
         self._file = file
         self._made: list[bytes] = []  # since the last chunk was posted
@@ -183,7 +183,7 @@ class Recorder:
         *,
         arm: ArmTree | None = None,
         now: Callable[[], int] | None = None,
-        opener: Opener = open_unbuffered,
+        opener: _Opener = _open_unbuffered,
     ) -> None:
         """Create the file and write its head.
 
@@ -210,7 +210,7 @@ class Recorder:
         self._closed = False
         self._n_posted = 0  # rows that were given to the thread before the disk failed
         try:
-            self._outbox = Outbox(opener(self.path))
+            self._outbox = _Outbox(opener(self.path))
         except OSError as error:
             raise RecordingError(
                 f"cannot create the recording {self.path}: {error.strerror or error}; choose another --out"

@@ -44,7 +44,7 @@ FIDELITIES = ("exact", "ideal", "typical", "poor")
 _MOST_CASES = 100_000
 """More than this is a slip of the pen: weeks on a large cluster."""
 
-Text = Annotated[str, text()]
+_Text = Annotated[str, text()]
 
 
 @record
@@ -68,7 +68,7 @@ class Range:
             raise ValueError(f"low: {self.low:g}; with log = true, give a number above 0")
 
 
-Axis = tuple[Value, ...] | Range
+_Axis = tuple[Value, ...] | Range
 
 
 _MOST_TRIALS = 100_000
@@ -115,24 +115,24 @@ class SweepFile:
         controller: fields of the controller, each with a value, a list of values or a range.
     """
 
-    movements: Annotated[tuple[Text, ...], Items()]
+    movements: Annotated[tuple[_Text, ...], Items()]
     controllers: Annotated[tuple[Annotated[str, word(CONTROLLERS)], ...], Items()] = (DEFAULT,)
     robots: Annotated[tuple[Annotated[str, word(ROBOTS)], ...], Items()] | None = None
     fidelities: Annotated[tuple[Annotated[str, word(FIDELITIES)], ...], Items()] | None = None
     seeds: Annotated[tuple[Annotated[int, whole(0)], ...], Items()] | None = None
-    robot: Text | None = None
+    robot: _Text | None = None
     port_base: Annotated[int, whole(-65535, 65535)] | None = None
     reverse_port: Annotated[int, whole(0, 65535)] | None = None
-    cell: Text | None = None
+    cell: _Text | None = None
     repeat: Annotated[int, whole(1, 99)] = 1
     search: Search | None = None
     keep_recordings: Flag = False
-    output: Text | None = None
+    output: _Text | None = None
     controller: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         for key in ("movements", "controllers", "robots", "fidelities", "seeds"):
-            if problem := repeated(getattr(self, key) or ()):
+            if problem := _repeated(getattr(self, key) or ()):
                 raise ValueError(f"{key}: {problem}")
         for key in ("port_base", "reverse_port", "cell") if self.robot is None else ():
             if getattr(self, key) is not None:
@@ -158,7 +158,7 @@ class SweepConfig:
     movements: tuple[MovementFile, ...]
     arms: tuple[SimulatedArm, ...]
     cell: Cell
-    axes: dict[str, Axis]
+    axes: dict[str, _Axis]
 
     @property
     def n_cases(self) -> int:
@@ -180,7 +180,7 @@ class SweepConfig:
         if self.file.search is not None:
             yield from searched(bases, self.axes, self.file.search, results)
         else:
-            yield grid(bases, {k: axis for k, axis in self.axes.items() if not isinstance(axis, Range)})
+            yield _grid(bases, {k: axis for k, axis in self.axes.items() if not isinstance(axis, Range)})
 
 
 def read_config(path: Path) -> SweepConfig:
@@ -196,7 +196,7 @@ def read_config(path: Path) -> SweepConfig:
         if key in FIELDS:
             raise SweepError(f"{path}: {key}: is a field of the controller; put it under [controller]")
     file = checked(SweepFile, values, str(path), SweepError)
-    axes = read_axes(file.controller or {}, str(path))
+    axes = _read_axes(file.controller or {}, str(path))
     if file.search is None:
         for name, axis in axes.items():
             if isinstance(axis, Range):
@@ -217,7 +217,7 @@ def read_config(path: Path) -> SweepConfig:
         NO_CELL if file.cell is None else load_cell(path.parent / file.cell),
         axes,
     )
-    if problem := repeated([movement.name for movement in config.movements]):
+    if problem := _repeated([movement.name for movement in config.movements]):
         raise SweepError(f"{path}: movements: {problem}")
     if config.n_cases > _MOST_CASES:
         raise SweepError(
@@ -239,7 +239,7 @@ def _movement(word: str, config: Path) -> MovementFile:
         raise MovementError(f"{config}: movements: {error}") from error
 
 
-def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
+def _read_axes(table: Mapping[str, Any], source: str) -> dict[str, _Axis]:
     """Check the table [controller] of a file: an axis a field, in the order of the file.
 
     Raises:
@@ -252,7 +252,7 @@ def read_axes(table: Mapping[str, Any], source: str) -> dict[str, Axis]:
     return {name: _read_axis(value, name, f"{source}: controller.{name}") for name, value in table.items()}
 
 
-def _read_axis(value: Any, name: str, where: str) -> Axis:
+def _read_axis(value: Any, name: str, where: str) -> _Axis:
     field = FIELDS[name]
     if isinstance(value, dict):
         if field.kind is not float:
@@ -265,18 +265,18 @@ def _read_axis(value: Any, name: str, where: str) -> Axis:
     read = tuple(checked(field, item, where, ControllerError) for item in values)
     if not read:
         raise SweepError(f"{where}: an empty list; give at least one value")
-    if problem := repeated(read):
+    if problem := _repeated(read):
         raise SweepError(f"{where}: {problem}")
     return read
 
 
-def repeated(values: Iterable[object]) -> str:
+def _repeated(values: Iterable[object]) -> str:
     """What is wrong with a list that names a value twice; empty when nothing is."""
     twice = next((value for value, n in Counter(values).items() if n > 1), None)
     return "" if twice is None else f"{twice!r} is there twice; name each value once"
 
 
-def grid(bases: Sequence[Controller], axes: Mapping[str, tuple[Value, ...]]) -> list[Controller]:
+def _grid(bases: Sequence[Controller], axes: Mapping[str, tuple[Value, ...]]) -> list[Controller]:
     """All combinations of the values, controller by controller; the last field changes first."""
     return [
         replace(base, **dict(zip(axes, values, strict=True)))  # type: ignore[arg-type]
@@ -297,7 +297,7 @@ RANKING = (
 """What is shown of a ranking."""
 
 
-def judge(table: pl.DataFrame, by: Sequence[str]) -> pl.DataFrame:
+def _judge(table: pl.DataFrame, by: Sequence[str]) -> pl.DataFrame:
     """What came of each setting, distinguished by some columns of the rows of a sweep.
 
     Returns:
@@ -319,12 +319,12 @@ def judge(table: pl.DataFrame, by: Sequence[str]) -> pl.DataFrame:
 
 
 def rank_settings(table: pl.DataFrame) -> pl.DataFrame:
-    """All settings of the controller as `judge` has them, and the values of each in one phrase, as `setting`.
+    """All settings of the controller as `_judge` has them, the values of each in one phrase as `setting`.
 
     The best is first, incomplete ones are last; equals are in the order of the table.
     """
     axes = _controller_axes(table) or ["controller"]
-    judged = judge(table, axes)
+    judged = _judge(table, axes)
     names = [", ".join(f"{axis} = {_short(row[axis])}" for axis in axes) for row in judged.to_dicts()]
     return judged.with_columns(setting=pl.Series(names, dtype=pl.String)).sort(
         "complete", "mean_snr_db", descending=True, nulls_last=True, maintain_order=True
@@ -386,7 +386,7 @@ _KEY = ("controller", *FIELDS)
 
 def searched(
     bases: Sequence[Controller],
-    axes: Mapping[str, Axis],
+    axes: Mapping[str, _Axis],
     search: Search,
     results: Callable[[], pl.DataFrame],
 ) -> Iterator[list[Controller]]:
@@ -417,7 +417,7 @@ def searched(
             values = dict(trial.params)
             settings.append(replace(named[values.pop("controller")], **values))
         yield settings
-        judged = judge(results(), _KEY).rows_by_key(_KEY, named=True, unique=True)
+        judged = _judge(results(), _KEY).rows_by_key(_KEY, named=True, unique=True)
         for trial, setting in zip(trials, settings, strict=True):
             found = judged[(setting.name, *(getattr(setting, name) for name in FIELDS))]
             if found["complete"]:
@@ -427,7 +427,7 @@ def searched(
                 study.tell(trial, state=state.FAIL if found["n_failed"] else state.PRUNED)
 
 
-def _distribution(axis: Axis | tuple[str, ...]) -> BaseDistribution:
+def _distribution(axis: _Axis | tuple[str, ...]) -> BaseDistribution:
     from optuna.distributions import CategoricalDistribution, FloatDistribution
 
     if isinstance(axis, Range):
