@@ -460,7 +460,7 @@ def test_force_mode_holds_ten_newtons_on_the_table(robot, fidelity):
         "def p():\n  force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,-10,0,0,0], 2, [.1,.1,.02,.2,.2,.2])\n"
         "  sleep(100)\nend\n"
     )
-    forces, _ = truth(bench, 2000)
+    forces, _ = truth(bench, 1400)
     assert reported(bench) == []
     assert forces[-500:, 2].mean() == pytest.approx(10.0, abs=1.5)
     assert forces[-500:, 2].std() < 1.0

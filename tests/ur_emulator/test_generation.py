@@ -147,7 +147,6 @@ def test_every_port_reports_the_same_software(tmp_path, given, numbers, day, mes
 # Control cycle and physics step [us].
 CYCLES = [(4_000, 2_000), (2_000, 2_000)]
 OTHERS = [CB3, *(replace(CB3, period_us=period, substep_us=substep) for period, substep in CYCLES), SECOND]
-HOME = "[0, -1.57, -1.57, -1.57, 1.57, 0]"
 # Two cycles of a CB3 [s]: by so much a script that waits for a whole cycle may differ.
 SLACK = 0.016
 
@@ -192,15 +191,15 @@ def test_programs_get_the_cycle_and_sync_takes_one(generation):
     [
         ("sleep(0.5)", 0.5),
         ("speedj([0.2, 0, 0, 0, 0, 0], 2, 0.5)", 0.5),
-        (f"movej({HOME})\nmovej([0.3, -1.57, -1.57, -1.57, 1.57, 0], t=1)", None),
-        (f"movej({HOME})\nmovel(p[0.2, -0.2, 0.3, 0, 3.14, 0], a=0.5, v=0.1)", None),
+        ("movej([0.3, -1.57, -1.57, -1.57, 1.57, 0], t=1)", 1.0),
+        # 0.1 m: 0.1/0.25 + 0.25/1.2 s.
+        ("movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]))", 0.608),
     ],
     ids=["sleep", "speedj", "movej", "movel"],
 )
 def test_what_takes_time_takes_the_same_time(generation, text, seconds):
-    if seconds is None:
-        seconds = time_of(Bench(generation=CB3), text)
-    assert time_of(Bench(generation=generation), text) == pytest.approx(seconds, abs=2 * SLACK)
+    bench = Bench(generation=generation, fidelity="exact")
+    assert time_of(bench, text) == pytest.approx(seconds, abs=2 * SLACK)
 
 
 @every_generation
@@ -251,7 +250,7 @@ def test_a_watchdog_counts_seconds(generation):
 
 @every_generation
 def test_a_protective_stop_may_be_unlocked_after_its_delay_and_time_passes_until_then(generation):
-    bench = Bench(generation=generation)
+    bench = Bench(generation=generation, fidelity="exact")
     bench.tick(1, TriggerProtectiveStop())
     begin = bench.now.timestamp
     while bench.controller.is_active:

@@ -213,10 +213,10 @@ def test_targets_of_a_carried_arm_are_consistent():
 
 def test_a_pause_stands_still_and_catches_up_afterwards():
     motion = ArmMotion(HOME, 20.0)
-    belt = linear(motion, 0.05, range_id=1)
-    targets = [belt.step() for _ in range(100)]
+    belt = linear(motion, 0.1, range_id=1)
+    targets = [belt.step() for _ in range(50)]
     motion.pause()
-    targets += [belt.step() for _ in range(100)]
+    targets += [belt.step() for _ in range(160)]
     assert motion.is_paused
     motion.resume()
     targets += [belt.step() for _ in range(150)]
@@ -224,7 +224,7 @@ def test_a_pause_stands_still_and_catches_up_afterwards():
     assert carried == pytest.approx(belt.way, abs=2e-3)
     speed = np.array([TOOL.twist(t.q, t.qd)[1] for t in targets])
     assert np.abs(np.diff(speed)).max() < 2.5 * CATCH_UP_ACCELERATION * DT
-    assert speed.max() < 0.35
+    assert speed.max() < 0.1 + 0.27  # of the belt, and 0.25 m/s to catch up with it
 
 
 @given(st.floats(-1e6, 1e6), st.floats(0.5, 50.0))

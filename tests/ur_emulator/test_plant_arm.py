@@ -532,7 +532,7 @@ ARMS = [
 
 
 @given(CYCLES, st.sampled_from(ARMS))
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_running_ahead_changes_no_bit(cycles, arm):
     plain, ahead = (states(Plant(*arm, 3), cycles, ahead=on) for on in (False, True))
     assert plain == ahead

@@ -110,7 +110,7 @@ def calls(draw, module=""):
     return f"{row.name}({', '.join([*given[:named_from], *named])})"
 
 
-EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "25"))
+EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "15"))
 some = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck), print_blob=True)
 TOLERANCE = 1.001
 
