@@ -8,8 +8,6 @@
 Exit status: 0 success, 1 bytes that cannot be decoded, 2 wrong arguments, file or address.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import socket

@@ -4,8 +4,6 @@ A decoder takes the bytes that one side has sent on one connection, from its beg
 `feed` returns the lines of the complete packages, one line a field, `end` a line about remaining bytes.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any

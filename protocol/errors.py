@@ -8,8 +8,6 @@ A `RemoteProtocolError` means that the byte stream cannot be trusted any more: c
 A `LocalProtocolError` leaves the connection as it was: nothing has been sent.
 """
 
-from __future__ import annotations
-
 __all__ = ["LocalProtocolError", "ProtocolError", "RemoteProtocolError"]
 
 

@@ -3,8 +3,6 @@
 Used for the realtime, primary and secondary ports, at both ends. The content of a frame is not read.
 """
 
-from __future__ import annotations
-
 from protocol.errors import RemoteProtocolError
 
 __all__ = ["LENGTH_SIZE", "FrameBuffer"]

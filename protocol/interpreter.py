@@ -12,8 +12,6 @@ messages`, `Compile error`, `Syntax error`); `CLEANED_UP` is that of another mak
 The number in the answers to `abort` and `skipbuffer` has no meaning; clients read one.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum

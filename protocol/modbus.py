@@ -17,8 +17,6 @@ Sources: Modbus application protocol V1.1b3, sections 4.1, 6 and 7; Modbus messa
 section 3.1.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ Rotation vectors that come out have length <= pi. At exactly pi both signs of th
 which one comes out is not fixed. Vectors that come in may have any length.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import atan2, cos, hypot, sin, sqrt
 from typing import TypeAlias

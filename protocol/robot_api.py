@@ -10,8 +10,6 @@ README of the PolyScope X "Remote Robot Controller", issue 551 of the client lib
 calls answer beyond that is chosen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

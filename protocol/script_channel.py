@@ -18,8 +18,6 @@ Sources: URScript manual CB3, chapter 2; the exceptions from python-urx, ur_rtde
 The text is not checked here: the compiler reports errors, at the right line.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from enum import Enum

@@ -1,7 +1,5 @@
 """Serial numbers: those of emulated boxes say that they are, which arm it is, and the seed."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

@@ -9,8 +9,6 @@ Scaled integers because CB3 scripts can only read integers in binary (`socket_re
 This module neither decides when to send nor limits a speed.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from enum import IntEnum

@@ -13,8 +13,6 @@ as Latin-1. `*`: records of another table, as many as there are up to the end (l
 The tables are in `primary.layout` and `primary.messages`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import struct
 from collections.abc import Callable, Mapping

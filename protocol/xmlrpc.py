@@ -19,8 +19,6 @@ HTTP and sockets; tests have it at the other end.
 Source: xmlrpc.com, XML-RPC specification; i8 and nil: extensions of Apache's library.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NoReturn

@@ -5,8 +5,6 @@ line in the log, or gets slower itself; others do not notice it. Limits that bel
 the format (`protocol`), limits of the language with the language (`urscript.dialect`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any, Final

@@ -20,8 +20,6 @@ Every message is one line: what was given, what is allowed, what to do. Errors o
 not here: they belong to the program (`urscript.errors`), not to the box.
 """
 
-from __future__ import annotations
-
 _LONGEST_TEXT = 500
 
 

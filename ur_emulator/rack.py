@@ -4,8 +4,6 @@ The boxes are independent; an error in a cycle ends its box, the others go on. I
 spread over the period.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

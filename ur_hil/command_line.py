@@ -3,8 +3,6 @@
 docs/commands.md shows the table of exit codes.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Sequence
 from enum import IntEnum

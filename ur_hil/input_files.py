@@ -4,8 +4,6 @@ A file beyond its limit is refused before its content is in memory. Only regular
 nobody writes to would be waited for without an end.
 """
 
-from __future__ import annotations
-
 import stat
 import tomllib
 from dataclasses import dataclass

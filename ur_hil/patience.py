@@ -5,8 +5,6 @@ The jump says nothing about the peer, so at most `LONGEST_STEP` counts between t
 module reads no clock: the time is an argument.
 """
 
-from __future__ import annotations
-
 import math
 
 LONGEST_STEP = 0.1

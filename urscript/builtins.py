@@ -10,8 +10,6 @@ Sources: script manual CB3 3.15.4, modules urmath and internals (str_at to to_st
 error but not its text; for lists with room and structs the e-Series script directory, Lists and Structs.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ Exit codes: `ur_hil.command_line`; 1 also for a program with errors, or that is 
 docs/urscript-tool.md shows all of it.
 """
 
-from __future__ import annotations
-
 import gc
 import sys
 from collections.abc import Iterable

@@ -24,8 +24,6 @@ Decisions without a constant, and where they are made:
 | str_find from beyond the ends, to_num("12 "), to_num("5e-4") | -1, an error, a float | builtins |
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal

@@ -5,8 +5,6 @@ deliver prepared data, interpreter mode ends at once. Used by `urscript run` and
 physics.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Mapping
 from functools import partial

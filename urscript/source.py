@@ -5,8 +5,6 @@ was passed, on the wire the `def` line. Source: primary interface captures of ru
 This module renders carets; it knows nothing of errors.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 

@@ -9,8 +9,6 @@ library; where documents differ, what that library's tests expect of simulators 
 of `load` on 5.x: log of a real robot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

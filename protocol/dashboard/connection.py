@@ -9,8 +9,6 @@ each event. Send the bytes that a method returns. After a LocalProtocolError not
 RemoteProtocolError close the connection.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass

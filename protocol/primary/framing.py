@@ -6,8 +6,6 @@
 Cut a received stream with `FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)`.
 """
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 from enum import IntEnum

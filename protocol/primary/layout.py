@@ -10,8 +10,6 @@ Inferred: that masterboard data and additional info grew with 3.10 / 5.4 (seen a
 and 5.3, as 75 and 9 bytes in 5.8; UR's client library needs 75 on 3.14).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar

@@ -10,8 +10,6 @@ Sources: UR "Primary/Secondary Client Interface" (2021), UR "Client_Interface" w
 byte captures named at the classes.
 """
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 from datetime import datetime

@@ -15,8 +15,6 @@ Sources: UR "Primary/Secondary Client Interface" (2021); order, sizes and what i
 3.10, 5.4, 5.8 and 5.11.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ Sources: UR "Primary/Secondary Client Interface" (2021), section "variable value
 codes of 5.9: a public client (Hirebotics/urscript-tools).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Mapping

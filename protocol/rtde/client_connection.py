@@ -4,8 +4,6 @@
 After a LocalProtocolError nothing has changed; after a RemoteProtocolError close the connection.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from typing import TypeAlias

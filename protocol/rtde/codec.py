@@ -10,8 +10,6 @@ Source: UR RTDE guide. Data packages of the robot carry no recipe id in version 
 library and the Robotics Library read them, against the guide's table.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass

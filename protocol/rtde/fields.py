@@ -10,8 +10,6 @@ e-Series alone: those of 5.23 and 5.26 are from the client library and its tests
 dates of lists of variables in public clients.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -4,8 +4,6 @@ A recipe is made once, when a client sets it up, and used every cycle: the robot
 call of `struct.pack` over all numbers of the package. Nothing here knows ids, frequencies or clients.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache

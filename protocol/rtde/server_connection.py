@@ -13,8 +13,6 @@ and close the connection.
 Source: UR RTDE guide; where it says nothing, what public clients need, as noted at the place.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass

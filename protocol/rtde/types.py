@@ -3,8 +3,6 @@
 Everything is big-endian. The variables are in `rtde.fields`, the packages in `rtde.codec`.
 """
 
-from __future__ import annotations
-
 import struct
 from enum import Enum, IntEnum, IntFlag
 

@@ -1,7 +1,5 @@
 """Commands of clients that write: input variables of RTDE, the robot's Modbus map."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from protocol.rtde.types import RtdeValue

@@ -3,8 +3,6 @@
 Clients of a real box cannot send most of these; they are for tests and for people at the emulator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import hypot, pi, radians

@@ -3,8 +3,6 @@
 No client of a real box can send these; they are for tests and for people at the emulator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import hypot
 from typing import Literal

@@ -3,8 +3,6 @@
 Exit codes: `ur_hil.command_line`; 1 when the box has refused, or none answers. Errors are one line.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -3,8 +3,6 @@
 Where the port has a token, a request must show it.
 """
 
-from __future__ import annotations
-
 import hmac
 from collections.abc import Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 All is done in the thread of the loop, step by step as cycles pass.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future

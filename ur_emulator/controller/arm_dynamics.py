@@ -3,8 +3,6 @@
 It is the model that the drives' feed-forward uses: calibrated geometry, masses and inertias of the table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from math import inf

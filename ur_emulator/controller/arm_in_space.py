@@ -3,8 +3,6 @@
 Most cycles of a box without clients, and all that a program does in joint space, need none of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ is written, with the last values of the others; values outside a mask are ignore
 do not initialise them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from typing import Any

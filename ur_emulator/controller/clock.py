@@ -1,7 +1,5 @@
 """Clock: the time of the controller, counted in control cycles."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 

@@ -6,8 +6,6 @@ Source: URScript manual CB3 3.15: freedrive_mode, teach_mode, force_mode, set_*_
 an input acts once no move runs, with or without a program; freedrive replaces force mode.
 """
 
-from __future__ import annotations
-
 from math import hypot
 
 from protocol.primary.messages import ReportLevel

@@ -5,8 +5,6 @@ with the check of its set-points, plant, sensors, safety, snapshot. Must not kno
 time is the tick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 

@@ -6,8 +6,6 @@ Source: maker's script manual for e-Series 5.x, zero_ftsensor and tool_contact; 
 both, undocumented.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence

@@ -7,8 +7,6 @@ from 0 to one turn, the turns beside them: UR forum, thread 641. Analogue levels
 the range of their domain, and the clock as the time since the controller started: chosen.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

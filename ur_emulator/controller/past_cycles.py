@@ -3,8 +3,6 @@
 Ports show less recent values than the controller works with: see `Plant.report`.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from itertools import islice
 from operator import mul

@@ -5,8 +5,6 @@ There is no person at the box: a client answers.
 Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.commands.programs`.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 It knows the robot that they run on only as `urscript.run.host.Host`; `scripting` has the builtins.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 

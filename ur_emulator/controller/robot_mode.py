@@ -5,8 +5,6 @@ on goes POWER_OFF -> POWER_ON -> IDLE within 5 s, brake release IDLE -> BACKDRIV
 transition is instantaneous. The durations are chosen, not measured.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 
 from protocol.ur_types import JointMode, RobotMode, SafetyMode

@@ -3,8 +3,6 @@
 The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothing has to be done here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from protocol.ur_types import RobotMode, SafetyMode

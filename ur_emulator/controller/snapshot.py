@@ -6,8 +6,6 @@ the realtime columns, lower-cased (`actual_TCP_pose` on the wire is `actual_tcp_
 is a pure function of a snapshot and a layout table.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple

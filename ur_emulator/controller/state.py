@@ -3,8 +3,6 @@
 The record itself is frozen. Scripts, commands and ports get the parts that they act on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

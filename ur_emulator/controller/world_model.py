@@ -7,8 +7,6 @@ attaching, deleting and moving does). Chosen: flange and TCP are those of the ta
 are those of its second frame if it gets no third one; a payload is what hangs on flange or TCP.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ The controller computes poses with it: it knows the calibration and no physics. 
 evaluate the chain on a model of their own, in about two microseconds; the rest is plain floats.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import inf, isfinite, pi, sqrt
 from typing import NamedTuple

@@ -9,8 +9,6 @@ rest is a planar two-link arm. Same geometry as K. P. Hawkins, "Analytic inverse
 Universal Robots UR-5/UR-10 arms", Georgia Tech, 2013.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import acos, atan2, cos, hypot, pi, sin
 

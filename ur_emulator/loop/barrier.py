@@ -4,8 +4,6 @@ The code that registers a callback names the function that gets an error in it. 
 has no owner any more: it ends the loop.
 """
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable
 from pathlib import Path

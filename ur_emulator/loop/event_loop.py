@@ -11,8 +11,6 @@ next round by `call_soon`. An error in a callback ends its registration, its own
 loop goes on (see `barrier`).
 """
 
-from __future__ import annotations
-
 import select
 import selectors
 import socket

@@ -1,7 +1,5 @@
 """Lines for a terminal, a pipe or a file: who writes one never waits, whether or not somebody reads them."""
 
-from __future__ import annotations
-
 import os
 import queue
 import select

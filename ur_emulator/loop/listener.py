@@ -8,8 +8,6 @@ accepted and closed at once, so that they notice it; connected clients are not d
 controller are not known.
 """
 
-from __future__ import annotations
-
 import errno
 import math
 import os

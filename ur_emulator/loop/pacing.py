@@ -6,8 +6,6 @@
 | lockstep   | at once while something is going on, never past a script that waits for the outside           |
 """
 
-from __future__ import annotations
-
 import math
 from enum import Enum
 from typing import Protocol

@@ -4,8 +4,6 @@ It decides when to tick and publishes. For its ports it is the whole box: they r
 commands, write into its log, and have work done in steps and in the worker process.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future

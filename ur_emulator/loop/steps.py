@@ -5,8 +5,6 @@ process has ended. So nothing waits for a clock, and a request is answered after
 the steps in which it was raised, and the caller that began them gets it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from typing import Any, TypeVar

@@ -7,8 +7,6 @@ somebody else for more than a moment. A task that takes too much processor time 
 The queue looks at the clock itself: a process may be stopped.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import pickle

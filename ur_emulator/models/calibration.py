@@ -4,8 +4,6 @@ The factory measures every arm and stores the differences in the control box, so
 kinematics know them; a client that trusts the nominal table is off by half a millimetre to a millimetre.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ur_emulator.models.fidelity import Fidelity, random_stream

@@ -7,8 +7,6 @@ wrist 2), wrist 2 (from wrist 1 along -y to the axis of wrist 3), wrist 3 (the t
 facing +z).
 """
 
-from __future__ import annotations
-
 from math import pi
 
 from ur_emulator.models.generations import CB3

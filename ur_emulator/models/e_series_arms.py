@@ -10,8 +10,6 @@ Sources of the joints, cited by letter there:
     proportional to it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import pi
 from typing import TypedDict

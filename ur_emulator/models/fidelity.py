@@ -18,8 +18,6 @@ Sources, cited by letter below:
  E  assumed: no published figure; to be checked on a real arm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path

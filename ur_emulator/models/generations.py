@@ -9,8 +9,6 @@ Sources of the electrics and fidelities of the e-Series, cited by letter below:
 Noise of encoders, speeds and currents: as in `fidelity.py`, whose source is a UR3e at 500 Hz.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import datetime
 from math import radians

@@ -8,8 +8,6 @@ hinge sits in its body's frame while DH puts it in the parent's. What a `Link` s
 therefore moved by the constant part Tz(d) Tx(a) Rx(alpha) of its row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, sin
 

@@ -4,8 +4,6 @@ A new arm of the table is its numbers in a file of arms and one row here. A file
 that it is based on, and what is otherwise (docs/fidelity.md, examples/arms).
 """
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any

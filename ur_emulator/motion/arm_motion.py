@@ -11,8 +11,6 @@ The rules of ownership are the controller's behaviour as users report it:
 Must not know scripts or physics: an owner is any object, compared by identity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from math import inf
 from typing import NamedTuple

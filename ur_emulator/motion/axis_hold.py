@@ -5,8 +5,6 @@ e-Series 5.11, freedrive_mode. Chosen: stiffness and damping; the axes are direc
 turns about its own centre point; those of the tool are as they were when freedrive began.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ A conveyor moves the tool along with a belt; force mode moves it until it meets 
 terms of the path; the joints get the displaced target. Without overlays none of this runs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum

@@ -6,8 +6,6 @@ down before the singularity. At the singularity itself it keeps a least speed, a
 arm, as a real one does.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import ceil
 from typing import NamedTuple

@@ -9,8 +9,6 @@ On a curved path a part of the acceleration changes the direction: a - b z remai
 bend b per unit of length. Units are those of the path.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Tool centre point and arm are those at the time of the command: a later `set_tcp
 has begun.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

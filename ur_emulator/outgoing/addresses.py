@@ -10,8 +10,6 @@ machine. Every connection of a box asks here with the address that it will use, 
 address change nothing.
 """
 
-from __future__ import annotations
-
 import errno
 import socket
 import threading

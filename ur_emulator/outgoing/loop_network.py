@@ -1,7 +1,5 @@
 """The network of one box: the only place from which it connects to others."""
 
-from __future__ import annotations
-
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import UnitAddress
 from ur_emulator.loop.barrier import Report

@@ -9,8 +9,6 @@ script manual e-Series 5.2x, modbus_add_signal and modbus_add_rw_signal: functio
 script manual, modbus_set_signal_watchdog: the 2 s. All other times and limits: chosen.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

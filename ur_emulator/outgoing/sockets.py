@@ -1,7 +1,5 @@
 """Sockets of the scripts of one box: they never block, and their buffers are bounded, each and together."""
 
-from __future__ import annotations
-
 import errno
 import selectors
 import socket

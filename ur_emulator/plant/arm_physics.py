@@ -5,8 +5,6 @@ of the gears. The law of the joint servos is that of MuJoCo's actuators, force =
 so that it acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

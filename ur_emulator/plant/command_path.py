@@ -27,8 +27,6 @@ A torque passes the path as the deflection of the servo that gives it: torque / 
 know the arm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import cycle
 from math import ceil

@@ -10,8 +10,6 @@ Angles: the physics' hinge is the motor side of the gear, which the drive holds;
 gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from operator import ge, truediv
 from typing import NamedTuple

@@ -5,8 +5,6 @@ next. Currents and torques are those that the controller's model expects. Nothin
 the declared payload, no push, no contact, no hand. The accelerometer reads gravity alone, also in motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

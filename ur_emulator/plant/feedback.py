@@ -4,8 +4,6 @@ The gear's transmission error lies between motor and joint. The sensors read a r
 as old as the feedback age.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from math import sqrt
 

@@ -7,8 +7,6 @@ the rest is part of the dry friction. The controller compensates friction in its
 that are off by what `Fidelity.friction_error` says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

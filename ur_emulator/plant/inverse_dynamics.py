@@ -5,8 +5,6 @@ neither friction nor the true masses of the arm: the joint loops compensate its 
 it takes the links for points.
 """
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Loads: payload and push at the flange, true ones and those that the controller assumes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import isfinite, pi
 

@@ -4,8 +4,6 @@ MuJoCo's models have a fixed size. So the model has SLOTS shapes from the beginn
 their own; those that are not in use collide with nothing and are skipped as a whole when none is in use.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, inf, sin

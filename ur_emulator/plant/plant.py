@@ -13,8 +13,6 @@ Part of the work need not wait for the next target: `run_ahead` does it while a 
 | old when they are reported, targets act at once   | step of the next cycle computes it, or `run_ahead`     |
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import exp
 from typing import NamedTuple

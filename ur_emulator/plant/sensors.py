@@ -4,8 +4,6 @@ Input is a record of true values of some moment (see the REC slices); output are
 comes in blocks from seeded streams, so equal seeds and equal motions give equal bits.
 """
 
-from __future__ import annotations
-
 from math import exp, pi, sqrt
 from typing import NamedTuple
 

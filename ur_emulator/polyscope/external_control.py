@@ -6,8 +6,6 @@ r"""External Control: when a program is played, the box asks a PC for a part of 
 Source: source text of the URCap and of the public client library.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

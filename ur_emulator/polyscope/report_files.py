@@ -6,8 +6,6 @@ worker process. Name of the support file: UR dashboard documents; of the log: Po
 ours.
 """
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -1,7 +1,5 @@
 """Lets the worker process write reports about a box, with what the box knows at that time."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Callable
 from typing import TypeVar

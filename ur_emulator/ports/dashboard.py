@@ -4,8 +4,6 @@ What the commands do is each a method; how they are spelt stands in `protocol`. 
 that end in one (see `loop.steps`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 

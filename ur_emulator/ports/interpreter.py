@@ -4,8 +4,6 @@ Lines wait here while no program is in the mode, and while the names that they w
 Clients take turns, so that one that sends thousands of lines does not keep others waiting for all of them.
 """
 
-from __future__ import annotations
-
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ can only be read, is refused as a whole with exception 2.
 Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus application protocol.
 """
 
-from __future__ import annotations
-
 from protocol.errors import RemoteProtocolError
 from protocol.modbus import (
     ExceptionCode,

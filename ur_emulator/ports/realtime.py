@@ -1,7 +1,5 @@
 """Port 30003 and its read-only twin 30013: one frame per cycle to every client; script text comes in."""
 
-from __future__ import annotations
-
 from protocol.realtime.layout import RealtimeLayout
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.ports.script_intake import ProgramIntake, ScriptPort

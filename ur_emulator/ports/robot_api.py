@@ -1,7 +1,5 @@
 """The Robot API of PolyScope X: a method for each call; `protocol.robot_api` lists the calls."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial

@@ -3,8 +3,6 @@
 All functions but `find_program` may take a while: they run in the worker process.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from email.parser import BytesParser
 from email.policy import HTTP

@@ -1,7 +1,5 @@
 """A client whose requests are answered in order, however many cycles each takes."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from functools import partial
 

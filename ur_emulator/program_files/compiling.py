@@ -4,8 +4,6 @@ It takes longer than a cycle: these functions run in the worker process (`loop.w
 that goes in and comes out can be pickled.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ mean the one folder, and so does a name without a folder. No name leads out of i
 another absolute path, nor through a link. Everything below the folder is read and written here.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

@@ -1,7 +1,5 @@
 """Loads programs: from a name to a program that can be played, as PolyScope's `load`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

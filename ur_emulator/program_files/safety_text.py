@@ -1,7 +1,5 @@
 """The safety settings in an installation: text with `[Section]` lines and `key = value` lines."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """What a script of PolyScope consists of: names, the head of an installation, and lines with their labels."""
 
-from __future__ import annotations
-
 import re
 import uuid
 from collections.abc import Iterator, Sequence

@@ -3,8 +3,6 @@
 Source: program files and the scripts that PolyScope saved beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 

@@ -1,7 +1,5 @@
 """UrpMaker: what the writers of nodes share while a program file becomes a script."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial

@@ -8,8 +8,6 @@ The box plays the script and does not look at the nodes. Source of the form: pro
 library's tests (10.12) and of its simulator's folder (10.14).
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 Software up to 5.12 writes Java properties, later software XML. Values are literals of URScript.
 """
 
-from __future__ import annotations
-
 import gzip
 import re
 from collections.abc import Iterator, Mapping

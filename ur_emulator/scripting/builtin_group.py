@@ -4,8 +4,6 @@ A group is a class whose marked methods are builtins. It gets only the parts of 
 on. Signatures, versions and costs of builtins are in `urscript.catalogue`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar

@@ -3,8 +3,6 @@
 A client of the control API answers instead of an operator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from functools import partial
 from typing import Any, NoReturn

@@ -1,7 +1,5 @@
 """Builtins for force mode, freedrive and contacts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ur_emulator.controller.compliance import Compliance

@@ -3,8 +3,6 @@
 The catalogue has checked that a line or register exists; its number may be a float without fraction.
 """
 
-from __future__ import annotations
-
 from collections.abc import MutableSequence, Sequence
 from typing import Any, Final
 

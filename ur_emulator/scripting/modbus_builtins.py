@@ -8,8 +8,6 @@ Source: URScript manuals CB3 3.15 and e-Series 5.2x, module interfaces. Chosen: 
 several sets its first one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Generator
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move before it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any

@@ -7,8 +7,6 @@ client library. Chosen: what the drives can give from rest by the controller's m
 the form of the ramps; a move with a blend at its end keeps the ramps of version 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, isfinite
 

@@ -1,7 +1,5 @@
 """Interfaces of the script functions to the network; the servers implement them, tests have a fake."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Protocol
 

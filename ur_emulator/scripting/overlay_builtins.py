@@ -1,7 +1,5 @@
 """Builtins that displace the arm from its path: path offset, conveyor tracking and its encoders."""
 
-from __future__ import annotations
-
 from math import hypot
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Builtins for RTDE: outputs that a program reads, watchdogs of inputs, and an external force sensor."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from protocol.rtde.fields import INPUTS, RtdeField

@@ -1,7 +1,5 @@
 """Builtins for TCP, payload and mounting, and the world model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import wraps
 from itertools import combinations

@@ -4,8 +4,6 @@ Timeouts are robot time, counted in cycles. Shapes of the results after a failur
 socket_read_binary_integer and related builtins ([0, -1, -1, ...], [0, nan, nan, ...], "").
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Generator

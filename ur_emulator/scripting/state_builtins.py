@@ -4,8 +4,6 @@ Actual and target values are those at the end of the last cycle, constant while 
 the target that a script reads is the one that the packages of its cycle show.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Builtins that stream: velocities, positions and torques that a script renews every cycle, and the stops."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -9,8 +9,6 @@ the texts about values, the one for poses is the controller's own (log of 5.12: 
 must be a Pose on the form p[x,y,z,a,b,c]"); the others follow its pattern, adding what was given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from math import hypot, isfinite

@@ -20,8 +20,6 @@ rows up to the next blank line.
 first seen in an e-Series manual of the 5.2x editions; the exact first release is not known.
 """
 
-from __future__ import annotations
-
 import re
 from ast import literal_eval
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

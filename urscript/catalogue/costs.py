@@ -5,8 +5,6 @@ Only the ratios matter; `urscript.run.metering` says what a unit buys. An effect
 too: a text message is also a line of the log and a package for the clients of port 30001.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Warnings about constant arguments: a type, length or range that a builtin refuses, degrees, millimetres."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

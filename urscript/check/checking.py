@@ -4,8 +4,6 @@ The parser says where it detected an error, which is what a controller reports. 
 around that place, explain the error, and repair a copy of the text so that the parser can find the next one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

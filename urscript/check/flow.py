@@ -1,7 +1,5 @@
 """Warnings about control flow: busy loops, unchecked reads, unreachable code."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Final
 

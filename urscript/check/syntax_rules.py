@@ -1,7 +1,5 @@
 """The rules that explain syntax errors: characters, brackets, blocks, statements of other languages."""
 
-from __future__ import annotations
-
 import re
 from typing import Final, NamedTuple
 

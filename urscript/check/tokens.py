@@ -4,8 +4,6 @@ The tokenizer is tolerant: words, numbers, strings and symbols of any text, also
 fails. Comments and labels are left out. Offsets count from 0, lines and columns from 1.
 """
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_right
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Warnings about what is never used, defined twice, hiding a builtin; methods of values without methods."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from urscript.catalogue import Catalogue

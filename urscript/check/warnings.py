@@ -3,8 +3,6 @@
 A code never changes its meaning and is never reused.
 """
 
-from __future__ import annotations
-
 from typing import Final, NamedTuple
 
 from urscript.errors import ScriptError

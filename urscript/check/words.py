@@ -1,7 +1,5 @@
 """Words and symbols of other languages, and what URScript has instead: tables, and hints made from them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Final, NamedTuple, TypeVar

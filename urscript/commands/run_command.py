@@ -1,7 +1,5 @@
 """`urscript run`: run a program on an emulated robot, or on a host that only records its calls."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext

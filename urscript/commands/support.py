@@ -1,7 +1,5 @@
 """What the commands of `urscript` share: their options, reading programs, showing lines."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -5,8 +5,6 @@ call that may take time becomes `yield from`. Names: `v_x` local, `g_x` global, 
 names a compiled program uses is listed in `runtime`.
 """
 
-from __future__ import annotations
-
 import ast
 from typing import Any, Final
 

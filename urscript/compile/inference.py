@@ -5,8 +5,6 @@ that of all its returns; everything else is ANY. Inference reports no errors: an
 at run time.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator
 from enum import Enum

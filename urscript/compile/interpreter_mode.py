@@ -3,8 +3,6 @@
 They are compiled like a program whose variables and functions exist already (`names.living_scope`).
 """
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import dataclass, field
 

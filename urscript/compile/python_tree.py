@@ -4,8 +4,6 @@ Python keeps the positions in the code object, so the position of an error is fo
 costs nothing at run time.
 """
 
-from __future__ import annotations
-
 import ast
 from typing import Any
 

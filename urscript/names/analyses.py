@@ -1,7 +1,5 @@
 """Analyses of a resolved program: what may be read unassigned, may block, is recursive, how deep it calls."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from urscript.names.scopes import FunctionScope, ResolvedProgram

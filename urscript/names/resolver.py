@@ -8,8 +8,6 @@ function may be used before its definition; names in branches that never run cou
 All errors of a program are collected, the first one in the text is raised.
 """
 
-from __future__ import annotations
-
 from urscript.catalogue import Catalogue
 from urscript.dialect import MAX_CALL_DEPTH, MAX_LOOP_DEPTH, Dialect
 from urscript.errors import (

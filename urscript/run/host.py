@@ -4,8 +4,6 @@ The language implements control flow, text and mathematics; everything that acts
 state is a function of the host. `recording_host` is a host without a robot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 

@@ -4,8 +4,6 @@ The statements become part of the program: their functions and variables stand i
 cleared. The main thread runs them in the order of their arrival. Source: script manual 5.11.
 """
 
-from __future__ import annotations
-
 import marshal
 from collections.abc import Callable, Container, Generator, Iterable, Mapping
 from typing import Any, Final

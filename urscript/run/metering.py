@@ -11,8 +11,6 @@ Compiled code counts its own statements and units (`compile.compiler`): `_b` is 
 the units beyond one a statement. Here are the charges that depend on values: arrays, texts, builtins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Any, Final

@@ -13,8 +13,6 @@ booleans it emits the Python operator. Two numbers, the most frequent operands, 
 Undocumented behaviour is decided in `dialect`.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable, Generator, Iterable, Mapping
 from math import ceil, fmod, isfinite, nan

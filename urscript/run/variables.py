@@ -5,8 +5,6 @@ place: storing an element, or a method that changes a list, makes a new value, w
 Undocumented behaviour is decided in `dialect`. The manual says when a method fails, the texts are ours.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 

@@ -3,8 +3,6 @@
 A builtin that takes time is a generator function; each `yield` passes one of these to the scheduler.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import Enum
 from typing import Final

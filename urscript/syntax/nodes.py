@@ -3,8 +3,6 @@
 The comparison of trees ignores spans and the spelling of numbers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cache

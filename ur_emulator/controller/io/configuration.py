@@ -3,8 +3,6 @@
 Source: URScript manual CB3 3.15, module ioconfiguration.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import IntEnum
 

@@ -5,8 +5,6 @@ Source: URScript manual CB3 3.15, encoder functions. Chosen: counts are not filt
 one once a cycle.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import IntEnum

@@ -4,8 +4,6 @@ Digital words carry bits 0-7 standard, 8-15 configurable, 16-17 tool (UR realtim
 Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import NamedTuple

@@ -5,8 +5,6 @@ upper for RTDE clients. Registers keep their values when programs end. Source: U
 CB3 3.15, read_input_boolean_register and related builtins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple, SupportsIndex, TypeVar
 

@@ -4,8 +4,6 @@ Source: URScript manual CB3 3.15, rtde_set_watchdog. Chosen: a minimum frequency
 time is robot time; a paused program is not watched, and its watchdogs restart when it continues.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Source: UR3/CB3 user manual and UR5e hardware manual 2022, safety I/O: low is th
 a pair are looked at. That a pair whose channels differ is not a fault is chosen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum

@@ -6,8 +6,6 @@ Sources: joint limits and torque limits of the robot model; C153 "position devia
 chosen (docs/fidelity.md).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import hypot
 from operator import sub

@@ -11,8 +11,6 @@ reduced mode and recovery mode; e-Series: UR5e hardware manual 2022, safety I/O;
 documents for unlocking and restarting. What is marked C in `why` is chosen because nothing is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from enum import Enum

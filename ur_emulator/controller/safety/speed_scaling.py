@@ -6,8 +6,6 @@ The limits are those of the robot's generation. Source of tolerance and patience
 manuals. That the controller slows down instead of stopping is chosen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import hypot, isfinite, radians
 

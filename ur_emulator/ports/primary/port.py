@@ -10,8 +10,6 @@ The primary port also reports the running program: its global variables at the r
 its threads stand in PolyScope's tree.
 """
 
-from __future__ import annotations
-
 from protocol.primary.framing import NO_TIME
 from protocol.primary.messages import (
     LONGEST_TITLE,

@@ -8,8 +8,6 @@ A `$ 12 "Move"` line is only noted by the thread that passes it; clients get a m
 a thread has passed on. `"breakAfter"` and `"noBreak"` behind the text mean nothing to the box.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache

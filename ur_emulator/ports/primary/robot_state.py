@@ -1,7 +1,5 @@
 """The robot state of the primary and secondary ports as a function of a snapshot."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable
 
