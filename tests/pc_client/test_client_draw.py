@@ -27,17 +27,18 @@ def file(tmp_path):
     return path
 
 
-def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot, file, tmp_path, capsys):
-    archive, out, saved = tmp_path / "two.zip", tmp_path / "out", tmp_path / "letter.toml"
+def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot, tmp_path, capsys):
+    archive, out, saved = tmp_path / "two.zip", tmp_path / "out", tmp_path / "one.toml"
     with zipfile.ZipFile(archive, "w") as packed:
-        packed.writestr("a/same.txt", recording_text(one_part()))
-        packed.writestr("b/same.txt", recording_text(one_part()))
+        packed.writestr("a/same one.txt", recording_text(two_parts_and_a_dot()))
+        packed.writestr("b/same one.txt", recording_text(one_part()))
+    first, second = f"{archive}:a/same one.txt", f"{archive}:b/same one.txt"
     options = ["--robot", "127.0.0.1", "--out", str(out), "--size", "25", "--plane", "horizontal"]
-    assert cli.run(["draw", str(file), *options, "--save", str(saved), "--dry-run"]) == 0
+    assert cli.run(["draw", second, *options, "--save", str(saved), "--dry-run"]) == 0
     assert not out.exists()
-    assert cli.run(["draw", str(file), f"{archive}:a/same.txt", f"{archive}:b/same.txt", *options]) == 0
+    assert cli.run(["draw", first, second, *options]) == 0
     assert robot.at_rest
-    recordings = {f"{name}_r1.mcap" for name in ("letter_a", "same", "same_2")}
+    recordings = {"same_one_r1.mcap", "same_one_2_r1.mcap"}
     assert {path.name for path in out.iterdir()} == {
         *recordings,
         "draw.json",
@@ -46,18 +47,18 @@ def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot,
         "figures",
     }
     said = capsys.readouterr().out
-    assert "letter_a: 3 marks" in said
+    assert "same_one: 3 marks" in said
     assert "report.html" in said
     drawings = json.loads((out / "draw.json").read_text())["drawings"]
-    assert [one["name"] for one in drawings] == ["letter_a", "same", "same_2"]
+    assert [one["name"] for one in drawings] == ["same_one", "same_one_2"]
     assert all(one["runs"][0]["planned"]["snr_v_db"] > 15.0 for one in drawings)
     page = (out / "report.html").read_text()
     check_needs_nothing(page)
     assert all(f'<section id="{one["name"]}">' in page for one in drawings)
-    assert page.count('class="zoom"') == 9
+    assert page.count('class="zoom"') == 6
     assert str(tmp_path) not in page
     assert "executed" in (out / "draw.md").read_text()
-    recording = load_recording(out / "letter_a_r1.mcap")
+    recording = load_recording(out / "same_one_2_r1.mcap")
     moving = recording.rows_of(1)
     t, p = recording.column("ref_t")[moving], recording.column("ref_tcp_position")[moving]
     np.testing.assert_allclose(p, load_movement(saved).sample(t).p, atol=1e-4)
