@@ -15,7 +15,7 @@ from pc_client.errors import PlanningError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model
-from pc_client.planning.approach import JointLines, _raised, approach_text, plan_approach
+from pc_client.planning.approach import JointLines, _raised, plan_approach
 from pc_client.planning.plan import plan_movement
 
 angle = st.floats(-6.0, 6.0)
@@ -230,11 +230,3 @@ def test_during_the_approach_the_flange_of_any_arm_is_slow(name, reach):
     assert approach.v * reach == pytest.approx(0.25)
     assert approach.a * reach == pytest.approx(0.4)
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
-
-
-def test_the_text_of_an_approach_names_start_end_and_speed():
-    approach = plan_approach(PLAN, HOME, model=UR3)
-    text = approach_text(approach)
-    assert "(0.0, -90.0, 0.0, -90.0, 0.0, 0.0) deg" in text
-    assert "29 deg/s" in text
-    assert f"{approach.duration:.1f} s" in text

@@ -16,7 +16,7 @@ import pytest
 
 from pc_client import cli
 from pc_client.errors import ClientError
-from pc_client.studies.executors import open_executor, usable_cores
+from pc_client.studies.executors import open_executor
 
 
 def square(x):
@@ -114,10 +114,6 @@ def test_workers_end_with_a_caller_that_is_killed(listener):
         caller.kill()
         caller.wait()
         assert link.recv(1) == b""  # a worker that stays ends this test by its timeout
-
-
-def test_the_default_fills_the_cores_that_may_be_used():
-    assert 1 <= usable_cores() <= (os.cpu_count() or 1)
 
 
 @pytest.mark.parametrize(

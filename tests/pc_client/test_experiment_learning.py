@@ -22,7 +22,7 @@ from pc_client.errors import DriverError
 from pc_client.experiment.checks import LEAD, SETTLE, broken_limit
 from pc_client.experiment.experiment import load_movements
 from pc_client.experiment.identification import learning_filter
-from pc_client.experiment.repetitions import Repetitions, RunLog, is_clean
+from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase
@@ -127,11 +127,6 @@ def test_a_run_that_is_not_clean_teaches_no_command(two, tmp_path, attribute, co
     # but the third run knows the gears by then
     assert recordings[2].summary["gear_waves"] > 0
     assert speed_error(recordings[2]) < 0.6 * speed_error(recordings[0])
-
-
-@pytest.mark.parametrize(("late", "lost", "clean"), [(0, 0, True), (1, 0, False), (0, 1, False)])
-def test_clean_runs(late, lost, clean):
-    assert is_clean(StreamReport(late_frames=late, lost_frames=lost)) is clean
 
 
 def commands_of(plan):

@@ -14,7 +14,6 @@ from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.model import RobotModel, robot_model
-from pc_client.planning.approach import plan_text
 from pc_client.planning.joint_path import fixed_tcp_rotation, rotation_from_rpy
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import limits_of
@@ -320,18 +319,6 @@ def test_turns_that_leave_a_joint_range_are_refused(turns):
 def test_half_turns_are_refused():
     with pytest.raises(PlanningError, match="whole turns"):
         PLAN.shifted((0.5, 0, 0, 0, 0, 0))
-
-
-def test_the_plan_in_words_holds_what_the_arm_will_do():
-    text = plan_text(PLAN)
-    report = PLAN.report
-    assert f"{report.duration:.2f} s" in text
-    assert f"{report.tcp_speed.value:.3f} m/s" in text
-    assert f"{np.degrees(report.joint_speed.value):.0f} deg/s" in text
-    assert f"{report.box_min[0]:.3f}..{report.box_max[0]:.3f}" in text
-    assert "joint range" in text
-    assert "ur3" in text
-    assert max(map(len, text.splitlines())) <= 120
 
 
 POINTS = st.tuples(st.floats(0.28, 0.42), st.floats(-0.195, 0.195), st.floats(0.155, 0.345))
