@@ -80,8 +80,7 @@ def test_time_stamps_are_whole_cycles(moved):
         assert snapshot.timestamp == snapshot.tick * 8 / 1000
 
 
-def test_tcp_offset_moves_the_pose_and_the_speed():
-    bench = Bench()
+def test_tcp_offset_moves_the_pose_and_the_speed(bench):
     flange = pose_to_T(bench.now.actual_tcp_pose)
     bench.run("def t():\n  set_tcp(p[0,0,0.1,0,0,0])\n  sync()\nend\n")
     tcp = pose_to_T(bench.now.actual_tcp_pose)
@@ -171,8 +170,7 @@ def test_speed_slider_slows_a_move(bench):
     assert bench.now.speed_scaling == 1.0, "clients multiply the two"
 
 
-def test_a_program_reads_whatever_comes_at_once_without_using_too_much_time():
-    bench = Bench(fidelity="ideal")
+def test_a_program_reads_whatever_comes_at_once_without_using_too_much_time(bench):
     n = 20_000
     bench.start(f"""def prog():
       socket_open("127.0.0.1", 5000)
@@ -198,8 +196,7 @@ def test_a_program_reads_whatever_comes_at_once_without_using_too_much_time():
 
 
 @pytest.mark.parametrize(("answer", "text"), [("\u20acuro", "6"), ("", "0")])
-def test_a_text_has_one_character_for_each_byte_of_utf_8(answer, text):
-    bench = Bench()
+def test_a_text_has_one_character_for_each_byte_of_utf_8(bench, answer, text):
     bench.start('def p():\n  textmsg(str_len(request_string_from_primary_client("?")))\nend\n')
     bench.tick(2, AnswerRequest(answer))
     assert bench.texts == [text]
@@ -215,8 +212,7 @@ def test_what_is_no_answer_at_all_cannot_be_given(answer):
     "wrong",
     [AnswerRequest(True), AnswerRequest(1.5), AnswerRequest(10**12), AnswerRequest(1, 99), ClosePopup()],
 )
-def test_wrong_answers_change_nothing(wrong):
-    bench = Bench()
+def test_wrong_answers_change_nothing(bench, wrong):
     bench.start('def p():\n  textmsg("got ", request_integer_from_primary_client("how many?"))\nend\n')
     bench.tick(3, wrong)
     assert bench.controller.programs.is_running
@@ -225,8 +221,7 @@ def test_wrong_answers_change_nothing(wrong):
     assert bench.texts == ["got 4"]
 
 
-def test_answers_go_to_the_oldest_question_of_their_type():
-    bench = Bench()
+def test_answers_go_to_the_oldest_question_of_their_type(bench):
     bench.start(
         'def p():\n  thread t():\n    y = request_integer_from_primary_client("b")\n    textmsg("b ", y)\n  end\n'
         '  h = run t()\n  x = request_integer_from_primary_client("a")\n  textmsg("a ", x)\n  join h\nend\n'
@@ -238,8 +233,7 @@ def test_answers_go_to_the_oldest_question_of_their_type():
 
 
 @pytest.mark.parametrize("kind", ["def", "sec"])
-def test_powerdown_ends_the_program_and_cuts_the_power(kind):
-    bench = Bench()
+def test_powerdown_ends_the_program_and_cuts_the_power(bench, kind):
     bench.start("def other():\n  while True:\n    sync()\n  end\nend\n")
     bench.start(f'{kind} p():\n  powerdown()\n  textmsg("never")\nend\n')
     assert bench.now.robot_mode == RobotMode.POWER_OFF
@@ -247,8 +241,7 @@ def test_powerdown_ends_the_program_and_cuts_the_power(kind):
     assert not [event for event in bench.events if type(event).__name__ in ("TextPrinted", "ScriptFailed")]
 
 
-def test_powerdown_in_motion_holds_the_arm_where_it_is():
-    bench = Bench()
+def test_powerdown_in_motion_holds_the_arm_where_it_is(bench):
     bench.start(
         "def p():\n  thread t():\n    sleep(0.4)\n    powerdown()\n  end\n  run t()\n"
         "  q = get_actual_joint_positions()\n  movej([q[0] + 1, q[1], q[2], q[3], q[4], q[5]])\nend\n"
@@ -260,8 +253,7 @@ def test_powerdown_in_motion_holds_the_arm_where_it_is():
     assert bench.tick(10).actual_q[0] == pytest.approx(bench.snapshots[-20].actual_q[0], abs=1e-4)
 
 
-def test_settings_are_kept():
-    bench = Bench()
+def test_settings_are_kept(bench):
     bench.start(
         "def p():\n  pause_on_error_code(153)\n  pause_on_error_code(204, 3)\n  set_safety_mode_transition_hardness(1)\n"
         "  reset_revolution_counter([0, 0, 0, 0, 0, 1])\n  while True:\n    sync()\n  end\nend\n"

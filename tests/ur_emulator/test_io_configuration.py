@@ -17,8 +17,12 @@ from ur_emulator.controller.io.encoders import RANGES, Decoder, Encoder
 from ur_emulator.controller.modbus_map import COILS, REGISTERS, MapAddressError
 
 
-def test_all_actions_to_default():
-    bench = Bench()
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def test_all_actions_to_default(bench):
     actions = bench.controller.state.io_configuration.input_actions
     bench.run('set_tool_digital_input_action(0, "freedrive")\n')
     assert actions == {("tool_digital", 0): "freedrive"}
@@ -70,8 +74,7 @@ def test_general_purpose_words(address, value):
     assert port_map.read_register(state, address) == value & 0xFFFF
 
 
-def test_joint_angles_count_up_from_zero_beside_their_turns():
-    bench = Bench()
+def test_joint_angles_count_up_from_zero_beside_their_turns(bench):
     q = bench.now.actual_q
     for joint in range(6):
         angle, turns = read(bench, 270 + joint) / 1e3, signed(read(bench, 320 + joint))
@@ -80,8 +83,7 @@ def test_joint_angles_count_up_from_zero_beside_their_turns():
     assert any(x < 0.0 for x in q)
 
 
-def test_tcp_pose_and_modes():
-    bench = Bench()
+def test_tcp_pose_and_modes(bench):
     pose = bench.now.actual_tcp_pose
     for i in range(3):
         assert signed(read(bench, 400 + i)) == pytest.approx(pose[i] * 1e4, abs=0.6)
@@ -89,16 +91,14 @@ def test_tcp_pose_and_modes():
     assert [read(bench, 256), read(bench, 257), read(bench, 258), read(bench, 310)] == [3, 15, 7, 253]
 
 
-def test_flags_of_a_protective_stop():
-    bench = Bench()
+def test_flags_of_a_protective_stop(bench):
     assert [read(bench, address) for address in range(260, 267)] == [1, 0, 0, 0, 0, 0, 1]
     bench.tick(1, TriggerProtectiveStop())
     assert [read(bench, address) for address in range(260, 267)] == [1, 1, 0, 0, 0, 1, 3]
     assert port_map.read_coil(bench.controller.state, 261)
 
 
-def test_outputs_by_word_mask_and_bit():
-    bench = Bench()
+def test_outputs_by_word_mask_and_bit(bench):
     state = bench.controller.state
     port_map.write_register(state, 1, 0b10_0000_0001)
     assert state.io.digital_out == 1 | 1 << 17
@@ -115,8 +115,7 @@ def test_outputs_by_word_mask_and_bit():
     assert [port_map.read_coil(state, 16 + i) for i in range(4)] == [False, True, True, False]
 
 
-def test_inputs_ignore_writes():
-    bench = Bench()
+def test_inputs_ignore_writes(bench):
     bench.controller.state.io.digital_in = 1 << 3 | 1 << 9 | 1 << 16
     assert texts(bench, "write_port_bit(3, False)", "textmsg(read_port_bit(3))") == ["True"]
     assert read(bench, 0) == 1 << 3 | 1 << 8
@@ -126,8 +125,7 @@ def test_inputs_ignore_writes():
     assert read(bench, 4) == 0
 
 
-def test_analogue_levels_are_parts_of_the_range():
-    bench = Bench()
+def test_analogue_levels_are_parts_of_the_range(bench):
     texts(bench, "set_analog_outputdomain(0, 1)", "set_standard_analog_out(0, 1)")
     assert [read(bench, 16), read(bench, 17)] == [65535, 1]
     port_map.write_register(bench.controller.state, 18, 0x8000)
@@ -135,8 +133,7 @@ def test_analogue_levels_are_parts_of_the_range():
     assert bench.controller.state.io.analog_out[1].value == pytest.approx(0.012, abs=1e-6)
 
 
-def test_register_booleans_are_shared():
-    bench = Bench()
+def test_register_booleans_are_shared(bench):
     assert texts(
         bench,
         "write_port_bit(300, True)",
@@ -146,8 +143,7 @@ def test_register_booleans_are_shared():
     ) == ["True", "True"]
 
 
-def test_the_clock_stands_until_it_is_latched_again():
-    bench = Bench()
+def test_the_clock_stands_until_it_is_latched_again(bench):
     assert [read(bench, address) for address in range(2049, 2054)] == [0, 0, 0, 0, 0]
     bench.tick(200)
     port_map.write_register(bench.controller.state, 2048, 1)
@@ -193,8 +189,7 @@ def test_every_code_on_every_kind_of_output(output):
             assert level() == (expected if stopped is None else stopped), code
 
 
-def test_a_secondary_program_is_no_program_start():
-    bench = Bench()
+def test_a_secondary_program_is_no_program_start(bench):
     bench.run("def setup():\n  set_runstate_standard_digital_output_to_value(0, 3)\nend\n")
     bench.run("sec nothing():\n  textmsg(1)\nend\n")
     assert bench.now.actual_digital_output_bits == 0
@@ -204,8 +199,7 @@ QUADRATURE = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 @pytest.mark.parametrize(("range_id", "low", "high"), [(0, -(2**31), 2**31 - 1), (1, 0, 255), (2, 0, 65535)])
-def test_counts_outside_the_range_are_refused(range_id, low, high):
-    bench = Bench()
+def test_counts_outside_the_range_are_refused(bench, range_id, low, high):
     for count in (low, high, low - 1.0, high + 1.0):
         texts(
             bench,

@@ -29,8 +29,12 @@ from ur_emulator.motion.overlay import (
 )
 
 
-def test_without_overlays_target_and_path_are_one_object():
-    motion = ArmMotion(HOME, 20.0)
+@pytest.fixture
+def motion():
+    return ArmMotion(HOME, 20.0)
+
+
+def test_without_overlays_target_and_path_are_one_object(motion):
     motion.command("me", Move(line(START, at(0.05, 0, 0))))
     for _ in range(100):
         motion.step(DT, 1.0)
@@ -52,8 +56,7 @@ def test_a_move_under_an_overlay_is_displaced_and_the_path_is_not():
         assert TOOL.pose(displaced.target.q)[:3] == pytest.approx(expected, abs=1e-8)
 
 
-def test_speeds_of_a_displaced_target_are_those_of_its_positions():
-    motion = ArmMotion(HOME, 20.0)
+def test_speeds_of_a_displaced_target_are_those_of_its_positions(motion):
     motion.add_overlay(Swing(rate=4.0))
     targets = run_cycles(motion, 200)
     q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
@@ -61,8 +64,7 @@ def test_speeds_of_a_displaced_target_are_those_of_its_positions():
     assert np.abs(central - qd[1:-1]).max() < 0.01 * np.abs(qd).max()
 
 
-def test_overlays_act_one_after_the_other():
-    motion = ArmMotion(HOME, 20.0)
+def test_overlays_act_one_after_the_other(motion):
     swings = Swing(), Swing(reach=0.01, rate=3.0)
     for swing in swings:
         motion.add_overlay(swing)
@@ -71,8 +73,7 @@ def test_overlays_act_one_after_the_other():
     assert TOOL.pose(targets[-1].q)[2] == pytest.approx(START[2] + lift, abs=1e-8)
 
 
-def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest():
-    motion = ArmMotion(HOME, 20.0)
+def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest(motion):
     swing = Swing()
     motion.add_overlay(swing)
     assert motion.is_moving
@@ -88,8 +89,7 @@ def test_removal_lets_the_path_go_on_from_where_the_arm_is_and_ramps_it_to_rest(
     assert np.abs(np.diff([t.q for t in after], axis=0)).max() <= speed * DT * 1.01
 
 
-def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end(motion):
     swing = Swing()
     motion.add_overlay(swing)
     motion.command("me", move := Move(line(START, at(0.05, 0, 0))))
@@ -108,8 +108,7 @@ def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end
     assert z > START[2] + 0.002
 
 
-def test_a_stream_goes_on_from_the_displaced_target():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_stream_goes_on_from_the_displaced_target(motion):
     swing = Swing()
     motion.add_overlay(swing)
     motion.command("me", SpeedJ((0.1,) * 6, 2.0))
@@ -124,8 +123,7 @@ def test_a_stream_goes_on_from_the_displaced_target():
 
 
 @pytest.mark.parametrize("end", ["stop", "place"])
-def test_stops_end_all_overlays(end):
-    motion = ArmMotion(HOME, 20.0)
+def test_stops_end_all_overlays(motion, end):
     motion.add_overlay(Swing())
     run_cycles(motion, 40)
     if end == "stop":
@@ -176,8 +174,7 @@ def linear(motion, speed, direction=(0.0, 1.0, 0.0), density=1000.0, **kwargs):
 
 @pytest.mark.parametrize("range_id", [0, 1, 2])
 @pytest.mark.parametrize("speed", [0.08, -0.05])
-def test_a_move_on_a_running_belt_is_a_move_in_the_frame_of_the_belt(speed, range_id):
-    motion = ArmMotion(HOME, 20.0)
+def test_a_move_on_a_running_belt_is_a_move_in_the_frame_of_the_belt(motion, speed, range_id):
     belt = linear(motion, speed, range_id=range_id)
     for _ in range(150):
         belt.step()
@@ -202,8 +199,7 @@ def test_the_arm_catches_up_with_bounded_acceleration_and_without_a_jump(speed, 
     assert abs(carried[-1] - belt.way) <= 1e-3 + 1.0 / density
 
 
-def test_targets_of_a_carried_arm_are_consistent():
-    motion = ArmMotion(HOME, 20.0)
+def test_targets_of_a_carried_arm_are_consistent(motion):
     belt = linear(motion, 0.1)
     targets = [belt.step() for _ in range(120)]
     q, qd = np.array([t.q for t in targets]), np.array([t.qd for t in targets])
@@ -211,8 +207,7 @@ def test_targets_of_a_carried_arm_are_consistent():
     assert motion.path.q == HOME
 
 
-def test_a_pause_stands_still_and_catches_up_afterwards():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_pause_stands_still_and_catches_up_afterwards(motion):
     belt = linear(motion, 0.1, range_id=1)
     targets = [belt.step() for _ in range(50)]
     motion.pause()

@@ -18,6 +18,11 @@ from ur_emulator.motion.path import arc_through
 CORNERS = [START, at(0.06, 0, 0), at(0.06, 0.06, 0)]
 
 
+@pytest.fixture
+def motion():
+    return ArmMotion(HOME, 20.0)
+
+
 def straight():
     return Move(line(START, at(0.06, 0.05, -0.03, 0.2, 0.1, 0.3))), []
 
@@ -78,8 +83,7 @@ def test_with_and_without_pauses_the_path_is_the_same(make, pauses):
     assert np.abs(steps - 0.5 * (qd[1:] + qd[:-1])).max() <= own + largest * 4.0 * DT
 
 
-def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_asked_for():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_asked_for(motion):
     motion.command("me", straight()[0])
     run_cycles(motion, 20)
     motion.pause()
@@ -101,8 +105,7 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
 @pytest.mark.parametrize(
     "stream", [SpeedJ((0.5,) * 6, 2.0), ServoJ((0.5, *HOME[1:]), 0.1, 300.0, (3.0,) * 6)]
 )
-def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(stream):
-    motion = ArmMotion(HOME, 20.0)
+def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
     motion.command("me", stream)
     for _ in range(40):
         motion.renew()
@@ -126,8 +129,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(stream):
     assert not motion.is_moving
 
 
-def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest(motion):
     motion.command("me", SpeedJ((0.5,) * 6, 2.0))
     for _ in range(20):
         motion.renew()
@@ -142,8 +144,7 @@ def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest():
 
 
 @pytest.mark.parametrize("pushed", [False, True])
-def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(pushed):
-    motion = ArmMotion(HOME, 20.0)
+def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(motion, pushed):
     move, _ = straight()
     motion.command("me", move)
     run_cycles(motion, 20)
@@ -170,8 +171,7 @@ def test_an_interrupted_move_goes_back_to_its_path_and_on_to_its_goal(pushed):
     assert np.abs(qd[:back]).max() <= 0.25 * (1 + 1e-9)
 
 
-def test_a_move_that_was_not_accepted_is_taken_back():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_move_that_was_not_accepted_is_taken_back(motion):
     move, _ = straight()
     motion.command("me", move)
     run_cycles(motion, 20)
@@ -189,8 +189,7 @@ def test_a_move_that_was_not_accepted_is_taken_back():
 
 
 @pytest.mark.parametrize("end", ["stop", "release"])
-def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
-    motion = ArmMotion(HOME, 20.0)
+def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(motion, end):
     move, _ = straight()
     motion.command("me", move)
     run_cycles(motion, 20)
@@ -205,8 +204,7 @@ def test_a_program_that_ends_in_a_pause_leaves_nothing_behind(end):
     assert motion.target.qd == ZERO6
 
 
-def test_overlays_stand_still_in_a_pause():
-    motion = ArmMotion(HOME, 20.0)
+def test_overlays_stand_still_in_a_pause(motion):
     lift = Swing()
     motion.add_overlay(lift)
     targets = run_cycles(motion, 60)
@@ -223,8 +221,7 @@ def test_overlays_stand_still_in_a_pause():
     assert np.abs(np.diff([t.qd for t in targets], axis=0)).max() < 0.02
 
 
-def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump():
-    motion = ArmMotion(HOME, 20.0)
+def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump(motion):
     motion.add_overlay(Swing())
     motion.command("me", SpeedJ((1.5, 0, 0, 0, 0, 0), 4.0))
     for _ in range(60):

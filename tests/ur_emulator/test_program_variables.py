@@ -101,6 +101,16 @@ class PortBench(Bench):
         return client
 
 
+@pytest.fixture
+def bench():
+    return PortBench()
+
+
+@pytest.fixture
+def client(bench):
+    return bench.client()
+
+
 def values_of(packages):
     """Index to value, as a client would know them."""
     known = {}
@@ -119,17 +129,13 @@ def names_of(packages):
     return names
 
 
-def test_without_a_program_a_client_gets_the_empty_update():
-    bench = PortBench()
-    client = bench.client()
+def test_without_a_program_a_client_gets_the_empty_update(client, bench):
     assert [p.hex() for p in client.sent if p[4] == 25] == ["0000001019" + "ff" * 8 + "010000"]
     bench.tick(50)
     assert client.packages() == [GlobalVariablesUpdate()]
 
 
-def test_names_once_and_values_when_they_change():
-    bench = PortBench()
-    client = bench.client()
+def test_names_once_and_values_when_they_change(client, bench):
     client.packages()
     bench.start(
         "def p():\n  global a = 1\n  global b = 2\n  local c = 3\n  d = 4\n  sleep(1)\n  b = 5\n" + FOREVER
@@ -149,9 +155,7 @@ def test_names_once_and_values_when_they_change():
     assert client.packages() == []
 
 
-def test_neighbours_share_a_package_and_others_do_not():
-    bench = PortBench()
-    client = bench.client()
+def test_neighbours_share_a_package_and_others_do_not(client, bench):
     declarations = "".join(f"  global v{i} = 0\n" for i in range(6))
     bench.start(f"def p():\n{declarations}  sleep(0.4)\n  v0 = 1\n  v1 = 1\n  v3 = 1\n  v5 = 1\n" + FOREVER)
     bench.tick(30)
@@ -160,9 +164,7 @@ def test_neighbours_share_a_package_and_others_do_not():
     assert [(p.start_index, len(p.values)) for p in client.packages()] == [(0, 2), (3, 1), (5, 1)]
 
 
-def test_the_last_values_come_before_the_program_is_reported_as_stopped():
-    bench = PortBench()
-    client = bench.client()
+def test_the_last_values_come_before_the_program_is_reported_as_stopped(client, bench):
     bench.start("def p():\n  global n = 0\n  while n < 7:\n    n = n + 1\n  end\nend\n")
     bench.tick(2)
     *_, update, stopped = client.packages()
@@ -172,8 +174,7 @@ def test_the_last_values_come_before_the_program_is_reported_as_stopped():
     assert client.packages() == []
 
 
-def test_a_client_that_comes_later_gets_everything():
-    bench = PortBench()
+def test_a_client_that_comes_later_gets_everything(bench):
     bench.start("def p():\n  global a = 1\n  global b = True\n  global c\n  sleep(2)\n  a = 2\n" + FOREVER)
     bench.tick(30)
     client = bench.client()
@@ -190,9 +191,7 @@ def test_a_client_that_comes_later_gets_everything():
     assert third.packages() == [GlobalVariablesUpdate()]
 
 
-def test_programs_that_follow_each_other_within_a_cycle_are_distinguished():
-    bench = PortBench()
-    client = bench.client()
+def test_programs_that_follow_each_other_within_a_cycle_are_distinguished(client, bench):
     client.packages()
     bench.start("def one():\n  global a = 1\n" + FOREVER)
     bench.start("def two():\n  global b = 2\n" + FOREVER)
@@ -284,9 +283,7 @@ def test_a_matrix_is_none_for_software_without_matrices():
     assert values_of(client.packages(version)) == {1: 1}
 
 
-def test_no_package_is_longer_than_clients_can_hold():
-    bench = PortBench()
-    client = bench.client()
+def test_no_package_is_longer_than_clients_can_hold(client, bench):
     long_text = "x" * 700
     names = [f"a_variable_with_a_rather_long_name_{i}" for i in range(300)]
     text = "".join(f'  global {name} = "{long_text}"\n' for name in names)
@@ -299,9 +296,7 @@ def test_no_package_is_longer_than_clients_can_hold():
     assert values_of(packages) == dict.fromkeys(range(300), long_text)
 
 
-def test_a_value_too_large_for_a_client_goes_as_none():
-    bench = PortBench()
-    client = bench.client()
+def test_a_value_too_large_for_a_client_goes_as_none(client, bench):
     bench.start(
         'def p():\n  global s = "abcdefghij"\n  while str_len(s) < 10000:\n    s = s + s\n  end\n  global n = 1\n'
         + FOREVER
@@ -311,9 +306,7 @@ def test_a_value_too_large_for_a_client_goes_as_none():
     assert values_of(client.packages()) == {1: 1}
 
 
-def test_thousands_of_variables_take_turns_and_all_come():
-    bench = PortBench()
-    client = bench.client()
+def test_thousands_of_variables_take_turns_and_all_come(client, bench):
     n = 3 * BUDGETS.variables_per_update + 7
     text = "".join(f"  global v{i} = {i}\n" for i in range(n))
     bench.start(f"def p():\n{text}" + FOREVER)
@@ -372,9 +365,7 @@ def test_all_values_of_a_program_have_a_limit_together(monkeypatch):
     assert [i for i, value in known.items() if value is not None] == [0]
 
 
-def test_the_names_of_a_program_have_a_limit_together():
-    bench = PortBench()
-    client = bench.client()
+def test_the_names_of_a_program_have_a_limit_together(client, bench):
     names = [f"v{i}".ljust(255, "_") for i in range(300)]
     bench.start("def p():\n" + "".join(f"  global {name} = 1\n" for name in names) + FOREVER)
     bench.tick(20)
@@ -398,8 +389,7 @@ def encoded(monkeypatch):
     return starts
 
 
-def test_clients_that_come_in_one_cycle_get_what_is_encoded_once(encoded):
-    bench = PortBench()
+def test_clients_that_come_in_one_cycle_get_what_is_encoded_once(bench, encoded):
     declarations = "".join(f"  global variable_{i} = {i}\n" for i in range(400))
     bench.start(f"def p():\n{declarations}" + FOREVER)
     bench.tick(20)
@@ -432,8 +422,7 @@ def test_clients_that_come_and_go_do_not_make_the_values_be_read_more_often(monk
     assert sorted(set(seen)) == [2, 15, 28, 41]
 
 
-def test_what_a_program_held_is_given_back_at_its_end_also_when_nobody_listens():
-    bench = PortBench()
+def test_what_a_program_held_is_given_back_at_its_end_also_when_nobody_listens(bench):
     bench.start("def p():\n  global x = [1, 2, 3]\n" + FOREVER)
     bench.tick(3)
     bench.port.closed(bench.client())
@@ -445,9 +434,7 @@ def test_what_a_program_held_is_given_back_at_its_end_also_when_nobody_listens()
 # --- labels
 
 
-def test_long_labels_of_many_threads_stay_within_a_package():
-    bench = PortBench()
-    client = bench.client()
+def test_long_labels_of_many_threads_stay_within_a_package(client, bench):
     label = f'    $ 1 "{"x" * 1_000}"\n'
     runs = "  run t()\n" * 100
     bench.start(f"def p():\n  thread t():\n{label}    sleep(9)\n  end\n{runs}" + FOREVER)
@@ -464,9 +451,7 @@ LABELLED = (
 )
 
 
-def test_labels_of_all_threads():
-    bench = PortBench()
-    client = bench.client()
+def test_labels_of_all_threads(client, bench):
     bench.start(LABELLED)
     bench.tick(60)
     told = [p.threads for p in client.packages() if isinstance(p, ProgramThreadsMessage)]
@@ -488,8 +473,7 @@ def test_labels_of_software_up_to_3_2():
     assert told == [(2, "MoveJ"), (3, "Wayp\xc3\xb6int")]
 
 
-def test_a_program_without_labels_is_not_watched():
-    bench = PortBench()
+def test_a_program_without_labels_is_not_watched(bench):
     bench.client()
     bench.start("def p():\n" + FOREVER)
     assert not bench.port._labels.is_watching
@@ -516,9 +500,7 @@ def test_lines_of_labels(line, label):
     assert parse_label(line) == label
 
 
-def test_a_label_that_is_none_is_not_reported():
-    bench = PortBench()
-    client = bench.client()
+def test_a_label_that_is_none_is_not_reported(client, bench):
     bench.start("def p():\n  $ nonsense\n" + FOREVER)
     bench.tick(20)
     assert not [p for p in client.packages() if isinstance(p, ProgramThreadsMessage)]

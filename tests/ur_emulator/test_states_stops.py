@@ -40,6 +40,12 @@ REDUCE, NO_REDUCE = ReducedMode(True), ReducedMode(False)
 LONG_MOVE = "def m():\n  q = get_actual_joint_positions()\n  movej([q[0] + 2, q[1], q[2], q[3], q[4], q[5]], a=3, v=3)\nend\n"
 
 
+@pytest.fixture
+def bench():
+    """A bench whose arm is moving for ever."""
+    return moving()
+
+
 def speeds(bench, first=0):
     return np.array([s.target_qd for s in bench.snapshots[first:]])
 
@@ -48,8 +54,7 @@ def speeds(bench, first=0):
 
 
 @pytest.mark.parametrize("command", [PRESS, PressEmergencyStop("system"), TriggerViolation(), TriggerFault()])
-def test_the_arm_brakes_as_it_can_then_loses_its_power(command):
-    bench = moving()
+def test_the_arm_brakes_as_it_can_then_loses_its_power(bench, command):
     first = len(bench.snapshots)
     bench.tick(BRAKING, command)
     limit = bench.controller.state.robot.stop_deceleration * 0.008
@@ -64,16 +69,14 @@ def test_the_arm_brakes_as_it_can_then_loses_its_power(command):
     assert bench.now.runtime_state == ProgramState.STOPPED
 
 
-def test_joint_modes_report_the_stop_while_the_arm_brakes():
-    bench = moving()
+def test_joint_modes_report_the_stop_while_the_arm_brakes(bench):
     assert bench.tick(1, PRESS).joint_mode == (JointMode.READY_FOR_POWER_OFF,) * 6
     assert bench.tick(BRAKING).joint_mode == (JointMode.POWER_OFF,) * 6
     bench.tick(1, TriggerFault())
     assert bench.now.joint_mode == (JointMode.FAULT,) * 6
 
 
-def test_a_client_gets_the_arm_going_after_an_emergency_stop():
-    bench = moving()
+def test_a_client_gets_the_arm_going_after_an_emergency_stop(bench):
     bench.tick(BRAKING, PRESS)
     bench.tick(300, PowerOn())
     assert bench.now.robot_mode == RobotMode.POWER_OFF
@@ -87,8 +90,7 @@ def test_a_client_gets_the_arm_going_after_an_emergency_stop():
     assert any(bench.now.target_qd)
 
 
-def test_a_stop_that_is_released_at_once_still_ends_without_power():
-    bench = moving()
+def test_a_stop_that_is_released_at_once_still_ends_without_power(bench):
     bench.tick(1, PRESS)
     bench.tick(1, RELEASE)
     assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
@@ -108,8 +110,7 @@ def test_a_stop_on_the_way_up_cuts_the_power(ticks):
     assert bench.now.robot_mode == RobotMode.POWER_OFF
 
 
-def test_two_buttons_must_both_be_released():
-    bench = moving()
+def test_two_buttons_must_both_be_released(bench):
     bench.tick(1, AssignSafetyInput(0, "emergency stop"))
     assert bench.now.safety_mode == SafetyMode.SYSTEM_EMERGENCY_STOP
     bench.tick(BRAKING, PRESS)
@@ -174,8 +175,7 @@ def test_the_hardness_of_the_stop_is_the_programs(hardness, least, most):
     assert bench.now.target_qd == (0.0,) * 6
 
 
-def test_with_a_reset_button_closing_is_not_enough():
-    bench = moving()
+def test_with_a_reset_button_closing_is_not_enough(bench):
     bench.tick(1, RequireSafeguardReset(True))
     bench.tick(100, OPEN)
     bench.tick(1, ResetSafeguard())
@@ -187,8 +187,7 @@ def test_with_a_reset_button_closing_is_not_enough():
     assert bench.now.runtime_state == ProgramState.PLAYING
 
 
-def test_a_reset_input_resets_on_its_rising_edge():
-    bench = moving()
+def test_a_reset_input_resets_on_its_rising_edge(bench):
     bench.tick(1, RequireSafeguardReset(True), AssignSafetyInput(1, "safeguard reset"))
     bench.tick(50, OPEN)
     bench.tick(5, CLOSE)
@@ -197,8 +196,7 @@ def test_a_reset_input_resets_on_its_rising_edge():
     assert bench.tick(1).safety_mode == SafetyMode.NORMAL
 
 
-def test_what_was_paused_before_stays_paused():
-    bench = moving()
+def test_what_was_paused_before_stays_paused(bench):
     bench.tick(60, PauseProgram())
     bench.tick(60, OPEN)
     bench.tick(60, CLOSE)
@@ -207,8 +205,7 @@ def test_what_was_paused_before_stays_paused():
     assert bench.now.runtime_state == ProgramState.PLAYING
 
 
-def test_programs_and_resuming_are_refused_while_the_safeguard_is_open():
-    bench = moving()
+def test_programs_and_resuming_are_refused_while_the_safeguard_is_open(bench):
     bench.tick(60, OPEN)
     bench.start(ENDLESS)
     bench.tick(10, ResumeProgram())
@@ -233,8 +230,7 @@ def test_a_push_in_a_safeguard_stop_is_a_protective_stop():
 # --- protective stop
 
 
-def test_unlocking_waits_five_seconds_for_the_dashboard_only():
-    bench = moving()
+def test_unlocking_waits_five_seconds_for_the_dashboard_only(bench):
     bench.tick(1, TriggerProtectiveStop())
     stopped_at, safety = bench.now.timestamp, bench.controller.state.safety
     while not safety.may_unlock(bench.now.timestamp):
@@ -247,8 +243,7 @@ def test_unlocking_waits_five_seconds_for_the_dashboard_only():
     assert not safety.may_unlock(bench.now.timestamp)
 
 
-def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it():
-    bench = moving()
+def test_an_emergency_stop_over_a_protective_stop_leads_back_to_it(bench):
     bench.tick(50, TriggerProtectiveStop())
     bench.tick(BRAKING, PRESS)
     assert bench.now.runtime_state == ProgramState.STOPPED
@@ -369,8 +364,7 @@ def test_the_teach_button_guides_by_hand_and_is_reported():
     assert bench.now.control_mode == 0
 
 
-def test_changed_safety_settings_want_to_be_confirmed():
-    bench = moving()
+def test_changed_safety_settings_want_to_be_confirmed(bench):
     bench.tick(1, ChangeSafetySettings())
     assert bench.now.robot_mode == RobotMode.CONFIRM_SAFETY
     bench.tick(300, ReleaseBrakes())
@@ -389,8 +383,7 @@ def test_a_controller_that_starts_from_nothing_boots():
     assert seen == [RobotMode.NO_CONTROLLER, RobotMode.DISCONNECTED, RobotMode.BOOTING, RobotMode.POWER_OFF]
 
 
-def test_faults_and_violations_are_reported_and_end_with_a_restart():
-    bench = moving()
+def test_faults_and_violations_are_reported_and_end_with_a_restart(bench):
     bench.tick(BRAKING, TriggerViolation("too fast"))
     reports = [e for e in bench.events if isinstance(e, ErrorReported)]
     assert [(e.text, e.level.name) for e in reports] == [("too fast", "VIOLATION")]

@@ -464,6 +464,7 @@ def test_the_pc_of_external_control_has_a_name_in_the_installation(tmp_path):
     ]
 
 
+LABEL = '  $ 1 "Robot Program"'
 # Variables that waypoints and popups name.
 VARIABLES = "global part=1\nglobal Home=p[0, 0, 0, 0, 0, 0]\nglobal a=Home\nglobal b=Home\n"
 
@@ -471,6 +472,8 @@ VARIABLES = "global part=1\nglobal Home=p[0, 0, 0, 0, 0, 0]\nglobal a=Home\nglob
 @pytest.mark.parametrize(("nodes", "expected"), SAMPLES.values(), ids=SAMPLES)
 def test_a_node_becomes_its_statements(tmp_path, nodes, expected):
     text = script_of(tmp_path, urp(nodes))
+    if LABEL not in expected:
+        expected = LABEL + expected
     assert text == "\n".join(("def sample():", expected.strip("\n"), "end"))
     program = text.replace("def sample():\n", f"def sample():\n{VARIABLES}").encode().decode("latin-1")
     compile_program(program, catalogue=catalogue_for("3.15"))

@@ -1,7 +1,7 @@
 """Nodes of program files of our own making, in the forms that PolyScope gives them, and the script they become.
 
-Each sample is (nodes of a program that runs once, its script without the first and the last line). Numbers of
-labels begin with 2: the main program has 1.
+Each sample is (nodes of a program that runs once, its script without the first and the last line). The label of
+the main program, number 1, stands before all that a sample shows, or where the sample shows it.
 """
 
 from dashboard_support import expression, external_control, script_line
@@ -68,16 +68,15 @@ POINT = """\
     local step=p[unit[0]*d, unit[1]*d, unit[2]*d, 0, 0, 0]
     local turned=pose_trans(p[0, 0, 0, feature[3], feature[4], feature[5]], step)
     return p[goal[0]+turned[0], goal[1]+turned[1], goal[2]+turned[2], goal[3], goal[4], goal[5]]
-  end"""
+  end
+  $ 1 "Robot Program\""""
 
 SAMPLES = {
     "SafeHome": ('<SafeHome positionOptionType="SPEED_AND_ACCELERATION" speed="1.0" acceleration="1.4"/>', """
-  $ 1 "Robot Program"
   $ 2 "Home"
   movej([0.0, -1.5707963267948966, 0.0, -1.5707963267948966, 0.0, 0.0], a=1.4, v=1.0)
 """),
     "Assignment": (assignment("part", "1 + 2"), """
-  $ 1 "Robot Program"
   $ 2 "part≔1 + 2"
   global part=1 + 2
 """),
@@ -85,7 +84,6 @@ SAMPLES = {
         assignment("part", "1 + 2") + '<Assignment valueSource="Expression"><variable reference="../../Assignment/variable"/>'
         '<expression><ExpressionVariable><ProgramVariable reference="../../../../Assignment[1]/variable"/></ExpressionVariable>'
         '<ExpressionChar character="≤"/><ExpressionToken token=" True "/></expression></Assignment>', """
-  $ 1 "Robot Program"
   $ 2 "part≔1 + 2"
   global part=1 + 2
   $ 3 "part≔part≤ True "
@@ -93,7 +91,6 @@ SAMPLES = {
 """),
     "Assignment by the operator": (
         '<Assignment valueSource="Operator" valueType="Integer" message="how &quot;many&quot;?"><variable name="part"/></Assignment>', """
-  $ 1 "Robot Program"
   $ 2 "part≔Operator"
   global part=request_integer_from_primary_client("how 'many'?")
 """),
@@ -114,7 +111,6 @@ SAMPLES = {
     "CircleMove": (
         move("MoveP", waypoint() + f'<CircleMove OrientationMode="FIXED"><children>{waypoint("Via")}{variable_waypoint("Home")}'
              f"</children></CircleMove>{waypoint()}", 'blendRadius="0.025"'), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveP"
   $ 3 "W" "breakAfter"
   movep({POSE_TEXT}, a=1.2, v=0.25, r=0.025)
@@ -126,14 +122,12 @@ SAMPLES = {
   movep({POSE_TEXT}, a=1.2, v=0.25, r=0.0)
 """),
     "Comment": ('<Comment comment="the &quot;first&quot;&#10;part"/><Comment/>', """
-  $ 1 "Robot Program"
   $ 2 "'the 'first' part'"
   # 'the "first" part'
   $ 3 "Comment"
   # Comment
 """),
     "Contributed": (external_control(), """
-  $ 1 "Robot Program"
   # begin: URCap Program Node
   #   Source: External Control
   #   Type: External Control
@@ -142,7 +136,6 @@ SAMPLES = {
   # end: URCap Program Node
 """),
     "Folder": (f'<Folder name="Set up" keepHidden="true"><children>{assignment("part", "3")}</children></Folder>', """
-  $ 1 "Robot Program"
   $ 2 "Set up"
   $ 3 "part≔3"
   global part=3
@@ -151,7 +144,6 @@ SAMPLES = {
         f'<Force type="Frame">{TOOL}<selection value="0, 0, 1, 0, 0, 0"/><wrench value="0.0, 0.0, 20.0, 0.0, 0.0, 0.0"/>'
         '<limitsForce value="0.15, 0.15, 0.15, 0.3, 0.3, 0.3"/><limitsMotion value="0.05, 0.06, 0.07, 0.2, 0.2, 0.2"/>'
         f'<children>{script_line("sync()")}</children></Force>', """
-  $ 1 "Robot Program"
   $ 2 "Force"
   sleep(0.02)
   zero_ftsensor()
@@ -162,12 +154,10 @@ SAMPLES = {
   stopl(5.0)
 """),
     "Halt": (HALT, """
-  $ 1 "Robot Program"
   $ 2 "Halt"
   halt
 """),
     "If": (branch("If", HALT, "1 ≟ 2"), """
-  $ 1 "Robot Program"
   $ 2 "If 1 ≟ 2"
   if (1  ==  2):
     $ 3 "Halt"
@@ -178,7 +168,6 @@ SAMPLES = {
         branch("If", HALT, "1 ≠ 2") + "<SuppressedNode><suppressedNode class='If' type='ElseIf'><children/></suppressedNode></SuppressedNode>"
         f'<If type="ElseIf" checkContinuously="false"><expression><ExpressionIO>{pin("config_in[3]")}</ExpressionIO></expression><children/></If>'
         + branch("Else", script_line("sync()")) + HALT, """
-  $ 1 "Robot Program"
   $ 2 "If 1 ≠ 2"
   if (1  !=  2):
     $ 3 "Halt"
@@ -197,7 +186,6 @@ SAMPLES = {
 """),
     "If that is watched": (
         branch("If", script_line("sync()"), "1≟1", watched=True) + branch("Else", HALT), """
-  $ 1 "Robot Program"
   $ 2 "If 1≟1"
   global thread_flag_2=0
   thread Thread_if_2():
@@ -225,7 +213,6 @@ SAMPLES = {
   end
 """),
     "Loop": (f'<Loop type="Forever"><children>{HALT}</children></Loop>', """
-  $ 1 "Robot Program"
   $ 2 "Loop"
   while (True):
     $ 3 "Halt"
@@ -235,7 +222,6 @@ SAMPLES = {
     "Loop that counts": (
         f'<Loop type="Counting" count="3"><loopVariable name="Loop_1"/><children>{HALT}</children></Loop>'
         '<Loop type="Counting" count="2"><loopVariable reference="../../Loop/loopVariable"/><children/></Loop>', """
-  $ 1 "Robot Program"
   $ 2 "Loop 3 times"
   Loop_1 = 0
   while (Loop_1 < 3):
@@ -250,14 +236,12 @@ SAMPLES = {
   end
 """),
     "Loop on a condition": (f'<Loop type="While" checkContinuously="false">{expression("1 ≤ 2")}<children/></Loop>', """
-  $ 1 "Robot Program"
   $ 2 "Loop 1 ≤ 2"
   while (1  <=  2):
   end
 """),
     "Loop that is watched": (
         f'<Loop type="While" checkContinuously="true">{expression("2 ≥ 1")}<children>{script_line("sync()")}</children></Loop>', """
-  $ 1 "Robot Program"
   $ 2 "Loop 2 ≥ 1"
   thread Thread_while_2():
     while (True):
@@ -274,19 +258,16 @@ SAMPLES = {
   end
 """),
     "Move": (move("MoveJ", waypoint()), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveJ"
   $ 3 "W" "breakAfter"
   movej({INVERSE}, a=1.2, v=0.25)
 """),
     "Move in joint space": (move("MoveJ", waypoint(), 'useActiveTCP="false"', ""), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveJ"
   $ 3 "W" "breakAfter"
   movej([{JOINTS}], a=1.2, v=0.25)
 """),
     "Move in a line": (move("MoveL", waypoint() + HALT + waypoint("V")), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "W" "breakAfter"
   movel({POSE_TEXT}, a=1.2, v=0.25)
@@ -298,7 +279,6 @@ SAMPLES = {
     "Move of a process": (
         move("MoveP", waypoint() + waypoint("V", f'<motionParameters blendRadius="0.01"/>{POSITION}') + waypoint(), 'blendRadius="0.02"')
         + move("MoveL", waypoint()), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveP"
   $ 3 "W" "breakAfter"
   movep({POSE_TEXT}, a=1.2, v=0.25, r=0.02)
@@ -311,7 +291,6 @@ SAMPLES = {
   movel({POSE_TEXT}, a=1.2, v=0.25)
 """),
     "Move in a move": (move("MoveL", move("MoveJ", variable_waypoint("a")) + variable_waypoint("b")), """
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "MoveJ"
   $ 4 "a" "breakAfter"
@@ -320,12 +299,10 @@ SAMPLES = {
   movel(b, a=1.2, v=0.25)
 """),
     "Placeholder": ("<Placeholder/>", """
-  $ 1 "Robot Program"
 """),
     "Popup": (
         '<Popup type="Message" haltProgram="false" message="say &quot;ok&quot;"/>'
         '<Popup type="Error" haltProgram="true" inputType="Text" message="no part"/>', """
-  $ 1 "Robot Program"
   $ 2 "Popup: say 'ok'"
   popup("say 'ok'", "Message", False, False, blocking=True)
   $ 3 "Popup: no part"
@@ -335,21 +312,18 @@ SAMPLES = {
     "Popup of a value": (
         '<Popup type="Warning" haltProgram="false" inputType="Variable"><variable name="part"/></Popup>'
         f'<Popup type="Message" haltProgram="false" inputType="Expression">{expression("1+2")}</Popup>', """
-  $ 1 "Robot Program"
   $ 2 "Popup"
   popup(str_cat("",part), "Warning", True, False, blocking=True)
   $ 3 "Popup"
   popup(str_cat("",1+2), "Message", False, False, blocking=True)
 """),
     "Script": (script_line('textmsg("a")'), """
-  $ 1 "Robot Program"
   $ 2 "textmsg('a')"
   textmsg("a")
 """),
     "Script in a lost file": (
         '<Loop type="Forever"><children><Script type="File"><cachedContents>x = 1\ntextmsg(x)\n</cachedContents>'
         '<file resolves-to="file">/programs/cell/gone.script</file></Script></children></Loop>', """
-  $ 1 "Robot Program"
   $ 2 "Loop"
   while (True):
     $ 3 "Script: gone.script"
@@ -362,7 +336,6 @@ SAMPLES = {
         f'<Set type="DigitalOutput">{pin("tool_out[1]")}<digitalValue>0</digitalValue></Set>'
         '<Set type="DigitalOutput"><pin reference="../../Set/pin"/><digitalValue>0</digitalValue></Set>'
         f'<Set type="DigitalOutput">{pin("config_out[7]")}<digitalValue>1</digitalValue></Set><Set type="NoAction"/>', """
-  $ 1 "Robot Program"
   $ 2 "Set DO[2]=On"
   set_standard_digital_out(2, True)
   $ 3 "Set TO[1]=Off"
@@ -375,14 +348,12 @@ SAMPLES = {
 """),
     "SuppressedNode": (
         "<SuppressedNode><suppressedNode class='Folder'><children><PalletWizard/></children></suppressedNode></SuppressedNode>" + HALT, """
-  $ 1 "Robot Program"
   $ 4 "Halt"
   halt
 """),
     "Switch": (
         f'<Switch>{expression("2")}<children><Case caseValue="1"><children>{HALT}</children></Case><Case caseValue="2147483647">'
         f'<children>{script_line("sync()")}</children></Case><Case caseValue="2"><children/></Case></children></Switch>', """
-  $ 1 "Robot Program"
   $ 2 "Switch 2"
   switch_1 = 2
   $ 3 "Case 1"
@@ -398,7 +369,6 @@ SAMPLES = {
   end
 """),
     "Switch without cases": (f"<Switch>{expression('2')}<children/></Switch>", """
-  $ 1 "Robot Program"
   $ 2 "Switch 2"
   switch_1 = 2
 """),
@@ -425,7 +395,6 @@ SAMPLES = {
   t_is_counting = False
 """),
     "Wait": ('<Wait type="Sleep"><waitTime>0.22</waitTime></Wait><Wait type="NoWait"/>', """
-  $ 1 "Robot Program"
   $ 2 "Wait: 0.22"
   sleep(0.22)
   $ 3 "Wait: 0"
@@ -433,7 +402,6 @@ SAMPLES = {
     "Wait for a line": (
         f'<Wait type="DigitalInput">{pin("digital_in[0]")}<digitalValue>1</digitalValue></Wait>'
         f'<Wait type="DigitalInput">{pin("tool_in[1]")}<digitalValue>0</digitalValue></Wait>', """
-  $ 1 "Robot Program"
   $ 2 "Wait DI[0]=HI"
   while (get_standard_digital_in(0) == False):
     sync()
@@ -445,14 +413,12 @@ SAMPLES = {
 """),
     "Wait for a level": (
         f'<Wait type="AnalogInput">{pin("analog_in[2]")}<analogComparison>1</analogComparison><analogValue>4.0</analogValue></Wait>', """
-  $ 1 "Robot Program"
   $ 2 "Wait AI[2]>4.0"
   while (not(get_tool_analog_in(0) > 4.0)):
     sync()
   end
 """),
     "Wait for a condition": (f'<Wait type="Condition">{expression("1 ≟ 1")}</Wait>', """
-  $ 1 "Robot Program"
   $ 2 "Wait 1 ≟ 1"
   while (not(1  ==  1)):
     sync()
@@ -461,7 +427,6 @@ SAMPLES = {
     "Waypoint": (
         move("MoveJ", waypoint("W", f"{FASTER}/>{POSITION}") + waypoint("W", f'<motionParameters nextMotionTime="3.5"/>{POSITION}'))
         + move("MoveL", waypoint("W", f'{FASTER} blendRadius="0.01"/>{POSITION}')), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveJ"
   $ 3 "W" "breakAfter"
   movej({INVERSE}, a=3.0, v=2.0)
@@ -472,14 +437,12 @@ SAMPLES = {
   movel({POSE_TEXT}, a=1.5, v=0.5, r=0.01)
 """),
     "Waypoint that has only angles": (move("MoveL", waypoint("W", f"<motionParameters/>{ANGLES}")), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "W" "breakAfter"
   movel([{JOINTS}], a=1.2, v=0.25)
 """),
     "Waypoint by reference": (
         move("MoveL", waypoint() + '<Waypoint reference="../Waypoint"/>'), f"""
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "W" "breakAfter"
   movel({POSE_TEXT}, a=1.2, v=0.25)
@@ -489,7 +452,6 @@ SAMPLES = {
     "Waypoint in an expression": (
         move("MoveL", waypoint()) + '<Assignment><variable name="a"/><expression><ExpressionWaypoint><Waypoint referenceName="W" '
         'reference="../../../../Move/children/Waypoint"/></ExpressionWaypoint></expression></Assignment>', f"""
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "W" "breakAfter"
   movel({POSE_TEXT}, a=1.2, v=0.25)
@@ -497,7 +459,6 @@ SAMPLES = {
   global a={POSE_TEXT}
 """),
     "gui.program.direction.MoveDirectionNode": (move("MoveL", direction(until_distance("0.15", HALT) + CONTACT)), POINT + """
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "Direction: Base Z-"
   global move_thread_flag_3=0
@@ -541,7 +502,6 @@ SAMPLES = {
 """),
     "Direction of a vector": (
         move("MoveL", direction(until_distance("0.2"), "", f'{TOOL}{expression("[1,0,1]")}')), POINT + """
-  $ 1 "Robot Program"
   $ 2 "MoveL"
   $ 3 "Direction: Tool"
   global move_thread_flag_3=0
