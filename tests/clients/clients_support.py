@@ -82,7 +82,7 @@ def wait_until(condition, what="what was waited for"):
     end = time.monotonic() + TIMEOUT
     while not condition():
         assert time.monotonic() < end, f"{what} did not come"
-        time.sleep(0.002)
+        time.sleep(0.005)
 
 
 def connect(box, port):

@@ -250,38 +250,11 @@ LIBRARY = (LIBRARY_FOLDER / "paper" / "lognorm_4_1.toml").read_text()
 TOML_READERS = [name for name, target in TARGETS.items() if target.mutate is mutate_toml]
 
 
+# As they stand in a TOML file.
 NO_NAMES = [
-    *(
-        "../../evil",
-        "/etc/evil",
-        "a/b",
-        "a\\\\b",
-        "..",
-        ".",
-        ".x",
-        "-rf",
-        "",
-        " ",
-        "a ",
-        " a",
-        "a.",
-        "x" * 300,
-        "é" * 51,
-    ),
-    *(
-        "a\\u0000",
-        "a\\u001b[2J",
-        "a\\nb",
-        "C:evil",
-        "a*",
-        "CON",
-        "nul",
-        "Com1",
-        "LPT9.txt",
-        "aux.tar.gz",
-        "a\\u202eb",
-    ),
-]
+    "../../evil", "/etc/evil", "a/b", "a\\\\b", "..", ".", ".x", "-rf", "", " ", "a ", " a", "a.", "x" * 300, "é" * 51,
+    "a\\u0000", "a\\u001b[2J", "a\\nb", "C:evil", "a*", "CON", "nul", "Com1", "LPT9.txt", "aux.tar.gz", "a\\u202eb",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NO_NAMES)

@@ -23,11 +23,11 @@ from urscript.source import Source, as_utf8
 
 def cases(file):
     """Name, program and what is said of it, of all programs of a file: `--- name`, the program, lines of `#said`."""
-    text = Path(__file__).with_name(file).read_text(encoding="utf-8")
+    text = Path(__file__).with_name(file).read_bytes().decode("latin-1")
     for part in re.split(r"^--- ", text, flags=re.MULTILINE)[1:]:
         name, _, rest = part.partition("\n")
         program = re.sub(r"^#said .*\n", "", rest, flags=re.MULTILINE)
-        yield name, program, re.findall(r"^#said (.*)$", rest, flags=re.MULTILINE)
+        yield name, program, [as_utf8(line) for line in re.findall(r"^#said (.*)$", rest, flags=re.MULTILINE)]
 
 
 WRONG = list(cases("wrong_programs.script"))
