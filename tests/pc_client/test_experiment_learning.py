@@ -20,10 +20,11 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import LEAD, SETTLE, broken_limit
-from pc_client.experiment.experiment import load_movements
 from pc_client.experiment.identification import learning_filter
 from pc_client.experiment.repetitions import Repetitions, RunLog
 from pc_client.experiment.runner import ExperimentRunner
+from pc_client.movements.movement import Movement, load_movement
+from pc_client.planning.plan import plan_movement
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase
 
@@ -48,13 +49,17 @@ class WavyRobot(FakeRobot):
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
-    movements = load_movements(["uniform_4_1", "lognorm_4_1"])
+    points = [(0.35, -0.1, 0.25), (0.3, 0.1, 0.32), (0.38, 0.0, 0.2)]
+    movements = [
+        Movement.through(points, "robot", [1.6, 1.6], name="robot"),
+        Movement.through(points[::-1], "human", [1.6, 1.6], name="human"),
+    ]
     return prepare_experiment(movements, repeat=3, out=tmp_path_factory.mktemp("unused"))
 
 
 @pytest.fixture(scope="module")
-def plan(two):
-    return two.planned[1].joints
+def plan():
+    return plan_movement(load_movement("lognorm_4_1"))
 
 
 def run(robot, experiment, out, config=BEST):
@@ -121,7 +126,7 @@ def test_a_run_that_is_not_clean_teaches_no_command(two, tmp_path, attribute, co
     assert [r.summary[count] for r in recordings] == [0, 1, 0]
     assert [r.summary["learned_from"] for r in recordings] == [0, 1, 0]
     assert report.remarks == [
-        f"uniform_4_1: run 2 had {int(attribute == 'hold')} late and {int(attribute == 'skip')} lost frames: "
+        f"robot: run 2 had {int(attribute == 'hold')} late and {int(attribute == 'skip')} lost frames: "
         "nothing learned"
     ]
     # but the third run knows the gears by then
