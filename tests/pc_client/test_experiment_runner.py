@@ -35,6 +35,7 @@ from pc_client.experiment.identification import identify
 from pc_client.experiment.runner import ExperimentRunner, run_approach
 from pc_client.kinematics.cell import Cell, Wall
 from pc_client.kinematics.model import robot_model
+from pc_client.movements.movement import Movement
 from pc_client.planning.approach import Approach
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
@@ -62,10 +63,14 @@ class Notes(list):
         self.append(f"finished {path.name}")
 
 
+POINTS = [(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)]
+THERE = Movement.through(POINTS, "robot", [1.2], name="there")
+BACK = Movement.through(POINTS[::-1], "human", [1.4], name="back")
+
+
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
-    movements = load_movements(["uniform_4_1", "lognorm_4_1"])
-    return prepare_experiment(movements, repeat=2, out=tmp_path_factory.mktemp("unused"))
+    return prepare_experiment([THERE, BACK], repeat=2, out=tmp_path_factory.mktemp("unused"))
 
 
 def with_folder(experiment, out):
@@ -112,7 +117,7 @@ def test_an_excitation_too_near_to_a_wall_is_refused_before_anything_moves(tmp_p
     assert not one.out.exists()
 
 
-@pytest.mark.parametrize("receiver_ticks", [{1}, {2}, {60}, {300, 301}])
+@pytest.mark.parametrize("receiver_ticks", [{1}, {2}, {60}, {150, 151}])
 def test_a_robot_in_real_time_that_repeats_frames_is_not_in_lockstep(tmp_path, receiver_ticks):
     """Also where the repeated frame is the first that comes after a program's hello: of one stream of several."""
     n_ticks, n_streams = 0, 0
@@ -124,7 +129,7 @@ def test_a_robot_in_real_time_that_repeats_frames_is_not_in_lockstep(tmp_path, r
         if n_streams >= 2 and n_ticks in receiver_ticks:
             robot.pipes["realtime"].incoming.append(robot.frame())
 
-    one = prepare_experiment(load_movements(["uniform_4_1"]), repeat=1, out=tmp_path)
+    one = prepare_experiment([THERE], repeat=1, out=tmp_path)
     report = run(FakeRobot(lockstep=False, delay=4, on_tick=repeat), one)
     assert n_streams == 3  # approach, identification, run
     assert load_recording(report.paths[0]).provenance.pace == "realtime"
@@ -135,7 +140,7 @@ def test_log_times_are_absolute_in_real_time_only(tmp_path, monkeypatch, lockste
     """In lockstep they are the controller's, so that equal runs give equal bytes."""
     now = 1_700_000_000_000_000_000
     monkeypatch.setattr("pc_client.experiment.runner.time.time_ns", lambda: now)
-    one = prepare_experiment(load_movements(["uniform_4_1"]), repeat=1, out=tmp_path)
+    one = prepare_experiment([THERE], repeat=1, out=tmp_path)
     path = run(FakeRobot(lockstep=lockstep, delay=4), one).paths[0]
     with path.open("rb") as stream:
         first = next(message.log_time for _, _, message in make_reader(stream).iter_messages("/robot_state"))
@@ -150,17 +155,17 @@ def test_two_movements_twice(two, tmp_path):
         "connected",
         "approaching",
         "identified",
-        "running uniform_4_1 1",
-        "finished uniform_4_1_r1.mcap",
+        "running there 1",
+        "finished there_r1.mcap",
         "approaching",
-        "running uniform_4_1 2",
-        "finished uniform_4_1_r2.mcap",
+        "running there 2",
+        "finished there_r2.mcap",
         "approaching",
-        "running lognorm_4_1 1",
-        "finished lognorm_4_1_r1.mcap",
+        "running back 1",
+        "finished back_r1.mcap",
         "approaching",
-        "running lognorm_4_1 2",
-        "finished lognorm_4_1_r2.mcap",
+        "running back 2",
+        "finished back_r2.mcap",
     ]
     assert report.delay.delay == pytest.approx(4 * PERIOD, abs=1e-3)
     assert robot.at_rest
@@ -169,7 +174,7 @@ def test_two_movements_twice(two, tmp_path):
     recording = load_recording(report.paths[2])
     assert recording.complete
     p = recording.provenance
-    assert (p.movement, p.kind, p.repetition, p.controller) == ("lognorm_4_1", "lognormal", 1, "preview")
+    assert (p.movement, p.kind, p.repetition, p.controller) == ("back", "lognormal", 1, "preview")
     assert (p.robot_model, p.firmware, p.serial, p.simulated, p.seed) == (
         "UR3",
         "3.15.8",
@@ -214,20 +219,20 @@ def test_accepted_recorded_and_tabled_gain_margins_are_one(two, tmp_path):
 
 
 def test_what_is_recorded_before_a_protective_stop_stays(two, tmp_path):
-    robot = FakeRobot()
-    receivers = []
+    robot, in_second_run = FakeRobot(), []
 
     def spoil(r):
-        receivers.extend(text for text in r.programs[len(receivers) :])
         # approach, excitation, first run, approach, second run
-        if sum("velocity_receiver" in text for text in receivers) == 5 and r.received and r.tick % 200 == 0:
+        if sum("velocity_receiver" in text for text in r.programs) == 5:
+            in_second_run.append(r.tick)
+        if len(in_second_run) == 100:
             r.safety_mode = 3
 
     robot.on_tick = spoil
     with pytest.raises(RobotStoppedError, match=r"PROTECTIVE_STOP.*'unlock protective stop'") as caught:
         run(robot, with_folder(two, tmp_path))
-    assert not load_recording(tmp_path / "uniform_4_1_r1.mcap").aborted
-    path = tmp_path / "uniform_4_1_r2.mcap"
+    assert not load_recording(tmp_path / "there_r1.mcap").aborted
+    path = tmp_path / "there_r2.mcap"
     assert full_message(caught.value) == f"{caught.value}; recorded until then: {path}"
     cut = load_recording(path)
     assert cut.summary == {"aborted": f"RobotStoppedError: {caught.value}"}
@@ -238,7 +243,7 @@ def test_what_is_recorded_before_a_protective_stop_stays(two, tmp_path):
     assert given_up.plot().axes
     with pytest.raises(RecordingError, match=r"the run was given up .*: it has no SNR"):
         _ = given_up.snr
-    assert not (tmp_path / "lognorm_4_1_r1.mcap").exists()
+    assert not (tmp_path / "back_r1.mcap").exists()
 
 
 @pytest.mark.parametrize(("phase", "receiver"), [("approach", 1), ("identification", 2), ("run", 3)])
@@ -339,7 +344,7 @@ def test_two_plans_of_one_name_are_refused_in_the_experiment_itself(two):
 
 def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
     experiment = with_folder(two, tmp_path)
-    ours, foreign = tmp_path / "uniform_4_1_r2.mcap", tmp_path / "other_r1.mcap"
+    ours, foreign = tmp_path / "there_r2.mcap", tmp_path / "other_r1.mcap"
     ours.write_bytes(b"old")
     clear_folder(experiment)
     assert not ours.exists()
@@ -356,14 +361,14 @@ def test_folder_of_another_experiment_is_left_alone(two, tmp_path):
 )
 def test_only_recordings_that_are_known_to_be_simulated_are_replaced(two, tmp_path, simulated, words):
     experiment = with_folder(two, tmp_path)
-    ours, kept = tmp_path / "uniform_4_1_r1.mcap", tmp_path / "uniform_4_1_r2.mcap"
+    ours, kept = tmp_path / "there_r1.mcap", tmp_path / "there_r2.mcap"
     with Recorder(ours, provenance(), SIGNALS), Recorder(kept, provenance(simulated=simulated), SIGNALS):
         pass
     with pytest.raises(RecordingError, match=words):
         clear_folder(experiment)
     assert ours.exists()
     kept.unlink()
-    with pytest.raises(RecordingError, match=r"uniform_4_1_r1\.mcap exists: .*--overwrite"):
+    with pytest.raises(RecordingError, match=r"there_r1\.mcap exists: .*--overwrite"):
         clear_folder(replace(experiment, overwrite=False))
     assert ours.exists()
     clear_folder(experiment)
