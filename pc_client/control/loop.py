@@ -108,8 +108,8 @@ def frequency_response(loop: LoopModel, period: float, hertz: Array) -> NDArray[
 def lagged_displacement(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]:
     """Follow held velocities (n, j) [rad/s] through a lag alone, whose time constant is in s.
 
-    Command k holds from knot k to k + 1 [s]; there are n + 1 knots. Position and velocity at the knots,
-    (n + 1, j) each, both begin at 0.
+    Command k holds from knot k to k + 1 [s]; there are n + 1 knots. Returns position and velocity at the
+    knots, (n + 1, j) each; both begin at 0.
     """
     steps = np.diff(knots)
     velocity = np.zeros((len(knots), commands.shape[1]))

@@ -26,7 +26,7 @@ category 0 from 183 deg/s, arm stretched, 3 kg: base 20, shoulder 21, elbow 35 r
 MISSED_ALLOWED = 0.016
 """For so long the last velocity is repeated when we are late [s]. UR's client library waits 20 ms.
 
-From the last command to rest, at the fastest speed that is commanded (180 deg/s, `kinematics.robot_model`),
+From the last command to rest, at the fastest speed that is commanded (180 deg/s, `kinematics.arms`),
 on a CB3: 8 ms until it is read, 24 ms until the ramp begins, 157 ms ramp, and the time in which the joints
 follow and the feedback shows it. On the emulated arms that makes at most 0.28 s, with the loop of `poor`
 0.34 s."""

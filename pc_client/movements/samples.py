@@ -267,11 +267,11 @@ def parse_rows(text: str, source: str, forms: Sequence[tuple[str, ...]], wanted:
             _parse_number(fields[place], source, number, name)
             for place, name in zip(order, columns, strict=True)
         ]
-        if "t" in columns and rows and row[columns.index("t")] <= rows[-1][columns.index("t")]:
-            now, before = (values[columns.index("t")] for values in (row, rows[-1]))
+        at = columns.index("t") if "t" in columns else None
+        if at is not None and rows and row[at] <= rows[-1][at]:
             raise MovementError(
-                f"{source}, line {number}: t = {now:g} s after t = {before:g} s in line {lines[-1]}; "
-                "times must increase"
+                f"{source}, line {number}: t = {row[at]:g} s after t = {rows[-1][at]:g} s in line "
+                f"{lines[-1]}; times must increase"
             )
         rows.append(row)
         lines.append(number)

@@ -1,6 +1,6 @@
 """Limits and margins of plans, defined once, and the one line that refuses a plan.
 
-The limits of the arm itself are in kinematics.robot_model; here is the share that a plan uses,
+The limits of the arm itself are in `kinematics.arms`; here is the share that a plan uses,
 and the distances that it keeps.
 """
 

@@ -228,28 +228,16 @@ def _between_slow_moments(trajectory: SigmaLognormal) -> Array:
 #: Share of a lift's length outside its gap, and of the drawing's size that a mark moves beside its
 #: neighbours.
 TAIL = 1e-3
-
-
 #: Share of the drawing's size that may be left to do before the movement begins and after it ends.
 _REST = 1e-4
-
-
 #: Least time, s of the hand, to lower the pen at the start and to lift it at the end.
 _LOWERING_S = 0.4
-
-
 #: Least time, s of the hand, between two marks.
 _LEAST_GAP_S = 0.1
-
-
 #: Of each of the two strokes of a pen-up move, as a share of the gap: they overlap in its middle.
 _PEN_UP_SHARE = 0.7
-
-
 #: Sigma of the lognormals of lifts; people show .1 to .35 in reaches.
 _LIFT_SIGMA = 0.15
-
-
 _COVERAGE = -float(ndtri(TAIL))
 
 
@@ -337,19 +325,11 @@ def _pen_up_height() -> float:
 
 #: Relative accuracy of the factor.
 ACCURACY = 1e-3
-
-
 #: Pen-up moves with this time, s of the hand, hold nothing up.
 _WIDE_GAP_S = 3.0
-
-
 #: A pen-up move that is too fast gets this much more time at least and at most, per attempt.
 _LONGER = (1.03, 1.5)
-
-
 _ATTEMPTS = 40
-
-
 #: Speed, m/s, at which a path is planned first: far from any limit, so that its samples lie close.
 _EASY_SPEED = 0.3
 

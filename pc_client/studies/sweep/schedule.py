@@ -262,18 +262,14 @@ def _contents(paths: Iterable[Path]) -> tuple[tuple[str, bytes], ...]:
 
 HOST = "127.0.0.1"
 
-
 _START_TIMEOUT = 60.0
 """A box is ready after about a second [s]; a machine that is busy may take its time."""
-
 
 _NOTICE = 0.5
 """The end of a box is noted within this [s] after it broke off."""
 
-
 _ATTEMPTS = 5
 """Another program may take a port between our look and the box's start."""
-
 
 # All ports of a box between 10000 and 29600: above those of common services, below those that kernels give
 # to clients, where they would be taken and freed while we look.

@@ -70,7 +70,6 @@ class Range:
 
 _Axis = tuple[Value, ...] | Range
 
-
 _MOST_TRIALS = 100_000
 
 
