@@ -22,7 +22,7 @@ from pc_client.studies.extraction.chain import Bounds, Chain, inserted, with_cho
 from pc_client.studies.extraction.initial import TYPICAL_SIGMA, initial_chain
 from pc_client.studies.extraction.refine import Fit, Goal, refine, residuals
 from pc_client.studies.extraction.smoothing import CUTOFF_HZ, less_noise
-from pc_client.studies.signals import Trace, velocity
+from pc_client.studies.signals import Trace, decibels, velocity
 
 #: The fit looks at every fourth sample of the 200 Hz signal: twice 12 Hz is 24 Hz, 50 Hz is enough.
 _DECIMATION = 4
@@ -158,8 +158,7 @@ class _Fitting:
         energy = sum(float(np.sum(v**2)) for v in left)
         if energy < self._v_size**2 * _share(self._options.enough_db):
             return False
-        snr = 10.0 * math.log10(self._v_size**2 / energy)
-        raised = _PAYS * max(snr, 0.0) / self.n_strokes
+        raised = _PAYS * max(decibels(self._v_size**2, energy), 0.0) / self.n_strokes
         least = energy * (1.0 - _share(raised))
         found = [
             (candidate, index)
