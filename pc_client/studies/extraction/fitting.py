@@ -158,6 +158,7 @@ class _Fitting:
         energy = sum(float(np.sum(v**2)) for v in left)
         if energy < self._v_size**2 * _share(self._options.enough_db):
             return False
+        # What a stroke must take of the energy to raise the SNR by a share of what each has brought so far.
         raised = _PAYS * max(decibels(self._v_size**2, energy), 0.0) / self.n_strokes
         least = energy * (1.0 - _share(raised))
         found = [
@@ -166,9 +167,9 @@ class _Fitting:
             for candidate in best_candidates(part.t, v, wanted)
             if candidate.energy > least
         ]
-        found.sort(key=lambda pair: -pair[0].energy)
-        for index in sorted({index for _, index in found[:wanted]}):
-            mine = [candidate for candidate, owner in found[:wanted] if owner == index]
+        best = sorted(found, key=lambda pair: -pair[0].energy)[:wanted]
+        for index in sorted({index for _, index in best}):
+            mine = [candidate for candidate, owner in best if owner == index]
             median = np.array([candidate.median for candidate in mine])
             width = np.array([candidate.width for candidate in mine])
             chain = inserted(self._tidy(index), median, width, TYPICAL_SIGMA)

@@ -52,6 +52,9 @@ def render_page(name: str, table: pl.DataFrame) -> str:
     axes = varying(table)
     done = [row for row in rows if row["status"] == "done" and row["snr_db"] is not None]
     pair = map_axes(table)
+    map_figure = None
+    if pair and done:
+        map_figure = picture(_map_figure(rows, *pair), "Mean SNR over two settings of the controller")
     settings = rank_settings(table)
     connect = spans_grid(table)
     # Repetitions are no axis of the sweep, but a controller may learn from one to the next.
@@ -67,13 +70,10 @@ def render_page(name: str, table: pl.DataFrame) -> str:
         n_settings=len(settings),
         n_shown=min(len(settings), _MOST_SETTINGS),
         edge=edge_of(table, settings),
-        map_figure=picture(_map_figure(rows, *pair), "Mean SNR over two settings of the controller")
-        if pair and done
-        else None,
+        map_figure=map_figure,
         axis_figures=[
             picture(
-                draw(_axis_sheet(done, axis, connect=connect or axis == "repetition")),
-                f"SNR over {axis}",
+                draw(_axis_sheet(done, axis, connect=connect or axis == "repetition")), f"SNR over {axis}"
             )
             for axis in plotted
         ],
@@ -96,7 +96,7 @@ def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
     random samples differ in more than this axis.
     """
     values = _in_order(rows, axis)
-    # Seeds are numbers, but there is no more or less of a seed.
+    # Numbers stand on a scale, other values at equal distances; so do seeds: there is no more or less of one.
     scale = axis != "seed" and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
     places = dict(zip(values, values if scale else range(len(values)), strict=True))
     splits = [c for c in ("controller", "fidelity") if c != axis and len(_in_order(rows, c)) > 1]
@@ -114,7 +114,11 @@ def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
                 Curve(runs, colour, width=0.0, marker=marker, size=3.0, opacity=0.3),
                 Curve(means, colour, label, width, line, marker, 6.0),
             ]
-    named = scale and connect and len(values) <= _MOST_TICKS
+    ticks = None
+    if not scale:
+        ticks = {place: str(value) for value, place in places.items()}
+    elif connect and len(values) <= _MOST_TICKS:
+        ticks = {place: f"{value:g}" for value, place in places.items()}
     panel = Panel(
         (0.06, 0.27, 0.73, 0.61),
         curves,
@@ -122,7 +126,7 @@ def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
         (axis, "SNR [dB]"),
         ((None, None) if scale else (-0.6, len(values) - 0.4), (None, None)),
         "right",
-        ticks={x: f"{v:g}" if scale else str(v) for v, x in places.items()} if named or not scale else None,
+        ticks=ticks,
     )
     return Sheet(3.2, [panel], origin_of_rows(rows).mark)
 
