@@ -13,8 +13,6 @@ Emulated and real robots are treated alike; only the address differs. Names are 
 used, so importing the package costs no time.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

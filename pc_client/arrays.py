@@ -1,7 +1,5 @@
 """Arrays of numbers: their type, and copies that nobody changes."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -4,8 +4,6 @@ Every error that a user can cause is one line on stderr. Heavy libraries are loa
 need them.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What can go wrong on the PC side. Each message is one line: what was given, what is allowed, what to do."""
 
-from __future__ import annotations
-
 
 class ClientError(Exception):
     """Root of all errors that a user of the PC client may meet."""

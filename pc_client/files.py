@@ -3,8 +3,6 @@
 Names come from files and archives of others; here they become names of files in one folder, on any system.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import PurePath

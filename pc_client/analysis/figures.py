@@ -3,8 +3,6 @@
 Loads matplotlib, for the bars.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -36,8 +36,6 @@ Source: A. Wolniakowski et al., "Towards human-like kinematics in industrial rob
 UR3 robot", Eq. 10 and section IV.B ("velocities are computed as the TCP position derivative").
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -16,8 +16,6 @@ square of their difference. What noise adds to the mean of the speed near rest i
 drops out there: of a movement with long slow tails this figure is better than the floor, else a little worse.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -4,8 +4,6 @@
 same recordings give the same page. The plotting libraries are loaded only when a report is built.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

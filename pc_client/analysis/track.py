@@ -5,8 +5,6 @@ arm gives a perfect figure. Nothing here smooths or shifts. Samples are 8 ms apa
 an arm with 500 Hz, every fourth frame is one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import MappingProxyType
 

@@ -1,7 +1,5 @@
 """`ur-client report` and `ur-client export`: what is done with recordings, without a robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

@@ -15,8 +15,6 @@ sizes come from least squares over all samples.
 A joint follows its reference when the motor is sent to q_ref - e(q_ref).
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ joint is no part of the loop; over the small movement its error is a smooth func
 cubic in the displacement of each joint takes it up, and with it any error of scale.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, pi, sin
 from typing import NamedTuple

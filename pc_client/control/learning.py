@@ -21,8 +21,6 @@ Source: D. A. Bristow, M. Tharayil, A. G. Alleyne, "A survey of iterative learni
 Systems 26(3), 2006: the Q-filter and model inversion; differencing and bounds are ours.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import pi, sin
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Frames come on a fixed grid, so the whole reference is computed before the arm m
 (jitter of a real controller's stamp) is computed when it comes, by the same function.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import floor
 from typing import NamedTuple, Protocol

@@ -12,8 +12,6 @@ from the real one (a few millimetres, factory calibration) counts in neither dir
 `Tracker` joins them for one run; `predict_run` computes what the controller would make of an ideal arm.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ the speed slider, the TCP offset, the type of the arm. Both connections must be 
 robot has to hold back its packages.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeVar
 

@@ -9,8 +9,6 @@ Time-outs count the running time of this process: with a box faster than real ti
 robot's time waits for its clients they are longer, since it may wait for another one that is stopped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

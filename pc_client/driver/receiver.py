@@ -5,8 +5,6 @@ our address and numbers. It is read as a data file, without importing that packa
 not the language.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from functools import cache

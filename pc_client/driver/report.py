@@ -4,8 +4,6 @@
 only reads: nothing is sent that could move an arm. What a robot does not report stays unknown.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields

@@ -5,8 +5,6 @@ when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) go
 first the stop word to the program, then a program of our own that stops the arm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType

@@ -3,8 +3,6 @@
 No protocol here: bytes in, bytes out, and every failure is a DriverError that names address and port.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

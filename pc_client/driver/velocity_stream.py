@@ -6,8 +6,6 @@ A pause so long that the robot's program has ended also ends the run: no command
 before it.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

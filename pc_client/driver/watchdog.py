@@ -3,8 +3,6 @@
 A `Condition` is one thing that a robot must fulfil: what it reports, what is needed, what to do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

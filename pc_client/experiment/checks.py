@@ -6,8 +6,6 @@ path. The guard of a run allows this deviation and a margin. A plan that the con
 than its tolerances allow is refused.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 All that can be refused is refused here, before the arm moves: plans for another arm or cell, a folder in use.
 """
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence

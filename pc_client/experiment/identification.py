@@ -4,8 +4,6 @@ The controller uses no other data about the arm's dynamics than those found here
 movements of the experiment.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

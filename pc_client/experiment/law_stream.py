@@ -4,8 +4,6 @@ Such a motion has no plan. So before a velocity is sent, the way on which the ar
 were stopped now is held against joint ranges and clearances, as a plan's postures are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ The same rows are shown by `ur-client doctor`, before the question to the user, 
 What a robot does not report is shown as "not reported": it never counts as passed, and it refuses nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shows on the terminal how far an experiment is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import TracebackType
 from typing import Self

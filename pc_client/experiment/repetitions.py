@@ -6,8 +6,6 @@ was learned before such a run is forgotten with it. Before anything learned is u
 be sent is held against the limits that the plan itself was held against.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from math import inf
 

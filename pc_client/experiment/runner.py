@@ -4,8 +4,6 @@ The approach is streamed like a run, so the arm stops when commands stop. Whatev
 what is recorded until then stays readable.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field

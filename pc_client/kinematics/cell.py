@@ -5,8 +5,6 @@ The TCP stays at the flange: the tool is a shape that must not touch anything, a
 A cell file is TOML, read strictly; `examples/cell.toml` shows every field, `docs/real-arm.md` explains them.
 """
 
-from __future__ import annotations
-
 from dataclasses import astuple, dataclass
 from math import hypot, pi
 from pathlib import Path

@@ -6,8 +6,6 @@ meshes they enclose the housings of its joints, which are cylinders about the ax
 share the distance between their middle planes equally.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache

@@ -18,8 +18,6 @@ Source: paper section III ("an iterative Jacobian solver"); log6 on SE(3) as in 
 kinematics.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache

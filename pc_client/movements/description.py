@@ -1,7 +1,5 @@
 """The figures of a movement: how long, how fast, how large, and what a delayed arm would make of it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ case: the theory's mu and sigma are kept and only D scales). When they must hit 
 for a farther and a smaller one (Fitts, T = a + b log2(2 D / W)).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

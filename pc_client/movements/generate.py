@@ -8,8 +8,6 @@ Run as a program it writes the library's files again: `python -m pc_client.movem
 same seed gives the same bytes.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The library: two sets of ten movements, and their files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path

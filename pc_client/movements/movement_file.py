@@ -3,8 +3,6 @@
 What the fields mean is described in `docs/movements.md`.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping

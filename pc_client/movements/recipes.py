@@ -16,8 +16,6 @@ own scaling of time. Random numbers are those of Python's `random.Random.random(
 language promises never to change: a seed gives the same movement on every machine and version.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import dataclass

@@ -24,8 +24,6 @@ signature", as an open implementation of the kinematic theory states them (it, t
 for all strokes, and finds angles relative to themselves unfit).
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

@@ -6,8 +6,6 @@ nearest of the start postures that differ by whole turns is used (the plan is sh
 direct line is not clear, routes over raised postures are tried: up, turn, and down.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise, product

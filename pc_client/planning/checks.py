@@ -4,8 +4,6 @@ All quantities are measured before any is judged, so the report of a good plan a
 have the same numbers. Limits are in `planning.limits`, the arm's own in `kinematics.arms`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

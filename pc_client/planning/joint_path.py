@@ -4,8 +4,6 @@ Each sample is solved from a linear prediction by the samples before it, so the 
 of the first sample; leaving it, coming near a singularity or out of reach is refused.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
 

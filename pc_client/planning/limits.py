@@ -4,8 +4,6 @@ The limits of the arm itself are in `kinematics.arms`; here is the share that a 
 and the distances that it keeps.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pc_client.arrays import Array

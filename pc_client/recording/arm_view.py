@@ -21,8 +21,6 @@ Quaternions are (x, y, z, w).
 Source of the messages: ROS 2 common_interfaces, geometry2 (fields only); OMG CDR (XCDR1) alignment rules.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, isfinite, sin

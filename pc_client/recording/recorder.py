@@ -11,8 +11,6 @@ Chunks are not compressed: one that was cut off is readable up to its last whole
 no compressor's version.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 from collections.abc import Callable, Iterable, Mapping

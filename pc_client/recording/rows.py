@@ -10,8 +10,6 @@ comment; `Signal.name`, the loader and the exports keep RTDE's `actual_TCP_pose`
 Source: ROS 2 interface definition, "field names"; OMG CDR (XCDR1) alignment rules.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A figure stays in the one theme because it is made and written inside `figure` a
 give the same bytes. Every figure of data that are not known to be of a real arm says so.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

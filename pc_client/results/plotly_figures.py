@@ -9,8 +9,6 @@ are called `xaxis2` and `yaxis2`. Places on the sheet are shares of its width an
 corner.
 """
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Sequence
 from html import escape

@@ -6,8 +6,6 @@ readers can distinguish. The reference is the thick grey line in every figure, s
 without its legend.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate

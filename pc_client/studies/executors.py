@@ -8,8 +8,6 @@ Ctrl-C: the process that opened the executor decides. It lives as long as that p
 pipe, so nothing is left behind, not even after `kill -9`.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

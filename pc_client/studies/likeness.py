@@ -14,8 +14,6 @@ Source: S. Balasubramanian et al., "On the analysis of movement smoothness", JNE
 first two; P. Viviani and F. Lacquaniti et al. for the two-thirds power law.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What all studies use: a movement as samples, its velocity, the low-pass, and the decibel."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

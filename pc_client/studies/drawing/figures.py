@@ -5,8 +5,6 @@ the person saw it, and seconds of the hand. Each of the four signals has its col
 are larger than elsewhere: these figures are shown to audiences.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

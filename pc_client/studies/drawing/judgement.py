@@ -16,8 +16,6 @@ time stamps, all signals through the same first difference, neither shifted nor 
 Source: docs/extraction.md, section 1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

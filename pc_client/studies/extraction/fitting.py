@@ -8,8 +8,6 @@ on; the strokes are refined together afterwards (`refine`).
 Source: the order of Robust XZERO (largest first, subtract, go on); docs/extraction.md, section 6.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

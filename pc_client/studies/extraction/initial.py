@@ -10,8 +10,6 @@ Source: segmentation of iDeLog (Ferrer et al., IEEE TPAMI 42 (2020)), parameters
 Plamondon, Pattern Recognition 42 (2009)).
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import NamedTuple

@@ -11,8 +11,6 @@ in ms, of 8000 in us. Files with START or BREAK are in s or ms. In memory times 
 a recording share one time axis that begins at 0; units of length are those of the recording.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import re

@@ -32,8 +32,6 @@ Source: docs/theory.md, section 1, "The path of a stroke"; the damping rule is N
 Nielsen & Tingleff, "Methods for non-linear least squares problems" (2004), section 3.2.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

@@ -14,8 +14,6 @@ may start and end in full motion.
 Source: docs/extraction.md, section 3; 12 Hz as is usual for signatures.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

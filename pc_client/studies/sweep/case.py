@@ -4,8 +4,6 @@ A case is one experiment: a movement, an arm, a controller, some repetitions. It
 Cases and outcomes travel between the command and its workers.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping, Sequence

@@ -7,8 +7,6 @@ by whatever cause, `kill -9` included. Then it takes the scratch folder away. Wh
 its exit code is written into FOLDER/ended, and the folder stays until the worker has had a look.
 """
 
-from __future__ import annotations
-
 import shutil
 import signal
 import subprocess

@@ -3,8 +3,6 @@
 One file that needs no network and holds no date. Import it only where a page is made: it loads matplotlib.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from typing import Any, Literal

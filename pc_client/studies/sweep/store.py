@@ -10,8 +10,6 @@ case's file is the identity of the case, so a sweep with another configuration f
 with this one, and a search that is repeated finds all of them.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os
