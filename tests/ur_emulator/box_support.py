@@ -8,6 +8,7 @@ from functools import partial
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
+from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
@@ -277,6 +278,19 @@ class MessageReader:
 
     def state(self):
         return self.message(RobotState)
+
+
+def program(*lines):
+    """A program of these lines."""
+    return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"
+
+
+def printed(box, *lines, n=1):
+    """Run a program on a box and return the first `n` texts that it prints."""
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        sock.sendall(program(*lines).encode())
+        return [reader.message(TextMessage).text for _ in range(n)]
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """A bench with an e-Series arm and the newest software, whose programs' variables can be read."""
 
 from box_support import Bench
+from box_support import program as program
 
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.models.generations import E_SERIES
@@ -31,8 +32,3 @@ class ESeriesBench(Bench):
             for event in self.events
             if type(event).__name__ in ("ErrorReported", "ScriptFailed")
         ]
-
-
-def program(*lines):
-    """A program of these lines."""
-    return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"

@@ -3,6 +3,7 @@
 import queue
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from ur_emulator.errors import (
     RefusedError,
     WaitTimeoutError,
 )
+from ur_emulator.loop import served_box
 
 MOVE = "def move():\n  movej([0.5, -1.5, -1.8, 0, 1.2, 1.5])\nend\n"
 LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
@@ -492,8 +494,14 @@ def test_times_and_operations_that_cannot_be_are_refused_at_once(box):
     with pytest.raises(RefusedError, match="too far ahead"):
         box.wait_until(time=now + 4000)
     assert box.state.time == now
-    for _ in range(BUDGETS.scheduled_commands):
-        tick = box.at(now + 1, "close_popups")
-    with pytest.raises(RefusedError, match="no more are taken"):
-        box.at(now + 1, "close_popups")
-    assert box.wait_until(time=now + 1).tick == tick
+
+
+def test_so_many_operations_wait_for_their_time(monkeypatch):
+    monkeypatch.setattr(served_box, "BUDGETS", replace(BUDGETS, scheduled_commands=3))
+    with control_box(control_port=None, in_process=True) as box:
+        time = box.state.time + 1
+        for _ in range(3):
+            tick = box.at(time, "close_popups")
+        with pytest.raises(RefusedError, match="3 operations wait for their time: no more are taken"):
+            box.at(time, "close_popups")
+        assert box.wait_until(time=time).tick == tick

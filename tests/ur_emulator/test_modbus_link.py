@@ -5,7 +5,7 @@ from box_support import FakeSocket
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.modbus import ExceptionCode, encode_frame, take_frame
+from protocol.modbus import ExceptionCode, encode_frame
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import (
     DISCONNECTED,
@@ -263,15 +263,6 @@ def test_own_requests_are_lost_when_nobody_is_there_and_bounded_before():
     assert wire.link.is_idle
 
 
-@given(function=st.integers(0, 255), data=st.binary(max_size=252), slave=st.integers(0, 255))
-def test_any_own_request_is_sent_as_one_frame(function, data, slave):
-    wire = Wire()
-    wire.link.send(slave, function, data)
-    wire.advance()
-    frame = take_frame(wire.sock.sent)
-    assert (frame.unit, frame.pdu, bytes(wire.sock.sent)) == (slave, bytes([function]) + data, b"")
-
-
 # --- units that are not there, break off, or are silent
 
 
@@ -365,17 +356,6 @@ def test_a_frame_cut_off_by_the_end_of_the_connection_is_no_answer(wire):
     assert s.values == (0,)
     wire.advance(FIRST_RETRY)
     read_7(wire, s)
-
-
-def test_an_answer_may_come_in_pieces(wire):
-    s = signal()
-    wire.want(s)
-    [(transaction, _)] = wire.asked()
-    for byte in transaction.to_bytes(2, "big") + bytes.fromhex("00000005ff0402002a"):
-        assert s.values == (0,)
-        wire.sock.inbox.append(byte)
-        wire.advance(0.05)
-    assert s.values == (42,)
 
 
 def test_one_lost_answer_does_not_cost_the_connection(wire):

@@ -4,13 +4,12 @@ import socket
 import struct
 
 import pytest
-from box_support import TIMEOUT, BareBox, Bench, FakeConnection, MessageReader, connect
+from box_support import TIMEOUT, BareBox, Bench, FakeConnection, connect, printed
 from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from protocol.modbus import decode_values, encode_frame, encode_read
-from protocol.primary.messages import TextMessage
 from ur_emulator import ControlBox, cli, rack
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.modbus_map import COILS, REGISTERS, read_coil, read_register
@@ -182,14 +181,6 @@ def client(box):
         yield client
 
 
-def run(box, *lines):
-    body = "".join(f"  {line}\n" for line in lines)
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        sock.sendall(f"def p():\n{body}end\n".encode())
-        return reader.message(TextMessage).text
-
-
 def test_the_state_of_the_robot(client):
     for unit in (1, 17, 255):  # it does not matter, and is sent back
         answer = client.read_holding_registers(256, count=2, device_id=unit)
@@ -225,7 +216,7 @@ def test_scripts_and_clients_share_words_and_booleans(box, client):
     client.write_register(140, 4711)
     client.write_coils(364, [True, False, True])
     lines = ("x = read_port_register(140)", "write_port_register(141, x + 1)", "sync()")
-    assert run(box, *lines, "textmsg(x, read_input_boolean_register(66))") == "4711True"
+    assert printed(box, *lines, "textmsg(x, read_input_boolean_register(66))") == ["4711True"]
     assert client.read_holding_registers(141).registers == [4712]
 
 
@@ -239,37 +230,31 @@ def test_a_script_can_be_the_client_of_its_own_box(box, client):
         'modbus_delete_signal("own")',
         'textmsg("round")',
     )
-    assert run(box, *lines) == "round"
+    assert printed(box, *lines) == ["round"]
 
 
-def read_exactly(sock, size):
-    data = sock.recv(size, socket.MSG_WAITALL)
-    assert len(data) == size, "the box has closed the connection"
-    return data
-
-
-def read_answer(sock):
-    transaction, _, length, _ = struct.unpack(">HHHB", read_exactly(sock, 7))
-    return transaction, read_exactly(sock, length - 1)
+def read_answer(stream):
+    transaction, _, length, _ = struct.unpack(">HHHB", stream.read(7))
+    return transaction, stream.read(length - 1)
 
 
 def test_bytes_may_come_one_by_one(box):
-    with connect(box, "modbus") as sock:
+    with connect(box, "modbus") as sock, sock.makefile("rb") as stream:
         for byte in frame(READ_VERSION, transaction=513):
             sock.sendall(bytes([byte]))
-        assert read_answer(sock) == (513, VERSION)
+        assert read_answer(stream) == (513, VERSION)
 
 
 def test_requests_that_come_together_are_answered_in_order(box):
     n = 5 * BUDGETS.client_work
-    with connect(box, "modbus") as sock:
+    with connect(box, "modbus") as sock, sock.makefile("rb") as stream:
         requests = [
             frame(b"\x06\x00\xa0" + struct.pack(">H", i), i) if i % 10 == 0 else frame(b"\3\0\xa0\0\1", i)
             for i in range(n)
         ]
         sock.sendall(b"".join(requests))
         for i in range(n):
-            transaction, pdu = read_answer(sock)
+            transaction, pdu = read_answer(stream)
             assert transaction == i
             assert int.from_bytes(pdu[-2:], "big") == i - i % 10  # reads see the write before them
 
@@ -325,7 +310,7 @@ def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch
     with ControlBox(in_process=True, pace="lockstep") as box:
         assert box.ports.modbus == 0
         assert box.ports.dashboard > 0
-        assert run(box, 'textmsg("up")') == "up"
+        assert printed(box, 'textmsg("up")') == ["up"]
         assert len(box.notices) == 1
         assert "502" in box.notices[0]
         assert "--port-base" in box.notices[0]

@@ -4,8 +4,8 @@ Values, names and most errors are in `chunks/modbus.script`; here is what takes 
 """
 
 import pytest
-from box_support import Bench, FakeModbusUnit
-from e_series_support import DT, ESeriesBench, program
+from box_support import Bench, FakeModbusUnit, program
+from e_series_support import DT, ESeriesBench
 
 UNIT = "10.0.0.2:502"
 

@@ -13,7 +13,7 @@ from socketserver import ThreadingMixIn
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
-from box_support import TIMEOUT, Bench, MessageReader, connect, inside, listening_socket
+from box_support import TIMEOUT, Bench, MessageReader, connect, inside, listening_socket, program
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.budgets import BUDGETS
@@ -21,6 +21,7 @@ from ur_emulator.commands.programs import StopProgram
 from ur_emulator.emulator import ControlBox
 from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.outgoing import xmlrpc as module
+from ur_emulator.scripting import rpc_builtins
 
 
 class FakeCall:
@@ -139,12 +140,13 @@ def test_a_program_that_is_stopped_closes_what_it_opened():
 
 @pytest.mark.parametrize(("generation", "cycles"), [(CB3, 1), (E_SERIES, 4)])
 def test_so_many_values_are_sent_in_8_ms_and_a_longer_call_takes_the_room_of_the_next_cycles(
-    generation, cycles
+    generation, cycles, monkeypatch
 ):
+    monkeypatch.setattr(rpc_builtins, "BUDGETS", replace(BUDGETS, remote_values_sent=100))
     bench = RpcBench(generation=generation)
     bench.start(
         'def p():\n  thread t():\n    h.second([1])\n  end\n  h = rpc_factory("xmlrpc", "http://10.0.0.1/")\n'
-        "  x = [0" + ", 0" * 4_998 + "]\n  sync()\n  run t()\n  h.first(x)\nend\n"
+        "  x = [0" + ", 0" * 98 + "]\n  sync()\n  run t()\n  h.first(x)\nend\n"
     )
     bench.tick()
     [server] = bench.servers
@@ -197,10 +199,7 @@ def box():
 
 
 def send(sock, port, body):
-    lines = "".join(f"  {line}\n" for line in body)
-    sock.sendall(
-        f'def p():\n  h = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")\n{lines}end\n'.encode()
-    )
+    sock.sendall(program(f'h = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")', *body).encode())
 
 
 def test_calls_go_there_and_back_on_one_connection(box):
@@ -318,7 +317,8 @@ def test_an_answer_that_is_none_is_a_run_time_error(box, answer, words):
     ],
     ids=["body", "chunks", "trailer", "continue", "header"],
 )
-def test_an_answer_without_end_is_a_run_time_error(box, answer, then):
+def test_an_answer_without_end_is_a_run_time_error(box, answer, then, monkeypatch):
+    monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, remote_answer_bytes=30_000))
     with answering(answer, then) as (port, _):
         text = fail(box, port).text
     assert "longer than" in text or "makes no sense" in text

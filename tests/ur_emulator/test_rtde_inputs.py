@@ -85,11 +85,6 @@ def test_integer_registers_hold_32_bits(bench):
     assert published(bench.tick(), "output_int_register_0") == (-(2**31),)
 
 
-def test_the_last_of_several_inputs_in_a_cycle_wins(bench):
-    now = write(bench, {"input_int_register_0": 1}, {"input_int_register_0": 2})
-    assert now.registers.input_integers[0] == 2
-
-
 @pytest.mark.parametrize(("group", "shift"), [("standard", 0), ("configurable", 8), ("tool", 16)])
 def test_digital_outputs_obey_their_mask(bench, group, shift):
     mask, value = f"{group}_digital_output_mask", f"{group}_digital_output"

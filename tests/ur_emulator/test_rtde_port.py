@@ -90,15 +90,11 @@ def bench():
     return PortBench()
 
 
-def test_nothing_is_sent_unasked_before_the_start(bench):
+def test_nothing_is_sent_before_the_start_and_its_reply_precedes_the_first_package(bench):
     client = bench.client("timestamp")
     bench.tick(5)
     bench.stand(5)
     assert client.events() == []
-
-
-def test_the_reply_to_start_precedes_the_first_package(bench):
-    client = bench.client("timestamp")
     client.say(client.pc.send(M.Start()))
     bench.tick(2)
     assert [type(event) for event in client.events()] == [M.StartReply, DataReceived, DataReceived]
@@ -259,7 +255,7 @@ def test_after_the_text_nothing_more_is_read(bench):
 def test_a_reply_that_cannot_be_sent_ends_the_connection(bench):
     client = bench.client("timestamp")
     client.full = True
-    client.say(client.pc.send(M.Start()))
+    client.say(client.pc.send(M.Start()) + client.pc.send(M.Pause()))  # what follows is read no further
     assert not client.is_open
     bench.tick()
     assert client.sent == []
@@ -273,13 +269,6 @@ def test_data_for_a_full_client_is_dropped_and_the_others_get_theirs(bench):
     bench.tick(1)
     assert len(full.events()) == 1
     assert len(other.events()) == 4
-
-
-def test_a_client_that_closes_within_a_burst_of_requests_is_read_no_further(bench):
-    client = bench.client("timestamp")
-    client.full = True
-    client.say(client.pc.send(M.Start()) + client.pc.send(M.Pause()))
-    assert not client.is_open
 
 
 # --- what clients share
@@ -400,30 +389,31 @@ def run(box, text):
         sock.sendall(text.encode())
 
 
-def raw_ask(sock, kind, payload):
+def next_package(stream):
+    size, kind = struct.unpack(">HB", stream.read(3))
+    return chr(kind), stream.read(size - 3)
+
+
+def ask_raw(stream, kind, payload=b""):
     """One request in bytes, one package back: what a client that looks at nothing does."""
-    sock.sendall(struct.pack(">HB", 3 + len(payload), kind) + payload)
-    return raw_next(sock)
-
-
-def raw_next(sock):
-    size, kind = struct.unpack(">HB", sock.recv(3, socket.MSG_WAITALL))
-    return kind, sock.recv(size - 3, socket.MSG_WAITALL) if size > 3 else b""
+    stream.write(struct.pack(">HB", 3 + len(payload), ord(kind)) + payload)
+    stream.flush()
+    return next_package(stream)
 
 
 def test_start_up_of_ur_rtde_reads_exactly_one_package_after_each_request(box):
-    with connect(box, "rtde") as sock:
-        assert raw_ask(sock, ord("V"), b"\0\2") == (ord("V"), b"\1")
-        assert raw_ask(sock, ord("v"), b"") == (ord("v"), struct.pack(">4I", 3, 15, 8, 106339))
-        kind, types = raw_ask(sock, ord("O"), struct.pack(">d", 125.0) + UR_RTDE_RECEIVE.encode())
-        assert (kind, types[0]) == (ord("O"), 1)
+    with connect(box, "rtde") as sock, sock.makefile("rwb") as stream:
+        assert ask_raw(stream, "V", b"\0\2") == ("V", b"\1")
+        assert ask_raw(stream, "v") == ("v", struct.pack(">4I", 3, 15, 8, 106339))
+        kind, types = ask_raw(stream, "O", struct.pack(">d", 125.0) + UR_RTDE_RECEIVE.encode())
+        assert (kind, types[0]) == ("O", 1)
         words = types[1:].decode().split(",")
         names = UR_RTDE_RECEIVE.rstrip(",").split(",")
         fields = output_fields(V3_15)
         assert words == [fields[name].type.value for name in names]
-        assert raw_ask(sock, ord("S"), b"") == (ord("S"), b"\1")
-        kind, values = raw_next(sock)
-        assert (kind, values[0]) == (ord("U"), 1)
+        assert ask_raw(stream, "S") == ("S", b"\1")
+        kind, values = next_package(stream)
+        assert (kind, values[0]) == ("U", 1)
         assert len(values) == 1 + sum(fields[name].type.size for name in names)
 
 
@@ -499,9 +489,9 @@ def test_a_client_that_does_not_read_gets_whole_packages_and_does_not_stop_the_o
 def test_in_lockstep_time_waits_for_a_client_that_reads_late(box):
     fields = output_fields(V3_15)
     names = ("output_int_register_24", *[name for name in fields if fields[name].type.count == 6])
-    n_cycles = 2000
+    n_cycles = 700
     size = sum(fields[name].type.size for name in names)
-    assert size * n_cycles > 1_000_000  # more than the buffers on the way hold
+    assert size * n_cycles > 500_000  # more than the buffers on the way hold
     with socket.socket() as sock:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         sock.settimeout(TIMEOUT)

@@ -7,7 +7,17 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from box_support import TIMEOUT, Bench, FrameReader, MessageReader, connect, inside, listening_socket
+from box_support import (
+    TIMEOUT,
+    Bench,
+    FrameReader,
+    MessageReader,
+    connect,
+    inside,
+    listening_socket,
+    printed,
+    program,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -33,10 +43,6 @@ def box():
         yield running
 
 
-def program(*lines):
-    return ("def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n").encode()
-
-
 def log_lines(box, words):
     return [entry.text for entry in box.log if words in entry.text]
 
@@ -46,13 +52,11 @@ def log_lines(box, words):
 
 def test_beyond_the_budget_of_connections_an_open_returns_false_and_says_why(box, monkeypatch):
     lower(monkeypatch, outgoing_connections=3)
-    with listening_socket() as server, connect(box, "primary") as sock:
+    with listening_socket() as server:
         port = server.getsockname()[1]
         opens = [f'textmsg(socket_open("127.0.0.1", {port}, "s{i}"))' for i in range(5)]
         again = ('socket_close("s0")', f'textmsg(socket_open("127.0.0.1", {port}, "again"))')
-        sock.sendall(program(*opens, *again))
-        reader = MessageReader(sock)
-        said = [reader.message(TextMessage).text for _ in range(6)]
+        said = printed(box, *opens, *again, n=6)
     assert said == ["True"] * 3 + ["False"] * 2 + ["True"]
     assert len(log_lines(box, "the box has 3 connections, close one first")) == 2
 
@@ -158,9 +162,7 @@ def test_two_hundred_scripts_that_wait_for_names_take_two_threads(monkeypatch):
             for _ in range(20):
                 reader.next()
         sock.sendall(b"stop program\n")
-        with connect(box, "primary") as primary:
-            primary.sendall(program('textmsg("next")'))
-            assert MessageReader(primary).message(TextMessage).text == "next"
+        assert printed(box, 'textmsg("next")') == ["next"]
         resolver.end()
     assert len(resolver.asked) <= BUDGETS.look_ups_at_once
 
@@ -185,7 +187,7 @@ def flood(server, n, data):
 
 def test_an_inbox_is_bounded_and_held_back_is_not_lost(box, monkeypatch):
     lower(monkeypatch, inbox_bytes=50_000)
-    n, lines = 12, 8_000
+    n, lines = 2, 8_000
     data = b"".join(b"%07d\n" % i for i in range(lines))
     network = inside(box)._network
     with listening_socket() as server, connect(box, "primary") as sock:
@@ -206,7 +208,7 @@ def test_an_inbox_is_bounded_and_held_back_is_not_lost(box, monkeypatch):
             "end",
             'textmsg("all")',
         )
-        sock.sendall(program(*opens, 'textmsg("open")', "sleep(1)", *check))
+        sock.sendall(program(*opens, 'textmsg("open")', "sleep(1)", *check).encode())
         senders = flood(server, n, data)
         reader = MessageReader(sock)
         assert reader.message(TextMessage).text == "open"
@@ -233,7 +235,7 @@ def test_all_outboxes_together_are_bounded(box, monkeypatch):
             "end",
         )
         fill = [f'while socket_send_string(s, "s{i}"):\n    sync()\n  end' for i in range(n)]
-        sock.sendall(program(*opens, *double, *fill, 'textmsg("full")', "sleep(5)"))
+        sock.sendall(program(*opens, *double, *fill, 'textmsg("full")', "sleep(5)").encode())
         with ExitStack() as peers:
             for _ in range(n):
                 peers.enter_context(server.accept()[0])
@@ -245,7 +247,7 @@ def test_all_outboxes_together_are_bounded(box, monkeypatch):
             assert 0 < sum(held) <= 100_000
             sock.sendall(b"stop program\n")
             peers.close()
-        sock.sendall(program('textmsg("next")'))
+        sock.sendall(program('textmsg("next")').encode())
         while reader.message(TextMessage).text != "next":
             pass
     assert inside(box)._network._buffers.unsent == 0
@@ -334,30 +336,24 @@ def test_a_line_that_comes_byte_by_byte_is_looked_at_once():
 
 def test_scripts_cannot_connect_to_the_control_port(box):
     hosts = ["127.0.0.1", "127.1", "127.0.0.9", "0.0.0.0", "0", "2130706433", "0x7f000001", "localhost"]
-    with connect(box, "primary") as sock:
-        sock.sendall(program(*(f'textmsg(socket_open("{host}", {box.control_port}))' for host in hosts)))
-        reader = MessageReader(sock)
-        assert [reader.message(TextMessage).text for _ in hosts] == ["False"] * len(hosts)
+    opens = [f'textmsg(socket_open("{host}", {box.control_port}))' for host in hosts]
+    assert printed(box, *opens, n=len(hosts)) == ["False"] * len(hosts)
     lines = log_lines(box, "Not able to open socket")
     assert len(lines) == len(hosts)
     assert all("control API" in line for line in lines)
 
 
 def test_nor_to_that_of_another_box_of_the_process_until_it_is_closed(box):
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        with ControlBox(in_process=True, port_base=None, control_port=0) as other:
-            port = other.control_port
-            sock.sendall(program(f'textmsg(socket_open("127.0.0.1", {port}))'))
-            assert reader.message(TextMessage).text == "False"
-        with socket.create_server(("127.0.0.1", port)):
-            sock.sendall(program(f'textmsg(socket_open("127.0.0.1", {port}))'))
-            assert reader.message(TextMessage).text == "True"
+    with ControlBox(in_process=True, port_base=None, control_port=0) as other:
+        port = other.control_port
+        assert printed(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["False"]
+    with socket.create_server(("127.0.0.1", port)):
+        assert printed(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["True"]
 
 
 def test_nor_through_a_modbus_unit(box):
     with connect(box, "primary") as sock:
         add = f'modbus_add_signal("127.0.0.1:{box.control_port}", 255, 1, 2, "s")'
         wait = ("while True:", '  modbus_get_signal_status("s", False)', "  sync()", "end")
-        sock.sendall(program(add, *wait))
+        sock.sendall(program(add, *wait).encode())
         assert "control API" in MessageReader(sock).message(RuntimeExceptionMessage).text
