@@ -41,22 +41,9 @@ USUAL = {
 }
 HUGE, NAN, INF = "1.0E308", 'to_num("nan")', 'to_num("inf")'
 SIX_HUGE, SIX_LARGE = ", ".join([HUGE] * 6), ", ".join(["9.0E14", "-9.0E14"] * 3)
-# Arguments that nobody should give, whatever the type.
-ODD = (
-    "0",
-    "-1",
-    "-2147483648",
-    HUGE,
-    "-" + HUGE,
-    "9.0E14",
-    "1.0E-300",
-    NAN,
-    INF,
-    "None",
-    "True",
-    '""',
-    '"' + "x" * 2000 + '"',
-    "[]",
+# Arguments that nobody should give: of the type of a number, of a list or pose, of a text; and those that fit no type.
+ODD_NUMBERS = ("0", "-1", "-2147483648", HUGE, "-" + HUGE, "9.0E14", "1.0E-300", NAN, INF)
+ODD_LISTS = (
     "[0, 0, 0, 0, 0, 0]",
     f"[{HUGE}, {HUGE}, {HUGE}]",
     f"[{SIX_HUGE}]",
@@ -67,6 +54,8 @@ ODD = (
     f"p[{SIX_HUGE}]",
     f"p[{INF}, 0, 0, 0, 0, 0]",
 )
+ODD_TEXTS = ('"' + "x" * 2000 + '"',)
+WRONG = ("0", "None", "True", '""', "[]")
 CYCLES = 3
 ROWS = [row for row in CB3_3_15 if row.name not in PURE and row.params]
 
@@ -80,13 +69,24 @@ def usual(param):
     return USUAL[param.type]
 
 
+def odd(argument):
+    """What to give instead of a usual argument: odd values of its type, and those of no type."""
+    match argument[0]:
+        case '"':
+            return {*ODD_TEXTS, *WRONG}
+        case "[" | "p":
+            return {*ODD_LISTS, *WRONG}
+        case _:
+            return {*ODD_NUMBERS, *WRONG}
+
+
 def calls(row):
     """The usual call, and each with one odd argument."""
     arguments = [usual(param) for param in row.params]
     yield arguments
-    for i in range(len(arguments)):
-        for odd in ODD:
-            yield [*arguments[:i], odd, *arguments[i + 1 :]]
+    for i, argument in enumerate(arguments):
+        for other in sorted(odd(argument)):
+            yield [*arguments[:i], other, *arguments[i + 1 :]]
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 import json
 import socket
-import struct
 
 import pytest
 from box_support import inside
@@ -303,19 +302,6 @@ def test_a_request_that_trickles_in_is_understood_and_holds_up_nobody(box, http)
                 assert other.ask("GET", "/v1/state")[0] == 200
     assert http.answer()[0] == 200
     assert http.ask("POST", "/v1/set_speed", {"fraction": 1})[0] == 200
-
-
-def test_half_a_request_and_then_nothing_is_forgotten(box):
-    half = b'POST /v1/power_off HTTP/1.1\r\nHost: localhost\r\nContent-Length: 30\r\n\r\n{"a'
-    for k in range(1, len(half), 7):
-        with Http(box) as http:
-            http.send(half[:k])
-            http.sock.shutdown(socket.SHUT_WR)
-            while http.sock.recv(65536):
-                pass
-        with Http(box) as http:
-            http.send(half[:k])
-            http.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # reset
 
 
 def test_who_says_no_more_still_gets_its_answers(http):

@@ -495,12 +495,6 @@ def test_a_client_that_says_no_more_still_hears_all_answers(box):
     still_serves(box)
 
 
-def test_a_client_that_ends_without_a_word_is_closed(box):
-    with Dashboard(box) as dashboard:
-        dashboard.sock.shutdown(socket.SHUT_WR)
-        assert dashboard.is_closed()
-
-
 def test_what_a_client_asked_before_it_went_is_done(box):
     dashboard = Dashboard(box)
     dashboard.send("load wait.urp", "play")

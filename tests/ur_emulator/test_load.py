@@ -4,12 +4,10 @@ import errno
 import os
 import selectors
 import socket
-import struct
 import threading
 from collections import Counter
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
 from box_support import TIMEOUT, connect, inside
@@ -202,23 +200,6 @@ def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their
             pass
     assert values == [float(k) for k in range(n)]
     assert max(taken) == 10
-
-
-def test_masters_that_ask_ahead_get_all_answers_in_order(box):
-    """Each sends some 20 KiB before it reads: what is not answered yet waits outside of the box."""
-    n = 1600
-    requests = b"".join(struct.pack(">HHHBBHH", k, 0, 6, 1, 3, 128, 10) for k in range(n))
-    with ExitStack() as stack:
-        masters = [stack.enter_context(connect(box, "modbus")) for _ in range(4)]
-        with standing_still(box):
-            for master in masters:
-                master.sendall(requests)
-        for master in masters:
-            data = b""
-            while len(data) < n * 29:
-                data += master.recv(65536)
-            transactions = [struct.unpack_from(">H", data, 29 * k)[0] for k in range(n)]
-            assert all(b - a == 1 for a, b in pairwise(transactions))
 
 
 # --- accepting: some at a time, and what happens when descriptors are out

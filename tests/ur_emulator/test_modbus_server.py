@@ -270,13 +270,6 @@ def test_a_client_that_never_reads_is_cut_off_alone(box, client):
     assert client.read_holding_registers(256).registers == [3]
 
 
-def test_a_client_that_goes_while_its_write_waits_harms_nobody(box, client):
-    for _ in range(20):
-        with connect(box, "modbus") as sock:
-            sock.sendall(frame(b"\6\0\x80\0\1"))
-    assert client.read_holding_registers(256).registers == [3]
-
-
 # --- a port that this user may not open
 
 
