@@ -7,7 +7,7 @@ from box_support import MessageReader, connect
 from dashboard_support import Dashboard
 from rtde_support import RtdeClient
 from states_support import BRAKING, COMMANDS, ENTRY, check_wires, moving
-from wire_story import ESeriesStory, Story
+from wire_story import ESeriesStory
 
 from protocol.primary import layout as L
 from protocol.primary.messages import SafetyModeMessage
@@ -35,11 +35,6 @@ V3_15 = SoftwareVersion(3, 15, 8)
 
 @pytest.fixture(scope="module")
 def story():
-    return Story()
-
-
-@pytest.fixture(scope="module")
-def e_series_story():
     return ESeriesStory()
 
 
@@ -220,18 +215,12 @@ def check(name, origin, values):
             assert not any(map(any, columns)), name
 
 
-@pytest.fixture
-def told(story, e_series_story, version):
-    """What happened to the box of a software, as snapshots."""
-    return story if version.major == 3 else e_series_story
-
-
 @pytest.mark.parametrize("version", [V3_15, SoftwareVersion(5, 12), SoftwareVersion(5, 26)], ids=str)
-def test_every_output_of_rtde_is_what_the_table_says(told, version):
+def test_every_output_of_rtde_is_what_the_table_says(story, version):
     fields = tuple(output_fields(version).values())
     recipe = Recipe((f.name for f in fields), (f.type for f in fields))
     encode = snapshot_encoder(fields, b"")
-    packages = [recipe.decode(encode(snapshot)) for snapshot, _ in told.moments]
+    packages = [recipe.decode(encode(snapshot)) for snapshot, _ in story.moments]
     for field, *values in zip(fields, *packages, strict=True):
         check(field.name, field.origin, values)
 
@@ -248,9 +237,9 @@ def test_every_column_of_a_frame_is_what_the_table_says(story):
 @pytest.mark.parametrize(
     "version", [V3_15, SoftwareVersion(3, 2), SoftwareVersion(5, 12), SoftwareVersion(5, 26)], ids=str
 )
-def test_every_field_of_a_state_is_what_the_table_says(told, version):
-    encoder = StateEncoder(CB3.software(version), told.controller.state.arm, told.controller.state.safety)
-    states = [decode_package(encoder.encode_first(s), version).sub_packages for s, _ in told.moments]
+def test_every_field_of_a_state_is_what_the_table_says(story, version):
+    encoder = StateEncoder(CB3.software(version), story.controller.state.arm, story.controller.state.safety)
+    states = [decode_package(encoder.encode_first(s), version).sub_packages for s, _ in story.moments]
     for record, *sent in zip(state_types(version, first=True), *states, strict=True):
         for field in wire_fields(record):
             if field.since.covers(version) and not field.only_if:
