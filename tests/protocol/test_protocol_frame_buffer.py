@@ -38,6 +38,16 @@ def test_any_split_gives_the_same_frames(bodies, cuts, drain_often):
     assert buffer.pending == 0
 
 
+@given(BODIES)
+def test_one_frame_a_feed_and_several_waiting(bodies):
+    frames = [frame(body) for body in bodies]
+    buffer = FrameBuffer(64)
+    for one in frames:
+        buffer.feed(one)
+    assert buffer.pending == sum(map(len, frames))
+    assert drain(buffer) == frames
+
+
 def test_trailing_bytes_wait():
     buffer = FrameBuffer(64)
     buffer.feed(frame(b"abc") + b"\0\0")

@@ -71,9 +71,15 @@ def test_a_fault():
         read(xmlrpc.client.dumps(xmlrpc.client.Fault(3, "no paper")).encode())
 
 
-@pytest.mark.parametrize("text", ["", "<params/>"])
-def test_what_has_no_value_is_none(text):
-    data = f"<methodResponse>{text or '<params></params>'}</methodResponse>".encode()
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"<methodResponse><params></params></methodResponse>",
+        b"<methodResponse><params/></methodResponse>",
+        answer("<nil/>"),
+    ],
+)
+def test_what_has_no_value_is_none(data):
     assert read(data) is None
 
 

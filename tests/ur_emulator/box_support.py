@@ -285,7 +285,7 @@ def program(*lines):
     return "def p():\n" + "".join(f"  {line}\n" for line in lines) + "end\n"
 
 
-def printed(box, *lines, n=1):
+def printed_by(box, *lines, n=1):
     """Run a program on a box and return the first `n` texts that it prints."""
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)

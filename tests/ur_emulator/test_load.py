@@ -206,16 +206,17 @@ def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their
 
 
 class Clients:
-    """A port that only remembers who came."""
+    """A port that only remembers who came and what they sent."""
 
     def __init__(self):
         self.connections = []
+        self.heard = []
 
     def opened(self, connection):
         self.connections.append(connection)
 
     def received(self, connection, data):
-        pass
+        self.heard.append(data)
 
     def closed(self, connection):
         self.connections.remove(connection)
@@ -368,6 +369,23 @@ def test_a_client_that_has_gone_while_it_waited_harms_nobody(loop, monkeypatch):
     port._accept(selectors.EVENT_READ)
     assert len(clients.connections) == 1
     close_all(port, clients, sock)
+
+
+@pytest.mark.parametrize(
+    ("data", "is_let_in"), [(b"POST / HTTP/1.1\r\n\r\nstop program\n", False), (b"POSTED = 1\n", True)]
+)
+def test_a_page_in_a_browser_reaches_no_port_that_speaks_no_http(loop, data, is_let_in):
+    clients, notices = Clients(), []
+    port = listen(loop, clients, notices)
+    with socket.create_connection(("127.0.0.1", port.number), timeout=TIMEOUT) as sock:
+        sock.sendall(data)
+        loop.add(Turns(loop, clients, 5))
+        loop.run()
+        assert clients.heard == [data] * is_let_in
+        assert len(clients.connections) == is_let_in
+        refused = f"is a browser, which dashboard port {port.number} is not for"
+        assert any(refused in line for line in notices) is not is_let_in
+    close_all(port, clients)
 
 
 def test_silent_clients_are_asked_whether_they_are_still_there(loop):

@@ -7,7 +7,7 @@ import threading
 from contextlib import contextmanager, suppress
 
 import pytest
-from box_support import TIMEOUT, MessageReader, connect, printed, program
+from box_support import TIMEOUT, MessageReader, connect, printed_by, program
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -162,7 +162,7 @@ def test_signals_of_every_type_go_there_and_back_on_one_connection(good_unit, pa
     good_unit.set(INPUTS, 2, True)
     good_unit.set(INPUT_REGISTERS, 4, 1234)
     with ControlBox(in_process=True, pace=pace, port_base=None) as box:
-        texts = printed(
+        texts = printed_by(
             box,
             *(
                 add(good_unit.port, *signal)
@@ -200,7 +200,7 @@ def test_a_unit_that_is_not_there_ends_the_program_that_uses_it(box, monkeypatch
 def test_an_address_may_be_a_name(box):
     with peer(answers_42) as port:
         signal = f'modbus_add_signal("localhost:{port}", 255, 4, 2, "in")'
-        assert printed(box, signal, until(f"{status('in')} == 42"), 'textmsg("found")') == ["found"]
+        assert printed_by(box, signal, until(f"{status('in')} == 42"), 'textmsg("found")') == ["found"]
 
 
 def test_an_own_request_reaches_the_unit_and_its_connection_ends(box):
@@ -214,7 +214,7 @@ def test_an_own_request_reaches_the_unit_and_its_connection_ends(box):
         ended.set()
 
     with peer(behave) as port:
-        printed(
+        printed_by(
             box, f'modbus_send_custom_command("127.0.0.1:{port}", 103, 6, [17, 32, 2, 88])', 'textmsg("sent")'
         )
         assert ended.wait(TIMEOUT)
@@ -232,7 +232,9 @@ def test_a_box_that_ends_closes_its_connections():
 
     with peer(behave) as port:
         with ControlBox(in_process=True, pace="lockstep", port_base=None) as box:
-            assert printed(box, add(port, 2, "in"), until(f"{status('in')} == 42"), 'textmsg("up")') == ["up"]
+            assert printed_by(box, add(port, 2, "in"), until(f"{status('in')} == 42"), 'textmsg("up")') == [
+                "up"
+            ]
         assert ended.wait(TIMEOUT)
 
 
@@ -262,7 +264,7 @@ def test_a_unit_that_misbehaves_harms_nobody(box, bad, monkeypatch):
     monkeypatch.setattr(modbus_units, "TOLERANCE", TIMEOUT)
     monkeypatch.setattr(modbus_units, "ANSWER_TIMEOUT", 0.2)
     with peer(answers_42) as good, peer(bad, answers_42) as port:
-        texts = printed(
+        texts = printed_by(
             box,
             add(port, 2, "bad"),
             add(good, 2, "good", 4),

@@ -4,7 +4,7 @@ import socket
 import struct
 
 import pytest
-from box_support import TIMEOUT, BareBox, Bench, FakeConnection, connect, printed
+from box_support import TIMEOUT, BareBox, Bench, FakeConnection, connect, printed_by
 from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
@@ -216,7 +216,7 @@ def test_scripts_and_clients_share_words_and_booleans(box, client):
     client.write_register(140, 4711)
     client.write_coils(364, [True, False, True])
     lines = ("x = read_port_register(140)", "write_port_register(141, x + 1)", "sync()")
-    assert printed(box, *lines, "textmsg(x, read_input_boolean_register(66))") == ["4711True"]
+    assert printed_by(box, *lines, "textmsg(x, read_input_boolean_register(66))") == ["4711True"]
     assert client.read_holding_registers(141).registers == [4712]
 
 
@@ -230,7 +230,7 @@ def test_a_script_can_be_the_client_of_its_own_box(box, client):
         'modbus_delete_signal("own")',
         'textmsg("round")',
     )
-    assert printed(box, *lines) == ["round"]
+    assert printed_by(box, *lines) == ["round"]
 
 
 def read_answer(stream):
@@ -303,7 +303,7 @@ def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch
     with ControlBox(in_process=True, pace="lockstep") as box:
         assert box.ports.modbus == 0
         assert box.ports.dashboard > 0
-        assert printed(box, 'textmsg("up")') == ["up"]
+        assert printed_by(box, 'textmsg("up")') == ["up"]
         assert len(box.notices) == 1
         assert "502" in box.notices[0]
         assert "--port-base" in box.notices[0]

@@ -15,7 +15,7 @@ from box_support import (
     connect,
     inside,
     listening_socket,
-    printed,
+    printed_by,
     program,
 )
 from hypothesis import given
@@ -56,7 +56,7 @@ def test_beyond_the_budget_of_connections_an_open_returns_false_and_says_why(box
         port = server.getsockname()[1]
         opens = [f'textmsg(socket_open("127.0.0.1", {port}, "s{i}"))' for i in range(5)]
         again = ('socket_close("s0")', f'textmsg(socket_open("127.0.0.1", {port}, "again"))')
-        said = printed(box, *opens, *again, n=6)
+        said = printed_by(box, *opens, *again, n=6)
     assert said == ["True"] * 3 + ["False"] * 2 + ["True"]
     assert len(log_lines(box, "the box has 3 connections, close one first")) == 2
 
@@ -162,7 +162,7 @@ def test_two_hundred_scripts_that_wait_for_names_take_two_threads(monkeypatch):
             for _ in range(20):
                 reader.next()
         sock.sendall(b"stop program\n")
-        assert printed(box, 'textmsg("next")') == ["next"]
+        assert printed_by(box, 'textmsg("next")') == ["next"]
         resolver.end()
     assert len(resolver.asked) <= BUDGETS.look_ups_at_once
 
@@ -337,7 +337,7 @@ def test_a_line_that_comes_byte_by_byte_is_looked_at_once():
 def test_scripts_cannot_connect_to_the_control_port(box):
     hosts = ["127.0.0.1", "127.1", "127.0.0.9", "0.0.0.0", "0", "2130706433", "0x7f000001", "localhost"]
     opens = [f'textmsg(socket_open("{host}", {box.control_port}))' for host in hosts]
-    assert printed(box, *opens, n=len(hosts)) == ["False"] * len(hosts)
+    assert printed_by(box, *opens, n=len(hosts)) == ["False"] * len(hosts)
     lines = log_lines(box, "Not able to open socket")
     assert len(lines) == len(hosts)
     assert all("control API" in line for line in lines)
@@ -346,9 +346,9 @@ def test_scripts_cannot_connect_to_the_control_port(box):
 def test_nor_to_that_of_another_box_of_the_process_until_it_is_closed(box):
     with ControlBox(in_process=True, port_base=None, control_port=0) as other:
         port = other.control_port
-        assert printed(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["False"]
+        assert printed_by(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["False"]
     with socket.create_server(("127.0.0.1", port)):
-        assert printed(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["True"]
+        assert printed_by(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["True"]
 
 
 def test_nor_through_a_modbus_unit(box):
