@@ -2,6 +2,7 @@
 
 import gzip
 import math
+from contextlib import contextmanager
 
 import pytest
 from box_support import Bench, MessageReader, connect, inside
@@ -422,30 +423,7 @@ def test_inputs_act_on_rising_edges_of_the_installation_that_is_loaded(machine, 
     assert dashboard.ask("programState") == "STOPPED p.urp"
 
 
-def test_an_input_starts_nothing_in_local_control(tmp_path):
-    actions = listed("DigitalInputActions", "START")
-    (tmp_path / "default.installation").write_bytes(installation("<IOs>", actions, "</IOs>", start_up("")))
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("sleep(1000)")))
-    with (
-        ControlBox("ur5e", in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
-        Dashboard(box) as dashboard,
-    ):
-        assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
-        box.remote_control(False)
-        pulse(box, dashboard, 0)
-        dashboard.ask_all(*["running"] * 5)
-        assert dashboard.ask("running") == "Program running: false"
-        assert any("an input starts programs only in remote control" in entry.text for entry in box.log)
-
-
 # --- start-up
-
-
-def after_start_up(dashboard):
-    """What is loaded then: what a client asks to load comes after it."""
-    dashboard.ask("load installation default.installation")
-    return dashboard.ask("get loaded program")
 
 
 def start_up(line="digital_in[6]", level="true"):
@@ -455,15 +433,30 @@ def start_up(line="digital_in[6]", level="true"):
     )
 
 
+@contextmanager
+def starting_box(folder, *parts, statement="x = 1", robot="ur3"):
+    """A box with a default installation of these parts, a program that it names, and a client of the dashboard."""
+    (folder / "sub").mkdir()
+    (folder / "sub" / "p.urp").write_bytes(urp(script_line(statement)))
+    (folder / "default.installation").write_bytes(installation(*parts))
+    with (
+        ControlBox(robot, in_process=True, pace="lockstep", port_base=None, programs=folder) as box,
+        Dashboard(box) as dashboard,
+    ):
+        yield box, dashboard
+
+
+def after_start_up(dashboard):
+    """What is loaded then: what a client asks to load comes after it."""
+    dashboard.ask("load installation default.installation")
+    return dashboard.ask("get loaded program")
+
+
 @pytest.mark.parametrize(("line", "level"), [("digital_in[6]", True), ("digital_in[6]", False), ("go", True)])
 def test_the_default_installation_loads_a_program_that_a_line_starts(tmp_path, line, level):
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line('textmsg("started")')))
-    names = listed("DigitalInputNames", *[""] * 6, "go", "")
-    (tmp_path / "default.installation").write_bytes(installation(start_up(line, str(level).lower()), names))
+    parts = start_up(line, str(level).lower()), listed("DigitalInputNames", *[""] * 6, "go", "")
     with (
-        ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
-        Dashboard(box) as dashboard,
+        starting_box(tmp_path, *parts, statement='textmsg("started")') as (box, dashboard),
         connect(box, "primary") as sock,
     ):
         reader = MessageReader(sock)
@@ -476,20 +469,12 @@ def test_the_default_installation_loads_a_program_that_a_line_starts(tmp_path, l
 
 def test_what_a_client_loads_at_start_up_stays(tmp_path):
     """However soon it asks: the box loads its own program before."""
-    (tmp_path / "sub").mkdir()
-    for name in ("sub/p.urp", "other.urp"):
-        (tmp_path / name).write_bytes(urp(script_line("x = 1")))
-    (tmp_path / "default.installation").write_bytes(installation(start_up()))
-    with (
-        ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
-        Dashboard(box) as dashboard,
-    ):
+    (tmp_path / "other.urp").write_bytes(urp(script_line("x = 1")))
+    with starting_box(tmp_path, start_up()) as (box, dashboard):
         assert dashboard.ask("load other.urp") == "Loading program: /programs/other.urp"
         loaded = [entry.text for entry in box.log if entry.text.startswith("Loaded program")]
         assert loaded == ["Loaded program: /programs/sub/p.urp", "Loaded program: /programs/other.urp"]
-        for level in (False, True):
-            box.set_digital_input("standard", 6, level)
-            dashboard.ask_all("running", "running")
+        pulse(box, dashboard, 6)
         assert dashboard.ask_all("running", "get loaded program") == [
             "Program running: false",
             "Loaded program: /programs/other.urp",
@@ -497,13 +482,18 @@ def test_what_a_client_loads_at_start_up_stays(tmp_path):
 
 
 def test_a_start_line_that_is_no_input_is_said(tmp_path):
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "sub" / "p.urp").write_bytes(urp(script_line("x = 1")))
-    (tmp_path / "default.installation").write_bytes(installation(start_up("digital_in[9]")))
-    with (
-        ControlBox(in_process=True, pace="lockstep", port_base=None, programs=tmp_path) as box,
-        Dashboard(box) as dashboard,
-    ):
+    with starting_box(tmp_path, start_up("digital_in[9]")) as (box, dashboard):
         assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
         dashboard.ask("running")
         assert any("'digital_in[9]': it is no digital input" in entry.text for entry in box.log)
+
+
+def test_an_input_starts_nothing_in_local_control(tmp_path):
+    parts = "<IOs>", listed("DigitalInputActions", "START"), "</IOs>", start_up("")
+    with starting_box(tmp_path, *parts, statement="sleep(1000)", robot="ur5e") as (box, dashboard):
+        assert after_start_up(dashboard) == "Loaded program: /programs/sub/p.urp"
+        box.remote_control(False)
+        pulse(box, dashboard, 0)
+        dashboard.ask_all(*["running"] * 5)
+        assert dashboard.ask("running") == "Program running: false"
+        assert any("an input starts programs only in remote control" in entry.text for entry in box.log)
