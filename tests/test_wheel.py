@@ -49,19 +49,23 @@ def source(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def sdist(source, tmp_path_factory):
-    out = tmp_path_factory.mktemp("sdist")
-    code = f"from setuptools.build_meta import build_sdist; build_sdist({str(out)!r})"
+def built(source, tmp_path_factory):
+    """The folder with the sdist and the wheel, made by setuptools as pip asks it to."""
+    out = tmp_path_factory.mktemp("built")
+    code = f"from setuptools import build_meta as b; b.build_sdist({str(out)!r}); b.build_wheel({str(out)!r})"
     run(sys.executable, "-c", code, cwd=source)
-    (made,) = out.glob("*.tar.gz")
+    return out
+
+
+@pytest.fixture(scope="module")
+def sdist(built):
+    (made,) = built.glob("*.tar.gz")
     return made
 
 
 @pytest.fixture(scope="module")
-def wheel(source, tmp_path_factory):
-    out = tmp_path_factory.mktemp("wheel")
-    run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", out, source)
-    (made,) = out.glob("*.whl")
+def wheel(built):
+    (made,) = built.glob("*.whl")
     return made
 
 
