@@ -172,21 +172,10 @@ def test_where_a_box_cannot_run_that_is_said(monkeypatch, capsys):
     )
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("ur-emulator", "serve", "--host", "nowhere.invalid"), "no such name or address is known"),
-        (("ur-emulator", "ctl", "state", "--host", "nowhere.invalid"), "cannot be looked up"),
-        (("ur-client", "doctor", "--robot", "nowhere.invalid"), "cannot be looked up"),
-    ],
-)
-def test_a_host_that_does_not_exist_is_named(words, said):
-    done = run(*words)
+def test_a_host_that_does_not_exist_is_named_by_ctl():
+    done = run("ur-emulator", "ctl", "state", "--host", "nowhere.invalid")
     assert done.returncode == ExitCode.FAILED
-    told = done.stderr or done.stdout
-    assert said in told
-    assert "nowhere.invalid" in told
-    assert told.count("\n") == 1
+    assert re.fullmatch(r".*nowhere\.invalid.*cannot be looked up.*\n", done.stderr)
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from clients_support import served_box, wait_until
-from ur_rtde_support import RTDEIO, Dashboard, connected, sample, shifted
+from ur_rtde_support import RTDEIO, Dashboard, connected, servo_along_a_sine, shifted
 
 PERIOD = 0.002  # s
 HOME = (0.2238, -1.7062, -1.8784, -0.3550, 1.4132, 1.7304)  # rad
-LOOKAHEAD, GAIN = 0.1, 300
 
 
 @pytest.fixture(scope="module")
@@ -50,21 +49,7 @@ def test_joint_and_tool_moves(arm):
 
 
 def test_servo_j_streams_at_500_hz(arm):
-    amplitude, frequency, duration = 0.1, 1.0, 1.0  # rad, Hz, s
-    control, receive = arm.control, arm.receive
-    start = receive.getTimestamp()
-    rows = []
-    while (now := receive.getTimestamp() - start) < duration:
-        begin = control.initPeriod()
-        offset = amplitude * (1 - np.cos(2 * np.pi * frequency * now)) / 2
-        assert control.servoJ([HOME[0] + offset, *HOME[1:]], 0.5, 0.5, PERIOD, LOOKAHEAD, GAIN)
-        rows.append(sample(receive, "Timestamp", "TargetQ", "ActualQ")[1])
-        control.waitPeriod(begin)
-    assert control.servoStop(5.0)
-    arm.still()
-    target, actual = (np.array([row[k][0] for row in rows]) for k in (1, 2))
-    assert len(rows) > 50
-    assert np.ptp(target) > 0.8 * amplitude
+    target, actual = servo_along_a_sine(arm, PERIOD)
     assert np.abs(actual - target).max() < 2e-3
 
 

@@ -5,9 +5,7 @@ import time
 import numpy as np
 import pytest
 from clients_support import wait_until
-from ur_rtde_support import HOME, home, shifted
-
-LOOKAHEAD, GAIN = 0.1, 300
+from ur_rtde_support import GAIN, HOME, LOOKAHEAD, PERIOD, home, servo_along_a_sine, shifted
 
 
 def test_speed_j_until_it_is_stopped(arm):
@@ -34,41 +32,13 @@ def test_speed_l_moves_the_tool_along_a_line(arm):
     assert np.allclose(moved[[0, 3, 4, 5]], 0, atol=1e-4)
 
 
-def test_servo_j_follows_a_sine_within_its_lag(arm):
-    """Compared in robot time: the set-point of a cycle is the sine at some earlier time, by less than the lookahead."""
-    amplitude, frequency, duration = 0.1, 0.5, 2.4  # rad, Hz, s
-    control, receive = arm.control, arm.receive
-
-    def sine(t):
-        return HOME[0] + amplitude * (1 - np.cos(2 * np.pi * frequency * t)) / 2
-
-    start = receive.getTimestamp()
-    rows = []
-    while (now := receive.getTimestamp() - start) < duration:
-        begin = control.initPeriod()
-        target = home(sine(now) - HOME[0])
-        assert control.servoJ(target, 0.5, 0.5, 0.008, LOOKAHEAD, GAIN)
-        rows.append((now, *sampled(receive)))
-        control.waitPeriod(begin)
-    assert control.servoStop(5.0)
-    arm.still()
-    t, q, actual = np.array(rows).T
-    assert len(t) > 50
-    # The lag that explains best where the set-points were.
-    lags = np.arange(0.0, 0.3, 0.002)
-    errors = [np.sqrt(np.mean((q - sine(np.maximum(t - lag, 0))) ** 2)) for lag in lags]
-    best = int(np.argmin(errors))
-    assert 0.0 < lags[best] < LOOKAHEAD + 0.05
-    assert errors[best] < 0.05 * amplitude
-    assert np.abs(actual - q).max() < 0.02
-
-
-def sampled(receive):
-    return receive.getTargetQ()[0], receive.getActualQ()[0]
+def test_servo_j_follows_a_sine(arm):
+    target, actual = servo_along_a_sine(arm, PERIOD)
+    assert np.abs(actual - target).max() < 0.02
 
 
 def test_servo_j_arrives_and_holds(arm):
-    assert arm.control.servoJ(home(0.05, 0.02), 0.5, 0.5, 0.008, LOOKAHEAD, GAIN)
+    assert arm.control.servoJ(home(0.05, 0.02), 0.5, 0.5, PERIOD, LOOKAHEAD, GAIN)
     arm.until(lambda r: np.allclose(r.getTargetQ(), home(0.05, 0.02), atol=1e-4))
     assert arm.control.servoStop()
     assert arm.is_at(home(0.05, 0.02))
@@ -76,7 +46,7 @@ def test_servo_j_arrives_and_holds(arm):
 
 def test_servo_l_arrives(arm):
     goal = shifted(arm.receive.getTargetTCPPose(), 0, 0, 0.02)
-    assert arm.control.servoL(goal, 0.5, 0.5, 0.008, LOOKAHEAD, GAIN)
+    assert arm.control.servoL(goal, 0.5, 0.5, PERIOD, LOOKAHEAD, GAIN)
     arm.until(lambda r: np.allclose(r.getTargetTCPPose(), goal, atol=2e-4))
     assert arm.control.servoStop()
     assert arm.is_at_pose(goal)

@@ -23,6 +23,7 @@ Dashboard = dashboard_client.DashboardClient
 HOME = (0.3944, -1.7645, -2.0996, -0.1030, 1.2950, 1.8570)  # rad
 PERIOD = 0.008  # s
 SPEED, ACCELERATION = 3.0, 12.0  # rad/s, rad/s^2; no test is about slowness
+LOOKAHEAD, GAIN = 0.1, 300  # of servoJ
 CLOSE_Q = 5e-4  # rad; backlash and sag of the arm at rest
 CLOSE_X = 1e-3  # m, and rad for a rotation vector
 TRIES = 3  # before the last
@@ -144,3 +145,22 @@ def sample(receive, *names):
         if receive.getTimestamp() == stamp:
             return stamp, values
     raise AssertionError("no cycle lasted as long as reading it")
+
+
+def servo_along_a_sine(arm, period, amplitude=0.1):
+    """Stream a whole sine of the first joint [rad] in a second of robot time; return its set-points and angles."""
+    start = arm.receive.getTimestamp()
+    rows = []
+    while (now := arm.receive.getTimestamp() - start) < 1.0:
+        begin = arm.control.initPeriod()
+        offset = amplitude * (1 - np.cos(2 * np.pi * now)) / 2
+        q = [arm.home[0] + offset, *arm.home[1:]]
+        assert arm.control.servoJ(q, 0.5, 0.5, period, LOOKAHEAD, GAIN)
+        rows.append([values[0] for values in sample(arm.receive, "TargetQ", "ActualQ")[1]])
+        arm.control.waitPeriod(begin)
+    assert arm.control.servoStop(5.0)
+    arm.still()
+    assert len(rows) > 50
+    target, actual = np.array(rows).T
+    assert np.ptp(target) > 0.8 * amplitude
+    return target, actual

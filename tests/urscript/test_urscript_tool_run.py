@@ -214,17 +214,6 @@ def test_the_same_seed_is_the_same_run(run):
     assert told("--seed", "1") != told("--seed", "2")
 
 
-def test_tracing_shows_the_lines_between_the_moves(run):
-    result = run(program_of("x = 1", f"movej({HOME})", "textmsg(x)"), "--trace")
-    assert [line[:10] for line in result.stdout.splitlines()[:3]] == [
-        "     0  p:",
-        "     0  p:",
-        "     0  p:",
-    ]
-    last = [line for line in result.stdout.splitlines() if "p:4: textmsg(x)" in line]
-    assert int(last[0].split()[0]) > 100
-
-
 def test_ctrl_c_ends_it_with_a_line_and_without_a_traceback(tmp_path):
     (tmp_path / "a.script").write_text(
         'textmsg("on")\nwhile True:\n  speedj([0,0,0,0,0,0.1], 1, 0.1)\n  speedj([0,0,0,0,0,-0.1], 1, 0.1)\nend\n'
