@@ -32,7 +32,9 @@ def turning(robot, joint, *, payload=0.0, stop="stopj(100)", limited=True):
     speed = 0.75 * robot_by_name(robot).qd_max[joint]
     qd = [speed * (i == joint) for i in range(6)]
     bench = ESeriesBench(robot=robot)
-    bench.run(program(f"set_payload({payload}, [0, 0, 0.05])", f"movej({list(START[joint])}, 1, 0.7)"))
+    bench.run(
+        program(f"set_payload({payload}, [0, 0, 0.05])", f"set_pos({list(START[joint])})", "sleep(0.2)")
+    )
     bench.snapshots.clear()
     if not limited:
         bench.controller.state.motion.braking = None
@@ -85,7 +87,7 @@ def test_a_stop_that_the_drives_can_give_is_as_hard_as_asked_for():
 
 def test_a_cb3_arm_brakes_as_asked_for():
     bench = Bench(robot="ur10")
-    bench.run(program(f"movej({list(START[0])}, 1, 0.7)", "speedj([1, 0, 0, 0, 0, 0], 2, 0.8)", "stopj(100)"))
+    bench.run(program(f"set_pos({list(START[0])})", "speedj([1, 0, 0, 0, 0, 0], 2, 0.8)", "stopj(100)"))
     speeds = [frame.target_qd[0] for frame in bench.snapshots]
     assert max(before - after for before, after in pairwise(speeds)) == pytest.approx(100 * 0.008)
 
@@ -171,7 +173,7 @@ class Turning(Bench):
         generation = ROBOTS[robot].generation
         super().__init__(robot=robot, generation=generation, **options)
         self.period = generation.period_s
-        self.run(f"def m():\n  movej({CLEAR_OF_THE_END[joint]})\nend\n")
+        self.run(f"set_pos({CLEAR_OF_THE_END[joint]})\n")
         self.start(client_program(acceleration, self.period), loaded=loaded)
         self.tick(3)
         (self.client,) = self.network.sockets
