@@ -1,12 +1,19 @@
-"""How errors of programs surface: texts, places, levels and order on port 30001; silence on 30002."""
+"""How errors and lives of programs are told: on port 30001, with texts, places, levels and order; in the log.
+
+Port 30002 says nothing of them.
+"""
+
+import threading
 
 import pytest
-from box_support import VERSION, Bench, MessageReader, connect
+from box_support import TIMEOUT, VERSION, Bench, FrameReader, MessageReader, connect
+from dashboard_support import Dashboard
 
 from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,
     ReportLevel,
+    RequestedType,
     RobotMessage,
     RuntimeExceptionMessage,
     StartupMessage,
@@ -14,12 +21,17 @@ from protocol.primary.messages import (
     VersionMessage,
 )
 from protocol.primary.packages import RobotState, decode_package
-from protocol.ur_types import ProgramState
+from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
+from ur_emulator.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
+from ur_emulator.commands.programs import ResumeProgram, StartProgram
+from ur_emulator.commands.safety import UnlockProtectiveStop
+from ur_emulator.controller import events
 from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
 from ur_emulator.models.generations import CB3
 from ur_emulator.ports.primary.port import PrimaryPort
 from ur_emulator.ports.primary.robot_state import StateEncoder
+from urscript import compile_program
 
 BUDGET = (
     "The program used too much time without instructing the robot what to do. "
@@ -213,3 +225,158 @@ def test_what_a_program_leaves_and_what_it_does_not():
     assert bench.run("def g():\n  textmsg(get_flag(3), read_output_float_register(2))\nend\n") == ["True0.5"]
     assert bench.now.tcp_offset[2] == 0.1
     assert bench.now.payload == 1.5
+
+
+# --- the log
+
+
+@pytest.fixture
+def new_box():
+    """A box with an empty log."""
+    with ControlBox(pace="lockstep", port_base=None) as box:
+        yield box
+
+
+def texts(entries, source=None):
+    return [entry.text for entry in entries if source in (None, entry.source)]
+
+
+def run(new_box, program):
+    """Send a program and wait for its end."""
+    with connect(new_box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.state()
+        sock.sendall(program.encode("latin-1"))
+        while reader.message(KeyMessage).title != "PROGRAM_XXX_STOPPED":
+            pass
+
+
+def test_the_life_of_a_program(new_box):
+    run(new_box, 'def hello():\n  textmsg("x = ", 5)\nend\n')
+    assert texts(new_box.log, "Program") == ["Starting program: hello", "x = 5", "Program stopped: hello"]
+    (started, *_) = [entry for entry in new_box.log if entry.source == "Program"]
+    assert started.level is ReportLevel.INFO
+    assert started.time == started.tick * 0.008 >= 60
+
+
+@pytest.mark.parametrize(
+    ("program", "line"),
+    [
+        ("def f():\n  y = nowhere(1)\nend\n", "Compile error: name 'nowhere' is not defined"),
+        ("sec s():\n  x = [1][2]\nend\n", "Secondary program: Runtime error (2:7)"),
+    ],
+)
+def test_errors_have_the_words_of_a_log(new_box, program, line):
+    with connect(new_box, "primary") as sock:
+        sock.sendall(program.encode())
+        MessageReader(sock).message((KeyMessage, RuntimeExceptionMessage))
+    (fault,) = [entry for entry in new_box.log if entry.level is ReportLevel.FAULT]
+    assert fault.text.startswith(line)
+
+
+def test_a_protective_stop_and_what_follows(new_box):
+    with connect(new_box, "realtime") as frames:
+        reader = FrameReader(frames)
+        program = compile_program("def f():\n  protective_stop()\n  sleep(1)\nend\n")
+        new_box.submit(StartProgram(program, loaded=True))
+        reader.until(lambda f: f.runtime_state == ProgramState.PAUSED)
+        new_box.submit(UnlockProtectiveStop())
+        reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
+        new_box.submit(ResumeProgram())
+        reader.until(lambda f: f.runtime_state == ProgramState.STOPPED)
+    found = [(e.source, e.code, e.text) for e in new_box.log if e.source != "Client"]
+    assert found == [
+        ("Program", "", "Starting program: f"),
+        ("Controller", "C209A0", "Protective stop requested"),
+        ("Safety", "", "Safety mode: PROTECTIVE_STOP"),
+        ("Program", "", "Program paused: f"),
+        ("Safety", "", "Safety mode: NORMAL"),
+        ("Program", "", "Program resumed: f"),
+        ("Program", "", "Program stopped: f"),
+    ]
+    assert [e.level for e in new_box.log if e.code] == [ReportLevel.WARNING]
+    ticks = [e.tick for e in new_box.log]
+    assert ticks == sorted(ticks)
+
+
+def test_modes_and_clients_are_noted(new_box):
+    with Dashboard(new_box) as dashboard:
+        dashboard.ask("power off")
+        dashboard.until("robotmode", "Robotmode: POWER_OFF")
+    assert "Robot mode: POWER_OFF" in texts(new_box.log, "Controller")
+    (first, *_) = texts(new_box.log, "Client")
+    assert first.endswith(f"connected to dashboard port {new_box.ports.dashboard}")
+
+
+def test_who_leaves_is_noted(new_box):
+    with connect(new_box, "secondary") as sock:
+        mine = "{}:{}".format(*sock.getsockname())
+        MessageReader(sock).state()
+    run(new_box, "textmsg(1)\n")
+    notes = [text for text in texts(new_box.log, "Client") if text.startswith(mine)]
+    port = new_box.ports.secondary
+    assert notes == [
+        f"{mine} connected to secondary port {port}",
+        f"{mine} disconnected from secondary port {port}",
+    ]
+
+
+def test_a_socket_that_does_not_open_is_noted(new_box):
+    run(new_box, 'def f():\n  socket_open("127.0.0.1", 1, "peer")\nend\n')
+    assert "Not able to open socket [peer] to host: 127.0.0.1 at port: 1: Connection refused" in texts(
+        new_box.log, "Program"
+    )
+
+
+def test_the_log_forgets_the_oldest_and_cuts_long_lines():
+    log = BoxLog(CB3)
+    for i in range(MAX_ENTRIES + 10):
+        log.note(events.TextPrinted(f"line {i}"), i)
+    assert len(log.entries) == MAX_ENTRIES
+    assert log.entries[0].text == "line 10"
+    log.note(events.TextPrinted("x" * 10**6), 1)
+    assert len(log.entries[-1].text) == MAX_TEXT
+    assert log.entries[-1].text.endswith("...")
+
+
+EVENTS = [
+    (
+        events.ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blends"),
+        "WARNING Controller: Overlapping Blends",
+    ),
+    (events.ErrorReported(153, 2, ReportLevel.WARNING, "deviates"), "WARNING Controller: C153A2 deviates"),
+    (events.PopupShown("T", "x", True, False, False), "WARNING Program: Popup: T: x"),
+    (events.PopupShown("T", "x", False, True, False), "FAULT Program: Popup: T: x"),
+    (events.PopupShown("T", "x", False, False, False), "INFO Program: Popup: T: x"),
+    (events.ScriptFailed(1, 2, "wire"), "FAULT Program: wire"),
+    (events.ScriptFailed(1, 2, "wire", True, "log"), "FAULT Program: Secondary program: log"),
+    (events.TextPrinted("a\nb\n"), r"INFO Program: a\nb"),
+    (
+        events.ValueRequested(1, RequestedType.INTEGER, "n?"),
+        "INFO Program: Waiting for a value (integer): n?",
+    ),
+]
+
+
+@pytest.mark.parametrize(("event", "line"), EVENTS, ids=[line for _, line in EVENTS])
+def test_lines_of_events(event, line):
+    log = BoxLog(CB3)
+    heard = []
+    log.follow(heard.append)
+    log.note(event, 7500)
+    assert str(log.entries[0]) == f"60.000 {line}"
+    assert heard == list(log.entries)
+
+
+def test_followers_hear_what_happens(new_box):
+    heard, done = [], threading.Event()
+
+    def follower(entry: LogEntry):
+        heard.append(entry)
+        if entry.text.startswith("Program stopped"):
+            done.set()
+
+    new_box.follow_log(follower)
+    run(new_box, "textmsg(1)\n")
+    assert done.wait(TIMEOUT)
+    assert heard[-len(new_box.log) :][-1] in new_box.log
