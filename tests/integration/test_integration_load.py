@@ -1,6 +1,6 @@
 """Clients that come and go in numbers, read late or never, and a process that gets nothing more from the system.
 
-The box keeps nothing of clients that have gone. Without descriptors or threads what needs them fails, and no more.
+The box keeps nothing of clients that have gone. Without descriptors what needs one fails, and no more.
 """
 
 import gc

@@ -7,6 +7,7 @@ Tests spoil it through `on_tick`, or by setting its attributes.
 
 from __future__ import annotations
 
+import dataclasses
 import struct
 from collections import deque, namedtuple
 from types import SimpleNamespace
@@ -139,7 +140,7 @@ class FakeRobot:
         return self.clock
 
     def connect(self, host, port, timeout):
-        kind = {v: k for k, v in vars_of(Ports.standard()).items()}[port]
+        kind = {v: k for k, v in dataclasses.asdict(Ports.standard()).items()}[port]
         if kind == "dashboard" and not self.has_dashboard:
             raise DriverError(f"{host}:{port} refuses the connection")
         pipe = self.pipes[kind] = Pipe(self, kind)
@@ -329,10 +330,6 @@ class FakeRobot:
 
     def report_error(self, level=3):
         self.report(ErrorCodeMessage(code=153, argument=2, report_level=level, text="position deviates"))
-
-
-def vars_of(ports):
-    return {name: getattr(ports, name) for name in type(ports).__dataclass_fields__}
 
 
 def package(body):

@@ -80,6 +80,9 @@ def test_names_say_kind_points_and_seed() -> None:
     assert generate_movement("power_law", 4, 9, name="mine").provenance["twin"] == "lognorm_4_seed9"
 
 
+# --- durations
+
+
 def test_fitts_law() -> None:
     """Every doubling of the distance, or halving of the width, costs one slope more."""
     trajectory = Fitts(intercept=0.2, slope=0.15, width=0.02)
@@ -133,6 +136,9 @@ def test_windows_overlap_by_their_share_and_fill_the_total(
     np.testing.assert_allclose(lengths / lengths[0], np.array(proportions) / proportions[0])
     shared = begins[:-1] + lengths[:-1] - begins[1:]
     np.testing.assert_allclose(shared, overlap * np.minimum(lengths[:-1], lengths[1:]), atol=1e-9 * total)
+
+
+# --- variability
 
 
 @settings(max_examples=60)
@@ -213,6 +219,9 @@ def test_rests_of_the_original_are_kept() -> None:
     ends = [s.timing.lognormal.time_at_deviation(FULL_COVERAGE) for s in copy.trajectory.strokes]
     assert min(begins) == pytest.approx(0.1, abs=1e-9)
     assert copy.duration - max(ends) == pytest.approx(0.1, abs=1e-9)
+
+
+# --- the library
 
 
 PAPER, ARCS = library_names("paper"), library_names("arcs")
@@ -296,7 +305,10 @@ def test_random_targets_follow_their_rules(seed: int, n: int) -> None:
     np.testing.assert_array_equal(points, random_targets(n, UR3_BOX, random.Random(seed), rules))
 
 
-HUMANS = library_names("paper")[5:]
+# --- the recipe of the paper
+
+
+HUMANS = PAPER[5:]
 #: With the seed that each was made by, in order.
 SEEDED = [pytest.param(name, seed, id=name) for seed, name in enumerate(HUMANS, start=1)]
 
@@ -419,6 +431,9 @@ def test_corners_are_stops_or_blends_with_a_stated_setback() -> None:
         assert off.any()
         nearest = np.linalg.norm(p[off][:, None] - human.target_points[1:-1], axis=2).min(axis=1)
         assert nearest.max() < setback + 1e-6
+
+
+# --- fitting into the workspace
 
 
 SHARES = np.linspace(0.0, 1.0, 1501)
