@@ -82,8 +82,8 @@ class RpcBench(Bench):
 
 def test_a_text_is_utf_8_in_a_program():
     bench = RpcBench()
-    call = bench.call('"\xc3\xa9"')
-    assert call.arguments == ["\u00e9"]
+    call = bench.call('"\xc3\xa9", "\xe9"')
+    assert call.arguments == ["\u00e9", "\xe9"]  # what is none goes out byte by byte
     call.answer("\u00e9")
     bench.tick()
     assert bench.texts[-1] == "got \xc3\xa9"
