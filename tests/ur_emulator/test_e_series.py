@@ -451,7 +451,7 @@ def test_the_raw_channel_has_the_payload_and_the_axes_of_the_flange():
 
 @pytest.mark.parametrize(
     ("robot", "fidelity"),
-    [("ur3e", "ideal"), ("ur3e", "poor"), ("ur5e", "typical"), ("ur10e", "ideal"), ("ur10e", "poor")],
+    [("ur3e", "poor"), ("ur5e", "typical"), ("ur10e", "ideal"), ("ur10e", "poor")],
 )
 def test_force_mode_holds_ten_newtons_on_the_table(robot, fidelity):
     """A real UR5e asked for 10 N held 8.95 to 13.26 N over its work space (doi 10.3390/s26051709)."""

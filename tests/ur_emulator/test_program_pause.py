@@ -24,7 +24,6 @@ from ur_emulator.controller.events import (
     ProgramStarted,
     ProgramStopped,
     SafetyModeChanged,
-    ScriptFailed,
 )
 from ur_emulator.ports.primary.robot_state import state_records
 
@@ -337,17 +336,6 @@ def test_threads_wait_until_the_arm_is_back_on_its_path(bench):
     assert bench.controller.state.registers.outputs.integers[0] == count + 1
 
 
-def test_another_program_is_refused_while_the_stop_lasts_and_the_first_stays(stopped):
-    stopped.start('def other():\n  textmsg("other")\nend\n')
-    stopped.tick(10)
-    (failed,) = [e for e in stopped.events if isinstance(e, ScriptFailed)]
-    assert "other not started: the robot is in PROTECTIVE_STOP" in failed.text
-    assert stopped.now.runtime_state == ProgramState.PAUSED
-    stopped.tick(5, UNLOCK)
-    stopped.tick(600, RESUME)
-    assert stopped.texts == ["there"]
-
-
 def test_after_the_unlocking_another_program_takes_its_place(stopped):
     stopped.tick(1, UNLOCK)
     stopped.run("def other():\n  movej([0.1,-1.6,-1.9,-0.2,1.2,1.6])\nend\n")
@@ -502,23 +490,6 @@ def test_flags_of_the_states(bench):
     bench.tick(5, PAUSE)
     bench.tick(1, STOP)
     assert flags(bench.now) == stopped
-
-
-def test_time_stands_still_over_a_pause_in_lockstep(box):
-    with connect(box, "secondary") as sock, connect(box, "realtime") as frames:
-        reader = FrameReader(frames)
-        sock.sendall(COUNT.encode())
-        reader.until(lambda f: f.runtime_state == ProgramState.PLAYING)
-        sock.sendall(b"pause program\n")
-        last = reader.until(lambda f: f.runtime_state == ProgramState.PAUSED)
-        same = 0
-        while same < 20:
-            frame = reader.next()
-            same = same + 1 if frame.timestamp == last.timestamp else 0
-            last = frame
-        assert last.runtime_state == ProgramState.PAUSED
-        sock.sendall(b"resume program\n")
-        assert reader.until(lambda f: f.runtime_state == ProgramState.PLAYING).timestamp > last.timestamp
 
 
 def test_a_client_that_reuploads_after_a_protective_stop(box):

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from box_support import Bench
-from states_support import BRAKING, ENDLESS, failures, infos, modes, moving, power_up
+from states_support import BRAKING, ENDLESS, failures, modes, moving, power_up
 
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
 from ur_emulator.commands.programs import PauseProgram, ResumeProgram
@@ -211,7 +212,9 @@ def test_programs_and_resuming_are_refused_while_the_safeguard_is_open(bench):
     bench.tick(10, ResumeProgram())
     assert "SAFEGUARD_STOP" in failures(bench)[-1]
     assert "close the safeguard" in failures(bench)[-1]
-    assert "stays paused: the robot is in SAFEGUARD_STOP" in infos(bench)[-1]
+    report = [event for event in bench.events if isinstance(event, ErrorReported)][-1]
+    assert "stays paused: the robot is in SAFEGUARD_STOP" in report.text
+    assert report.level is ReportLevel.INFO  # a client of the public library ends its script on warnings
     assert bench.now.runtime_state == ProgramState.PAUSED
 
 
