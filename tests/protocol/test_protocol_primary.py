@@ -73,6 +73,8 @@ MESSAGES = [
      f"00000020 14 {NO_TIME} fd 05 00000001 ffffffff 03 00000002 00000005"),
     ("3.15.8", M.PopupMessage(request_id=1, is_warning=True, is_blocking=True, title="T", text="text"),
      f"00000020 14 {NO_TIME} fd 02 00000001 00000008 01 00 01 01 54 {b'text'.hex()}"),
+    ("3.15.8", M.RequestValueMessage(timestamp=5, request_id=7, requested_type=M.RequestedType.FLOAT, text="x?"),
+     f"00000019 14 {5:016x} fd 09 00000007 00000002 {b'x?'.hex()}"),
     # the forms of software up to 3.2
     ("3.2", M.VersionMessage(major=3, minor=2, bugfix=19171, build_date="May 01 2016, 00:00:00"),
      f"00000034 14 {NO_TIME} fe 03 09 {b'URControl'.hex()} 03 02 00004ae3 "
