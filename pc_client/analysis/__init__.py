@@ -1,7 +1,7 @@
 """From recordings to figures of merit, Table I and the report.
 
-    track         the TCP path of one recording, reference and actual at the same time stamps
-    measures      the signal-to-noise ratio of the TCP velocity (Eq. 10), errors, and where the rest is lost
+    measures      the TCP path of a recording; the signal-to-noise ratio of its velocity (Eq. 10), errors,
+                  and where the rest is lost
     run           a run as signals, what is measured on it, its figure
     table         Table I: ours beside the paper's
     figures       bars and speeds of all movements; loads matplotlib, so import it only to draw

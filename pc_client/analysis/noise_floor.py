@@ -21,9 +21,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pc_client.analysis.measures import decibels, rest_samples, speed_noise
+from pc_client.analysis.measures import decibels, rest_samples, speed, speed_noise, velocity
 from pc_client.analysis.run import MeasuredRun
-from pc_client.analysis.track import speed, velocity
 from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.kinematics.arms import ROBOTS

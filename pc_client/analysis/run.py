@@ -19,13 +19,16 @@ from pc_client.analysis.measures import (
     Budget,
     Errors,
     Snr,
+    TcpTrack,
     error_budget,
     joint_errors,
     measure_errors,
     measure_snr,
     position_errors,
+    rows_per_sample,
+    speed,
+    track_of,
 )
-from pc_client.analysis.track import TcpTrack, rows_per_sample, speed, track_of
 from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance, Source, origin_of

@@ -5,7 +5,7 @@ import pytest
 from integration_support import at, free_port_base
 
 import pc_client as ur
-from pc_client.analysis.track import speed
+from pc_client.analysis.measures import speed
 from pc_client.driver.report import probe
 from pc_client.driver.transport import TcpNetwork
 from ur_emulator import ControlBox

@@ -13,11 +13,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from recording_samples import N_VALUES, PERIOD, SIGNALS, append_rows, lognormal, provenance, record_movement
 
-from pc_client.analysis.measures import PARTS, Snr, measure_snr, rest_noise, snr_db, speed_noise
+from pc_client.analysis.measures import (
+    PARTS,
+    Snr,
+    measure_snr,
+    rest_noise,
+    snr_db,
+    speed,
+    speed_noise,
+    track_of,
+)
 from pc_client.analysis.noise_floor import floor_db, step_covariance, unrepeatable_power
 from pc_client.analysis.run import MeasuredRun, analyse_run
 from pc_client.analysis.table import build_table
-from pc_client.analysis.track import speed, track_of
 from pc_client.control.loop import LoopModel, velocity_response
 from pc_client.errors import RecordingError
 from pc_client.kinematics.model import robot_model, tcp_positions
