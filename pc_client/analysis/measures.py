@@ -59,7 +59,7 @@ from pc_client.recording.rows import Phase
 # Fewer samples than this are no movement: 80 ms.
 _MIN_MOVEMENT_ROWS = 10
 
-SHORTEST_CYCLE, LONGEST_CYCLE = 0.5e-3, 0.05
+_SHORTEST_CYCLE, _LONGEST_CYCLE = 0.5e-3, 0.05
 """Median steps of time stamps outside are of no robot [s]: UR's control cycles are 8 and 2 ms."""
 
 _MOST = MappingProxyType(
@@ -132,10 +132,10 @@ def track_of(recording: Recording) -> TcpTrack:
     if not np.all(np.diff(t[new_rows]) > 0.0):
         raise RecordingError(f"{recording.path} has time stamps that go back; those of a robot do not")
     cycle = float(np.median(np.diff(t[new_rows])))
-    if not SHORTEST_CYCLE <= cycle <= LONGEST_CYCLE:
+    if not _SHORTEST_CYCLE <= cycle <= _LONGEST_CYCLE:
         raise RecordingError(
-            f"{recording.path} has time stamps {cycle:g} s apart; {SHORTEST_CYCLE:g} to {LONGEST_CYCLE:g} s "
-            "are a robot's"
+            f"{recording.path} has time stamps {cycle:g} s apart; {_SHORTEST_CYCLE:g} to "
+            f"{_LONGEST_CYCLE:g} s are a robot's"
         )
     each = rows_per_sample(t[new_rows])
     rows = new_rows[moving[0] % each :: each]
@@ -161,7 +161,8 @@ def _movement_of(recording: Recording, rows: NDArray[np.intp]) -> NDArray[np.int
     moving = np.flatnonzero(recording.rows_of(Phase.MOVEMENT)[rows])
     if len(moving) < _MIN_MOVEMENT_ROWS:
         raise RecordingError(
-            f"{recording.path} has {len(moving)} samples of movement; at least {_MIN_MOVEMENT_ROWS} are needed"
+            f"{recording.path} has {len(moving)} samples of movement; at least {_MIN_MOVEMENT_ROWS} "
+            "are needed"
         )
     return moving
 
@@ -180,7 +181,7 @@ def speed(t: Array, p: Array) -> Array:
     return length
 
 
-class ShiftedReference:
+class _ShiftedReference:
     """The reference path, delayed by any time: what an arm would do whose only fault is a lag.
 
     The reference is shifted rather than the measurement, because it is smooth: interpolating it changes
@@ -199,7 +200,7 @@ class ShiftedReference:
 
 
 # Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
-MIN_LAG_S, MAX_LAG_S = -0.1, 0.4
+_MIN_LAG_S, _MAX_LAG_S = -0.1, 0.4
 
 SPLIT_HZ = 6.0
 """Between the slow and the fast rest of the budget."""
@@ -251,7 +252,7 @@ def measure_snr(track: TcpTrack) -> Snr:
     raw = [
         snr_db(f(track.t, track.p_ref)[steps], f(track.t, track.p_actual)[steps]) for f in (speed, velocity)
     ]
-    reference = ShiftedReference(track)
+    reference = _ShiftedReference(track)
     speed_lag = _best_lag(track, reference, speed)
     velocity_lag = _best_lag(track, reference, velocity)
     return Snr(
@@ -264,7 +265,7 @@ def measure_snr(track: TcpTrack) -> Snr:
     )
 
 
-def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _VelocityOf) -> float:
+def _best_lag(track: TcpTrack, reference: _ShiftedReference, velocity_of: _VelocityOf) -> float:
     """Return the delay in s of the reference that leaves the least square error.
 
     A scan in steps of one control cycle finds the valley, a bounded search its bottom, far below one cycle.
@@ -272,8 +273,8 @@ def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _Veloci
     needs, so that the sum is a smooth function of the lag.
     """
     cycle = float(np.median(np.diff(track.t)))
-    start = max(0, track.movement.start + math.floor(MIN_LAG_S / cycle))
-    stop = min(len(track.t), track.movement.stop + math.ceil(MAX_LAG_S / cycle))
+    start = max(0, track.movement.start + math.floor(_MIN_LAG_S / cycle))
+    stop = min(len(track.t), track.movement.stop + math.ceil(_MAX_LAG_S / cycle))
     window = slice(start, stop)
     t = track.t[window]
     actual = velocity_of(t, track.p_actual[window])
@@ -281,7 +282,7 @@ def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _Veloci
     def error(lag: float) -> float:
         return float(np.sum(np.square(actual - velocity_of(t, reference.at(lag, window)))))
 
-    lags = np.arange(MIN_LAG_S, MAX_LAG_S + cycle / 2, cycle)
+    lags = np.arange(_MIN_LAG_S, _MAX_LAG_S + cycle / 2, cycle)
     coarse = float(lags[np.argmin([error(lag) for lag in lags])])
     fine = minimize_scalar(
         error, bounds=(coarse - cycle, coarse + cycle), method="bounded", options={"xatol": 1e-7}
@@ -290,7 +291,7 @@ def _best_lag(track: TcpTrack, reference: ShiftedReference, velocity_of: _Veloci
 
 
 def _shifted_pair(
-    track: TcpTrack, reference: ShiftedReference, lag_s: float, velocity_of: _VelocityOf
+    track: TcpTrack, reference: _ShiftedReference, lag_s: float, velocity_of: _VelocityOf
 ) -> tuple[Array, Array]:
     """Return reference and actual over the movement, both taken `lag_s` later at the robot.
 
@@ -346,7 +347,7 @@ def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Error
     """Measure position and joint errors over the movement; the best shift is that of the velocity [s]."""
     moving = track.movement
     error = track.p_actual[moving] - track.p_ref[moving]
-    path_error = track.p_actual[moving] - ShiftedReference(track).at(lag_s, moving)
+    path_error = track.p_actual[moving] - _ShiftedReference(track).at(lag_s, moving)
     offset = path_error.mean(axis=0)
     distance = 1e3 * np.linalg.norm(error, axis=1)
     path_distance = 1e3 * np.linalg.norm(path_error - offset, axis=1)
@@ -455,7 +456,7 @@ def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
     ref_speed = speed(track.t, track.p_ref)[steps]
     error_power = _power(speed(track.t, track.p_actual)[steps] - ref_speed)
 
-    reference, actual = _shifted_pair(track, ShiftedReference(track), lag_s, speed)
+    reference, actual = _shifted_pair(track, _ShiftedReference(track), lag_s, speed)
     cycle = float(np.median(np.diff(track.t)))
     error = actual - reference
     after_shift = min(_power(error), error_power)
