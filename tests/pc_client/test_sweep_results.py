@@ -14,7 +14,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from sweep_samples import case, figures, invented, table_of, table_with
 
@@ -290,6 +290,7 @@ def test_the_map_prefers_the_gains():
     assert map_axes(rows) == ("gain_i", "slew_limit")
 
 
+@settings(max_examples=20)
 @given(
     ps=st.sets(st.integers(1, 9), min_size=2, max_size=4),
     qs=st.sets(st.integers(1, 9), min_size=2, max_size=4),
