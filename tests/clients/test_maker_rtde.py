@@ -249,6 +249,10 @@ def test_the_control_loop(box, recipes):
             for n, value in enumerate(goal):
                 setattr(setp, f"input_double_register_{n}", value)
             assert client.send(setp)
+            # The program copies a pose in the cycle after the one in which it comes: only then it may move there.
+            sent = newest(watcher).timestamp
+            while newest(watcher).timestamp < sent + 10 * box.period:
+                client.send(watchdog)
             watchdog.input_int_register_0 = 1
             until(0)
             watchdog.input_int_register_0 = 0
