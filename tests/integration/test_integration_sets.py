@@ -29,8 +29,8 @@ def test_preview_follows_the_paper_set_far_better_than_the_paper(standard_box, u
 
 @pytest.mark.slow
 def test_best_is_within_one_decibel_of_the_floor_on_the_third_run(standard_box, ur_client, tmp_path):
-    names = "lognorm_4_1,lognorm_5_2,uniform_4_1,uniform_5_2"
-    data = table(ur_client, standard_box, tmp_path / "out", "--controller", "best", "--movements", names)
+    data = table(ur_client, standard_box, tmp_path / "out", "--controller", "best")
+    assert len(data["rows"]) == 10  # what one movement shows of the gears serves the others
     for row in data["rows"]:
         assert row["snr_db"][2] >= row["noise_floor_db"] - 1.0
     assert fmean(row["snr_db"][2] for row in data["rows"]) > fmean(row["snr_db"][0] for row in data["rows"])

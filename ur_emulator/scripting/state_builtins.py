@@ -24,6 +24,8 @@ _SYSTEM_CLOCK = 2
 # Units of work of an iteration of the inverse kinematics (32 µs): 2 or 3 along a path, 160 for a pose that is
 # just out of reach.
 _ITERATION = 650
+# So many are in what a call costs anyway, see `urscript.catalogue.costs`.
+_INCLUDED = 5
 
 
 class StateBuiltins(BuiltinGroup):
@@ -156,7 +158,7 @@ class StateBuiltins(BuiltinGroup):
 
     def _inverse(self, thread: ScriptThread, pose: Pose, q_near: Any, tcp: Any) -> tuple[float, ...] | None:
         solution = self._model.inverse(tuple(pose), self._joints(q_near), self._tool(tcp))
-        thread.charge(0, _ITERATION * self._model.n_iterations)
+        thread.charge(0, _ITERATION * max(0, self._model.n_iterations - _INCLUDED))
         return solution
 
     def _joints(self, value: Any) -> tuple[float, ...]:

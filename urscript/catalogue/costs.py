@@ -20,8 +20,8 @@ OF_THREAD: Final = 100
 _NAMES: Final = {
     20_000: "set_payload_from_attached_frames",  # 1 ms of 25 frames
     11_000: "set_pos",  # 550 µs: the arm is placed and looked at for contacts
-    # 80 µs without the iterations, which are charged when they are done
-    1_600: "get_inverse_kin get_inverse_kin_has_solution is_within_safety_limits",
+    # 240 µs with five iterations; more are charged when they are done
+    4_800: "get_inverse_kin get_inverse_kin_has_solution is_within_safety_limits",
     2_000: "delete_frame",
     1_000: "textmsg popup "  # with the log and the clients of port 30001
     "get_pose convert_pose move_frame attach_frame add_frame",  # 50 µs at the end of a chain of 30 frames
