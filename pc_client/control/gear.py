@@ -180,7 +180,9 @@ class MotorReference:
 class GearObserver:
     """Collects runs; each makes the waves better known.
 
-    The identified loop says what of a motion the commands explain; the control cycle is the period [s].
+    Args:
+        loop: says what of a motion the commands explain.
+        period: control cycle [s].
     """
 
     def __init__(self, loop: LoopModel, period: float) -> None:

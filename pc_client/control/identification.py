@@ -38,7 +38,12 @@ _SIGNS = (1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
 
 
 class Excitation:
-    """Raised-cosine velocity pulses of a length [s], out and back, around a start posture (6,) [rad]."""
+    """Raised-cosine velocity pulses, out and back, around a start posture.
+
+    Args:
+        q_start: (6,) where the arm stands [rad].
+        pulse: length of one pulse [s].
+    """
 
     def __init__(self, q_start: Sequence[float], pulse: float = PULSE) -> None:
         self._q_start = tuple(q_start)

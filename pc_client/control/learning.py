@@ -67,9 +67,16 @@ class LearningFilter:
 def design_filter(
     loop: LoopModel, period: float, *, learning_gain: float, gain_p: float, gain_i: float
 ) -> LearningFilter:
-    """Choose Q for an identified loop, its feedback [1/s, 1/s2] and a gain of learning, 0..1.
+    """Choose Q for an identified loop.
 
-    A `contraction` of 1 or more means that this loop must not learn. The control cycle is the period [s].
+    Args:
+        period: control cycle [s].
+        learning_gain: 0..1.
+        gain_p: of the feedback [1/s].
+        gain_i: of the feedback [1/s2].
+
+    Returns:
+        The filter; `contraction` of 1 or more means that this loop must not learn.
     """
     hertz = np.linspace(0.0, 0.5 / period, 501)[1:-1]
     model = frequency_response(loop, period, hertz)

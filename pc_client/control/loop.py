@@ -87,7 +87,10 @@ class LoopModel:
 
 
 def velocity_response(loop: LoopModel, period: float) -> Array:
-    """Differenced position after a unit velocity that is commanded for one cycle, the period [s].
+    """Differenced position after a unit velocity that is commanded for one cycle.
+
+    Args:
+        period: control cycle [s].
 
     Returns:
         (n,): (q_k - q_(k-1)) / period for k = 0, 1, ...; the command is held from k = 0 to k = 1. Sums to 1.
@@ -106,10 +109,15 @@ def frequency_response(loop: LoopModel, period: float, hertz: Array) -> NDArray[
 
 
 def lagged_displacement(knots: Array, commands: Array, lag: float) -> tuple[Array, Array]:
-    """Follow held velocities (n, j) [rad/s] through a lag alone, whose time constant is in s.
+    """Follow held velocities through the lag alone.
 
-    Command k holds from knot k to k + 1 [s]; there are n + 1 knots. Returns position and velocity at the
-    knots, (n + 1, j) each; both begin at 0.
+    Args:
+        knots: (n + 1,) times; command k holds from knot k to k + 1 [s].
+        commands: (n, j) velocities [rad/s].
+        lag: time constant [s].
+
+    Returns:
+        Position and velocity at the knots, (n + 1, j) each; both begin at 0.
     """
     steps = np.diff(knots)
     velocity = np.zeros((len(knots), commands.shape[1]))
@@ -165,9 +173,15 @@ def sensitivity(
 
 
 def loop_margins(loop: LoopModel, gain_p: float, gain_i: float, period: float) -> LoopMargins:
-    """Measure the margins of the sampled loop with gains [1/s, 1/s2] of 0 or more, and a control cycle [s].
+    """Measure the margins of the sampled loop.
 
-    Without feedback all are infinite and the peak is 1.
+    Args:
+        gain_p: proportional gain [1/s], >= 0.
+        gain_i: integral gain [1/s2], >= 0.
+        period: control cycle [s].
+
+    Returns:
+        The margins; without feedback all are infinite and the peak is 1.
     """
     if gain_p == 0.0 and gain_i == 0.0:
         return LoopMargins(inf, inf, inf, 1.0)
