@@ -16,18 +16,8 @@ import typer
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 from urscript.check.checking import check_with_advice, with_advice
 from urscript.check.warnings import RULES, ScriptWarning
+from urscript.commands import support
 from urscript.commands.run_command import run
-from urscript.commands.support import (
-    STANDARD_INPUT,
-    AsJson,
-    Diagnostic,
-    Software,
-    catalogue_of,
-    diagnostic_of,
-    echo_json,
-    read_program,
-    shown_name,
-)
 from urscript.errors import ScriptError, ScriptSyntaxError
 from urscript.formatter import format_program
 from urscript.source import Source, as_utf8
@@ -56,24 +46,26 @@ app.command(
 )
 def check(
     files: Annotated[list[Path], typer.Argument(help="Programs to check; - reads one.", show_default=False)],
-    software: Software = "3.15",
+    software: support.Software = "3.15",
     ignore: Annotated[
         list[str] | None, typer.Option(help="Warnings to leave out: W101, or W101,W103.", show_default=False)
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Warnings make it exit with 1 too.")] = False,
-    as_json: AsJson = False,
+    as_json: support.AsJson = False,
 ) -> None:
     """Show all errors and warnings of the given programs; exit 1 if there is an error."""
-    catalogue = catalogue_of(software)
+    catalogue = support.catalogue_of(software)
     ignored = _codes(ignore or ())
     found: list[tuple[str, ScriptError]] = []
     for file in files:
-        errors, warnings = check_with_advice(read_program(file), catalogue=catalogue, name=shown_name(file))
+        errors, warnings = check_with_advice(
+            support.read_program(file), catalogue=catalogue, name=support.shown_name(file)
+        )
         kept = [warning for warning in warnings if warning.rule.code not in ignored]
         in_order = sorted([*errors, *kept], key=lambda problem: (problem.line, problem.column))
         found += [(str(file), problem) for problem in in_order]
     if as_json:
-        echo_json(diagnostics=[diagnostic_of(error, file)._asdict() for file, error in found])
+        support.echo_json(diagnostics=[support.diagnostic_of(error, file)._asdict() for file, error in found])
     else:
         for _, error in found:
             typer.echo(as_utf8(error.render()))
@@ -106,18 +98,18 @@ def fmt(
         bool, typer.Option("--check", help="Write nothing; exit 1 if a layout is not canonical.")
     ] = False,
     diff: Annotated[bool, typer.Option("--diff", help="Write nothing; show what would change.")] = False,
-    as_json: AsJson = False,
+    as_json: support.AsJson = False,
 ) -> None:
     """Put programs into the canonical layout; comments and labels stay, and what the program does."""
     reports: list[dict[str, Any]] = []
-    diagnostics: list[Diagnostic] = []
+    diagnostics: list[support.Diagnostic] = []
     for file in files:
-        source = Source(read_program(file), shown_name(file))
+        source = Source(support.read_program(file), support.shown_name(file))
         try:
             formatted = format_program(source)
         except ScriptSyntaxError as wrong:
             error = with_advice(wrong)
-            diagnostics.append(diagnostic_of(error, str(file)))
+            diagnostics.append(support.diagnostic_of(error, str(file)))
             if not as_json:
                 typer.echo(as_utf8(error.render()), err=True)
             continue
@@ -128,12 +120,12 @@ def fmt(
         elif only_check:
             if changes and not as_json:
                 typer.echo(f"{source.name}: not in canonical layout")
-        elif file == STANDARD_INPUT:
+        elif file == support.STANDARD_INPUT:
             _write_bytes(formatted)
         elif changes:
             _write(file, formatted)
     if as_json:
-        echo_json(files=reports, diagnostics=[item._asdict() for item in diagnostics])
+        support.echo_json(files=reports, diagnostics=[item._asdict() for item in diagnostics])
     if diagnostics or (only_check and any(report["changes"] for report in reports)):
         raise typer.Exit(ExitCode.FAILED)
 

@@ -12,23 +12,11 @@ from matplotlib.figure import Figure
 from pc_client.analysis.measures import PARTS
 from pc_client.analysis.run import budget_column, speed_curve
 from pc_client.analysis.table import Table
+from pc_client.results import sheet
 from pc_client.results.matplotlib_figures import Bars, bars_of_levels, figure
-from pc_client.results.sheet import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PAPER_GREY,
-    RED,
-    REFERENCE_GREY,
-    SKY,
-    WIDTH,
-    Panel,
-    Sheet,
-    boxes,
-    colour_of,
-)
+from pc_client.results.sheet import Panel, Sheet, boxes
 
-_PARTS_COLOURS = (BLUE, ORANGE, GREEN, RED, "#444444")
+_PARTS_COLOURS = (sheet.BLUE, sheet.ORANGE, sheet.GREEN, sheet.RED, "#444444")
 _SPEED_COLUMNS = 2
 _SPEED_HEIGHT = 1.85
 """Columns of the speeds of all movements, and the height of a row [inches]."""
@@ -44,12 +32,12 @@ def levels_figure(
         experiments: label and table of each.
     """
     names = frame["name"].to_list()
-    series = [Bars("paper, real UR3", PAPER_GREY, frame["paper_snr_db"].to_numpy())]
+    series = [Bars("paper, real UR3", sheet.PAPER_GREY, frame["paper_snr_db"].to_numpy())]
     for i, (label, table) in enumerate(experiments):
         runs = [[run.snr.speed_db for run in table.runs.get(name, ())] for name in names]
         means = np.array([np.mean(levels) if levels else np.nan for levels in runs])
         series.append(
-            Bars(label, colour_of(i), means, [levels if len(levels) > 1 else [] for levels in runs])
+            Bars(label, sheet.colour_of(i), means, [levels if len(levels) > 1 else [] for levels in runs])
         )
     return bars_of_levels(
         names,
@@ -65,7 +53,7 @@ def speeds_sheet(names: Sequence[str], experiments: Sequence[tuple[str, Table]],
     n_rows = -(-len(names) // _SPEED_COLUMNS)
     height = _SPEED_HEIGHT * n_rows + 0.4
     grid = boxes(
-        (WIDTH, height),
+        (sheet.WIDTH, height),
         [1] * _SPEED_COLUMNS,
         [1] * n_rows,
         margins=(0.65, 0.15, 0.55, 0.5),
@@ -76,8 +64,10 @@ def speeds_sheet(names: Sequence[str], experiments: Sequence[tuple[str, Table]],
     for k, name in enumerate(names):
         runs = {i: table.runs[name][0] for i, (_, table) in enumerate(experiments) if name in table.runs}
         first = next(iter(runs.values()))
-        desired = speed_curve(first, REFERENCE_GREY, "desired", desired=True, width=3.6)
-        actual = [speed_curve(run, colour_of(i), experiments[i][0], width=1.0) for i, run in runs.items()]
+        desired = speed_curve(first, sheet.REFERENCE_GREY, "desired", desired=True, width=3.6)
+        actual = [
+            speed_curve(run, sheet.colour_of(i), experiments[i][0], width=1.0) for i, run in runs.items()
+        ]
         span = (-0.1, first.track.t_end - first.track.t_start + 0.3)
         panels.append(
             Panel(
@@ -95,10 +85,10 @@ def speeds_sheet(names: Sequence[str], experiments: Sequence[tuple[str, Table]],
 def definitions_figure(table: Table) -> Figure:
     """The four SNR definitions for each movement, means over the repetitions."""
     series = (
-        ("speed, as in Eq. 10", BLUE, "snr_db"),
-        ("speed, shifted", SKY, "snr_shifted_db"),
-        ("velocity vector", RED, "vector_snr_db"),
-        ("velocity vector, shifted", ORANGE, "vector_snr_shifted_db"),
+        ("speed, as in Eq. 10", sheet.BLUE, "snr_db"),
+        ("speed, shifted", sheet.SKY, "snr_shifted_db"),
+        ("velocity vector", sheet.RED, "vector_snr_db"),
+        ("velocity vector, shifted", sheet.ORANGE, "vector_snr_shifted_db"),
     )
     means = table.means
     bars = [Bars(label, colour, means[name].to_numpy()) for label, colour, name in series]

@@ -14,37 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pc_client.analysis.measures import (
-    PARTS,
-    Budget,
-    Errors,
-    Snr,
-    TcpTrack,
-    error_budget,
-    joint_errors,
-    measure_errors,
-    measure_snr,
-    position_errors,
-    rows_per_sample,
-    speed,
-    track_of,
-)
+from pc_client.analysis import measures
 from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance, Source, origin_of
 from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
-from pc_client.results.sheet import (
-    BLUE,
-    REFERENCE_GREY,
-    WIDTH,
-    Box,
-    Curve,
-    Panel,
-    Sheet,
-    boxes,
-    colour_of,
-    cube_around,
-)
+from pc_client.results import sheet
+from pc_client.results.sheet import Box, Curve, Panel, Sheet, boxes
 from protocol.ur_types import JOINT_NAMES
 
 if TYPE_CHECKING:
@@ -90,7 +66,7 @@ class Signals:
 
         The rows of the first 8 ms are 0.
         """
-        t, p, each = self.t, self.tcp_pose[:, :3], rows_per_sample(self.t)
+        t, p, each = self.t, self.tcp_pose[:, :3], measures.rows_per_sample(self.t)
         moved = np.linalg.norm(p[each:] - p[:-each], axis=1) / (t[each:] - t[:-each])
         return np.concatenate((np.zeros(min(each, len(t))), moved))
 
@@ -127,7 +103,7 @@ class Run(Signals):
     """
 
     recording: Recording
-    _track: TcpTrack
+    _track: measures.TcpTrack
 
     @classmethod
     def from_file(cls, path: Path | str) -> Run:
@@ -137,7 +113,7 @@ class Run(Signals):
             RecordingError: it cannot be read, or holds too little.
         """
         recording = load_recording(path)
-        track = track_of(recording)
+        track = measures.track_of(recording)
         t, q, qd, pose, command = (
             recording.column(name)[track.new_rows]
             for name in ("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
@@ -208,10 +184,10 @@ class MeasuredRun:
     """One recording and what was measured on it."""
 
     recording: Recording
-    track: TcpTrack
-    snr: Snr
-    errors: Errors
-    budget: Budget
+    track: measures.TcpTrack
+    snr: measures.Snr
+    errors: measures.Errors
+    budget: measures.Budget
 
     @property
     def provenance(self) -> Provenance:
@@ -237,8 +213,8 @@ class MeasuredRun:
             "max_position_error_mm": errors.max_position_error_mm,
             "rms_position_error_mm": errors.rms_position_error_mm,
             "max_path_error_mm": errors.max_path_error_mm,
-            **{budget_column(part): budget.share(part) for part in PARTS},
-            **{f"{budget_column(part)}_alone_db": budget.alone_db(part) for part in PARTS},
+            **{budget_column(part): budget.share(part) for part in measures.PARTS},
+            **{f"{budget_column(part)}_alone_db": budget.alone_db(part) for part in measures.PARTS},
         }
 
 
@@ -259,14 +235,14 @@ def analyse_run(recording: Recording, *, include_aborted: bool = False) -> Measu
         whose = recording.provenance
         name = f"{whose.movement}_r{whose.repetition}_given_up"
         recording = replace(recording, provenance=replace(whose, movement=name, kind=GIVEN_UP))
-    track = track_of(recording)
-    snr = measure_snr(track)
+    track = measures.track_of(recording)
+    snr = measures.measure_snr(track)
     return MeasuredRun(
         recording=recording,
         track=track,
         snr=snr,
-        errors=measure_errors(recording, track, snr.velocity_lag_s),
-        budget=error_budget(recording, track, snr.speed_lag_s),
+        errors=measures.measure_errors(recording, track, snr.velocity_lag_s),
+        budget=measures.error_budget(recording, track, snr.speed_lag_s),
     )
 
 
@@ -278,16 +254,16 @@ def budget_column(part: str) -> str:
 def _signals_sheet(signals: Signals) -> Sheet:
     """A motion without a reference: speed of the TCP, joint angles, joint velocities."""
     t, free = signals.t, (None, None)
-    size = (WIDTH, 7.2)
+    size = (sheet.WIDTH, 7.2)
     (upper,), (middle,), (lower,) = boxes(
         size, (1,), (1, 1, 1), margins=(0.7, 0.15, 0.4, 0.5), gaps=(0.0, 0.5)
     )
     span = (float(t[0]), float(t[-1]))
-    commanded = [Curve(np.c_[t, v], REFERENCE_GREY, width=2.0, stepped=True) for v in signals.qd_cmd.T]
+    commanded = [Curve(np.c_[t, v], sheet.REFERENCE_GREY, width=2.0, stepped=True) for v in signals.qd_cmd.T]
     panels = (
         Panel(
             upper,
-            [Curve(np.c_[t, 1e3 * signals.tcp_speed], BLUE)],
+            [Curve(np.c_[t, 1e3 * signals.tcp_speed], sheet.BLUE)],
             "",
             ("", "TCP speed [mm/s]"),
             (span, (0.0, None)),
@@ -306,15 +282,15 @@ def _signals_sheet(signals: Signals) -> Sheet:
 
 def movement_sheet(runs: Sequence[MeasuredRun]) -> Sheet:
     """Everything about the runs of one movement: the paper's figures 4 and 5 and what explains them."""
-    first, coloured = runs[0], {colour_of(i): run for i, run in enumerate(runs)}
+    first, coloured = runs[0], {sheet.colour_of(i): run for i, run in enumerate(runs)}
     t, track = _step_times(first), first.track
     span = (max(t[0], -0.15), min(t[-1], track.t_end - track.t_start + 0.35))
-    size = (WIDTH, 8.4)
+    size = (sheet.WIDTH, 8.4)
     ((upper, _), (lower, right)) = boxes(
         size, (6.3, 3.7), (2.6, 1.4), margins=(0.72, 0.4, 0.45, 3.4), gaps=(0.2, 0.45)
     )
     below = boxes(size, (1, 1, 1), (1,), margins=(0.72, 0.15, 5.75, 0.5), gaps=(0.8, 0.0))[0]
-    desired = speed_curve(first, REFERENCE_GREY, "desired", desired=True, width=4.0)
+    desired = speed_curve(first, sheet.REFERENCE_GREY, "desired", desired=True, width=4.0)
     actual = [
         speed_curve(run, colour, f"actual r{run.provenance.repetition}, {run.snr.speed_db:.1f} dB")
         for colour, run in coloured.items()
@@ -361,7 +337,9 @@ def speed_curve(
 def _path_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
     first = next(iter(coloured.values()))
     targets = 1e3 * np.array(first.provenance.target_points, dtype=np.float64).reshape(-1, 3)
-    desired = Curve(1e3 * first.track.p_ref[first.track.movement], REFERENCE_GREY, width=3.0, opacity=0.6)
+    desired = Curve(
+        1e3 * first.track.p_ref[first.track.movement], sheet.REFERENCE_GREY, width=3.0, opacity=0.6
+    )
     actual = [
         Curve(1e3 * run.track.p_actual[run.track.movement], colour, width=0.9)
         for colour, run in coloured.items()
@@ -372,7 +350,7 @@ def _path_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
         (desired, *actual, circles),
         "TCP path and target points, base frame",
         ("x [mm]", "y [mm]", "z [mm]"),
-        cube_around(np.vstack([desired.points, targets])),
+        sheet.cube_around(np.vstack([desired.points, targets])),
         texts=[(target, str(i)) for i, target in enumerate(targets, start=1)],
     )
 
@@ -381,8 +359,8 @@ def _joint_panels(places: Sequence[Box], run: MeasuredRun) -> tuple[Panel, Panel
     rows, moving, number = run.track.rows, run.track.movement, f"r{run.provenance.repetition}"
     t = run.track.t[moving] - run.track.t_start
     ref, actual = (run.recording.column(name)[rows][moving] for name in ("ref_q", "actual_q"))
-    wanted = [Curve(np.c_[t, q], REFERENCE_GREY, width=2.6) for q in (ref - ref[0]).T]
-    errors = 1e3 * joint_errors(run.recording, run.track)[moving]
+    wanted = [Curve(np.c_[t, q], sheet.REFERENCE_GREY, width=2.6) for q in (ref - ref[0]).T]
+    errors = 1e3 * measures.joint_errors(run.recording, run.track)[moving]
     return (
         Panel(
             places[0],
@@ -404,7 +382,7 @@ def _joint_panels(places: Sequence[Box], run: MeasuredRun) -> tuple[Panel, Panel
 
 
 def _spread_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
-    errors = [1e3 * position_errors(run.track) for run in coloured.values()]
+    errors = [1e3 * measures.position_errors(run.track) for run in coloured.values()]
     edges = np.linspace(0.0, max(1e-3, *(float(e.max()) for e in errors)), 31)
     curves = []
     for (colour, run), error in zip(coloured.items(), errors, strict=True):
@@ -424,14 +402,14 @@ def _spread_panel(box: Box, coloured: Mapping[str, MeasuredRun]) -> Panel:
 
 def _joint_curves(t: Array, values: Array) -> list[Curve]:
     return [
-        Curve(np.c_[t, v], colour_of(i), name)
+        Curve(np.c_[t, v], sheet.colour_of(i), name)
         for i, (v, name) in enumerate(zip(values.T, JOINT_NAMES, strict=True))
     ]
 
 
 def _speed(run: MeasuredRun, *, desired: bool = False) -> Array:
     """TCP speed at each first difference [m/s]."""
-    return speed(run.track.t, run.track.p_ref if desired else run.track.p_actual)
+    return measures.speed(run.track.t, run.track.p_ref if desired else run.track.p_actual)
 
 
 def _step_times(run: MeasuredRun) -> Array:

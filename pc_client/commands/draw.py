@@ -10,19 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from pc_client.commands import options
 from pc_client.commands.experiment import execute, read_runs
-from pc_client.commands.options import (
-    OutOption,
-    RepeatOption,
-    RobotOption,
-    RunSettings,
-    TimeUnitOption,
-    console,
-    progress_bar,
-    reach,
-    say,
-    takes_run_settings,
-)
+from pc_client.commands.options import console, progress_bar, reach, say
 from pc_client.errors import MovementError
 from pc_client.files import as_file_name
 
@@ -33,7 +23,7 @@ if TYPE_CHECKING:
     from pc_client.studies.extraction.pen import PenRecording
 
 
-@takes_run_settings
+@options.takes_run_settings
 def draw(
     files: Annotated[
         list[str],
@@ -41,9 +31,9 @@ def draw(
             metavar="FILE...", help="Recordings of drawings; one inside an archive is ARCHIVE.zip:PATH."
         ),
     ],
-    robot: RobotOption,
-    out: OutOption,
-    repeat: RepeatOption = 1,
+    robot: options.RobotOption,
+    out: options.OutOption,
+    repeat: options.RepeatOption = 1,
     plane: Annotated[
         str,
         typer.Option(
@@ -86,24 +76,24 @@ def draw(
             help="Times slower than the arm's limits ask: room for what a controller adds.",
         ),
     ] = 1.0,
-    time_unit: TimeUnitOption = "auto",
+    time_unit: options.TimeUnitOption = "auto",
     save: Annotated[
         Path | None,
         typer.Option("--save", metavar="FILE", help="Write the movement as a .toml for `ur-client run`."),
     ] = None,
     *,
-    settings: RunSettings,
+    settings: options.RunSettings,
 ) -> None:
     """Draw what people drew: extract strokes, fit them into the workspace, execute, compare."""
     from pc_client.studies.extraction.pen import read_recording
 
     if save is not None and len(files) > 1:
         raise typer.BadParameter("--save is for one drawing: give one FILE")
-    options = _options(plane, size, rotate, lift, y)
+    placement = _placement(plane, size, rotate, lift, y)
     import matplotlib  # noqa: F401  # complains before the work is done
 
     recordings = [read_recording(file, None if time_unit == "auto" else time_unit) for file in files]
-    drawings = _make(recordings, options, slower, robot, settings)
+    drawings = _make(recordings, placement, slower, robot, settings)
     if save is not None:
         drawings[0].movement.save(save)
         say(f"movement: {save}")
@@ -114,7 +104,7 @@ def draw(
     _report(_judge(drawings, out), out)
 
 
-def _options(plane: str, size: str, rotate: str, lift: float, y: str) -> PlacementOptions:
+def _placement(plane: str, size: str, rotate: str, lift: float, y: str) -> PlacementOptions:
     from pc_client.studies.drawing.placement import PlacementOptions
 
     try:
@@ -138,10 +128,10 @@ def _number(text: str, option: str, word: str) -> float:
 
 def _make(
     recordings: Sequence[PenRecording],
-    options: PlacementOptions,
+    placement: PlacementOptions,
     slower: float,
     robot: str,
-    settings: RunSettings,
+    settings: options.RunSettings,
 ) -> list[Drawing]:
     """Extract the strokes of recordings and make them ready for the arm that answers."""
     from rich.progress import TimeElapsedColumn
@@ -150,7 +140,7 @@ def _make(
     from pc_client.studies.extraction.extract import extract
 
     model = reach(robot, settings.ports, settings.cell).model
-    options = replace(options, box=model.description.working_box)
+    placement = replace(placement, box=model.description.working_box)
     drawings = []
     with progress_bar("{task.description}", TimeElapsedColumn()) as bar:
         task = bar.add_task("", total=2 * len(recordings))
@@ -158,7 +148,7 @@ def _make(
             bar.update(task, description=f"{name}: strokes")
             extraction = extract(recording)
             bar.update(task, advance=1, description=f"{name}: pace for the arm")
-            drawings.append(make_drawing(extraction, name, model, options, slower))
+            drawings.append(make_drawing(extraction, name, model, placement, slower))
             bar.advance(task)
     return drawings
 

@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import (
-    OutOption,
-    RepeatOption,
-    RobotOption,
-    RunSettings,
-    SetOption,
-    console,
-    reach,
-    say,
-    show_report,
-    takes_run_settings,
-)
+from pc_client.commands import options
+from pc_client.commands.options import console, reach, say, show_report
 from pc_client.errors import InterruptedByUserError
 
 if TYPE_CHECKING:
@@ -28,17 +18,17 @@ if TYPE_CHECKING:
     from pc_client.studies.comparison import Comparison, MovementSet
 
 
-@takes_run_settings
+@options.takes_run_settings
 def experiment(
-    robot: RobotOption,
-    out: OutOption,
+    robot: options.RobotOption,
+    out: options.OutOption,
     movements: Annotated[
         str | None, typer.Option("--movements", metavar="A,B,...", help="Names or files instead of a set.")
     ] = None,
-    set_name: SetOption = None,
-    repeat: RepeatOption = 3,
+    set_name: options.SetOption = None,
+    repeat: options.RepeatOption = 3,
     *,
-    settings: RunSettings,
+    settings: options.RunSettings,
 ) -> None:
     """Run the paper's experiment: ten movements, three times each, Table I and a report."""
     from pc_client.movements.library_sets import DEFAULT_SET, library_names
@@ -52,27 +42,29 @@ def experiment(
     _run(chosen, robot, out, repeat, settings)
 
 
-@takes_run_settings
+@options.takes_run_settings
 def run(
     file: Annotated[str, typer.Argument(metavar="FILE", help="Movement file, or a name of the library.")],
-    robot: RobotOption,
-    out: OutOption,
-    repeat: RepeatOption = 1,
+    robot: options.RobotOption,
+    out: options.OutOption,
+    repeat: options.RepeatOption = 1,
     *,
-    settings: RunSettings,
+    settings: options.RunSettings,
 ) -> None:
     """Run one movement."""
     _run([file], robot, out, repeat, settings)
 
 
-def _run(movements: Sequence[str], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
+def _run(movements: Sequence[str], robot: str, out: Path, repeat: int, settings: options.RunSettings) -> None:
     from pc_client.experiment.experiment import load_movements
 
     execute(load_movements(movements), robot, out, repeat, settings)
     show_report(out)
 
 
-def execute(movements: Sequence[Motion], robot: str, out: Path, repeat: int, settings: RunSettings) -> None:
+def execute(
+    movements: Sequence[Motion], robot: str, out: Path, repeat: int, settings: options.RunSettings
+) -> None:
     """Plan movements, ask where a real arm would move, run them, and say how it went.
 
     A dry run shows the plan and the question, on a simulated arm too, and ends the command there.
@@ -130,9 +122,9 @@ def read_runs(folder: Path) -> list[MeasuredRun]:
     return [analyse_run(load_recording(path)) for path in files]
 
 
-@takes_run_settings
+@options.takes_run_settings
 def compare(
-    out: OutOption,
+    out: options.OutOption,
     robot: Annotated[
         str | None,
         typer.Option("--robot", metavar="HOST", help="Control box to execute on; planned only without."),
@@ -146,7 +138,7 @@ def compare(
         ),
     ] = 1,
     *,
-    settings: RunSettings,
+    settings: options.RunSettings,
 ) -> None:
     """Compare all generators of movements: smoothness, power law, peaks; planned and executed."""
     from pc_client.studies.comparison import build_comparison, make_sets, save_sets

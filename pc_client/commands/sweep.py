@@ -11,16 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pc_client.commands.options import (
-    DaskOption,
-    WorkersOption,
-    YesOption,
-    check_workers,
-    console,
-    ports_of,
-    reach,
-    say,
-)
+from pc_client.commands import options
+from pc_client.commands.options import console, reach, say
 from pc_client.errors import InterruptedByUserError, SweepError
 from ur_hil.command_line import ExitCode
 
@@ -40,13 +32,13 @@ def sweep(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results, instead of `output`.")
     ] = None,
-    workers: WorkersOption = None,
-    dask: DaskOption = None,
+    workers: options.WorkersOption = None,
+    dask: options.DaskOption = None,
     format: Annotated[
         Literal["parquet", "csv"],
         typer.Option("--format", metavar="parquet|csv", help="Of the table's file."),
     ] = "parquet",
-    yes: YesOption = False,
+    yes: options.YesOption = False,
 ) -> None:
     """Run every combination of gains, arms and movements; a second call goes on where the first ended."""
     from pc_client.studies.sweep.case import GivenRobot
@@ -54,7 +46,7 @@ def sweep(
     from pc_client.studies.sweep.settings import read_config
     from pc_client.studies.sweep.store import ResultStore
 
-    check_workers(workers, dask)
+    options.check_workers(workers, dask)
     plan = read_config(config)
     host, port_base = plan.file.robot, plan.file.port_base or 0
     if host is not None and (workers is not None or dask is not None):
@@ -65,7 +57,7 @@ def sweep(
     arm: Arm | None = None
     arms: Sequence[SimulatedArm] | Sequence[GivenRobot] = plan.arms
     if host is not None:
-        arm = reach(host, ports_of(port_base), plan.cell, yes=yes)
+        arm = reach(host, options.ports_of(port_base), plan.cell, yes=yes)
         serial = arm.report.info.serial
         arms = (GivenRobot(host, port_base, arm.model.name, serial, plan.cell, plan.file.reverse_port),)
     store.prepare()

@@ -17,18 +17,12 @@ from pc_client.driver.realtime import RealtimeClient
 from pc_client.driver.transport import NO_ROUTE, Network
 from pc_client.errors import DriverError, UnknownHostError
 from pc_client.recording.provenance import Source, origin_of, source_of
+from protocol import ur_types
 from protocol.errors import RemoteProtocolError
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.realtime.layout import RealtimeFrame
 from protocol.serial_numbers import SerialNumber, parse_serial
-from protocol.ur_types import (
-    LOCKSTEP_MASTERBOARD,
-    SIMULATED_MASTERBOARD,
-    SIMULATOR_CHECKSUM,
-    Ports,
-    RobotType,
-    SoftwareVersion,
-)
+from protocol.ur_types import Ports, RobotType, SoftwareVersion
 
 UNKNOWN = "unknown"
 """Stands for what a robot does not report."""
@@ -188,7 +182,7 @@ class StatePorts:
         except RemoteProtocolError:  # software before 3.12 does not know the question
             serial = None
         kinematics = self.primary.newest(KinematicsInfo)
-        has_calibration = kinematics is None or set(kinematics.checksum) != {SIMULATOR_CHECKSUM}
+        has_calibration = kinematics is None or set(kinematics.checksum) != {ur_types.SIMULATOR_CHECKSUM}
         model = answers.get(_MODEL, "")
         self.info = RobotInfo(
             version,
@@ -198,7 +192,7 @@ class StatePorts:
             UNKNOWN if serial is None else serial.text,
             _is_simulated(serial, configuration, has_calibration),
             None if serial is None else serial.seed,
-            configuration is not None and configuration.masterboard_version == LOCKSTEP_MASTERBOARD,
+            configuration is not None and configuration.masterboard_version == ur_types.LOCKSTEP_MASTERBOARD,
             has_calibration,
         )
         return self.info
@@ -391,7 +385,7 @@ def _is_simulated(
 
     A missing calibration proves nothing: a real arm may have lost its own.
     """
-    marks = (SIMULATED_MASTERBOARD, LOCKSTEP_MASTERBOARD)
+    marks = (ur_types.SIMULATED_MASTERBOARD, ur_types.LOCKSTEP_MASTERBOARD)
     if configuration is not None and configuration.masterboard_version in marks:
         return True
     if serial is not None and serial.simulated:

@@ -19,20 +19,11 @@ from numpy.typing import ArrayLike
 from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError, UnknownMovementError
 from pc_client.files import FILE_KINDS
+from pc_client.movements import samples
 from pc_client.movements.durations import default_durations
 from pc_client.movements.library_sets import LIBRARY_SETS, library_path
 from pc_client.movements.movement_file import file_text, kind_of, read_record, trajectory_of
-from pc_client.movements.samples import (
-    FORMS,
-    JOINT_COLUMNS,
-    MIN_SAMPLES,
-    JointTrajectory,
-    SampledTrajectory,
-    parse_rows,
-    rotations_of,
-    samples_of,
-    write_samples,
-)
+from pc_client.movements.samples import JointTrajectory, SampledTrajectory, parse_rows
 from pc_client.movements.sigma_lognormal import leg_lengths, literal_strokes
 from pc_client.movements.trajectory import (
     Motion,
@@ -163,7 +154,7 @@ class Movement:
         Raises:
             MovementError: shapes or values are not valid.
         """
-        turns = None if rotations is None else rotations_of(rotations)
+        turns = None if rotations is None else samples.rotations_of(rotations)
         trajectory = SampledTrajectory(
             np.asarray(t, dtype=np.float64), np.asarray(points, dtype=np.float64), turns
         )
@@ -304,7 +295,7 @@ class Movement:
             raise MovementError(f"{path}: a movement of kind {self.kind} is saved as a {wanted} file")
         try:
             if isinstance(self.trajectory, SampledTrajectory):
-                write_samples(path, self.trajectory)
+                samples.write_samples(path, self.trajectory)
             else:
                 path.write_text(self.text, encoding="utf-8")
         except OSError as error:
@@ -384,18 +375,18 @@ def _read(path: Path) -> Movement | JointTrajectory:
 def _parse_samples(text: str, path: Path) -> Movement | JointTrajectory:
     """What a table of samples or target points holds; without a line of names, x, y, z and perhaps t."""
     wanted = "x, y, z in m and t in s, target points x, y, z, or what docs/movements.md names beside them"
-    rows = parse_rows(text, str(path), (*FORMS, JOINT_COLUMNS, _POINT_COLUMNS), wanted)
-    if rows.columns != _POINT_COLUMNS and len(rows.values) < MIN_SAMPLES:
+    rows = parse_rows(text, str(path), (*samples.FORMS, samples.JOINT_COLUMNS, _POINT_COLUMNS), wanted)
+    if rows.columns != _POINT_COLUMNS and len(rows.values) < samples.MIN_SAMPLES:
         raise MovementError(
-            f"{path}: {len(rows.values)} samples; a movement needs at least {MIN_SAMPLES} "
+            f"{path}: {len(rows.values)} samples; a movement needs at least {samples.MIN_SAMPLES} "
             "(target points with times: `ur-client movements new`, or Movement.from_csv with a style)"
         )
     try:
         if rows.columns == _POINT_COLUMNS:
             return Movement.through(rows.values, name=path.stem)
-        if rows.columns == JOINT_COLUMNS:
+        if rows.columns == samples.JOINT_COLUMNS:
             return JointTrajectory(rows.values[:, 0], rows.values[:, 1:], path.stem)
-        trajectory = samples_of(rows)
+        trajectory = samples.samples_of(rows)
         return Movement(path.stem, trajectory, np.array([trajectory.duration]), {"file": path.name})
     except MovementError as error:
         raise MovementError(f"{path}: {error}") from error

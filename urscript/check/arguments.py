@@ -10,16 +10,9 @@ from urscript.builtins import PURE
 from urscript.catalogue import STEP_TIME, Catalogue
 from urscript.catalogue.calls import compile_check, fits, type_error
 from urscript.catalogue.types import Builtin, Param
+from urscript.check import warnings
 from urscript.check.unused import Variable, expressions_read, owner
-from urscript.check.warnings import (
-    DEGREES,
-    MILLIMETRES,
-    REFUSED_ARGUMENT,
-    SHORT_TIME,
-    WRONG_COUNT,
-    Rule,
-    ScriptWarning,
-)
+from urscript.check.warnings import ScriptWarning
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
 from urscript.syntax import nodes
@@ -51,7 +44,7 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
         callee = scope.find_function(call.function)
         if callee is not None:
             if refusal := wrong_count(call, callee):
-                yield ScriptWarning(WRONG_COUNT, refusal, call.span, program.source)
+                yield ScriptWarning(warnings.WRONG_COUNT, refusal, call.span, program.source)
             continue
         builtin = catalogue.lookup(call.function)
         if builtin is None or builtin.name in PURE:
@@ -62,14 +55,14 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
                 continue
             message = _refused(builtin, param, known)
             if message:
-                yield ScriptWarning(REFUSED_ARGUMENT, message, argument.span, program.source)
+                yield ScriptWarning(warnings.REFUSED_ARGUMENT, message, argument.span, program.source)
             elif found := _wrong_unit(param, known.value):
                 rule, text, hint = found
                 yield ScriptWarning(rule, f"{builtin.name}: {text}", argument.span, program.source, hint)
             elif builtin.name in _STREAMED and param.name == "t" and 0 < known.value < cycle:
                 text = f"{builtin.name}: {known.value:g} s is shorter than a control cycle of {cycle:g} s"
                 hint = "write get_steptime()"
-                yield ScriptWarning(SHORT_TIME, text, argument.span, program.source, hint)
+                yield ScriptWarning(warnings.SHORT_TIME, text, argument.span, program.source, hint)
 
 
 def _constants(program: ResolvedProgram) -> dict[Variable, Expression]:
@@ -177,7 +170,7 @@ _TOOL_SPEED: Final = 10.0
 class _Excess(NamedTuple):
     """A value that is too large for its unit: the warning, what is too large, what to write instead."""
 
-    rule: Rule
+    rule: warnings.Rule
     text: str
     hint: str
 
@@ -242,8 +235,8 @@ def _too_long(lengths: Sequence[float]) -> _Excess | None:
 
 
 def _in_degrees(text: str, value: float) -> _Excess:
-    return _Excess(DEGREES, text, f"write d2r({value:g}) if degrees are meant")
+    return _Excess(warnings.DEGREES, text, f"write d2r({value:g}) if degrees are meant")
 
 
 def _in_millimetres(text: str, value: float) -> _Excess:
-    return _Excess(MILLIMETRES, text, f"write {value / 1000:g} if millimetres are meant")
+    return _Excess(warnings.MILLIMETRES, text, f"write {value / 1000:g} if millimetres are meant")

@@ -4,27 +4,13 @@ from collections.abc import Iterator
 from typing import Final
 
 from urscript.catalogue import Catalogue
+from urscript.check import warnings
 from urscript.check.unused import Variable, expressions_read, owner
-from urscript.check.warnings import (
-    BUSY_LOOP,
-    CALL_OF_PROGRAM,
-    DEAD_BRANCH,
-    UNCHECKED_READ,
-    UNREACHABLE,
-    ScriptWarning,
-)
+from urscript.check.warnings import ScriptWarning
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import (
-    Block,
-    Expression,
-    Statement,
-    all_expressions,
-    all_statements,
-    own_blocks,
-    own_expressions,
-)
+from urscript.syntax.nodes import Block, Expression, Statement
 
 COUNTED_READS: Final = frozenset(
     {"socket_read_ascii_float", "socket_read_binary_integer", "socket_read_byte_list"}
@@ -36,17 +22,19 @@ def flow_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
     """Everything this module warns about, in no order."""
     for scope in program.scopes():
         yield from _unreachable(scope.body, program)
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.While) and _is_busy(statement, scope, catalogue):
                 message = "this loop takes no time and never ends by itself: the controller stops the program"
                 place = _head(statement.span, statement.condition)
-                yield ScriptWarning(BUSY_LOOP, message, place, program.source, "put a sync() into it")
+                yield ScriptWarning(
+                    warnings.BUSY_LOOP, message, place, program.source, "put a sync() into it"
+                )
             elif isinstance(statement, nodes.If):
                 yield from _dead_branches(statement, program)
     yield from _unchecked_reads(program)
     for call in program.calls_after:
         message = f"'{program.name}' runs when it is defined; this call is a program of its own and fails"
-        yield ScriptWarning(CALL_OF_PROGRAM, message, call.span, program.source, "leave it out")
+        yield ScriptWarning(warnings.CALL_OF_PROGRAM, message, call.span, program.source, "leave it out")
 
 
 def constant_truth(expression: Expression) -> bool | None:
@@ -79,9 +67,9 @@ def _head(span: Span, condition: Expression) -> Span:
 
 def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> bool:
     """Whether the loop, from its second iteration on, never ends and never lets a cycle pass."""
-    statements = list(all_statements(loop.body))
-    expressions = [loop.condition, *(item for each in statements for item in own_expressions(each))]
-    parts = [part for expression in expressions for part in all_expressions(expression)]
+    statements = list(nodes.all_statements(loop.body))
+    expressions = [loop.condition, *(item for each in statements for item in nodes.own_expressions(each))]
+    parts = [part for expression in expressions for part in nodes.all_expressions(expression)]
     if any(isinstance(item, nodes.Join) or _is_pause(item) for item in statements):
         return False
     if any(_takes_time(part, scope, catalogue) for part in parts):
@@ -129,7 +117,7 @@ def _can_leave(block: Block, in_loop: bool = False) -> bool:
             case nodes.KeywordStatement(keyword="break") if not in_loop:
                 return True
         inside = in_loop or isinstance(statement, nodes.While)
-        if any(_can_leave(inner, inside) for inner in own_blocks(statement)):
+        if any(_can_leave(inner, inside) for inner in nodes.own_blocks(statement)):
             return True
     return False
 
@@ -143,11 +131,11 @@ def _unreachable(block: Block, program: ResolvedProgram) -> Iterator[ScriptWarni
     for statement in block:
         if ended_by and not isinstance(statement, (nodes.Function, nodes.Label, nodes.Declaration)):
             message = f"unreachable code: it follows {ended_by}"
-            yield ScriptWarning(UNREACHABLE, message, _first_line(statement), program.source)
+            yield ScriptWarning(warnings.UNREACHABLE, message, _first_line(statement), program.source)
             break
         ended_by = ended_by or _end_of(statement)
     for statement in block:
-        for inner in own_blocks(statement):
+        for inner in nodes.own_blocks(statement):
             yield from _unreachable(inner, program)
 
 
@@ -172,7 +160,7 @@ def _breaks(block: Block) -> bool:
     """Whether a `break` in `block` ends the loop around it."""
     return any(
         statement == nodes.KeywordStatement("break")
-        or (isinstance(statement, nodes.If) and any(map(_breaks, own_blocks(statement))))
+        or (isinstance(statement, nodes.If) and any(map(_breaks, nodes.own_blocks(statement))))
         for statement in block
     )
 
@@ -196,7 +184,7 @@ def _dead_branches(statement: nodes.If, program: ResolvedProgram) -> Iterator[Sc
             line = (always or same or branch).span.line
             why = f"the condition of line {line} is {'always true' if always else 'the same'}"
             yield ScriptWarning(
-                DEAD_BRANCH, f"this branch is never reached: {why}", branch.span, program.source
+                warnings.DEAD_BRANCH, f"this branch is never reached: {why}", branch.span, program.source
             )
         earlier.append(branch)
     last = earlier[-1]
@@ -204,13 +192,15 @@ def _dead_branches(statement: nodes.If, program: ResolvedProgram) -> Iterator[Sc
         first = statement.else_body[0]
         why = f"the condition of line {last.span.line} is always true"
         place = _first_line(first)
-        yield ScriptWarning(DEAD_BRANCH, f"this branch is never reached: {why}", place, program.source)
+        yield ScriptWarning(
+            warnings.DEAD_BRANCH, f"this branch is never reached: {why}", place, program.source
+        )
 
 
 def _is_same(first: Expression, second: Expression) -> bool:
     """Whether two conditions read the same values; a call may give another value the second time."""
     calls = (nodes.Call, nodes.MethodCall, nodes.RunThread)
-    return first == second and not any(isinstance(part, calls) for part in all_expressions(first))
+    return first == second and not any(isinstance(part, calls) for part in nodes.all_expressions(first))
 
 
 # --- socket reads ----------------------------------------------------------------------------------------
@@ -234,7 +224,7 @@ def _unchecked_reads(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             ) and indices != (nodes.IntLiteral(0),):
                 yield _unchecked(call, "its count", program)
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=nodes.Call() as call):
                     variable = (None, name) if statement.scope == "global" else owner(name, scope)
@@ -249,4 +239,4 @@ def _is_read(call: nodes.Call, scope: FunctionScope) -> bool:
 def _unchecked(call: nodes.Call, what: str, program: ResolvedProgram) -> ScriptWarning:
     message = f"the number of received values is never checked: {what} is not read"
     hint = "after a timeout it is 0 and the values are invalid"
-    return ScriptWarning(UNCHECKED_READ, message, call.span, program.source, hint)
+    return ScriptWarning(warnings.UNCHECKED_READ, message, call.span, program.source, hint)

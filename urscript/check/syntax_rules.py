@@ -3,6 +3,7 @@
 import re
 from typing import Final, NamedTuple
 
+from urscript.check import words
 from urscript.check.tokens import (
     CLOSERS,
     PAIRS,
@@ -13,16 +14,6 @@ from urscript.check.tokens import (
     TokenizedText,
     advice_at,
     replacement,
-)
-from urscript.check.words import (
-    BLOCK_ENDS,
-    INVISIBLE,
-    OPERATORS,
-    RESERVED,
-    STATEMENTS,
-    SYMBOLS,
-    WORD_OPERATORS,
-    WORDS_AFTER_END,
 )
 from urscript.source import as_utf8
 from urscript.values import to_script_text
@@ -59,15 +50,17 @@ def quotes(problem: Problem) -> Advice | None:
     """Strings between other quotation marks than `"`."""
     token = problem.token
     mark = as_utf8(token.text)
-    if SYMBOLS.get(mark, ("", ""))[0] != '"':
+    if words.SYMBOLS.get(mark, ("", ""))[0] != '"':
         return None
-    marks = "|".join(re.escape(to_script_text(sign)) for sign, (new, _) in SYMBOLS.items() if new == '"')
+    marks = "|".join(
+        re.escape(to_script_text(sign)) for sign, (new, _) in words.SYMBOLS.items() if new == '"'
+    )
     start, line = problem.tokenized.line_start(token.line), problem.tokenized.line(token.line)
     edits = [
         Edit(start + match.start(), start + match.end(), '"'.ljust(len(match[0])))
         for match in re.finditer(marks, line)
     ]
-    return advice_at(token, f"{mark} does not delimit a string", SYMBOLS[mark][1], *edits)
+    return advice_at(token, f"{mark} does not delimit a string", words.SYMBOLS[mark][1], *edits)
 
 
 def symbol(problem: Problem) -> Advice | None:
@@ -76,18 +69,20 @@ def symbol(problem: Problem) -> Advice | None:
     if problem.error.unexpected or token.kind != "symbol":
         return None
     written = as_utf8(token.text)
-    if token.text + problem.following.text in SYMBOLS and problem.following.start == token.end:
+    if token.text + problem.following.text in words.SYMBOLS and problem.following.start == token.end:
         last = problem.following
         written = token.text + last.text
-    if written not in SYMBOLS:
+    if written not in words.SYMBOLS:
         message = f"unexpected character '{written}'"
         return advice_at(token, message, None, replacement(token, " "), exact=False)
-    new, hint = SYMBOLS[written]
+    new, hint = words.SYMBOLS[written]
     if written == "{" and problem.previous.text == ":":
         new = " "
     edit = replacement(token, f" {new} " if new.isalpha() else new, last)
     what = (
-        f"unexpected {INVISIBLE[written]}" if written in INVISIBLE else f"there is no '{written}' in URScript"
+        f"unexpected {words.INVISIBLE[written]}"
+        if written in words.INVISIBLE
+        else f"there is no '{written}' in URScript"
     )
     return advice_at(token, what, hint, edit, last=last)
 
@@ -248,7 +243,7 @@ def missing_comma(problem: Problem) -> Advice | None:
         return None
     if token.kind not in ("word", "number", "string") and token.text not in PAIRS:
         return None
-    if token.text in RESERVED - _VALUE_WORDS:
+    if token.text in words.RESERVED - _VALUE_WORDS:
         return None
     if before.kind == "string" and before.text.endswith('\\"'):
         start = problem.tokenized.line_start(token.line)
@@ -311,12 +306,12 @@ def foreign_end(problem: Problem) -> Advice | None:
             tokenized.tokens[index + 1],
             tokenized.tokens[min(index + 2, len(tokenized.tokens) - 1)],
         )
-        if token.text in BLOCK_ENDS and _is_elsewhere(second, token):
+        if token.text in words.BLOCK_ENDS and _is_elsewhere(second, token):
             return advice_at(
                 token, f"there is no '{token.text}' in URScript", "write end", replacement(token, "end")
             )
         alone = not _is_elsewhere(second, token) and _is_elsewhere(third, token)
-        if token.text == "end" and second.text in WORDS_AFTER_END and alone:
+        if token.text == "end" and second.text in words.WORDS_AFTER_END and alone:
             message = f"a block ends with 'end', not 'end {second.text}'"
             return advice_at(token, message, "write end", replacement(second, " "), last=second)
     return None
@@ -421,7 +416,7 @@ def foreign_statement(problem: Problem) -> Advice | None:
     lines = {problem.token.line, problem.previous.line if problem.starts_line else problem.token.line}
     for line in sorted(lines):
         index, head = problem.line_head(line)
-        word = STATEMENTS.get(head.text)
+        word = words.STATEMENTS.get(head.text)
         if word is None or index > problem.index or problem.tokenized.tokens[index + 1].text == "=":
             continue
         if word.new and not word.new.endswith(":"):
@@ -437,9 +432,9 @@ def foreign_statement(problem: Problem) -> Advice | None:
 def reserved_word(problem: Problem) -> Advice | None:
     """`end = 3`, `textmsg(run)`: a reserved word as a name."""
     token, before = problem.token, problem.previous
-    if token.text == "=" and before.text in RESERVED and before.line == token.line:
+    if token.text == "=" and before.text in words.RESERVED and before.line == token.line:
         word = before
-    elif token.text in RESERVED and not problem.starts_line and problem.accepts("NAME"):
+    elif token.text in words.RESERVED and not problem.starts_line and problem.accepts("NAME"):
         word = token
     elif before.text == "run" and before.line == token.line and token.kind == "symbol":
         word = before
@@ -506,9 +501,9 @@ def foreign_operator(problem: Problem) -> Advice | None:
     """`2 ** 3`, `a <> b`, `a => b`."""
     token, before = problem.token, problem.previous
     both = before.text + token.text
-    if before.end != token.start or both not in OPERATORS:
+    if before.end != token.start or both not in words.OPERATORS:
         return None
-    new, hint = OPERATORS[both]
+    new, hint = words.OPERATORS[both]
     return advice_at(
         before, f"there is no '{both}' in URScript", hint, replacement(before, new, token), last=token
     )
@@ -517,9 +512,9 @@ def foreign_operator(problem: Problem) -> Advice | None:
 def word_operator(problem: Problem) -> Advice | None:
     """`x is None`, `1 in x`."""
     token = problem.token
-    if problem.starts_line or token.text not in WORD_OPERATORS:
+    if problem.starts_line or token.text not in words.WORD_OPERATORS:
         return None
-    new, hint = WORD_OPERATORS[token.text]
+    new, hint = words.WORD_OPERATORS[token.text]
     message = f"there is no '{token.text}' in URScript"
     return advice_at(token, message, hint, replacement(token, new), exact=token.text != "in")
 
@@ -597,7 +592,7 @@ def missing_value(problem: Problem) -> Advice | None:
     token, before = problem.token, problem.previous
     if not problem.accepts("RUN", "NAME") or problem.accepts("WHILE"):
         return None
-    if not problem.starts_line and token.text not in RESERVED:
+    if not problem.starts_line and token.text not in words.RESERVED:
         return None
     what = "a value" if problem.accepts("RUN") else "a name"
     message = f"{what} is missing after '{before.text}'"

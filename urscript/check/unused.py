@@ -3,19 +3,8 @@
 from collections.abc import Iterator
 
 from urscript.catalogue import Catalogue
-from urscript.check.warnings import (
-    CALL_WITHOUT_HANDLE,
-    DEFINED_TWICE,
-    HIDES_BUILTIN,
-    RUN_OF_DEF,
-    UNUSED_FUNCTION,
-    UNUSED_GLOBAL,
-    UNUSED_LOCAL,
-    UNUSED_PARAMETER,
-    UNUSED_THREAD,
-    UNUSED_VALUE,
-    ScriptWarning,
-)
+from urscript.check import warnings
+from urscript.check.warnings import ScriptWarning
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.syntax import nodes
@@ -102,12 +91,12 @@ def _unused_variables(program: ResolvedProgram) -> Iterator[ScriptWarning]:
         if variable in read or variable in seen or variable in parameters or name.startswith("_"):
             continue
         seen.add(variable)
-        rule, kind = (UNUSED_GLOBAL, "global") if scope is None else (UNUSED_LOCAL, "local")
+        rule, kind = (warnings.UNUSED_GLOBAL, "global") if scope is None else (warnings.UNUSED_LOCAL, "local")
         yield ScriptWarning(rule, f"{kind} variable '{name}' is never read", span, program.source)
     for scope, name, span in _parameters(program):
         if (scope, name) not in read and not name.startswith("_"):
             message = f"parameter '{name}' of '{scope.name}' is never read"
-            yield ScriptWarning(UNUSED_PARAMETER, message, span, program.source)
+            yield ScriptWarning(warnings.UNUSED_PARAMETER, message, span, program.source)
 
 
 def _parameters(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, str, Span]]:
@@ -127,7 +116,7 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             runs[scope].add(callee)
         if not callee.is_thread:
             message = f"'{part.thread}' is run as a thread but defined with 'def'"
-            yield ScriptWarning(RUN_OF_DEF, message, part.span, program.source)
+            yield ScriptWarning(warnings.RUN_OF_DEF, message, part.span, program.source)
     reached: set[FunctionScope] = set()
     todo = program.scopes() if program.is_open else [program.main]
     while todo:
@@ -140,12 +129,12 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
         span = name_of(scope.node, program.source)
         if scope.parent is not None and scope.parent.functions[scope.name] is not scope:
             message = f"'{scope.name}' is defined twice here; the last definition is used"
-            yield ScriptWarning(DEFINED_TWICE, message, span, program.source)
+            yield ScriptWarning(warnings.DEFINED_TWICE, message, span, program.source)
         elif scope not in reached and not scope.name.startswith("_"):
             rule, what = (
-                (UNUSED_THREAD, "thread '{}' is never run")
+                (warnings.UNUSED_THREAD, "thread '{}' is never run")
                 if scope.is_thread
-                else (UNUSED_FUNCTION, "function '{}' is never called")
+                else (warnings.UNUSED_FUNCTION, "function '{}' is never called")
             )
             yield ScriptWarning(rule, what.format(scope.name), span, program.source)
 
@@ -155,7 +144,9 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
 
 def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     def warning(what: str, name: str, span: Span) -> ScriptWarning:
-        return ScriptWarning(HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span, program.source)
+        return ScriptWarning(
+            warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span, program.source
+        )
 
     def is_builtin(name: str) -> bool:
         return name in catalogue or name in catalogue.variables or name in catalogue.arrays
@@ -184,14 +175,14 @@ def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[S
         for statement in all_statements(scope.body):
             if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
                 message, hint = _unused(statement.value)
-                yield ScriptWarning(UNUSED_VALUE, message, statement.span, program.source, hint)
+                yield ScriptWarning(warnings.UNUSED_VALUE, message, statement.span, program.source, hint)
     if "rpc_factory" in program.builtins or catalogue.methods:
         return
     for _, part in expressions_read(program):
         if isinstance(part, nodes.MethodCall):
             message = f"nothing in this program has a method '{part.method}'"
             hint = _FUNCTIONS.get(part.method)
-            yield ScriptWarning(CALL_WITHOUT_HANDLE, message, part.span, program.source, hint)
+            yield ScriptWarning(warnings.CALL_WITHOUT_HANDLE, message, part.span, program.source, hint)
 
 
 _FUNCTIONS = {

@@ -9,17 +9,9 @@ from typing import Annotated, Any, Final, NamedTuple
 import typer
 
 from ur_hil.command_line import ExitCode
+from urscript import errors
 from urscript.catalogue import Catalogue, catalogue_for
 from urscript.check.warnings import ScriptWarning
-from urscript.errors import (
-    ScriptContextError,
-    ScriptError,
-    ScriptLexerError,
-    ScriptNameError,
-    ScriptRuntimeError,
-    ScriptSyntaxError,
-    ScriptTypeError,
-)
 from urscript.source import as_utf8, program_text
 
 STANDARD_INPUT: Final = Path("-")
@@ -72,13 +64,13 @@ def show(text: str, *, error: bool = False) -> None:
 
 # --- errors and warnings as plain records: `urscript check --json` --------------------------------------
 
-ERROR_CODES: Final[dict[type[ScriptError], str]] = {
-    ScriptSyntaxError: "E101",
-    ScriptLexerError: "E102",
-    ScriptNameError: "E103",
-    ScriptTypeError: "E104",
-    ScriptContextError: "E105",
-    ScriptRuntimeError: "E201",
+ERROR_CODES: Final[dict[type[errors.ScriptError], str]] = {
+    errors.ScriptSyntaxError: "E101",
+    errors.ScriptLexerError: "E102",
+    errors.ScriptNameError: "E103",
+    errors.ScriptTypeError: "E104",
+    errors.ScriptContextError: "E105",
+    errors.ScriptRuntimeError: "E201",
 }
 """The stable codes of errors; those of warnings are in `check.warnings`."""
 
@@ -101,7 +93,7 @@ class Diagnostic(NamedTuple):
     hint: str | None
 
 
-def diagnostic_of(error: ScriptError, file: str) -> Diagnostic:
+def diagnostic_of(error: errors.ScriptError, file: str) -> Diagnostic:
     """The record of an error or warning in `file`."""
     if isinstance(error, ScriptWarning):
         severity, code = "warning", error.rule.code

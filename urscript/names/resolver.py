@@ -21,16 +21,7 @@ from urscript.names.analyses import find_maybe_unassigned, mark_recursion, sprea
 from urscript.names.scopes import FunctionScope, NameErrors, ResolvedProgram, shape_of, signature_of
 from urscript.source import NOWHERE, Source, Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import (
-    Block,
-    Expression,
-    Statement,
-    all_expressions,
-    all_statements,
-    child_expressions,
-    own_blocks,
-    own_expressions,
-)
+from urscript.syntax.nodes import Block, Expression, Statement
 
 
 def resolve(
@@ -92,7 +83,7 @@ class _LookUp:
         for statement in block:
             self._statement(statement, scope, loops)
             inside = loops + isinstance(statement, nodes.While)
-            for inner in own_blocks(statement):
+            for inner in nodes.own_blocks(statement):
                 self._block(inner, scope, inside)
 
     def _statement(self, statement: Statement, scope: FunctionScope, loops: int) -> None:
@@ -108,7 +99,7 @@ class _LookUp:
                 scope.blocks = True
                 self._program.builtins.add("pause")
                 return
-        for expression in own_expressions(statement):
+        for expression in nodes.own_expressions(statement):
             self._expression(expression, scope, scope)
 
     def _is_pause(self, scope: FunctionScope) -> bool:
@@ -144,7 +135,7 @@ class _LookUp:
                 )
             case nodes.UnaryOperation(operator="-", operand=nodes.IntLiteral()):
                 return
-        for part in child_expressions(expression):
+        for part in nodes.child_expressions(expression):
             self._expression(part, scope, runs_in)
 
     def _is_array(self, name: str, scope: FunctionScope) -> bool:
@@ -235,7 +226,7 @@ class _Declarations:
 
     def declare(self, scope: FunctionScope) -> None:
         """Declare the functions of `scope` and its globals, then those of nested functions."""
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.Function):
                 self._declare_function(statement, scope)
             elif isinstance(statement, (nodes.Assign, nodes.Declaration)) and (
@@ -268,7 +259,7 @@ class _Declarations:
                     ScriptContextError(f"duplicate parameter '{parameter.name}'"), parameter.span
                 )
             scope.locals.add(parameter.name)
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if not isinstance(statement, (nodes.Assign, nodes.Declaration)) or statement.scope == "global":
                 continue
             name = _declared_name(statement)
@@ -282,8 +273,8 @@ def _statement_name(block: Block) -> str:
     Source: key messages of one-line programs on the primary interface.
     """
     for statement in block:
-        for expression in own_expressions(statement):
-            for part in all_expressions(expression):
+        for expression in nodes.own_expressions(statement):
+            for part in nodes.all_expressions(expression):
                 if isinstance(part, nodes.Call):
                     return part.function
         if isinstance(statement, nodes.KeywordStatement):

@@ -12,25 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pc_client.arrays import Array
-from pc_client.results.sheet import (
-    AXIS_GREY,
-    BLUE,
-    GREEN,
-    RED,
-    SKY,
-    Box,
-    Curve,
-    Panel,
-    Sheet,
-    boxes,
-    cube_around,
-)
+from pc_client.results import sheet
+from pc_client.results.sheet import Box, Curve, Panel, Sheet, boxes
 from pc_client.studies.drawing.drawing import Drawing
 from pc_client.studies.drawing.judgement import Execution, signals
 from pc_client.studies.signals import Trace
 
 #: Colour of each signal; names as of `judgement.signals`.
-COLOURS = {"human": "#3A3A3A", "reconstructed": BLUE, "planned": GREEN, "executed": RED}
+COLOURS = {"human": "#3A3A3A", "reconstructed": sheet.BLUE, "planned": sheet.GREEN, "executed": sheet.RED}
 #: Colours of what the pen does in the air, of the person's signal behind others, of the sheet.
 _AIR, _FAINT, _PAPER_EDGE = "#A8A8A8", "#BDBDBD", "#C9B37E"
 #: The figures are shown to audiences: letters [points] for a width [inches].
@@ -179,7 +168,7 @@ def _paths(shown: Shown, name: str, half: float) -> list[Curve]:
         for extracted in shown.drawing.extraction.parts:
             targets = shown.on_page(extracted.trajectory.target_points)
             curves += [
-                Curve(targets, SKY, width=0.7),
+                Curve(targets, sheet.SKY, width=0.7),
                 Curve(targets, colour, width=0.0, marker="o", size=3.6, hollow=True),
             ]
     curves += [Curve(shown.on_page(dot), colour, width=0.0, marker="o") for dot in shown.dots]
@@ -267,7 +256,7 @@ def _space(box: Box, shown: Shown) -> Panel:
         curves,
         "",
         ("x [mm]", "y [mm]", "z [mm]"),
-        cube_around(np.vstack([curve.points for curve in curves]), least=0.35, margin=0.1),
+        sheet.cube_around(np.vstack([curve.points for curve in curves]), least=0.35, margin=0.1),
         "above",
         texts=((p[0], "begin"),),
         zoom=1.3,
@@ -359,7 +348,7 @@ def _profile(shown: Shown, name: str) -> list[Curve]:
             at = shown.since_pen_down(t, index)
             for stroke in shown.unit * part.trajectory.stroke_speeds(t).T:
                 visible = stroke > 1e-3 * stroke.max()
-                curves.append(Curve(np.c_[at, stroke][visible], SKY, width=0.8, filled=True))
+                curves.append(Curve(np.c_[at, stroke][visible], sheet.SKY, width=0.8, filled=True))
     if name in ("planned", "executed"):
         whole = shown.whole(executed=name == "executed")
         curves.append(Curve(np.c_[whole.t - shown.start, 1e3 * whole.speed], _AIR, width=1.1))
@@ -381,7 +370,7 @@ def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
 
 
 def _differences(shown: Shown) -> list[Curve]:
-    curves = [Curve(np.array([[at, 0.0] for at in shown.span]), AXIS_GREY, width=0.7)]
+    curves = [Curve(np.array([[at, 0.0] for at in shown.span]), sheet.AXIS_GREY, width=0.7)]
     for name in ("reconstructed", "executed"):
         for index, own, human in zip(
             shown.drawing.moving, shown.parts[name], shown.parts["human"], strict=True
