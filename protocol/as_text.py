@@ -15,16 +15,7 @@ from protocol.primary.messages import MESSAGES, ThreadLabel, VersionMessage
 from protocol.primary.packages import RobotState, decode_package, state_size, state_types
 from protocol.primary.values import TypedValue, value_codes
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size, layout_for_version
-from protocol.rtde.codec import (
-    HEADER_SIZE,
-    MAX_SIZE,
-    DataPackage,
-    RequestProtocolVersionReply,
-    Role,
-    SetupOutputsReply,
-    decode_message,
-    take_package,
-)
+from protocol.rtde import codec
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField
 from protocol.rtde.recipe import Recipe
 from protocol.rtde.types import REFUSALS, RtdeType
@@ -129,9 +120,9 @@ class RtdeDecoder:
             RemoteProtocolError: the bytes are not those of a robot's RTDE port.
         """
         self._buffer += data
-        while (package := take_package(self._buffer, MAX_SIZE)) is not None:
+        while (package := codec.take_package(self._buffer, codec.MAX_SIZE)) is not None:
             kind, payload = package
-            size = HEADER_SIZE + len(payload)
+            size = codec.HEADER_SIZE + len(payload)
             self.count += 1
             yield from self._package(kind, payload, size)
             self._position += size
@@ -142,18 +133,18 @@ class RtdeDecoder:
             yield f"byte {self._position}: {len(self._buffer)} bytes of a package that is not complete"
 
     def _package(self, kind: int, payload: bytes, size: int) -> Iterator[str]:
-        message = decode_message(kind, payload, Role.ROBOT, self._protocol)
+        message = codec.decode_message(kind, payload, codec.Role.ROBOT, self._protocol)
         if message is None:
             raise RemoteProtocolError(f"the robot sent an RTDE package of the unknown type {kind}")
         yield f"byte {self._position}: {type(message).__name__}, {size} bytes"
         match message:
-            case DataPackage(values, _) if self._recipe is not None:
+            case codec.DataPackage(values, _) if self._recipe is not None:
                 for name, value in zip(self._recipe.names, self._recipe.decode(values), strict=True):
                     yield f"  {name:<{_WIDTH}} {_text(value)}"
                 return
-            case RequestProtocolVersionReply(True):
+            case codec.RequestProtocolVersionReply(True):
                 self._protocol = 2  # version 1 needs no request
-            case SetupOutputsReply(types):
+            case codec.SetupOutputsReply(types):
                 self._take_types(types)
         yield from _describe(message)
 

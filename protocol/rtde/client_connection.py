@@ -9,27 +9,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from protocol.errors import RemoteProtocolError
-from protocol.rtde.codec import (
-    MAX_SIZE,
-    REQUESTS,
-    VERSIONS,
-    DataPackage,
-    Pause,
-    PauseReply,
-    Reply,
-    Request,
-    RequestProtocolVersion,
-    RequestProtocolVersionReply,
-    Role,
-    RtdeTextMessage,
-    SetupOutputs,
-    SetupOutputsReply,
-    Start,
-    StartReply,
-    decode_message,
-    encode_message,
-    take_package,
-)
+from protocol.rtde import codec
 from protocol.rtde.recipe import Recipe
 from protocol.rtde.types import REFUSALS, RtdeState, RtdeType, RtdeValue
 
@@ -44,7 +24,7 @@ class DataReceived:
     values: tuple[RtdeValue, ...]
 
 
-ClientEvent: TypeAlias = Reply | RtdeTextMessage | DataReceived
+ClientEvent: TypeAlias = codec.Reply | codec.RtdeTextMessage | DataReceived
 
 
 class RtdeClientConnection:
@@ -57,19 +37,19 @@ class RtdeClientConnection:
 
     def __init__(self) -> None:
         self._buffer = bytearray()
-        self._unanswered: deque[Request] = deque()
+        self._unanswered: deque[codec.Request] = deque()
         self._outputs: dict[int | None, Recipe] = {}
         self._was_started = False
-        self.protocol_version = VERSIONS[0]
+        self.protocol_version = codec.VERSIONS[0]
         self.state = RtdeState.PAUSED
 
     def receive_data(self, data: bytes) -> None:
         """Take what the socket gave; any split is fine."""
         self._buffer += data
 
-    def send(self, request: Request) -> bytes:
+    def send(self, request: codec.Request) -> bytes:
         """Ask for something; its reply comes as an event."""
-        data = encode_message(request, Role.PC, self.protocol_version)
+        data = codec.encode_message(request, codec.Role.PC, self.protocol_version)
         self._unanswered.append(request)
         return data
 
@@ -79,22 +59,22 @@ class RtdeClientConnection:
         Raises:
             RemoteProtocolError: the stream cannot be trusted any more.
         """
-        while (package := take_package(self._buffer, MAX_SIZE)) is not None:
+        while (package := codec.take_package(self._buffer, codec.MAX_SIZE)) is not None:
             event = self._read(*package)
             if event is not None:
                 return event
         return None
 
     def _read(self, kind: int, payload: bytes) -> ClientEvent | None:
-        message = decode_message(kind, payload, Role.ROBOT, self.protocol_version)
+        message = codec.decode_message(kind, payload, codec.Role.ROBOT, self.protocol_version)
         if message is None:
             raise RemoteProtocolError(f"the robot sent an RTDE package of the unknown type {kind}")
-        if isinstance(message, RtdeTextMessage):
+        if isinstance(message, codec.RtdeTextMessage):
             return message
-        if isinstance(message, DataPackage):
+        if isinstance(message, codec.DataPackage):
             return self._read_data(message.values, message.recipe_id)
         asked = self._unanswered[0] if self._unanswered else None
-        if asked is None or not isinstance(message, REQUESTS[type(asked)]):
+        if asked is None or not isinstance(message, codec.REQUESTS[type(asked)]):
             raise RemoteProtocolError(f"the robot answered {message!r}, but {asked or 'nothing'} was asked")
         self._take_reply(self._unanswered.popleft(), message)
         return message
@@ -109,19 +89,19 @@ class RtdeClientConnection:
             raise RemoteProtocolError(f"the robot sent data of recipe {recipe_id}, which was not set up")
         return DataReceived(recipe.names, recipe.decode(values))
 
-    def _take_reply(self, request: Request, reply: Reply) -> None:
+    def _take_reply(self, request: codec.Request, reply: codec.Reply) -> None:
         match request, reply:
-            case RequestProtocolVersion(version), RequestProtocolVersionReply(True):
+            case codec.RequestProtocolVersion(version), codec.RequestProtocolVersionReply(True):
                 self.protocol_version = version
-            case SetupOutputs(names), SetupOutputsReply(types, recipe_id):
+            case codec.SetupOutputs(names), codec.SetupOutputsReply(types, recipe_id):
                 self._outputs.clear()
                 recipe = _recipe_of(names, types)
                 if recipe is not None:
                     self._outputs[recipe_id] = recipe
-            case Start(), StartReply(True):
+            case codec.Start(), codec.StartReply(True):
                 self.state = RtdeState.STARTED
                 self._was_started = True
-            case Pause(), PauseReply(True):
+            case codec.Pause(), codec.PauseReply(True):
                 self.state = RtdeState.PAUSED
 
 

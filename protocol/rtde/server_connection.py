@@ -19,32 +19,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.rtde.codec import (
-    MAX_NAMES_SIZE,
-    VERSIONS,
-    DataPackage,
-    GetControllerVersion,
-    GetControllerVersionReply,
-    Pause,
-    PauseReply,
-    Reply,
-    Request,
-    RequestProtocolVersion,
-    RequestProtocolVersionReply,
-    Role,
-    RtdePackageType,
-    RtdeTextMessage,
-    SetupInputs,
-    SetupInputsReply,
-    SetupOutputs,
-    SetupOutputsReply,
-    Start,
-    StartReply,
-    data_header,
-    decode_message,
-    encode_message,
-    take_package,
-)
+from protocol.rtde import codec
 from protocol.rtde.fields import RtdeField
 from protocol.rtde.recipe import Recipe, recipe_of, snapshot_encoder
 from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue
@@ -71,22 +46,22 @@ class Transition(NamedTuple):
 
 _PAUSED, _STARTED = RtdeState
 
-TRANSITIONS: Mapping[tuple[RtdeState, type[Request]], Transition] = {
-    (_PAUSED, RequestProtocolVersion): Transition(True, _PAUSED),
-    (_PAUSED, GetControllerVersion): Transition(True, _PAUSED),
-    (_PAUSED, SetupOutputs): Transition(True, _PAUSED),
-    (_PAUSED, SetupInputs): Transition(True, _PAUSED),
-    (_PAUSED, Start): Transition(True, _STARTED),
+TRANSITIONS: Mapping[tuple[RtdeState, type[codec.Request]], Transition] = {
+    (_PAUSED, codec.RequestProtocolVersion): Transition(True, _PAUSED),
+    (_PAUSED, codec.GetControllerVersion): Transition(True, _PAUSED),
+    (_PAUSED, codec.SetupOutputs): Transition(True, _PAUSED),
+    (_PAUSED, codec.SetupInputs): Transition(True, _PAUSED),
+    (_PAUSED, codec.Start): Transition(True, _STARTED),
     # ur_rtde's I/O interface never starts, but waits for this reply when it ends.
-    (_PAUSED, Pause): Transition(True, _PAUSED),
+    (_PAUSED, codec.Pause): Transition(True, _PAUSED),
     # The layout of what flows cannot change under it.
-    (_STARTED, RequestProtocolVersion): Transition(False, _STARTED),
-    (_STARTED, GetControllerVersion): Transition(True, _STARTED),
+    (_STARTED, codec.RequestProtocolVersion): Transition(False, _STARTED),
+    (_STARTED, codec.GetControllerVersion): Transition(True, _STARTED),
     # Assumed: the guide shows set-ups before S or after P only, but not that others fail.
-    (_STARTED, SetupOutputs): Transition(True, _STARTED),
-    (_STARTED, SetupInputs): Transition(True, _STARTED),
-    (_STARTED, Start): Transition(True, _STARTED),
-    (_STARTED, Pause): Transition(True, _PAUSED),
+    (_STARTED, codec.SetupOutputs): Transition(True, _STARTED),
+    (_STARTED, codec.SetupInputs): Transition(True, _STARTED),
+    (_STARTED, codec.Start): Transition(True, _STARTED),
+    (_STARTED, codec.Pause): Transition(True, _PAUSED),
 }
 """Every request in every state. A version that does not exist is refused in both."""
 
@@ -138,7 +113,7 @@ class InputReceived:
     values: tuple[RtdeValue, ...]
 
 
-ServerEvent: TypeAlias = Request | RtdeTextMessage | InputReceived
+ServerEvent: TypeAlias = codec.Request | codec.RtdeTextMessage | InputReceived
 
 
 class RtdeServerConnection:
@@ -164,10 +139,10 @@ class RtdeServerConnection:
         self._known_outputs = outputs
         self._known_inputs = inputs
         self._buffer = bytearray()
-        self._unanswered: Request | None = None
+        self._unanswered: codec.Request | None = None
         self._output_ids = 0
         self._encoder: Callable[[Any], bytes] | None = None
-        self.protocol_version = VERSIONS[0]
+        self.protocol_version = codec.VERSIONS[0]
         self.state = RtdeState.PAUSED
         self.input_recipes: dict[int, Recipe] = {}
         self.frequency: float | None = None
@@ -187,15 +162,15 @@ class RtdeServerConnection:
         """
         if self._unanswered is not None:
             raise LocalProtocolError(f"{self._unanswered!r} has no reply yet: one for each, in order")
-        while (package := take_package(self._buffer, self._limits.package)) is not None:
+        while (package := codec.take_package(self._buffer, self._limits.package)) is not None:
             event = self._read(*package)
             if event is not None:
                 return event
         return None
 
-    def text(self, message: RtdeTextMessage) -> bytes:
+    def text(self, message: codec.RtdeTextMessage) -> bytes:
         """A text message to the client."""
-        return encode_message(message, Role.ROBOT, self.protocol_version)
+        return codec.encode_message(message, codec.Role.ROBOT, self.protocol_version)
 
     @property
     def encoder(self) -> Callable[[Any], bytes] | None:
@@ -214,66 +189,66 @@ class RtdeServerConnection:
             raise LocalProtocolError("nothing has been asked: one reply for each request")
         accepted, self.state = TRANSITIONS[self.state, type(request)]
         version = self.protocol_version
-        reply: Reply
+        reply: codec.Reply
         match request:
-            case RequestProtocolVersion(wanted):
-                accepted = accepted and wanted in VERSIONS
-                reply = RequestProtocolVersionReply(accepted)
+            case codec.RequestProtocolVersion(wanted):
+                accepted = accepted and wanted in codec.VERSIONS
+                reply = codec.RequestProtocolVersionReply(accepted)
                 self.protocol_version = wanted if accepted else version
-            case GetControllerVersion():
-                reply = GetControllerVersionReply(self._software)
-            case SetupOutputs():
+            case codec.GetControllerVersion():
+                reply = codec.GetControllerVersionReply(self._software)
+            case codec.SetupOutputs():
                 reply = self._set_up_outputs(request)
-            case SetupInputs():
+            case codec.SetupInputs():
                 reply = self._set_up_inputs(request, in_use, self._known_inputs if has_room else {})
-            case Start():
-                reply = StartReply(accepted)
-            case Pause():
-                reply = PauseReply(accepted)
-        return encode_message(reply, Role.ROBOT, version)
+            case codec.Start():
+                reply = codec.StartReply(accepted)
+            case codec.Pause():
+                reply = codec.PauseReply(accepted)
+        return codec.encode_message(reply, codec.Role.ROBOT, version)
 
     def _read(self, kind: int, payload: bytes) -> ServerEvent | None:
         try:
-            message = decode_message(kind, payload, Role.PC, self.protocol_version)
+            message = codec.decode_message(kind, payload, codec.Role.PC, self.protocol_version)
         except RemoteProtocolError:
-            if kind in (RtdePackageType.DATA_PACKAGE, RtdePackageType.TEXT_MESSAGE):
+            if kind in (codec.RtdePackageType.DATA_PACKAGE, codec.RtdePackageType.TEXT_MESSAGE):
                 return None  # no answer is expected: the connection need not end
             raise
-        if isinstance(message, DataPackage):
+        if isinstance(message, codec.DataPackage):
             recipe = self.input_recipes.get(message.recipe_id or 0)
             if recipe is None:
                 return None
             values = recipe.decode_leading(message.values)
             return InputReceived(recipe.names[: len(values)], values) if values else None
-        if isinstance(message, Request):
+        if isinstance(message, codec.Request):
             self._unanswered = message
             return message
-        return message if isinstance(message, RtdeTextMessage) else None
+        return message if isinstance(message, codec.RtdeTextMessage) else None
 
-    def _set_up_outputs(self, request: SetupOutputs) -> SetupOutputsReply:
+    def _set_up_outputs(self, request: codec.SetupOutputs) -> codec.SetupOutputsReply:
         """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""
         fields, types = _look_up(request.names, self._known_outputs, (), self._limits)
         is_v1 = self.protocol_version == 1
         self.frequency = request.frequency
         self._encoder = None
         if not fields:
-            return SetupOutputsReply(types, None if is_v1 else 0)
+            return codec.SetupOutputsReply(types, None if is_v1 else 0)
         self._output_ids = self._output_ids % _LAST_ID + 1
         recipe_id = None if is_v1 else self._output_ids
         size = sum(field.type.size for field in fields)
-        self._encoder = snapshot_encoder(fields, data_header(size, recipe_id))
-        return SetupOutputsReply(types, recipe_id)
+        self._encoder = snapshot_encoder(fields, codec.data_header(size, recipe_id))
+        return codec.SetupOutputsReply(types, recipe_id)
 
     def _set_up_inputs(
-        self, request: SetupInputs, in_use: Collection[str], known: Mapping[str, RtdeField]
-    ) -> SetupInputsReply:
+        self, request: codec.SetupInputs, in_use: Collection[str], known: Mapping[str, RtdeField]
+    ) -> codec.SetupInputsReply:
         """Add an input recipe. One that is refused takes no id."""
         fields, types = _look_up(request.names, known, in_use, self._limits)
         recipe_id = len(self.input_recipes) + 1
         if not fields or recipe_id > _LAST_ID:
-            return SetupInputsReply(types, 0)
+            return codec.SetupInputsReply(types, 0)
         self.input_recipes[recipe_id] = recipe_of(fields)
-        return SetupInputsReply(types, recipe_id)
+        return codec.SetupInputsReply(types, recipe_id)
 
 
 def _look_up(
@@ -287,7 +262,7 @@ def _look_up(
     for name in names:
         end += 1 + len(name)
         # What lies beyond the limits is answered as if it had not been read.
-        is_read = end <= MAX_NAMES_SIZE or (limits.takes_long_lists and name not in read)
+        is_read = end <= codec.MAX_NAMES_SIZE or (limits.takes_long_lists and name not in read)
         read.add(name)
         field = known.get(name) if is_read else None
         if field is None:

@@ -8,13 +8,7 @@ from collections.abc import Callable
 
 from protocol.ur_types import ProgramState
 from ur_emulator.budgets import BUDGETS, of_cycle
-from ur_emulator.controller.events import (
-    ProgramPaused,
-    ProgramResumed,
-    ProgramStarted,
-    ProgramStopped,
-    ScriptFailed,
-)
+from ur_emulator.controller import events
 from ur_emulator.controller.state import ControllerState
 from urscript import CompiledProgram, ProgramStatus, RunningProgram
 from urscript.run.host import Host
@@ -129,7 +123,7 @@ class ProgramRunner:
         if program.kind == "sec":
             if len(self._secondaries) >= BUDGETS.secondary_programs:
                 text = f"{len(self._secondaries)} secondary programs wait already: this one is not started"
-                self._state.events.append(ScriptFailed(1, 1, text, True))
+                self._state.events.append(events.ScriptFailed(1, 1, text, True))
                 return
             self._secondaries.append(program.start(self._make_host(), self._secondary_work))
             return
@@ -143,7 +137,7 @@ class ProgramRunner:
         self._state.io_configuration.program_started()
         self._state.interpreter.program_started()
         self._state.force_sense.program_started(self._state.past.steady_cycles)
-        self._state.events.append(ProgramStarted(program.name, self._primary))
+        self._state.events.append(events.ProgramStarted(program.name, self._primary))
 
     def stop(self, *, unscheduled: bool = False) -> None:
         """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint.
@@ -188,7 +182,7 @@ class ProgramRunner:
             state.motion.resume()
             state.watchdogs.restart(state.clock.tick)
             state.io_configuration.program_started()
-            state.events.append(ProgramResumed(self.name))
+            state.events.append(events.ProgramResumed(self.name))
             self._enter(ProgramState.RESUMING)
 
     def end_for_memory(self, text: str) -> None:
@@ -248,7 +242,7 @@ class ProgramRunner:
         if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:
             self._enter(ProgramState.PAUSED)
             state.io_configuration.program_stopped(unscheduled=self._is_unscheduled)
-            state.events.append(ProgramPaused(self.name))
+            state.events.append(events.ProgramPaused(self.name))
         if self._phase in _STANDS_STILL or state.motion.is_returning:
             return False
         if not is_new:
@@ -263,7 +257,7 @@ class ProgramRunner:
         error = program.error
         assert error is not None
         self._state.events.append(
-            ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
+            events.ScriptFailed(error.line, error.column, error.wire_text, secondary, error.log_text)
         )
 
     def _end(self, *, unscheduled: bool) -> None:
@@ -273,4 +267,4 @@ class ProgramRunner:
         self._state.io_configuration.program_stopped(unscheduled=unscheduled)
         self._state.watchdogs.clear()
         self._state.error_settings.program_ended()
-        self._state.events.append(ProgramStopped(self.name))
+        self._state.events.append(events.ProgramStopped(self.name))

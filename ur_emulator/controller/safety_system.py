@@ -9,16 +9,10 @@ from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.controller.program_runner import ProgramRunner
 from ur_emulator.controller.robot_mode import POWERED, ModeCommand
+from ur_emulator.controller.safety import modes
 from ur_emulator.controller.safety.boundaries import TRIGGER_BAND
 from ur_emulator.controller.safety.inputs import Guard, OperationalMode, SafetyInput, SafetyInputs
 from ur_emulator.controller.safety.limit_checks import Violation
-from ur_emulator.controller.safety.modes import (
-    EVENTS,
-    ROW,
-    ArmEffect,
-    ProgramEffect,
-    SafetyEvent,
-)
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.controller.state import ControllerState
@@ -80,7 +74,7 @@ class SafetySystem:
         self._set_limits(self._state.safety.mode)
         self._update()
 
-    def handle(self, event: SafetyEvent) -> None:
+    def handle(self, event: modes.SafetyEvent) -> None:
         """Apply an event."""
         state, safety = self._state, self._state.safety
         before = safety.mode
@@ -89,7 +83,7 @@ class SafetySystem:
         if safety.mode is not before:
             state.events.append(SafetyModeChanged(int(safety.mode)))
             self._react(before)
-        if EVENTS[event].cuts_power or (was_stopping and ROW[safety.mode].may_have_power):
+        if modes.EVENTS[event].cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
             self.cut_power()  # an emergency stop ends without power, however soon it is released
         self._update()
 
@@ -102,12 +96,12 @@ class SafetySystem:
         state.mode.command(ModeCommand.POWER_OFF)
         state.motion.stop()
         state.motion.place(state.past.sensed.actual_q)
-        self.handle(SafetyEvent.POWERED_OFF)
+        self.handle(modes.SafetyEvent.POWERED_OFF)
 
     def check_range(self) -> None:
         """Check joint ranges and boundaries when the brakes have opened."""
         if not self._is_in_range():
-            self.handle(SafetyEvent.RANGE_LEFT)
+            self.handle(modes.SafetyEvent.RANGE_LEFT)
 
     # --- cycle
 
@@ -119,7 +113,7 @@ class SafetySystem:
         if self._watches_space:
             self._watch_space()
         if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
-            self.handle(SafetyEvent.RANGE_KEPT)
+            self.handle(modes.SafetyEvent.RANGE_KEPT)
         if self._cut_after is not None:
             if any(state.motion.target.qd):
                 self._rests_since = None
@@ -155,28 +149,28 @@ class SafetySystem:
             crossed = state.safety.boundaries.find_crossed(arm)
             if crossed is not None:
                 state.events.append(crossed)
-                self.handle(SafetyEvent.VIOLATION)
+                self.handle(modes.SafetyEvent.VIOLATION)
 
     # --- effects
 
     def _react(self, before: SafetyMode) -> None:
         state, mode = self._state, self._state.safety.mode
-        row, row_before = ROW[mode], ROW[before]
+        row, row_before = modes.ROW[mode], modes.ROW[before]
         self._set_limits(mode)
         robot_mode = state.mode.mode
-        if row.arm is ArmEffect.POWER_OFF:
-            if row_before.arm is not ArmEffect.POWER_OFF:
+        if row.arm is modes.ArmEffect.POWER_OFF:
+            if row_before.arm is not modes.ArmEffect.POWER_OFF:
                 self._is_waiting = False
                 self._programs.stop(unscheduled=True)
                 if robot_mode is RobotMode.RUNNING:
                     self._cut_after = state.clock.tick + round(LONGEST_BRAKING / state.clock.period_s)
                 elif robot_mode in POWERED:
                     self.cut_power()
-        elif row.arm is ArmEffect.STOP:
+        elif row.arm is modes.ArmEffect.STOP:
             self._is_waiting = False
             self._programs.interrupt()
-        elif row.arm is ArmEffect.PATH_STOP:
-            if row.program is ProgramEffect.PAUSE_FOR_A_WHILE and row_before.may_move:
+        elif row.arm is modes.ArmEffect.PATH_STOP:
+            if row.program is modes.ProgramEffect.PAUSE_FOR_A_WHILE and row_before.may_move:
                 self._wait()
         elif self._is_waiting:
             self._is_waiting = False

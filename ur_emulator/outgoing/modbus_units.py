@@ -14,19 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from protocol import modbus
 from protocol.errors import RemoteProtocolError
-from protocol.modbus import (
-    EXCEPTION_BIT,
-    ExceptionCode,
-    ModbusFrame,
-    ModbusFunction,
-    decode_values,
-    encode_frame,
-    encode_read,
-    encode_read_write,
-    encode_write,
-    take_frame,
-)
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.modbus_signals import (
     DISCONNECTED,
@@ -40,18 +29,18 @@ from ur_emulator.loop.event_loop import EventLoop
 from ur_emulator.scripting.network import ScriptSocket
 
 _READ = {
-    SignalType.DIGITAL_INPUT: ModbusFunction.READ_DISCRETE_INPUTS,
-    SignalType.DIGITAL_OUTPUT: ModbusFunction.READ_COILS,
-    SignalType.REGISTER_INPUT: ModbusFunction.READ_INPUT_REGISTERS,
-    SignalType.REGISTER_OUTPUT: ModbusFunction.READ_HOLDING_REGISTERS,
+    SignalType.DIGITAL_INPUT: modbus.ModbusFunction.READ_DISCRETE_INPUTS,
+    SignalType.DIGITAL_OUTPUT: modbus.ModbusFunction.READ_COILS,
+    SignalType.REGISTER_INPUT: modbus.ModbusFunction.READ_INPUT_REGISTERS,
+    SignalType.REGISTER_OUTPUT: modbus.ModbusFunction.READ_HOLDING_REGISTERS,
 }
 _WRITE_ONE = {
-    SignalType.DIGITAL_OUTPUT: ModbusFunction.WRITE_COIL,
-    SignalType.REGISTER_OUTPUT: ModbusFunction.WRITE_REGISTER,
+    SignalType.DIGITAL_OUTPUT: modbus.ModbusFunction.WRITE_COIL,
+    SignalType.REGISTER_OUTPUT: modbus.ModbusFunction.WRITE_REGISTER,
 }
 _WRITE = {
-    SignalType.DIGITAL_OUTPUT: ModbusFunction.WRITE_COILS,
-    SignalType.REGISTER_OUTPUT: ModbusFunction.WRITE_REGISTERS,
+    SignalType.DIGITAL_OUTPUT: modbus.ModbusFunction.WRITE_COILS,
+    SignalType.REGISTER_OUTPUT: modbus.ModbusFunction.WRITE_REGISTERS,
 }
 
 
@@ -72,26 +61,26 @@ class SentRequest:
 def request_for(signal: ModbusSignal) -> bytes:
     """Return the request that a signal needs: write its output if a program has set it, else read."""
     if signal.output is None:
-        return encode_read(_READ[signal.type.single], signal.address, signal.count)
+        return modbus.encode_read(_READ[signal.type.single], signal.address, signal.count)
     if signal.reads_back:
-        return encode_read_write(signal.address, signal.count, signal.write_address, signal.output)
+        return modbus.encode_read_write(signal.address, signal.count, signal.write_address, signal.output)
     is_one = signal.count == 1 and signal.type in _WRITE_ONE
     function = _WRITE_ONE[signal.type] if is_one else _WRITE[signal.type.single]
-    return encode_write(function, signal.address, signal.output)
+    return modbus.encode_write(function, signal.address, signal.output)
 
 
 def error_of(answer: bytes, request: bytes) -> int:
     """Return the code of an answer that has no value: of its exception, or of a failure of the server."""
-    is_exception = answer[0] == request[0] | EXCEPTION_BIT and len(answer) > 1
-    return answer[1] if is_exception else ExceptionCode.SLAVE_DEVICE_FAILURE
+    is_exception = answer[0] == request[0] | modbus.EXCEPTION_BIT and len(answer) > 1
+    return answer[1] if is_exception else modbus.ExceptionCode.SLAVE_DEVICE_FAILURE
 
 
 def problem_of(answer: bytes, request: bytes) -> str:
     """Return what is wrong with an answer that has no value."""
-    if answer[0] == request[0] | EXCEPTION_BIT and len(answer) > 1:
+    if answer[0] == request[0] | modbus.EXCEPTION_BIT and len(answer) > 1:
         code = answer[1]
-        known = code in ExceptionCode.__members__.values()
-        name = ExceptionCode(code).name.lower().replace("_", " ") if known else "unknown"
+        known = code in modbus.ExceptionCode.__members__.values()
+        name = modbus.ExceptionCode(code).name.lower().replace("_", " ") if known else "unknown"
         return f"answers with exception E{code} ({name})"
     return "gives an answer that makes no sense"
 
@@ -261,12 +250,12 @@ class ModbusLink:
 
     def _receive(self, inbox: bytearray, now: float) -> None:
         try:
-            while self._socket is not None and (frame := take_frame(inbox)) is not None:
+            while self._socket is not None and (frame := modbus.take_frame(inbox)) is not None:
                 self._take(frame, now)
         except RemoteProtocolError:
             self._fail(now, "sends what is not Modbus")
 
-    def _take(self, frame: ModbusFrame, now: float) -> None:
+    def _take(self, frame: modbus.ModbusFrame, now: float) -> None:
         request = self._under_way.pop(frame.transaction, None)
         if request is None:
             self._n_unexpected += 1
@@ -279,7 +268,7 @@ class ModbusLink:
         signal = request.signal
         if signal is None:
             return
-        values = decode_values(request.pdu, frame.pdu)
+        values = modbus.decode_values(request.pdu, frame.pdu)
         if values is None:
             self._waiting[signal].why = problem_of(frame.pdu, request.pdu)
             signal.device_error, signal.connection_error = error_of(frame.pdu, request.pdu), 0
@@ -326,7 +315,7 @@ class ModbusLink:
             transaction = self._next()
             self._under_way[transaction] = request
             # A connection that breaks here is noticed in the next round.
-            sock.send(encode_frame(transaction, unit, request.pdu))
+            sock.send(modbus.encode_frame(transaction, unit, request.pdu))
 
     def _may_ask(self, now: float) -> bool:
         if not self._under_way:

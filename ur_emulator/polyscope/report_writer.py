@@ -6,15 +6,8 @@ from typing import TypeVar
 
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
+from ur_emulator.polyscope import report_files
 from ur_emulator.polyscope.player import ProgramPlayer
-from ur_emulator.polyscope.report_files import (
-    BoxFacts,
-    ReportFolder,
-    flight_report,
-    flight_report_archive,
-    save_log,
-    support_file,
-)
 from ur_hil import tool_version
 
 T = TypeVar("T")
@@ -32,7 +25,7 @@ class ReportWriter:
     def __init__(self, box: ServedBox, player: ProgramPlayer) -> None:
         self._box = box
         self._player = player
-        self._folder = ReportFolder(player.folder)
+        self._folder = report_files.ReportFolder(player.folder)
         # Looked up now: a process without descriptors cannot do it later.
         self._versions = {
             "software": str(box.identity.software.version),
@@ -43,19 +36,19 @@ class ReportWriter:
 
     def flight_report(self, kind: str = "") -> Steps[str]:
         """Write a flight report; return its number."""
-        return self._written(flight_report, kind)
+        return self._written(report_files.flight_report, kind)
 
     def support_file(self, directory: str) -> Steps[str]:
         """Write a support file into a directory; return its name."""
-        return self._written(support_file, directory)
+        return self._written(report_files.support_file, directory)
 
     def save_log(self) -> Steps[str]:
         """Write the log; return the name of the file on the wire."""
-        return self._written(save_log)
+        return self._written(report_files.save_log)
 
     def archive(self) -> Steps[bytes]:
         """Return an archive of all flight reports, b"" without one."""
-        return self._written(flight_report_archive)
+        return self._written(report_files.flight_report_archive)
 
     def close(self) -> None:
         """Remove what was written into a temporary folder."""
@@ -65,9 +58,9 @@ class ReportWriter:
         facts = self._facts()
         return (yield from self._box.in_worker(write, self._folder.folder, *arguments, facts))
 
-    def _facts(self) -> BoxFacts:
+    def _facts(self) -> report_files.BoxFacts:
         box, player = self._box, self._player
-        return BoxFacts(
+        return report_files.BoxFacts(
             serial_number=box.identity.serial_number,
             versions=self._versions,
             timestamp=box.snapshot.timestamp,

@@ -8,18 +8,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from protocol import interpreter
 from protocol.errors import ProtocolError
-from protocol.interpreter import (
-    CLEANED_UP,
-    INVALID_STATE,
-    TOO_MANY,
-    InterpreterConnection,
-    Statements,
-    Word,
-    acknowledge,
-    discard,
-    state,
-)
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import AbortMove, AppendStatements, SkipStatements
 from ur_emulator.controller.command import BoxParts, Command, Result
@@ -88,7 +78,7 @@ class InterpreterIntake:
         self._n_waiting = self._held = 0
         self._is_serving = False
         # Who waits for the answer to a word that acts in the next cycle.
-        self._asking: dict[Word, list[Connection]] = {}
+        self._asking: dict[interpreter.Word, list[Connection]] = {}
 
     @property
     def _queue(self) -> InterpreterQueue:
@@ -101,7 +91,7 @@ class InterpreterIntake:
         self._n_taken += 1
         line = _Line(client, text, self._n_taken, self._queue.run, self._queue.n_cleanups)
         if self._held + line.cost > BUDGETS.interpreter_bytes:
-            _send(client, discard(TOO_MANY, text))
+            _send(client, interpreter.discard(interpreter.TOO_MANY, text))
             return
         self._held += line.cost
         self._n_waiting += 1
@@ -110,30 +100,30 @@ class InterpreterIntake:
             self._is_serving = True
             self._box.steps.start(self._serve(), self._served)
 
-    def take_word(self, client: Connection, word: Word) -> None:
+    def take_word(self, client: Connection, word: interpreter.Word) -> None:
         """Take a word."""
         queue = self._queue
         match word:
-            case Word.ABORT:
+            case interpreter.Word.ABORT:
                 self._act(client, word, AbortMove())
-            case Word.SKIP_BUFFER:
+            case interpreter.Word.SKIP_BUFFER:
                 self._skipped_up_to = self._n_taken
                 self._act(client, word, SkipStatements())
-            case Word.LAST_EXECUTED:
-                _send(client, state(queue.last_executed, word))
-            case Word.LAST_INTERPRETED:
-                _send(client, state(queue.last_interpreted, word))
-            case Word.LAST_CLEARED:
-                _send(client, state(queue.last_cleared, word))
-            case Word.UNEXECUTED:
-                _send(client, state(queue.n_ready + self._n_waiting, word))
+            case interpreter.Word.LAST_EXECUTED:
+                _send(client, interpreter.state(queue.last_executed, word))
+            case interpreter.Word.LAST_INTERPRETED:
+                _send(client, interpreter.state(queue.last_interpreted, word))
+            case interpreter.Word.LAST_CLEARED:
+                _send(client, interpreter.state(queue.last_cleared, word))
+            case interpreter.Word.UNEXECUTED:
+                _send(client, interpreter.state(queue.n_ready + self._n_waiting, word))
 
     def ended(self, client: Connection) -> None:
         """A client sends nothing more: close it when all its lines are answered."""
         if client not in self._waiting and (self._current is None or self._current.client is not client):
             client.close_when_sent()
 
-    def _act(self, client: Connection, word: Word, command: Command) -> None:
+    def _act(self, client: Connection, word: interpreter.Word, command: Command) -> None:
         """Do what a word asks for, and answer when it is done; a word acts once in a cycle."""
         if word in self._asking:
             self._asking[word].append(client)
@@ -141,7 +131,7 @@ class InterpreterIntake:
         clients = self._asking[word] = [client]
 
         def done(_: object, error: Exception | None) -> None:
-            answer = acknowledge(self._queue.last_interpreted, word.value)
+            answer = interpreter.acknowledge(self._queue.last_interpreted, word.value)
             for each, count in Counter(clients).items():
                 if error is None:
                     _send(each, count * answer)
@@ -157,9 +147,9 @@ class InterpreterIntake:
         """Return why a line is not interpreted any more; "" if it can be."""
         queue = self._queue
         if not self._box.controller.programs.is_running or line.run != queue.run:
-            return INVALID_STATE
+            return interpreter.INVALID_STATE
         is_dropped = line.n_cleanups != queue.n_cleanups or line.number <= self._skipped_up_to
-        return CLEANED_UP if is_dropped else ""
+        return interpreter.CLEANED_UP if is_dropped else ""
 
     def _serve(self) -> Steps[None]:
         """Interpret or discard lines until none is left."""
@@ -168,7 +158,7 @@ class InterpreterIntake:
             refused = next((line for line in self._next_lines() if self._why_not(line)), None)
             if refused is not None:
                 self._take_out(refused)
-                self._answer(refused, discard(self._why_not(refused), refused.text))
+                self._answer(refused, interpreter.discard(self._why_not(refused), refused.text))
                 n_refused += 1
                 if n_refused % _REFUSED_AT_ONCE == 0:
                     yield
@@ -209,7 +199,7 @@ class InterpreterIntake:
         """Compile and append a line; return the answer, b"" if it has to wait for other names."""
         queue = self._queue
         if reason := self._why_not(line):
-            return discard(reason, line.text)
+            return interpreter.discard(reason, line.text)
         if not queue.takes_lines:
             return b""
         epoch, self._n_compiled = queue.epoch, self._n_compiled + 1
@@ -220,14 +210,14 @@ class InterpreterIntake:
         except WorkerError as error:
             outcome = f"Compile error: {error}"
         if isinstance(outcome, str):
-            return discard(outcome, line.text)
+            return interpreter.discard(outcome, line.text)
         if self._why_not(line):
             return b""
         try:
             result = yield from self._box.apply(AppendStatements(outcome, epoch))
         except RefusedError as error:
-            return discard(str(error), line.text)
-        return acknowledge(result["id"], line.text) if result["id"] else b""
+            return interpreter.discard(str(error), line.text)
+        return interpreter.acknowledge(result["id"], line.text) if result["id"] else b""
 
     def _answer(self, line: _Line, answer: bytes) -> None:
         """Answer a line, and close a client that sends nothing more after its last one."""
@@ -254,12 +244,12 @@ class InterpreterPort:
     def __init__(self, intake: InterpreterIntake) -> None:
         """Serve a box; `intake` gets the lines of all its clients."""
         self._intake = intake
-        self._lines: dict[Connection, InterpreterConnection] = {}
+        self._lines: dict[Connection, interpreter.InterpreterConnection] = {}
 
     def opened(self, connection: Connection) -> None:
         """Wait for lines; a client that has closed its sending side still gets its answers."""
         connection.allow_half_close(self._intake.ended)
-        self._lines[connection] = InterpreterConnection()
+        self._lines[connection] = interpreter.InterpreterConnection()
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take lines; a client whose line has no end is disconnected."""
@@ -270,7 +260,7 @@ class InterpreterPort:
             connection.close()
             return
         while (event := lines.next_event()) is not None:
-            if isinstance(event, Statements):
+            if isinstance(event, interpreter.Statements):
                 self._intake.take(connection, event.text)
             else:
                 self._intake.take_word(connection, event)

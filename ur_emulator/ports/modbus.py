@@ -7,17 +7,8 @@ can only be read, is refused as a whole with exception 2.
 Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus application protocol.
 """
 
+from protocol import modbus
 from protocol.errors import RemoteProtocolError
-from protocol.modbus import (
-    ExceptionCode,
-    ModbusRequest,
-    ModbusRequestError,
-    decode_request,
-    encode_answer,
-    encode_exception,
-    encode_frame,
-    take_frame,
-)
 from ur_emulator.commands.client_writes import WriteModbus
 from ur_emulator.controller.modbus_map import MapAddressError, can_write, read_coil, read_register
 from ur_emulator.loop.connection import Connection
@@ -61,34 +52,34 @@ class _ModbusSession(Session):
 
     def _answer_next(self) -> Steps[int]:
         try:
-            frame = take_frame(self._inbox)
+            frame = modbus.take_frame(self._inbox)
         except RemoteProtocolError:
             self.connection.close()
             return 0
         if frame is None:
             return 0
         pdu = yield from self._answer(frame.pdu)
-        if not self.connection.send(encode_frame(frame.transaction, frame.unit, pdu)):
+        if not self.connection.send(modbus.encode_frame(frame.transaction, frame.unit, pdu)):
             self.connection.close()  # without its answer, a client takes the next one for it
         return _REQUEST_COST + len(pdu) // (2 * _VALUES_PER_UNIT)
 
     def _answer(self, pdu: bytes) -> Steps[bytes]:
         """Return the answer to a request; that to a write after the cycle in which it acts."""
         try:
-            request = decode_request(pdu)
+            request = modbus.decode_request(pdu)
             if request.function.is_read:
-                return encode_answer(request, self._read(request))
+                return modbus.encode_answer(request, self._read(request))
             is_bits, first = request.function.is_bits, request.address
             if not all(can_write(is_bits, first + i) for i in range(request.count)):
-                raise ModbusRequestError(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+                raise modbus.ModbusRequestError(modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
             yield from self._box.apply(WriteModbus(is_bits, first, request.values))
-            return encode_answer(request)
+            return modbus.encode_answer(request)
         except MapAddressError:
-            return encode_exception(pdu[0], ExceptionCode.ILLEGAL_DATA_ADDRESS)
-        except ModbusRequestError as error:
-            return encode_exception(pdu[0], error.code)
+            return modbus.encode_exception(pdu[0], modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
+        except modbus.ModbusRequestError as error:
+            return modbus.encode_exception(pdu[0], error.code)
 
-    def _read(self, request: ModbusRequest) -> list[int]:
+    def _read(self, request: modbus.ModbusRequest) -> list[int]:
         state = self._box.controller.state
         read = read_coil if request.function.is_bits else read_register
         return [int(read(state, request.address + i)) for i in range(request.count)]

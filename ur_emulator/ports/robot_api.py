@@ -7,15 +7,8 @@ from html import escape
 from http import HTTPStatus
 from typing import Any
 
+from protocol import robot_api
 from protocol.primary.messages import RequestedType
-from protocol.robot_api import (
-    BASE,
-    ROBOT_MODE_NAMES,
-    SAFETY_MODE_NAMES,
-    ApiCall,
-    api_version,
-    match_call,
-)
 from protocol.ur_types import RobotMode, SafetyMode
 from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.commands.programs import ClosePopup, ShowPopup
@@ -31,26 +24,20 @@ from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
 from ur_emulator.polyscope.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
+from ur_emulator.ports import robot_api_files
 from ur_emulator.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
-from ur_emulator.ports.robot_api_files import (
-    StoreResult,
-    find_program,
-    list_programs,
-    read_program,
-    write_program,
-)
 
 
-def openapi(calls: Iterable[ApiCall], version: str) -> dict[str, Any]:
+def openapi(calls: Iterable[robot_api.ApiCall], version: str) -> dict[str, Any]:
     """Return the OpenAPI document of some calls; `version` is that of the API."""
     paths: dict[str, dict[str, Any]] = {}
     for call in calls:
         paths.setdefault(call.path, {})[call.method.lower()] = _described(call)
     info = {"title": "Robot API", "version": version}
-    return {"openapi": "3.0.3", "info": info, "servers": [{"url": BASE}], "paths": paths}
+    return {"openapi": "3.0.3", "info": info, "servers": [{"url": robot_api.BASE}], "paths": paths}
 
 
-def page(calls: Iterable[ApiCall], version: str) -> bytes:
+def page(calls: Iterable[robot_api.ApiCall], version: str) -> bytes:
     """Return the same as a page in HTML."""
     rows = "\n".join(
         f"<tr><td><code>{call.method} {escape(call.path)}</code></td><td>{escape(call.does)}</td>"
@@ -59,13 +46,13 @@ def page(calls: Iterable[ApiCall], version: str) -> bytes:
     )
     return (
         f"<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>Robot API {escape(version)}</title>\n"
-        f'<h1>Robot API {escape(version)}</h1>\n<p>Below <code>{BASE}</code>; <a href="{BASE}/openapi.json">'
+        f'<h1>Robot API {escape(version)}</h1>\n<p>Below <code>{robot_api.BASE}</code>; <a href="{robot_api.BASE}/openapi.json">'
         f"openapi.json</a> is for programs.</p>\n"
         f"<table>\n<tr><th>call</th><th>does</th><th>control</th></tr>\n{rows}\n</table>\n</html>\n"
     ).encode()
 
 
-def _described(call: ApiCall) -> dict[str, Any]:
+def _described(call: robot_api.ApiCall) -> dict[str, Any]:
     name = call.path.partition("{")[2].rstrip("}")
     parameter = {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
     return {
@@ -119,7 +106,7 @@ class ProgramCalls:
     def load(self, request: HttpRequest, key: str) -> Steps[HttpAnswer]:
         """Load the program that the body names under a key."""
         name = request.text(key)
-        file = find_program(self._player.folder, name)
+        file = robot_api_files.find_program(self._player.folder, name)
         yield from self._player.load(file.wire_path)
         return HttpAnswer(200, {"name": name})
 
@@ -127,19 +114,19 @@ class ProgramCalls:
 
     def list_all(self) -> Steps[HttpAnswer]:
         """Name all programs."""
-        programs = yield from self._box.in_worker(list_programs, self._player.folder)
+        programs = yield from self._box.in_worker(robot_api_files.list_programs, self._player.folder)
         return HttpAnswer(200, {"programs": programs, "message": ""})
 
     def send(self, name: str) -> Steps[HttpAnswer]:
         """Send the file of a program."""
-        data = yield from self._box.in_worker(read_program, self._player.folder, name)
+        data = yield from self._box.in_worker(robot_api_files.read_program, self._player.folder, name)
         return HttpAnswer(200, data)
 
     def store(self, request: HttpRequest, *, is_new: bool) -> Steps[HttpAnswer]:
         """Take the file of a program, a new one or one that exists."""
         in_use = self.loaded_name() if self._player.is_running else ""
         name, outcome = yield from self._box.in_worker(
-            write_program,
+            robot_api_files.write_program,
             self._player.folder,
             request.headers.get("content-type", ""),
             request.body,
@@ -147,11 +134,11 @@ class ProgramCalls:
             in_use,
         )
         match outcome:
-            case StoreResult.EXISTS:
+            case robot_api_files.StoreResult.EXISTS:
                 raise HttpError(400, f"there is a program {name!r} already: PUT replaces it")
-            case StoreResult.MISSING:
+            case robot_api_files.StoreResult.MISSING:
                 raise HttpError(404, f"there is no program {name!r} yet: POST makes it")
-            case StoreResult.IN_USE:
+            case robot_api_files.StoreResult.IN_USE:
                 raise RefusedError(f"{name} is loaded and plays: stop it first")
         return HttpAnswer(200, {"programName": name})
 
@@ -191,7 +178,7 @@ class RobotApiAnswers:
         self._shut_down = shut_down
         self._own_host = own_host
         self._calls = box.identity.software.robot_api
-        version = api_version(box.identity.software.version)
+        version = robot_api.api_version(box.identity.software.version)
         self._methods: dict[str, Callable[[HttpRequest, str], Steps[HttpAnswer]]] = {
             "GET /openapi.json": lambda *_: _at_once(openapi(self._calls, version)),
             "GET /docs": lambda *_: _at_once(page(self._calls, version), "text/html; charset=utf-8"),
@@ -200,10 +187,10 @@ class RobotApiAnswers:
             ),
             "PUT /robotstate/v1/state": self._change_robot_state,
             "GET /robotstate/v1/robotmode": lambda *_: _at_once(
-                {"mode": ROBOT_MODE_NAMES[RobotMode(box.snapshot.robot_mode)], "message": ""}
+                {"mode": robot_api.ROBOT_MODE_NAMES[RobotMode(box.snapshot.robot_mode)], "message": ""}
             ),
             "GET /robotstate/v1/safetymode": lambda *_: _at_once(
-                {"mode": SAFETY_MODE_NAMES[SafetyMode(box.snapshot.safety_mode)], "message": ""}
+                {"mode": robot_api.SAFETY_MODE_NAMES[SafetyMode(box.snapshot.safety_mode)], "message": ""}
             ),
             "PUT /program/v1/state": lambda request, _: programs.change_state(request),
             "GET /program/v1/state": lambda *_: _at_once(
@@ -244,11 +231,11 @@ class RobotApiAnswers:
 
     def _answer(self, request: HttpRequest) -> Steps[HttpAnswer]:
         check_origin(request.headers, self._own_host)
-        call, argument = match_call(request.method, request.path, self._calls)
+        call, argument = robot_api.match_call(request.method, request.path, self._calls)
         if call is None:
             if argument:
                 raise HttpError(405, f"{request.path} is asked with {argument}", ("Allow", argument))
-            raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {BASE}/openapi.json")
+            raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {robot_api.BASE}/openapi.json")
         if call.needs_remote and not self._box.controller.state.pendant.remote_period:
             raise HttpError(403, _LOCAL)
         try:

@@ -7,18 +7,8 @@ from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import ZERO6, Vector6
+from ur_emulator.motion import generators
 from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
-from ur_emulator.motion.generators import (
-    DirectTorque,
-    JointTarget,
-    ServoJ,
-    SpeedJ,
-    SpeedL,
-    StopJ,
-    StopL,
-    Streamed,
-    TorqueCommand,
-)
 from ur_emulator.scripting.builtin_group import (
     MIN_LIMIT,
     BuiltinGroup,
@@ -50,34 +40,36 @@ class StreamBuiltins(BuiltinGroup):
     def _speedj(self, thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
         if not a >= MIN_LIMIT:
             a = _limit("speedj", t, a=a)
-        return self._stream(thread, SpeedJ(floats(qd), a), t)
+        return self._stream(thread, generators.SpeedJ(floats(qd), a), t)
 
     @builtin("speedl")
     def _speedl(self, thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
         a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
         a = _limit("speedl", t, a=a)
         twist = floats(tuple(xd))
-        return self._stream(thread, SpeedL(twist, a, a_rot, self._arm.tool), t)
+        return self._stream(thread, generators.SpeedL(twist, a, a_rot, self._arm.tool), t)
 
     @builtin("servoj")
     def _servoj(
         self, thread: object, q: list[float], a: float, v: float, t: float, lookahead_time: float, gain: float
     ) -> Cycles:
         require_positive("servoj", t=t, lookahead_time=lookahead_time, gain=gain)
-        return self._stream(thread, ServoJ(floats(q), lookahead_time, gain, self._arm.robot.qd_max), t)
+        return self._stream(
+            thread, generators.ServoJ(floats(q), lookahead_time, gain, self._arm.robot.qd_max), t
+        )
 
     @builtin("stopj")
     def _stopj(self, thread: object, a: float) -> Cycles:
         require_positive("stopj", a=a)
-        return self._stop(thread, StopJ(a))
+        return self._stop(thread, generators.StopJ(a))
 
     @builtin("stopl")
     def _stopl(self, thread: object, a: float, aRot: float | None) -> Cycles:
         a_rot = a if aRot is None else aRot
         require_positive("stopl", a=a, aRot=a_rot)
-        return self._stop(thread, StopL(a, a_rot, self._arm.tool))
+        return self._stop(thread, generators.StopL(a, a_rot, self._arm.tool))
 
-    def _stream(self, thread: object, generator: Streamed, t: float | None) -> Cycles:
+    def _stream(self, thread: object, generator: generators.Streamed, t: float | None) -> Cycles:
         """Renew a motion for the time t [s] of the speed slider, or until it is done."""
         motion, step_time = self._motion, self._step_time
         self._arm.take(thread, generator)
@@ -96,7 +88,7 @@ class StreamBuiltins(BuiltinGroup):
                 motion.renew()
                 yield NEXT_CYCLE
 
-    def _stop(self, thread: object, generator: StopJ | StopL) -> Cycles:
+    def _stop(self, thread: object, generator: generators.StopJ | generators.StopL) -> Cycles:
         self._arm.take(thread, generator)
         while not generator.done:
             yield NEXT_CYCLE
@@ -152,21 +144,21 @@ class TorqueBuiltins(BuiltinGroup):
             text = "direct_torque: friction_comp is deprecated, use viscous_scale and coulomb_scale"
             self._events.append(LogAdded("Program", text))
         compensates = friction_comp is not False or viscous is not None or coulomb is not None
-        command = TorqueCommand(
+        command = generators.TorqueCommand(
             floats(torque),
             _scale("viscous_scale", viscous, _VISCOUS_SCALE) if compensates else ZERO6,
             _scale("coulomb_scale", coulomb, _COULOMB_SCALE) if compensates else ZERO6,
         )
         self._compliance.end_force()
         try:
-            self._motion.command_torque(thread, DirectTorque(command, self._measure))
+            self._motion.command_torque(thread, generators.DirectTorque(command, self._measure))
         except OwnershipError:
             raise ScriptRuntimeError("Another thread is already controlling the robot") from None
         yield NEXT_CYCLE
 
-    def _measure(self) -> JointTarget:
+    def _measure(self) -> generators.JointTarget:
         sensed = self._past.sensed
-        return JointTarget(sensed.actual_q, sensed.actual_qd)
+        return generators.JointTarget(sensed.actual_q, sensed.actual_qd)
 
 
 def _scale(name: str, given: Sequence[float] | None, default: Vector6) -> Vector6:

@@ -10,22 +10,8 @@ The primary port also reports the running program: its global variables at the r
 its threads stand in PolyScope's tree.
 """
 
+from protocol.primary import messages
 from protocol.primary.framing import NO_TIME
-from protocol.primary.messages import (
-    LONGEST_TITLE,
-    ErrorCodeMessage,
-    HardwareInfoMessage,
-    KeyMessage,
-    MessageSource,
-    PopupMessage,
-    RequestValueMessage,
-    RobotMessage,
-    RuntimeExceptionMessage,
-    SafetyModeMessage,
-    StartupMessage,
-    TextMessage,
-    version_message,
-)
 from protocol.primary.packages import (
     encode_message_package,
     encode_safety_tolerances,
@@ -60,7 +46,7 @@ STOPPED_TITLE = "PROGRAM_XXX_STOPPED"
 SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 
 
-def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
+def message_for(event: events.Event, timestamp: int) -> messages.RobotMessage | None:
     """Return the message for an event; None for events that stand only in the log.
 
     Args:
@@ -68,45 +54,45 @@ def message_for(event: events.Event, timestamp: int) -> RobotMessage | None:
     """
     match event:
         case events.ProgramStarted(name):
-            return KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
+            return messages.KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
         case events.ProgramStopped(name):
-            return KeyMessage(timestamp=timestamp, title=STOPPED_TITLE, text=name)
+            return messages.KeyMessage(timestamp=timestamp, title=STOPPED_TITLE, text=name)
         case events.ProgramPaused(name):
-            return KeyMessage(timestamp=timestamp, title=PAUSED_TITLE, text=name)
+            return messages.KeyMessage(timestamp=timestamp, title=PAUSED_TITLE, text=name)
         case events.ProgramResumed() | events.RobotModeChanged() | events.LogAdded():
             return None  # no client knows a message for the first; the states show the second
         case events.TextPrinted(text):
-            return TextMessage(timestamp=timestamp, text=text)
+            return messages.TextMessage(timestamp=timestamp, text=text)
         case events.ScriptFailed(line, column, text, secondary):
             if secondary:
-                return KeyMessage(timestamp=timestamp, title=SECONDARY_EXCEPTION_TITLE, text=text)
+                return messages.KeyMessage(timestamp=timestamp, title=SECONDARY_EXCEPTION_TITLE, text=text)
             # A capture shows "no time" on these.
-            return RuntimeExceptionMessage(timestamp=NO_TIME, line=line, column=column, text=text)
+            return messages.RuntimeExceptionMessage(timestamp=NO_TIME, line=line, column=column, text=text)
         case events.ErrorReported(code, argument, level, text):
-            return ErrorCodeMessage(
+            return messages.ErrorCodeMessage(
                 timestamp=timestamp,
-                source=MessageSource.CONTROLLER,
+                source=messages.MessageSource.CONTROLLER,
                 code=code,
                 argument=argument,
                 report_level=level,
                 text=text,
             )
         case events.SafetyModeChanged(safety_mode):
-            return SafetyModeMessage(
-                timestamp=timestamp, source=MessageSource.CONTROLLER, safety_mode=safety_mode
+            return messages.SafetyModeMessage(
+                timestamp=timestamp, source=messages.MessageSource.CONTROLLER, safety_mode=safety_mode
             )
         case events.ValueRequested(request_id, kind, text):
-            return RequestValueMessage(
+            return messages.RequestValueMessage(
                 timestamp=timestamp, request_id=request_id, requested_type=kind, text=text
             )
         case events.PopupShown(title, text, warning, error, blocking, request_id):
-            return PopupMessage(
+            return messages.PopupMessage(
                 timestamp=timestamp,
                 request_id=request_id,
                 is_warning=warning,
                 is_error=error,
                 is_blocking=blocking,
-                title=title[:LONGEST_TITLE],
+                title=title[: messages.LONGEST_TITLE],
                 text=text,
             )
 
@@ -144,13 +130,13 @@ class PrimaryPort(ScriptPort):
         self._variables = VariableReporter(version)
         self._labels = LabelReporter(version)
         self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
-        self._greeting = encode_message_package(version_message(version, software.built), version)
-        self._second_greeting = encode_message_package(StartupMessage(), version)
+        self._greeting = encode_message_package(messages.version_message(version, software.built), version)
+        self._second_greeting = encode_message_package(messages.StartupMessage(), version)
         if sends_safety_tolerances(version):
             self._second_greeting += encode_safety_tolerances()
-        if all_messages and HardwareInfoMessage.SINCE.covers(version):
+        if all_messages and messages.HardwareInfoMessage.SINCE.covers(version):
             self._second_greeting += self._package(
-                HardwareInfoMessage(robot_type=controller.state.robot.robot_type)
+                messages.HardwareInfoMessage(robot_type=controller.state.robot.robot_type)
             )
 
     def opened(self, connection: Connection) -> None:
@@ -211,7 +197,7 @@ class PrimaryPort(ScriptPort):
         """Time stamp of the present cycle."""
         return round(self._controller.snapshot.timestamp * 1e6)
 
-    def _package(self, message: RobotMessage) -> bytes:
+    def _package(self, message: messages.RobotMessage) -> bytes:
         return encode_message_package(message, self._version)
 
     def _begin_report(self, run: RunningProgram | None) -> None:

@@ -5,23 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from protocol.primary import layout
 from protocol.primary.framing import SubPackage
-from protocol.primary.layout import (
-    AdditionalInfo,
-    CalibrationData,
-    CartesianInfo,
-    ConfigurationData,
-    ForceModeData,
-    JointData,
-    KinematicsInfo,
-    MasterboardData,
-    RobotModeData,
-    SafetyData,
-    SingularityInfo,
-    ToolCommunicationInfo,
-    ToolData,
-    ToolModeInfo,
-)
 from protocol.primary.packages import encode_state
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import (
@@ -74,7 +59,7 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
     running = snap.runtime_state in RUNNING_STATES
     domains, analog = snap.analog_domains, snap.analog_values
     return (
-        RobotModeData(
+        layout.RobotModeData(
             timestamp=round(snap.timestamp * 1e6),
             is_real_robot_connected=snap.robot_mode not in _UNCONNECTED,
             is_real_robot_enabled=powered,
@@ -88,7 +73,7 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
             target_speed_fraction=snap.target_speed_fraction,
             speed_scaling=snap.speed_scaling,
         ),
-        JointData(
+        layout.JointData(
             q_actual=snap.actual_q,
             q_target=snap.target_q,
             qd_actual=snap.actual_qd,
@@ -97,9 +82,9 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
             temperature_motor=snap.joint_temperatures,
             joint_mode=snap.joint_mode,
         ),
-        CartesianInfo(tcp_pose=snap.actual_tcp_pose, tcp_offset=snap.tcp_offset),
-        CalibrationData(),
-        MasterboardData(
+        layout.CartesianInfo(tcp_pose=snap.actual_tcp_pose, tcp_offset=snap.tcp_offset),
+        layout.CalibrationData(),
+        layout.MasterboardData(
             digital_input_bits=snap.actual_digital_input_bits,
             digital_output_bits=snap.actual_digital_output_bits,
             analog_input_range0=domains[0],
@@ -118,7 +103,7 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
             in_reduced_mode=snap.safety_mode == SafetyMode.REDUCED,
             safety_checksum=checksum,
         ),
-        ToolData(
+        layout.ToolData(
             analog_input_range2=domains[4],
             analog_input_range3=domains[5],
             analog_input2=analog[4],
@@ -129,18 +114,18 @@ def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0)
             tool_temperature=snap.tool_temperature,
             tool_mode=snap.tool_mode,
         ),
-        ForceModeData(wrench=snap.actual_tcp_force, robot_dexterity=dexterity),
-        AdditionalInfo(
+        layout.ForceModeData(wrench=snap.actual_tcp_force, robot_dexterity=dexterity),
+        layout.AdditionalInfo(
             teach_button_state=int(bool(snap.buttons & _TEACH)),
             freedrive_button_enabled=(
                 snap.robot_mode == RobotMode.RUNNING and snap.safety_mode in MOVING_MODES and not running
             ),
             io_enabled_freedrive=snap.is_guided_by_input,
         ),
-        SafetyData(safety_checksum=checksum, elbow_sphere=(*snap.elbow_position, ELBOW_RADIUS)),
-        ToolCommunicationInfo(*snap.tool_line),
-        ToolModeInfo(*snap.tool_output_modes),
-        SingularityInfo(),
+        layout.SafetyData(safety_checksum=checksum, elbow_sphere=(*snap.elbow_position, ELBOW_RADIUS)),
+        layout.ToolCommunicationInfo(*snap.tool_line),
+        layout.ToolModeInfo(*snap.tool_output_modes),
+        layout.SingularityInfo(),
     )
 
 
@@ -208,14 +193,14 @@ def setup_records(
     """
     checksum = zlib.crc32(repr(calibrated_dh).encode())  # of the calibration, the same for every joint
     return (
-        KinematicsInfo(
+        layout.KinematicsInfo(
             checksum=(checksum,) * 6,
             dh_theta=tuple(row.theta for row in calibrated_dh),
             dh_a=tuple(row.a for row in calibrated_dh),
             dh_d=tuple(row.d for row in calibrated_dh),
             dh_alpha=tuple(row.alpha for row in calibrated_dh),
         ),
-        ConfigurationData(
+        layout.ConfigurationData(
             joint_min_limit=limits.q_min,
             joint_max_limit=limits.q_max,
             joint_max_speed=limits.speed,
