@@ -42,15 +42,8 @@ def _watch(
 ) -> Iterator[str]:
     """Decode what a box sends, as lines of text; nothing else of this package opens a socket.
 
-    Args:
-        interface: one of `_INTERFACES`.
-        address: host, or host:port for another port than the standard one.
-        count: packages to wait for, after the replies of the set-up on RTDE.
-
-    Raises:
-        LocalProtocolError: not an address, or the box does not have a variable.
-        OSError: no connection.
-        RemoteProtocolError: the bytes are not those of a box.
+    `count` packages are waited for, after the replies of the set-up on RTDE. LocalProtocolError: this is no
+    address (host or host:port), or the box does not have a variable.
     """
     host, _, number = address.partition(":")
     port = number or str(getattr(Ports(), _INTERFACES[interface]))

@@ -94,11 +94,10 @@ class StreamDecoder:
 
 
 class RtdeDecoder:
-    """What a robot has sent on port 30004.
+    """What a robot has sent on port 30004; it sends the types of variables without their names.
 
     Args:
-        names: of the variables that the client asked for, because the robot sends only their types. Missing
-            ones get numbers.
+        names: those that the client asked for; missing ones get numbers.
 
     Attributes:
         refused: refusals that the robot sent instead of types, by name.

@@ -12,14 +12,10 @@ LENGTH_SIZE = 4
 
 
 class FrameBuffer:
-    """Bytes in, whole frames out.
+    """Bytes in, whole frames of valid sizes out.
 
-    The usual case on a live port, one `recv` that holds exactly one frame, costs no copy.
-
-    Args:
-        max_size: longest valid frame in bytes; a longer one means that the frame boundary is lost or that the
-            peer uses another protocol.
-        min_size: shortest valid frame, at least the length prefix.
+    A longer one means that the frame boundary is lost or that the peer uses another protocol. The usual case
+    on a live port, one `recv` that holds exactly one frame, costs no copy.
     """
 
     __slots__ = ("_buffer", "_max_size", "_min_size", "_start", "_whole")

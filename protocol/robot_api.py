@@ -130,15 +130,10 @@ def api_version(version: SoftwareVersion) -> str:
 
 
 def match_call(method: str, path: str, known: Iterable[ApiCall]) -> tuple[ApiCall, str] | tuple[None, str]:
-    """The call that a request is, and its argument.
+    """The call that a request is, and the argument of its path, decoded ("" without one).
 
-    Args:
-        path: of the request, without the query; a slash at its end has no meaning.
-        known: the calls of the software.
-
-    Returns:
-        The call and the argument of its path, decoded ("" without one). Without a call: None, and the
-        methods that the path knows, separated by commas; "" for a path that nothing is known of.
+    A slash at the end of the path has no meaning. Without a call: None, and the methods that the path knows,
+    separated by commas; "" for a path that nothing is known of.
     """
     inner = path.removeprefix(BASE).rstrip("/") if path.startswith(f"{BASE}/") else ""
     allowed = []

@@ -42,14 +42,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ControllerWord:
-    """One row.
-
-    Attributes:
-        text: the fixed words, with one space between.
-        takes_number: whether one number follows.
-        effect: what a controller does, for documentation.
-        source: who sends it.
-    """
+    """One row: the words with one space between, whether a number follows, what it does, who sends it."""
 
     text: str
     takes_number: bool
@@ -113,12 +106,9 @@ class ProgramText(NamedTuple):
 
 
 class ControlLine(NamedTuple):
-    """One of the controller's own words.
+    """One of the controller's own words: its row's fixed part, and its number as text, "" without one.
 
-    Attributes:
-        text: the line with single spaces, such as `set speed 0.5`.
-        word: the row's fixed part, such as `set speed`.
-        argument: the number as text, "" for words without.
+    The text is the whole line with single spaces, such as `set speed 0.5`.
     """
 
     text: str
@@ -127,12 +117,7 @@ class ControlLine(NamedTuple):
 
 
 class Overflow(NamedTuple):
-    """A line or program was too long and has been dropped.
-
-    Attributes:
-        what: "line" or "program".
-        limit: the limit in bytes that it exceeds.
-    """
+    """A line or program that was longer than the limit in bytes, and has been dropped."""
 
     what: Literal["line", "program"]
     limit: int
@@ -166,9 +151,7 @@ class _State(Enum):
 class ScriptChannel:
     """Bytes of one connection in, programs and controller words out. The split of the bytes does not matter.
 
-    Args:
-        max_line: longest line in bytes.
-        max_program: longest program in bytes.
+    Lines and programs beyond the longest [bytes] are dropped.
     """
 
     def __init__(self, max_line: int = MAX_LINE, max_program: int = MAX_PROGRAM) -> None:

@@ -23,14 +23,9 @@ class SerialNumber(NamedTuple):
 
 
 def simulated_serial(robot_type: int, seed: int) -> str:
-    """Serial number of a simulated box: prefix, robot type digit, six digits of the seed.
+    """Serial number of a simulated box: prefix, robot type digit, six digits of the seed modulo 10**6.
 
-    Args:
-        robot_type: code of `RobotType`, one digit (3 = UR3).
-        seed: any whole number; only its value modulo 10**6 is kept.
-
-    Raises:
-        LocalProtocolError: the robot type is not one of 1..9.
+    LocalProtocolError if the robot type (3 = UR3) is not one of 1..9.
     """
     if not 1 <= robot_type <= 9:
         raise LocalProtocolError(f"robot type {robot_type} has no digit in a serial number: use 1 to 9")
@@ -38,11 +33,7 @@ def simulated_serial(robot_type: int, seed: int) -> str:
 
 
 def parse_serial(text: str) -> SerialNumber:
-    """Read a serial number as `get serial number` answers it.
-
-    Raises:
-        RemoteProtocolError: the text is not digits only.
-    """
+    """Read what `get serial number` answers; RemoteProtocolError if it is not digits only."""
     text = text.strip()
     if not (text.isascii() and text.isdigit()):
         raise RemoteProtocolError(f"serial number {text!r} is not digits only")

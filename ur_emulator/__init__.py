@@ -22,11 +22,7 @@ __all__ = ["BoxRack", "ControlBox"]
 
 
 def check_platform(platform: str = sys.platform) -> None:
-    """Look whether a box can run on a system, named as in `sys.platform`.
-
-    Raises:
-        ImportError: it cannot: its worker process needs what only POSIX systems have.
-    """
+    """Raise ImportError on a system without POSIX, which the worker process needs."""
     if platform == "win32":
         raise ImportError("the box needs Linux or macOS: on Windows, run it in WSL 2 (docs/commands.md)")
 

@@ -48,14 +48,7 @@ from ur_emulator.scripting.robot_host import robot_hosts
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class _Choice:
-    """What the arguments of a box amount to.
-
-    Attributes:
-        version: software that is asked for.
-        pace: lockstep or real time.
-        closed: names of the ports that stay closed.
-        identity: names and numbers by which clients know the box.
-    """
+    """What the arguments of a box amount to; the ports in `closed` stay closed."""
 
     model: RobotModel
     version: SoftwareVersion
@@ -66,11 +59,7 @@ class _Choice:
 
     @classmethod
     def of(cls, options: BoxOptions) -> _Choice:
-        """Check the arguments, and look up what they name.
-
-        Raises:
-            EmulatorError: an argument is not among the allowed ones.
-        """
+        """Check the arguments, and look up what they name; EmulatorError for one that is not allowed."""
         model = robot_by_name(str(options.robot), options.version)
         if options.generation is not None:
             model = dataclasses.replace(model, generation=options.generation)
@@ -246,8 +235,7 @@ class Box:
     def listen(self) -> None:
         """Open all ports; harmless if they are open.
 
-        Raises:
-            PortError: one of them is taken; none stays open then and the box cannot be used any more.
+        PortError if one is taken; none stays open then and the box cannot be used any more.
         """
         if self._port_set.is_open:
             return

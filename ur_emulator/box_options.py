@@ -70,11 +70,7 @@ class BoxOptions:
     generation: RobotGeneration | None = None
 
     def check(self) -> None:
-        """Check the arguments that need no table.
-
-        Raises:
-            EmulatorError: one is not allowed.
-        """
+        """Check the arguments that need no table; EmulatorError for one that is not allowed."""
         if not 0.0 < self.speed < math.inf:
             raise EmulatorError(f"speed {self.speed:g} given: it must be above 0 and finite, 1 is real time")
         if self.seed < 0:
@@ -121,11 +117,7 @@ class ServedAt:
 
 
 def check_token(token: str | None) -> None:
-    """Check a token, which lets who shows it control the box; None is no token.
-
-    Raises:
-        EmulatorError: it cannot stand in a header of HTTP.
-    """
+    """Raise EmulatorError for a token that cannot stand in a header of HTTP; None is no token."""
     if token is not None and not (0 < len(token) <= MAX_TOKEN and set(token) <= _TOKEN_CHARACTERS):
         raise EmulatorError(
             f"a token of {len(token)} characters given: it has 1 to {MAX_TOKEN} printed characters of ASCII, "
@@ -142,11 +134,7 @@ def is_loopback(host: str) -> bool:
 
 
 def standard_ports(base: int) -> Ports:
-    """Return the standard ports, moved by an offset.
-
-    Raises:
-        EmulatorError: they are not all ports of TCP.
-    """
+    """Return the standard ports, moved by an offset; EmulatorError if they are not all ports of TCP."""
     try:
         return Ports.standard(base)
     except ProtocolError as error:
@@ -154,11 +142,7 @@ def standard_ports(base: int) -> Ports:
 
 
 def parse_pace(pace: str | Pace) -> Pace:
-    """Return the pace of that name.
-
-    Raises:
-        EmulatorError: there is none.
-    """
+    """Return the pace of that name; EmulatorError if there is none."""
     try:
         return Pace(pace)
     except ValueError:
@@ -168,11 +152,7 @@ def parse_pace(pace: str | Pace) -> Pace:
 
 
 def check_count(count: int) -> None:
-    """Check a number of boxes that share a loop.
-
-    Raises:
-        EmulatorError: there are none, or too many.
-    """
+    """Raise EmulatorError if that many boxes cannot share a loop."""
     if not 1 <= count <= MAX_BOXES:
         raise EmulatorError(f"{count} boxes asked for: 1 to {MAX_BOXES} are possible")
 

@@ -73,11 +73,7 @@ class ProcessRack:
     # --- life
 
     def start(self) -> None:
-        """Open the ports and run.
-
-        Raises:
-            PortError: a port is taken.
-        """
+        """Open the ports and run; PortError if one is taken."""
         self._served = self._ask_for_boxes("start")
         self._reader = threading.Thread(target=_read, args=(weakref.ref(self), self._child.pipe), daemon=True)
         self._reader.start()
@@ -169,11 +165,7 @@ class ProcessRack:
             self._child.pipe.sendall(data)
 
     def _request(self, kind: str, *request: Any) -> Any:
-        """Ask for something and wait for it.
-
-        Raises:
-            ControlError: it was not done.
-        """
+        """Ask for something and wait for it; ControlError if it was not done."""
         future: Future[Any] = Future()
         self._begin(future, kind, *request)
         return future.result()
@@ -301,13 +293,7 @@ def run(pipe: socket.socket) -> None:
 
 
 class _Link:
-    """The boxes' end of the pipe, in their loop.
-
-    Args:
-        rack: the boxes; their ports are open.
-        pipe: to the process of their user.
-        owner: the number of that process.
-    """
+    """The boxes' end of the pipe, in their loop; `owner` is the number of the process of their user."""
 
     def __init__(self, rack: LoopRack, pipe: Pipe, owner: int) -> None:
         self._rack = rack

@@ -21,8 +21,6 @@ class BudgetRow:
 
     Attributes:
         name: of the field of `Budgets`.
-        limit: in `unit`.
-        unit: bytes, seconds, clients and so on.
         scope: what it bounds: a client, a port, a program, a box.
         beyond: what happens to what comes on top.
     """

@@ -73,8 +73,7 @@ class Rack(Protocol):
 def make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
     """Assemble boxes in a process of their own, or on a loop in this one.
 
-    Raises:
-        EmulatorError: an argument is not among the allowed ones, or there are no boxes, or too many.
+    EmulatorError if an argument is not allowed, or there are no boxes, or too many.
     """
     check_count(len(options))
     if in_process:

@@ -166,11 +166,7 @@ def _defaults(config: pytest.Config, robot: str | None) -> dict[str, Any]:
 
 
 def _robot(name: str, version: str | None) -> RobotModel:
-    """Return an arm that runs a version of the software.
-
-    Raises:
-        ModelError: there is none.
-    """
+    """Return an arm that runs a version of the software; ModelError if there is none."""
     from ur_emulator.models.robots import robot_by_name
 
     robot = robot_by_name(name, version)

@@ -30,14 +30,7 @@ class LoopRack:
     """
 
     def __init__(self, options: Sequence[BoxOptions]) -> None:
-        """Assemble the boxes; nothing listens yet.
-
-        Args:
-            options: arguments of each box. Two boxes need two addresses, or a `port_base` each.
-
-        Raises:
-            EmulatorError: an argument is not among the allowed ones.
-        """
+        """Assemble the boxes; nothing listens yet. Two boxes need two addresses, or a `port_base` each."""
         self.loop = EventLoop(precise=any(one.pace not in _LOCKSTEP for one in options))
         # Several boxes would compute at each other's deadlines.
         lead = WAKE_UP if len(options) == 1 else 0.0
@@ -58,8 +51,7 @@ class LoopRack:
     def listen(self) -> None:
         """Open all ports of all boxes.
 
-        Raises:
-            PortError: one of them is taken; none stays open then and the rack cannot be used any more.
+        PortError if one is taken; none stays open then and the rack cannot be used any more.
         """
         try:
             for box in self.boxes:
@@ -83,11 +75,7 @@ class LoopRack:
             raise failure
 
     def start(self) -> None:
-        """Open the ports and run in a thread.
-
-        Raises:
-            PortError: a port is taken.
-        """
+        """Open the ports and run in a thread; PortError if one is taken."""
         self.listen()
         self.loop.is_running = True
         self._thread = threading.Thread(target=self._run_in_thread, name="control-box", daemon=True)

@@ -54,15 +54,10 @@ class ScriptBox:
     def __init__(
         self, robot: str, fidelity: str, seed: int, software: Sequence[int], answers: Sequence[str]
     ) -> None:
-        """Assemble the box.
+        """Assemble the box with a version (major, minor) of the software.
 
-        Args:
-            fidelity: how far it is from a perfect one.
-            software: version that it runs, (major, minor).
-            answers: what the operator answers, in order.
-
-        Raises:
-            EmulatorError: there is no such arm or fidelity, or the arm needs newer software.
+        `answers` are the operator's, in order. EmulatorError if there is no such arm or fidelity, or the arm
+        needs newer software.
         """
         asked = f"{software[0]}.{software[1]}"
         model = robot_by_name(robot, asked)
@@ -104,7 +99,6 @@ class _Run:
     """One run as a service of the loop: ticks, answers for the operator, knows when it is over.
 
     Attributes:
-        status: how it stands.
         robot_time: from the start to the end of the program [s].
         real_time: from the first cycle to the last [s].
     """

@@ -161,8 +161,7 @@ def decode_state(body: bytes) -> RobotState:
 def split_state(body: bytes) -> Iterator[tuple[int, bytes]]:
     """Cut the body of a state package into sub-packages: sub-type and what follows the five-byte header.
 
-    Raises:
-        RemoteProtocolError: sub-package sizes do not add up.
+    RemoteProtocolError: their sizes do not add up.
     """
     position = 0
     while position < len(body):
@@ -179,8 +178,7 @@ def split_state(body: bytes) -> Iterator[tuple[int, bytes]]:
 def decode_sub_package(sub_type: int, data: bytes) -> SubPackage | UnknownSubPackage:
     """Read the fields of one sub-package; its size determines the software version of its form.
 
-    Raises:
-        RemoteProtocolError: shorter than the oldest form.
+    RemoteProtocolError: it is shorter than the oldest form.
     """
     record = _BY_SUB_TYPE.get(sub_type)
     if record is None:

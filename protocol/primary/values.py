@@ -280,12 +280,7 @@ class ProgramStateMessage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlobalVariablesSetup(ProgramStateMessage):
-    """Names of global variables.
-
-    Attributes:
-        start_index: of the first name.
-        names: they count on from there.
-    """
+    """Names of global variables; they count on from the index of the first."""
 
     SUB_TYPE: ClassVar[int] = 0
 
@@ -295,12 +290,7 @@ class GlobalVariablesSetup(ProgramStateMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GlobalVariablesUpdate(ProgramStateMessage):
-    """Values of global variables.
-
-    Attributes:
-        start_index: of the first value.
-        values: those of the variables from there on.
-    """
+    """Values of global variables, from the index of the first one on."""
 
     SUB_TYPE: ClassVar[int] = 1
 
@@ -336,8 +326,7 @@ _END = b"\n"
 def encode_program_state(message: ProgramStateMessage, version: SoftwareVersion) -> bytes:
     """A whole package of type 25 as software `version` sends it.
 
-    Raises:
-        LocalProtocolError: a value does not fit, or the message has no table.
+    LocalProtocolError: a value does not fit, or the message has no table.
     """
     match message:
         case GlobalVariablesSetup(start_index=start, names=names):
@@ -359,20 +348,12 @@ def encode_program_state(message: ProgramStateMessage, version: SoftwareVersion)
 
 
 def encode_names(timestamp: int, start_index: int, names: list[bytes]) -> bytes:
-    """The package of a `GlobalVariablesSetup` whose names are encoded already.
-
-    Raises:
-        LocalProtocolError: the index does not fit.
-    """
+    """The package of a `GlobalVariablesSetup` whose names are encoded already."""
     return _variables(timestamp, GlobalVariablesSetup.SUB_TYPE, start_index, names)
 
 
 def encode_values(timestamp: int, start_index: int, values: list[bytes]) -> bytes:
-    """The package of a `GlobalVariablesUpdate` whose values are encoded already.
-
-    Raises:
-        LocalProtocolError: the index does not fit.
-    """
+    """The package of a `GlobalVariablesUpdate` whose values are encoded already."""
     return _variables(timestamp, GlobalVariablesUpdate.SUB_TYPE, start_index, values)
 
 

@@ -56,8 +56,7 @@ class RtdeClientConnection:
     def next_event(self) -> ClientEvent | None:
         """The next package as an event, or None when more bytes are needed.
 
-        Raises:
-            RemoteProtocolError: the stream cannot be trusted any more.
+        RemoteProtocolError: the stream cannot be trusted any more.
         """
         while (package := codec.take_package(self._buffer, codec.MAX_SIZE)) is not None:
             event = self._read(*package)
@@ -108,8 +107,7 @@ class RtdeClientConnection:
 def _recipe_of(names: tuple[str, ...], words: tuple[str, ...]) -> Recipe | None:
     """The recipe of a reply, or None if the robot refused it.
 
-    Raises:
-        RemoteProtocolError: not one word for each name, or a word that is no type.
+    RemoteProtocolError: not one word for each name, or a word that is no type.
     """
     if len(words) != len(names):
         raise RemoteProtocolError(f"the robot answered {len(words)} types for {len(names)} names")

@@ -18,12 +18,7 @@ __all__ = ["Recipe", "recipe_of", "snapshot_encoder"]
 
 
 class Recipe:
-    """An ordered list of variables with their types.
-
-    Attributes:
-        names: of the variables, as on the wire.
-        size: bytes of all values.
-    """
+    """An ordered list of variables with their types; `size` is the bytes of all values."""
 
     __slots__ = ("__weakref__", "_counts", "_is_flat", "_struct", "names", "size", "types")
 
@@ -39,11 +34,7 @@ class Recipe:
         return f"<Recipe {','.join(self.names)}: {self.size} bytes>"
 
     def decode(self, data: bytes) -> tuple[RtdeValue, ...]:
-        """Values from bytes of exactly the recipe's size.
-
-        Raises:
-            RemoteProtocolError: the bytes are fewer or more.
-        """
+        """Values from bytes of exactly the recipe's size; RemoteProtocolError if they are fewer or more."""
         if len(data) != self.size:
             raise RemoteProtocolError(
                 f"a data package of {len(self.names)} variables has {self.size} bytes of values, "

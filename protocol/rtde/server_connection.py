@@ -69,10 +69,8 @@ TRANSITIONS: Mapping[tuple[RtdeState, type[codec.Request]], Transition] = {
 def cycles_per_package(frequency: float | None, rate: int) -> int:
     """How many control cycles lie between two packages: floor(rate / frequency).
 
-    Args:
-        frequency: packages a second as asked for [Hz]; None for the full rate. What lies outside of 1 to
-            `rate` is clamped (assumed: the guide gives the range only).
-        rate: control cycles a second.
+    A frequency [Hz] outside of 1 to `rate` is clamped (assumed: the guide gives the range only); None is the
+    full rate.
     """
     if frequency is None or math.isnan(frequency):
         return 1
@@ -180,9 +178,8 @@ class RtdeServerConnection:
     def reply(self, in_use: Collection[str] = (), *, has_room: bool = True) -> bytes:
         """Answer the request that `next_event` gave, and do what it asks.
 
-        Args:
-            in_use: names of input variables that belong to other clients.
-            has_room: for an input recipe; without, its names are answered as if they had not been read.
+        Names `in_use` are input variables of other clients. Without room for an input recipe, its names are
+        answered as if they had not been read.
         """
         request, self._unanswered = self._unanswered, None
         if request is None:

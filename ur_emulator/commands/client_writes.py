@@ -9,11 +9,7 @@ from ur_emulator.controller.modbus_map import write_range
 
 @dataclass(frozen=True, slots=True)
 class WriteInputs:
-    """Write input variables of RTDE.
-
-    Attributes:
-        values: names of `protocol.rtde.fields.INPUTS` with their values, in order.
-    """
+    """Write input variables of RTDE: pairs of name and value, in order; see `protocol.rtde.fields.INPUTS`."""
 
     values: tuple[tuple[str, RtdeValue], ...]
 
@@ -25,10 +21,7 @@ class WriteInputs:
 class WriteModbus:
     """Write neighbouring addresses of the robot's Modbus map; what cannot be written is left out.
 
-    Attributes:
-        is_coils: coils, otherwise registers.
-        first: lowest address.
-        values: 0 or 1 for a coil, 0 to 65535 for a register.
+    The values are 0 or 1 for coils, 0 to 65535 for registers; `first` is the lowest address.
     """
 
     is_coils: bool

@@ -66,7 +66,6 @@ class Parameter:
     """A parameter of an operation.
 
     Attributes:
-        name: as in Python, JSON and on the command line.
         meaning: what it is, as a phrase.
         default: taken when it is not given; None where leaving it out means something of its own, MISSING
             where it must be given.
@@ -87,12 +86,7 @@ class Parameter:
 
     @classmethod
     def of(cls, declared: Field[Any], annotation: Any) -> Parameter:
-        """Return what a field of an operation declares.
-
-        Args:
-            declared: the field, made with `parameter`.
-            annotation: its type, not as a string.
-        """
+        """Return what a field of an operation, made with `parameter`, declares; `annotation` is its type."""
         details = {**_details_of(annotation), **declared.metadata}
         if details.get("choices"):
             details["kind"] = Kind.CHOICE
@@ -128,11 +122,7 @@ class Parameter:
         return ("on", "off") if self.kind is Kind.BOOLEAN else self.choices
 
     def check(self, value: Any) -> Any:
-        """Return a value as operations want it.
-
-        Raises:
-            ArgumentError: it does not fit.
-        """
+        """Return a value as operations want it; ArgumentError if it does not fit."""
         if value is None and self.default is None:
             return None
         checked = self._checked(value)
@@ -206,12 +196,8 @@ def parameter(
 ) -> Any:
     """Declare a field of an operation's dataclass; see `Parameter`.
 
-    Args:
-        meaning: what it is, as a phrase.
-        low: least number.
-        high: greatest number; of a vector, its greatest length.
-        default: taken when it is not given; without it the parameter is required.
-        details: `kind`, `choices` or `lengths`, where the type of the field does not define it.
+    Without a default it must be given. `details` are `kind`, `choices` or `lengths`, where the type of the
+    field does not say them.
     """
     declared = {"meaning": meaning, "unit": unit, "low": low, "high": high, **details}
     return field(default=default, metadata=declared)
@@ -301,11 +287,7 @@ class Operation(Generic[R_co]):
         self.check_together()
 
     def check_together(self) -> None:
-        """Refuse parameters that fit one by one but not together.
-
-        Raises:
-            ArgumentError: says which.
-        """
+        """Raise ArgumentError for parameters that fit one by one but not together."""
 
 
 class CommandOperation(Operation[int]):
@@ -313,11 +295,7 @@ class CommandOperation(Operation[int]):
 
     @abstractmethod
     def apply(self, box: BoxParts) -> Result:
-        """Apply the operation.
+        """Apply the operation; return what its result holds beside `tick`, if anything.
 
-        Returns:
-            What the result holds beside `tick`, if anything.
-
-        Raises:
-            RefusedError: the state of the box does not allow it.
+        RefusedError if the state of the box does not allow it.
         """

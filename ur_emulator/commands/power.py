@@ -119,11 +119,7 @@ class SwitchRemoteControl(CommandOperation):
 
 
 def needs_operational_modes(state: ControllerState) -> None:
-    """Refuse what only a box with operational modes has.
-
-    Raises:
-        RefusedError: it has none.
-    """
+    """Raise RefusedError on a box without operational modes."""
     generation = state.robot.generation
     if not generation.has_operational_modes:
         raise RefusedError(f"a box of the {generation.name} has no operational modes")

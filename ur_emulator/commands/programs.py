@@ -29,9 +29,7 @@ PROGRAM_RUNS = "a program runs, stop it first"
 class StartProgram:
     """Run a compiled program; a primary program replaces the one that runs, a `sec` runs beside it.
 
-    Attributes:
-        program: compiled.
-        loaded: it was loaded from a file and played; otherwise it came through a socket.
+    `loaded`: it comes from a file and was played; otherwise it came through a socket.
     """
 
     program: CompiledProgram
@@ -53,9 +51,7 @@ class StartProgram:
 class SetUp:
     """Run what makes an installation effective; unlike a program it needs no power. Not while a program runs.
 
-    Attributes:
-        program: a `sec`.
-        inputs: pairs of configurable inputs that e-Series boxes have, in place of those of the one before.
+    `program` is a `sec`; `inputs` are pairs of configurable inputs (e-Series), in place of those before.
     """
 
     program: CompiledProgram
@@ -128,12 +124,7 @@ def _program_state(box: BoxParts) -> str:
 
 @dataclass(frozen=True, slots=True)
 class AppendStatements:
-    """Add a compiled line to what the program runs in interpreter mode.
-
-    Attributes:
-        statements: compiled.
-        epoch: of the queue, when its names were taken.
-    """
+    """Add a compiled line to interpreter mode; `epoch` is that of the queue when its names were taken."""
 
     statements: CompiledStatements
     epoch: int

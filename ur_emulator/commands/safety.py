@@ -51,11 +51,7 @@ GuardName = Literal["permanent", "automatic mode"]
 
 
 def _guard_of(box: BoxParts, name: GuardName) -> Guard:
-    """Return a safeguard, if the box has it.
-
-    Raises:
-        RefusedError: it does not.
-    """
+    """Return a safeguard; RefusedError if the box does not have it."""
     if Guard(name) is Guard.AUTOMATIC:
         needs_operational_modes(box.state)
     return Guard(name)

@@ -168,11 +168,7 @@ def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
 
 
 def _arguments(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what was given as JSON has it.
-
-    Raises:
-        ArgumentError: it does not fit.
-    """
+    """Return what was given as JSON has it; ArgumentError if it does not fit."""
     arguments: dict[str, Any] = {}
     for parameter in OPERATIONS[name].parameters:
         if (path := given.get(f"{parameter.name}_file")) is not None:

@@ -24,9 +24,7 @@ _GONE = HttpAnswer(503, {"error": "the client has gone"})
 class ControlAnswers:
     """Does the operations that requests name.
 
-    Args:
-        own_host: address that the port is bound to.
-        token: what each request must show; None: nothing.
+    `own_host` is the address that the port is bound to; each request must show the token, if there is one.
     """
 
     def __init__(self, runner: OperationRunner, own_host: str, token: str | None) -> None:
@@ -65,13 +63,9 @@ class ControlAnswers:
 
 
 def parse_request(request: HttpRequest) -> tuple[str, Mapping[str, Any]]:
-    """Return the name of what a request asks for, and its arguments.
+    """Return the operation that a request names, or `LIST`, and its arguments, not yet checked.
 
-    Returns:
-        The name of an operation, or `LIST`; the arguments are not checked yet.
-
-    Raises:
-        HttpError: it is refused.
+    HttpError if the request is refused.
     """
     path = request.path
     name = path.removeprefix(PREFIX) if path.startswith(PREFIX) else ""

@@ -32,11 +32,7 @@ class ControlClient:
     """One box, one connection for every question."""
 
     def __init__(self, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT, token: str | None = None) -> None:
-        """Ask a box.
-
-        Args:
-            token: of that port, None if it has none.
-        """
+        """Ask a box; the token is that of its port, None if it has none."""
         self.host = host
         self.port = port
         self._headers = {} if token is None else {"Authorization": f"Bearer {token}"}
@@ -44,10 +40,8 @@ class ControlClient:
     def perform(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """Have an operation done; return its result.
 
-        Raises:
-            ArgumentError: it was given something that it does not take.
-            RefusedError: the state of the box stands against it.
-            ControlError: it was not done for another reason, such as that no box answers.
+        ArgumentError and RefusedError are those of the box; ControlError: it was not done for another reason,
+        such as that no box answers.
         """
         make(name, arguments)
         given = {key: value for key, value in arguments.items() if value is not None}
@@ -85,11 +79,7 @@ class ControlClient:
         raise _ERRORS.get(response.status, ControlError)(text)
 
     def whole_log(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
-        """Return all entries of the log as one result of `log`; the box gives some at a time.
-
-        Raises:
-            ControlError: no box answers.
-        """
+        """Return all entries of the log as one result of `log`; the box gives some at a time."""
         entries: list[Any] = []
         while True:
             result = self.perform("log", arguments)
@@ -109,11 +99,7 @@ class AttachedBox:
     """
 
     def __init__(self, host: str, port: int, token: str | None) -> None:
-        """Ask it who it is.
-
-        Raises:
-            ControlError: no box answers there, or not without its token.
-        """
+        """Ask it who it is; ControlError if no box answers there, or not without its token."""
         self._client = ControlClient(host, port, token)
         facts = self._client.perform("identity", {})
         ports = facts["ports"]
@@ -145,11 +131,7 @@ class AttachedBox:
         return _state_of(result) if OPERATIONS[name] in (ReadState, WaitUntil) else result
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
-        """Refuse.
-
-        Raises:
-            ControlError: always.
-        """
+        """Raise ControlError: it takes operations only."""
         raise ControlError("a box that was attached takes operations only, no commands: see docs/control.md")
 
     def log(self, index: int) -> tuple[LogEntry, ...]:
@@ -158,11 +140,7 @@ class AttachedBox:
         return tuple(LogEntry(**{**entry, "level": ReportLevel[entry["level"]]}) for entry in entries)
 
     def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
-        """Refuse.
-
-        Raises:
-            ControlError: always.
-        """
+        """Raise ControlError: its log is read with operations."""
         raise ControlError("the log of a box that was attached cannot be followed: use `ctl log --follow`")
 
     def end_of(self, index: int) -> tuple[bool, Exception | None]:

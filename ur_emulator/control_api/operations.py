@@ -56,11 +56,7 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
 
 
 class ReadProperty(Generic[R]):
-    """The property for an operation that only reads.
-
-    Args:
-        read: how it is asked for in Python, if not through the loop.
-    """
+    """The property for an operation that only reads; `read` asks for it, if not the loop."""
 
     def __init__(
         self, operation: Callable[[], Operation[R]], read: Callable[[BoxOperations], R] | None = None
@@ -155,11 +151,7 @@ for _name, _member in vars(BoxOperations).items():
 
 
 def make(name: str, arguments: Mapping[str, Any]) -> Operation[Any]:
-    """Return an operation as it was asked for.
-
-    Raises:
-        ArgumentError: there is none of that name; an argument does not fit, is missing, or is not known.
-    """
+    """Return an operation as it was asked for; ArgumentError for its name, or for an argument."""
     if name not in OPERATIONS:
         raise ArgumentError(f"there is no operation {ascii(name)[:60]}: choose from {', '.join(OPERATIONS)}")
     rows = OPERATIONS[name].parameters

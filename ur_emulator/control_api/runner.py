@@ -31,11 +31,7 @@ class OperationRunner:
         self._is_closed = False
 
     def perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
-        """Do an operation, from any thread but that of the loop; return its result.
-
-        Raises:
-            ControlError: it was not done.
-        """
+        """Do an operation, from any thread but the loop's; return its result, or raise ControlError."""
         if self._loop.is_own_thread:
             raise ControlError(f"{name} called in the thread of the box, which cannot wait: use `submit`")
         future: Future[Any] = Future()
@@ -62,11 +58,7 @@ class OperationRunner:
         self._context.box.steps.start(self.steps(name, arguments), finished)
 
     def steps(self, name: str, arguments: Mapping[str, Any]) -> Steps[Any]:
-        """Check the arguments of an operation, write it into the log, do it, and return its result.
-
-        Raises:
-            EmulatorError: it was not done.
-        """
+        """Check the arguments of an operation, write it into the log, do it, and return its result."""
         box = self._context.box
         operation = make(name, arguments)
         if operation.is_logged and not operation.only_reads:

@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Context:
-    """What the steps of operations need.
-
-    Attributes:
-        identity: returns the result of `identity`.
-        make: makes an operation of the table from its name and arguments; raises ArgumentError.
-    """
+    """What steps need: `identity` gives the result of that operation, `make` makes an operation."""
 
     box: ServedBox
     player: ProgramPlayer
@@ -50,13 +45,9 @@ class StepOperation(Operation[R_co]):
 
     @abstractmethod
     def steps(self, context: Context) -> Steps[Any]:
-        """Do it; yield to wait for the next cycle.
+        """Do it; yield to wait for the next cycle. The result is a dataclass or fits into JSON.
 
-        Returns:
-            The result: an object that JSON can hold, or a dataclass.
-
-        Raises:
-            ControlError: it cannot be done, or not now.
+        ControlError: it cannot be done, or not now.
         """
 
 
@@ -255,12 +246,7 @@ class At(StepOperation[int]):
 
 
 def read_script(path: Path) -> str:
-    """Return the text of a program file of this machine.
-
-    Raises:
-        ArgumentError: it is UTF-16.
-        OSError: it cannot be read.
-    """
+    """Return the text of a program file of this machine; ArgumentError if it is UTF-16."""
     from urscript.source import as_utf8, program_text
 
     try:

@@ -36,12 +36,7 @@ class ArmDynamics:
         self._payload: Payload | None = None
 
     def mass_matrix(self, q: Sequence[float], *, with_rotors: bool) -> NDArray[np.float64]:
-        """Return the joint-space inertia (6, 6) [kg m²].
-
-        Args:
-            q: joint angles (6,) [rad].
-            with_rotors: with the inertia of rotors and gears, as felt at the joints.
-        """
+        """Return the joint-space inertia (6, 6) [kg m²]; with rotors and gears: as felt at the joints."""
         gravity = self.gravity_torque(q)
         columns = [self._torque(q, _STILL, axis) - gravity for axis in np.eye(6)]
         matrix = np.column_stack(columns)
@@ -60,11 +55,9 @@ class ArmDynamics:
         return self._torque(q, _STILL, _STILL)
 
     def greatest_acceleration(self, q: Sequence[float], slope: Sequence[float]) -> float:
-        """Return the greatest acceleration along a path that the drives can give from rest.
+        """Return the greatest acceleration along a path that the drives can give from rest at q.
 
-        Args:
-            q: joint angles (6,) [rad].
-            slope: change of the angles per length of the path (6,) [rad per unit].
+        `slope` (6,): change of the joint angles per length of the path [rad per unit].
         """
         gravity = self.gravity_torque(q)
         per_acceleration = np.abs(self._torque(q, _STILL, np.array(slope, dtype=np.float64)) - gravity)

@@ -94,10 +94,8 @@ class ArmInSpace:
     def target_base_wrench(self, gravity: Vector3, mass: float, cog: Vector3) -> Vector6:
         """Return what holds the base of the arm at the target, base axes at its origin [N, Nm].
 
-        Args:
-            gravity: what a resting arm is held up with, base axes [m/s^2].
-            mass: of the payload [kg].
-            cog: of the payload, in the flange frame [m].
+        `gravity` [m/s²] is what a resting arm is held up with, base axes; `mass` [kg] and `cog` [m] are those
+        of the payload, in the flange frame.
         """
 
         def momentum(q: list[float], qd: list[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -138,13 +136,10 @@ class ArmInSpace:
         return moved_wrench(self._wrench, actual.flange_position, actual.tcp_pose)
 
     def in_flange_axes(self, wrench: Vector6, mass: float, cog: Vector3, gravity: Vector3) -> Vector6:
-        """Return a wrench at the flange with the weight of the payload, along the axes of the flange.
+        """Return a wrench at the flange [N, Nm] with the weight of the payload, along the axes of the flange.
 
-        Args:
-            wrench: without the weight, base axes [N, Nm].
-            mass: of the payload [kg].
-            cog: its centre of gravity in the flange frame [m].
-            gravity: acceleration that it feels at rest, base axes [m/s^2]: upwards.
+        `wrench` is without the weight, in base axes, as `gravity` [m/s²], which points upwards; `cog` [m] is
+        in the flange frame.
         """
         rotation = rotvec_to_matrix(self._arm.fk(self._actual_joints[0])[3:])
         weight = -mass * (rotation.T @ gravity)

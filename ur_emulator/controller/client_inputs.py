@@ -44,11 +44,7 @@ class ClientInputs:
         return self._values.get(name, default)
 
     def write(self, values: Iterable[tuple[str, Any]]) -> None:
-        """Write variables, in order.
-
-        Args:
-            values: names with values of the types that `protocol.rtde.fields.INPUTS` gives.
-        """
+        """Write variables, in order: names and values of the types of `protocol.rtde.fields.INPUTS`."""
         acts: dict[Callable[[ClientInputs], None], None] = {}
         values = tuple(values)
         if self._watchdogs:

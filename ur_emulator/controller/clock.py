@@ -11,12 +11,10 @@ CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 
 @dataclass(slots=True)
 class Clock:
-    """Counts the cycles of the controller, and those in which a primary program ran.
+    """Counts the cycles of the controller, and those in which a primary program ran, or did not pause.
 
     Attributes:
-        generation: of the robot, which says how long a cycle is.
         tick: number of the present cycle.
-        program_tick: cycles in which a primary program ran; a paused program does not run.
         period_s: duration of a control cycle [s].
     """
 

@@ -26,13 +26,7 @@ Done = Callable[[Result, Exception | None], None]
 
 
 class BoxParts(Protocol):
-    """The parts of a box that commands act on.
-
-    Attributes:
-        state: modes, inputs and outputs, questions, events.
-        plant: the arm and what surrounds it.
-        safety: safety events, and their effects on arm, program and power.
-    """
+    """The parts of a box that commands act on; `safety` applies safety events to arm, program and power."""
 
     state: ControllerState
     plant: Plant
@@ -46,11 +40,7 @@ class Command(Protocol):
     """Something that is done to a box at the beginning of a cycle."""
 
     def apply(self, box: BoxParts) -> Result:
-        """Apply the command.
-
-        Raises:
-            RefusedError: the state of the box does not allow it.
-        """
+        """Apply the command; RefusedError if the state of the box does not allow it."""
         ...
 
 

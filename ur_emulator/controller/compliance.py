@@ -55,12 +55,7 @@ class Compliance:
     ) -> None:
         """Begin with an arm that is driven by position.
 
-        Args:
-            motion: of the arm; force mode is an overlay of it, a guided arm its place.
-            mode: compliance ends when it is not RUNNING.
-            safety: compliance ends when it stops the arm.
-            operational: decides whether people may guide the arm.
-            past: measured positions.
+        `mode` and `safety` can end compliance; `operational` decides whether people may guide the arm.
         """
         self._motion = motion
         self._robot_mode = mode
@@ -100,11 +95,7 @@ class Compliance:
         self.is_on = True
 
     def check_payload(self, wrench: Vector6) -> None:
-        """Stop protectively when freedrive begins while an unexpected force acts.
-
-        Args:
-            wrench: external one, at the flange [N, Nm].
-        """
+        """Stop protectively when freedrive begins while an external wrench acts that is not expected."""
         self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
 
     def end_freedrive_by_program(self) -> None:

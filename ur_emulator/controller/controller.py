@@ -56,11 +56,7 @@ def make_snapshot(state: ControllerState, programs: ProgramRunner, sensed: Plant
     """Return everything that any port may publish of this cycle.
 
     The target is the one with which the cycle began: target and measurements are of the same moment.
-
-    Args:
-        state: after commands, scripts, motion and safety.
-        programs: for the program state and line.
-        sensed: state of the arm, as `Plant.report` gives it.
+    `sensed` is the state of the arm as `Plant.report` gives it.
     """
     target = state.past.target
     arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
@@ -145,12 +141,10 @@ class Controller:
         """Assemble the box.
 
         Args:
-            robot: the arm; its generation has the control cycle.
-            fidelity: how far it is from a perfect one.
-            seed: of everything random in it: calibration, phases, noise.
+            fidelity: how far the arm is from a perfect one.
+            seed: of everything random in the box: calibration, phases, noise.
             make_robot: called once with the parts of the controller; what it returns makes the robot as one
                 program sees it.
-            mode: robot mode to start in.
             version: of the software, major and minor; None: the usual one of the generation.
         """
         self.generation = generation = robot.generation
@@ -221,13 +215,9 @@ class Controller:
         return self.programs.waits_outside
 
     def tick(self, commands: Iterable[Command]) -> Snapshot:
-        """Advance one control cycle.
+        """Advance one control cycle; return what ports publish of it.
 
-        Args:
-            commands: those since the last cycle, in order of arrival.
-
-        Returns:
-            What ports publish of the cycle.
+        The commands are those since the last cycle, in order of arrival.
         """
         state = self.state
         state.clock.advance()

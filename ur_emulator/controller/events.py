@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ProgramStarted:
-    """A primary program began.
-
-    Attributes:
-        name: of its `def`, or of the function called by a one-line program.
-    """
+    """A primary program began; its name is that of its `def`, or of the function that it calls."""
 
     name: str
     run: RunningProgram | None = field(default=None, compare=False, repr=False)
@@ -56,8 +52,7 @@ class ScriptFailed:
     """A program did not compile, or a run-time error ended it.
 
     Attributes:
-        line: 1-based line in the text as sent, the `def` line being 1.
-        column: 1-based column.
+        line: in the text as sent, the `def` line being 1; columns count from 1, too.
         secondary: the program was a `sec`: only logged, the primary program goes on.
         log_text: as its log has it; "" if it is the same.
     """
@@ -95,12 +90,7 @@ class RobotModeChanged:
 
 @dataclass(frozen=True, slots=True)
 class LogAdded:
-    """A server or a client added a line to the log.
-
-    Attributes:
-        source: part that added it, such as `Dashboard`.
-        text: the line.
-    """
+    """A part of the box (`source`), such as the dashboard server, or a client added a line to the log."""
 
     source: str
     text: str
@@ -120,11 +110,7 @@ class PopupShown:
 
 @dataclass(frozen=True, slots=True)
 class ValueRequested:
-    """A script asks the operator for a value.
-
-    Attributes:
-        request_id: number of the question, see `Pendant`.
-    """
+    """A script asks the operator for a value; `request_id` is that of `Pendant`."""
 
     request_id: int
     kind: RequestedType

@@ -30,13 +30,9 @@ VARIABLE = "external_force_torque"
 
 @dataclass(frozen=True, slots=True)
 class ExternalSensor:
-    """An enabled sensor.
+    """An enabled sensor: mass [kg]; measuring point `offset` and centre of gravity in the flange frame [m].
 
-    Attributes:
-        mass: of the sensor [kg].
-        offset: measuring point in the flange frame [m].
-        cog: centre of gravity of the sensor in the flange frame [m].
-        lever_sign: 1; -1 for the deprecated builtin, which kept a sign error of the moments.
+    `lever_sign` is 1; -1 for the deprecated builtin, which kept a sign error of the moments.
     """
 
     mass: float
@@ -104,11 +100,7 @@ class ForceSense:
         self._cycles_to_zero = 0
 
     def set_zero(self, still_cycles: int) -> None:
-        """Set the zero to the present wrench. Source: zero_ftsensor.
-
-        Args:
-            still_cycles: number of cycles for which the arm has stood still.
-        """
+        """Set the zero to the present wrench, after some cycles of standstill. Source: zero_ftsensor."""
         self.zero = self._present(still_cycles)
 
     def program_started(self, still_cycles: int) -> None:
@@ -144,8 +136,7 @@ class ForceSense:
     def steps_since_contact(self, direction: Sequence[float]) -> int:
         """Return how many cycles ago a contact began; 0 if the history has none.
 
-        Args:
-            direction: of the contact, base axes (3,); zero for any.
+        `direction` is that of the contact (3,), base axes; zero for any.
         """
         forces = [wrench[:3] for wrench in self._history]
         if len(forces) < self._n_recent + self._n_early:

@@ -121,8 +121,7 @@ class InterpreterQueue:
     def append(self, statements: CompiledStatements, epoch: int) -> int:
         """Take a compiled line; return its id, 0 if the names have changed since it was compiled.
 
-        Raises:
-            RefusedError: too much was interpreted already.
+        RefusedError if too much was interpreted already.
         """
         if epoch != self.epoch or not self.takes_lines:
             return 0

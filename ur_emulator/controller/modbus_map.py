@@ -143,8 +143,6 @@ class MapRow:
     """Neighbouring addresses of one kind.
 
     Attributes:
-        first: lowest address.
-        count: how many addresses.
         meaning: what is there, and its unit.
         read: gives the value at an offset from `first`; None where reading gives 0.
         write: takes a value there; None where nothing can be written.
@@ -269,40 +267,27 @@ def _row(rows: dict[int, MapRow], what: str, address: int) -> MapRow:
 
 
 def read_register(state: ControllerState, address: int) -> int:
-    """Return a register, 0 to 65535.
-
-    Raises:
-        MapAddressError: there is none at this address.
-    """
+    """Return a register, 0 to 65535; MapAddressError if there is none."""
     row = _row(_REGISTER_AT, "register", address)
     return 0 if row.read is None else round(row.read(state, address - row.first)) & WORD_MAX
 
 
 def write_register(state: ControllerState, address: int, value: int) -> bool:
-    """Write a register; its low 16 bits count; False if it can only be read.
+    """Write a register, of which the low 16 bits count; False if it can only be read.
 
-    Raises:
-        MapAddressError: there is none at this address.
+    MapAddressError if there is none.
     """
     return _write(_row(_REGISTER_AT, "register", address), state, address, value & WORD_MAX)
 
 
 def read_coil(state: ControllerState, address: int) -> bool:
-    """Return a coil.
-
-    Raises:
-        MapAddressError: there is none at this address.
-    """
+    """Return a coil; MapAddressError if there is none."""
     row = _row(_COIL_AT, "bit", address)
     return row.read is not None and bool(row.read(state, address - row.first))
 
 
 def write_coil(state: ControllerState, address: int, value: bool) -> bool:
-    """Write a coil; False if it can only be read.
-
-    Raises:
-        MapAddressError: there is none at this address.
-    """
+    """Write a coil; False if it can only be read. MapAddressError if there is none."""
     return _write(_row(_COIL_AT, "bit", address), state, address, value)
 
 

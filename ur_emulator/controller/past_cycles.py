@@ -50,11 +50,7 @@ class PastCycles:
     def add(self, snapshot: Snapshot, target: JointTarget, sensed: PlantState, *, is_still: bool) -> None:
         """Take the results of a cycle that has ended.
 
-        Args:
-            snapshot: what is published of it.
-            target: set-point at its end.
-            sensed: state of the arm after it.
-            is_still: the target stands still, and no compliant mode is on.
+        `is_still`: the target stands still, and no compliant mode is on.
         """
         self.steady_cycles = self.steady_cycles + 1 if is_still else 0
         self.snapshot = snapshot

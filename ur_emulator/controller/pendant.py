@@ -35,14 +35,7 @@ def _as_asked(kind: RequestedType, value: Answer) -> Answer | None:
 
 @dataclass(slots=True)
 class PendantRequest:
-    """A question on the screen.
-
-    Attributes:
-        request_id: number of it, from 1.
-        kind: type of the answer; NONE is a popup, which is to be closed.
-        answer: what was answered; None so far.
-        is_answered: it was answered, or the popup closed.
-    """
+    """A question on the screen, numbered from 1; of kind NONE, a popup, which is to be closed."""
 
     request_id: int
     kind: RequestedType
@@ -104,8 +97,7 @@ class Pendant:
     def answer(self, value: Answer, request_id: int | None = None) -> int | None:
         """Answer a question, or the oldest; one that does not exist or wants another type stays as it is.
 
-        Returns:
-            Number of the question that was answered; None if none was.
+        Return the number of the question that was answered; None if none was.
         """
         for request in self.requests:
             if request_id in (None, request.request_id):

@@ -35,12 +35,7 @@ class ProgramRunner:
     """
 
     def __init__(self, state: ControllerState, make_host: Callable[[], Host]) -> None:
-        """Prepare.
-
-        Args:
-            state: changed with a program: motion, outputs, watchdogs, events.
-            make_host: makes the robot as one program sees it.
-        """
+        """Prepare; `make_host` makes the robot as one program sees it."""
         self._state = state
         self._make_host = make_host
         self._primary: RunningProgram | None = None
@@ -116,9 +111,7 @@ class ProgramRunner:
     def start(self, program: CompiledProgram, *, loaded: bool = False) -> None:
         """Start a program; a primary one replaces the one that runs.
 
-        Args:
-            program: compiled.
-            loaded: it was loaded from a file and played; otherwise it came through a socket.
+        `loaded`: it comes from a file and was played; otherwise it came through a socket.
         """
         if program.kind == "sec":
             if len(self._secondaries) >= BUDGETS.secondary_programs:
@@ -142,8 +135,7 @@ class ProgramRunner:
     def stop(self, *, unscheduled: bool = False) -> None:
         """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint.
 
-        Args:
-            unscheduled: nobody wanted it, which the outputs that follow the program show.
+        `unscheduled`: nobody wanted it, which the outputs that follow the program show.
         """
         if self._primary is not None:
             self._primary.kill()
@@ -153,8 +145,7 @@ class ProgramRunner:
     def pause(self, deceleration: float = 0.0) -> None:
         """Pause the primary program; the arm comes to rest on its path.
 
-        Args:
-            deceleration: of the leading axis, if that is faster than the usual ramp [rad/s^2].
+        `deceleration` of the leading axis [rad/s²], if that is faster than the usual ramp.
         """
         if self._primary is not None and self._phase not in _STANDS_STILL:
             self._state.motion.pause(deceleration)

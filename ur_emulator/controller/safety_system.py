@@ -26,8 +26,7 @@ BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
 class SafetySystem:
     """Applies safety events to the safety state, and its effects to arm, program and power.
 
-    Attributes:
-        is_busy: `step` and `find_violation` must be called in every cycle.
+    While it `is_busy`, `step` and `find_violation` must be called in every cycle.
     """
 
     def __init__(self, state: ControllerState, programs: ProgramRunner, plant: Plant) -> None:

@@ -115,11 +115,9 @@ JERK_TIME = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ToolWrenchLimit:
-    """Greatest wrench that motion may cause on the payload.
+    """Greatest wrench that motion may cause on the payload, along and about the axes of a frame.
 
-    Attributes:
-        frame: pose in the flange frame.
-        most: magnitudes along and about its axes [N, Nm]; infinite: not limited.
+    The frame is in that of the flange; `most` are magnitudes [N, Nm], infinite where nothing is limited.
     """
 
     frame: Vector6
@@ -222,8 +220,7 @@ class ErrorSettings:
     def deviation_warning(self, position_error: tuple[float, ...]) -> ErrorReported | None:
         """Return the log entry when a joint begins to deviate too far, once until it is back.
 
-        Args:
-            position_error: delayed target minus true position [rad], (6,).
+        `position_error` (6,) is the delayed target minus the true position [rad].
         """
         error, joint = max((abs(error), joint) for joint, error in enumerate(position_error))
         was_warned, self._has_warned = (

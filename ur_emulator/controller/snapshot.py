@@ -92,11 +92,7 @@ def arm_current(supply: Electrics, joint_currents: Iterable[float]) -> float:
 
 
 class EnergyMeter:
-    """Sums up the power on the arm's bus.
-
-    Attributes:
-        consumed: energy [J].
-    """
+    """Sums up the power on the arm's bus; `consumed` [J]."""
 
     __slots__ = ("_joules_per_ampere", "_supply", "consumed")
 

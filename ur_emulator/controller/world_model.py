@@ -28,22 +28,16 @@ class WorldModelError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A frame that programs can move.
-
-    Attributes:
-        parent: name of the frame that it is attached to.
-        pose: in that frame.
-    """
+    """A frame that programs can move; its pose is in its parent, the frame that it is attached to."""
 
     parent: str = WORLD
     pose: Pose = ZERO6
 
 
 class WorldModel:
-    """The frames of a controller.
+    """The frames of a controller; `flange_pose` gives the pose of the flange in the base.
 
-    Args:
-        flange_pose: the pose of the flange in the base.
+    All methods raise WorldModelError for a frame that does not exist, or cannot be used so.
     """
 
     def __init__(self, flange_pose: Callable[[], Pose], tool: ToolSettings) -> None:
@@ -60,28 +54,16 @@ class WorldModel:
         return name in _OWN or name in self._frames
 
     def parent(self, name: str) -> str:
-        """Return what a frame is attached to.
-
-        Raises:
-            WorldModelError: there is no such frame, or it is the world.
-        """
+        """Return what a frame is attached to; the world is attached to nothing."""
         return self._placed(name).parent
 
     def children(self, name: str) -> list[str]:
-        """Return the frames that are attached to one, the oldest first.
-
-        Raises:
-            WorldModelError: there is no such frame.
-        """
+        """Return the frames that are attached to one, the oldest first."""
         self._require(name)
         return [frame for frame in (*self._frames, FLANGE, TCP) if self.parent(frame) == name]
 
     def pose(self, name: str, seen_from: str = WORLD) -> Pose:
-        """Return the pose of a frame in another one.
-
-        Raises:
-            WorldModelError: there is no such frame.
-        """
+        """Return the pose of a frame in another one."""
         self._require(name)
         self._require(seen_from)
         above = set(self._chain(seen_from))
@@ -103,8 +85,7 @@ class WorldModel:
     def add(self, name: str, pose: Pose, reference: str) -> None:
         """Add a frame to the world, at a pose in the reference frame, to which it is not attached.
 
-        Raises:
-            WorldModelError: the name is taken or empty, the reference does not exist, or there are too many.
+        WorldModelError if the name is taken or empty, or if there are too many frames.
         """
         if not name or name in self:
             raise WorldModelError(f'"{name}" is no name for a new frame; allowed: one that no frame has')
@@ -113,11 +94,7 @@ class WorldModel:
         self._frames[name] = Frame(pose=pose_trans(self.pose(reference), pose))
 
     def attach(self, child: str, parent: str) -> None:
-        """Attach a frame to another one; it stays where it is.
-
-        Raises:
-            WorldModelError: the child cannot be attached, one does not exist, or the chain would be closed.
-        """
+        """Attach a frame to another one; it stays where it is. WorldModelError: the chain would be closed."""
         frame = self._movable(child)
         self._require(parent)
         if child in self._chain(parent):
@@ -125,22 +102,14 @@ class WorldModel:
         self._frames[child] = replace(frame, parent=parent, pose=self.pose(child, parent))
 
     def move(self, name: str, pose: Pose, reference: str) -> None:
-        """Place a frame anew, at a pose in the reference frame; what is attached to it comes along.
-
-        Raises:
-            WorldModelError: the frame cannot be moved, or one does not exist.
-        """
+        """Place a frame anew, at a pose in the reference frame; what is attached to it comes along."""
         frame = self._movable(name)
         in_world = pose_trans(self.pose(reference), pose)
         in_parent = pose_trans(self.pose(WORLD, frame.parent), in_world)
         self._frames[name] = replace(frame, pose=in_parent)
 
     def delete(self, name: str) -> None:
-        """Delete a frame; what is attached to it stays where it is, attached to the world.
-
-        Raises:
-            WorldModelError: there is no such frame that could be deleted.
-        """
+        """Delete a frame; what is attached to it stays where it is, attached to the world."""
         self._require(name)
         if name in _OWN:
             raise WorldModelError(f'"{name}" cannot be deleted, it belongs to the robot')
@@ -158,11 +127,7 @@ class WorldModel:
         self._masses = {name: payload for name, payload in self._masses.items() if name in _OWN}
 
     def set_mass(self, name: str, payload: Payload) -> None:
-        """Set mass, centre of gravity and inertia of a frame, in its own axes.
-
-        Raises:
-            WorldModelError: there is no such frame.
-        """
+        """Set mass, centre of gravity and inertia of a frame, in its own axes."""
         self._require(name)
         self._masses[name] = payload
 

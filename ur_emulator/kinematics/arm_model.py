@@ -23,11 +23,9 @@ from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 
 
 def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> Vector6:
-    """Return a wrench at another point, in the same axes: the moment loses lever times force.
+    """Return a wrench [N, Nm] at another point, in the same axes: the moment loses lever times force.
 
-    Args:
-        wrench: [N, Nm].
-        of: point that its moment refers to, (3,) or the pose of it [m].
+    `of` is the point that its moment refers to, (3,) [m] or a pose there.
     """
     rx, ry, rz = (b - a for a, b in zip(of[:3], to[:3], strict=True))
     fx, fy, fz, mx, my, mz = wrench
@@ -43,9 +41,7 @@ _DAMPING = 1e-12 * np.eye(6)
 def joint_speeds(jacobian: NDArray[np.float64], twist: NDArray[np.float64]) -> NDArray[np.floating]:
     """Return the joint speeds (6,) [rad/s] whose twist, `jacobian @ qd`, is closest to the one given.
 
-    Args:
-        jacobian: (6, 6).
-        twist: (6,), linear first [m/s, rad/s]; a small displacement [m, rad] gives joint steps [rad].
+    The twist (6,) is linear first [m/s, rad/s]; a small displacement [m, rad] gives joint steps [rad].
     """
     transposed = jacobian.T
     return np.linalg.solve(transposed @ jacobian + _DAMPING, transposed @ twist)
@@ -133,13 +129,7 @@ class ArmModel:
     def state(
         self, q: Sequence[float], qd: Sequence[float], tcp: Sequence[float] | None = None
     ) -> CartesianState:
-        """Return the Cartesian state.
-
-        Args:
-            q: joint angles (6,) [rad].
-            qd: joint speeds (6,) [rad/s].
-            tcp: tool centre point in the flange frame.
-        """
+        """Return the Cartesian state at q (6,) [rad] and qd (6,) [rad/s]."""
         model, data = self._model, self._data
         self._qpos[:] = q
         self._qvel[:] = qd
@@ -166,10 +156,6 @@ class ArmModel:
         self, q: Sequence[float], qd: Sequence[float]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the momentum of the arm without a payload, and where its mass is.
-
-        Args:
-            q: joint angles (6,) [rad].
-            qd: joint speeds (6,) [rad/s].
 
         Returns:
             Linear and angular momentum about the base's origin (6,) [kg m/s, kg m^2/s]; first moment of the
@@ -211,13 +197,8 @@ class ArmModel:
     ) -> Vector6 | None:
         """Inverse kinematics: the solution closest to given joint angles.
 
-        Newton's method starts from `q_near`, which is enough along a path; else from the closed-form branches
-        of the nominal arm, the closest first.
-
-        Args:
-            pose: wanted pose of the tool centre point in the base frame.
-            q_near: joint angles (6,) [rad].
-            tcp: tool centre point in the flange frame.
+        Newton's method starts from `q_near` (6,) [rad], which is enough along a path; else from the
+        closed-form branches of the nominal arm, the closest first.
 
         Returns:
             Joint angles within the joint ranges, pose error at most 1e-10 m and 1e-10 rad; None when the

@@ -22,12 +22,12 @@ _TOLERANCE = 0.02
 def closed_form_inverse(
     dh: Sequence[DhRow], rotation: Sequence[float], position: Vector3, q6_free: float
 ) -> list[Vector6]:
-    """Find all joint angles that bring the flange to a pose.
+    """Find all joint angles that bring the flange to a pose in the base frame.
 
     Args:
         dh: six nominal rows of UR pattern.
-        rotation: orientation of the flange in the base frame, nine numbers row by row.
-        position: flange in the base frame [m].
+        rotation: nine numbers row by row.
+        position: [m].
         q6_free: value for joint 6 where it is undetermined (wrist singularity) [rad].
 
     Returns:

@@ -26,9 +26,7 @@ class BufferedSocket(ABC):
     def __init__(self, loop: EventLoop, outbox_limit: int, read_size: int) -> None:
         """Prepare; there is no socket yet.
 
-        Args:
-            outbox_limit: bytes that may wait for a peer that does not read.
-            read_size: bytes taken from the peer in a turn of the loop.
+        `outbox_limit` bytes may wait for a peer that does not read; `read_size` are taken from it in a turn.
         """
         self._loop = loop
         self._outbox_limit = outbox_limit
@@ -42,8 +40,7 @@ class BufferedSocket(ABC):
     def send(self, data: bytes) -> bool:
         """Send what the kernel takes at once, keep the rest for later; all of it or nothing.
 
-        Returns:
-            False if it was dropped: the outbox is full, or the peer takes nothing any more.
+        False if it was dropped: the outbox is full, or the peer takes nothing any more.
         """
         if not self._can_send:
             return False
@@ -226,17 +223,12 @@ class Connection(BufferedSocket):
     def allow_half_close(self, on_end: Callable[[Connection], None]) -> None:
         """Stay open when the client closes its sending side: it may still read. The owner closes then.
 
-        Args:
-            on_end: called once, when that happens.
+        `on_end` is called once, when that happens.
         """
         self._on_end = on_end
 
     def send(self, package: bytes) -> bool:
-        """Send a package, whole or not at all.
-
-        Returns:
-            False if the package was dropped: the outbox is full or the connection is closed.
-        """
+        """Send a package, whole or not at all: False if the outbox is full or the connection is closed."""
         is_sent = super().send(package)
         if self._outbox:
             self._backlog.add(self)

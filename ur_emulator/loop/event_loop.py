@@ -71,11 +71,7 @@ class EventLoop:
     """
 
     def __init__(self, *, precise: bool = True) -> None:
-        """Make the loop.
-
-        Args:
-            precise: deadlines matter to the microsecond; False saves a system call per wait.
-        """
+        """Make the loop; deadlines that are not `precise` to the microsecond save a system call a wait."""
         self._selector = selectors.DefaultSelector()
         self._services: list[Service] = []
         self._calls: deque[Callable[[], None]] = deque()

@@ -23,12 +23,7 @@ class LineWriter:
     """
 
     def __init__(self, stream: TextIO | None, name: str) -> None:
-        """Begin.
-
-        Args:
-            stream: where to; None (the process has no such stream) drops everything.
-            name: of what is written, for the line that says how much was lost.
-        """
+        """Begin to write lines called `name`; without a stream (the process has none) all are dropped."""
         self._name = name
         self._n_lost = 0
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()

@@ -43,13 +43,10 @@ class SpareDescriptor:
                 self._descriptor = os.open(os.devnull, os.O_RDONLY)
 
     def refuse_client(self, listening: socket.socket) -> bool:
-        """Accept the next client of a listening socket and close it at once.
+        """Accept the next client of a listening socket and close it at once; False if no client waits.
 
-        Returns:
-            False if no client waits: without descriptors, the system does not look before it refuses.
-
-        Raises:
-            OSError: another thread or process took the descriptor first.
+        Without descriptors, the system does not look before it refuses. OSError: another thread or process
+        took the descriptor first.
         """
         self.close()
         try:
@@ -77,11 +74,7 @@ class ClientLimits:
         self._taken: Counter[tuple[str | int, ...]] = Counter()
 
     def take(self, host: str, port: int) -> str:
-        """Count a client that has connected; return "", or which limit stands against it.
-
-        Args:
-            port: number of the port that it has connected to.
-        """
+        """Count a client that has connected to a port; return "", or which limit stands against it."""
         for key, limit, what in _limits(host, port):
             if self._taken[key] >= limit:
                 return f"{limit} clients{what} are the most"
@@ -318,11 +311,9 @@ _WINDOW = 60.0  # s
 
 
 class ClientLines:
-    """Writes so many lines a minute, and counts the others.
+    """Writes so many lines a minute into the log, and counts the others.
 
-    Args:
-        write: writes a line into the log.
-        clock: monotonic seconds; also where the time of the box stands still, clients come and go.
+    The clock is monotonic [s]; also where the time of the box stands still, clients come and go.
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:

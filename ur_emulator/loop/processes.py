@@ -72,11 +72,7 @@ def framed(message: bytes) -> bytes:
 
 
 def read_message(pipe: socket.socket) -> bytes:
-    """Wait for the next message from a blocking pipe.
-
-    Raises:
-        EOFError: the other end was closed.
-    """
+    """Wait for the next message from a blocking pipe; EOFError if the other end was closed."""
     return _read(pipe, int.from_bytes(_read(pipe, _HEAD), "big"))
 
 
@@ -200,11 +196,7 @@ class Child:
 
 
 def start_child(role: Role) -> Child:
-    """Start a child.
-
-    Raises:
-        OSError: it cannot be started.
-    """
+    """Start a child; OSError if it cannot be started."""
     pipe, its_pipe = socket.socketpair()
     life, its_life = socket.socketpair()
     try:
@@ -226,11 +218,7 @@ def prepare_children(role: Role) -> None:
 
 
 class _Server:
-    """The server of this process, or that of the box process that this one is.
-
-    Attributes:
-        process: None in a box process, whose server is its parent.
-    """
+    """The server of this process, or, without a process, that of the box process's parent."""
 
     def __init__(self, channel: socket.socket, process: subprocess.Popen[bytes] | None = None) -> None:
         self.channel = channel
@@ -238,11 +226,7 @@ class _Server:
 
     @classmethod
     def start(cls) -> _Server:
-        """Start one.
-
-        Raises:
-            OSError: there is no process or no descriptor to be had.
-        """
+        """Start one; OSError if there is no process or no descriptor to be had."""
         channel, other = socket.socketpair()
         with other:
             try:
@@ -260,10 +244,9 @@ class _Server:
         return cls(channel, process)
 
     def look(self) -> None:
-        """See that it lives: for a moment after its end, a child that it has just forked holds its channel.
+        """See that it lives; OSError if it has ended.
 
-        Raises:
-            OSError: it has ended.
+        For a moment after its end, a child that it has just forked holds its channel.
         """
         if self.process is not None and self.process.poll() is not None:
             raise ChildProcessError(f"the server has ended with exit code {self.process.returncode}")
@@ -342,11 +325,7 @@ def serve_forks() -> None:
 
 
 class _ForkServer:
-    """Forks children, reports how they end, and ends those whose life is closed.
-
-    Args:
-        channel: of the process that has started the server.
-    """
+    """Forks children of the process at its channel, reports how they end, ends those whose life is closed."""
 
     def __init__(self, channel: socket.socket) -> None:
         self._selector = selectors.DefaultSelector()

@@ -93,11 +93,8 @@ class ServedBox:
     ) -> None:
         """Serve a controller.
 
-        Args:
-            controller: the box without its ports.
-            identity: names and numbers by which clients know the box.
-            loop: expects bytes that a script waits for, and has the worker process.
-            on_failure: called with the error that has ended a cycle; there will be no further one.
+        The loop expects bytes that a script waits for, and has the worker process. `on_failure` gets the
+        error that has ended a cycle; there will be no further one.
         """
         self.controller = controller
         self.identity = identity
@@ -128,11 +125,9 @@ class ServedBox:
     def attach(
         self, publishers: Iterable[Publisher], listeners: Iterable[Callable[[Event], None]] = ()
     ) -> None:
-        """Register publishers and listeners.
+        """Register publishers, called after every cycle in this order, and listeners of events.
 
-        Args:
-            publishers: after every cycle, in this order.
-            listeners: with every event, before the cycle that it belongs to is published.
+        A listener gets each event before the cycle that it belongs to is published.
         """
         self._publishers, self._listeners = tuple(publishers), tuple(listeners)
 
@@ -152,11 +147,9 @@ class ServedBox:
         return self.controller.state.pendant.remote_period
 
     def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
-        """Take a command for the next cycle.
+        """Take a command for the next cycle; `done` is called then with the result or the error.
 
-        Args:
-            done: called then with the result or the error.
-            in_place_of: a name; one of the same name that waits for the cycle does not act any more.
+        It takes the place of one with the same name `in_place_of` that still waits.
         """
         is_stopped = self.snapshot.safety_mode not in MOVING_MODES
         if isinstance(command, _STOPS) or (is_stopped and isinstance(command, UnlockProtectiveStop)):
@@ -168,8 +161,7 @@ class ServedBox:
     def schedule(self, tick: int, command: Command, done: Done) -> None:
         """Take a command for the cycle of that number; in lockstep it is no reason for time to pass.
 
-        Raises:
-            RefusedError: the cycle has passed, or too many commands wait.
+        RefusedError if the cycle has passed, or too many commands wait.
         """
         now = self.snapshot
         if tick <= now.tick:
@@ -182,11 +174,7 @@ class ServedBox:
         heappush(self._scheduled, (tick, self._n_scheduled, command, done))
 
     def wake_until(self, tick: int) -> None:
-        """Let time pass until the cycle of that number, also in lockstep with nothing to do.
-
-        Raises:
-            RefusedError: it is too far ahead.
-        """
+        """Let time pass until that cycle, also in lockstep. RefusedError if it is too far ahead."""
         now, ahead = self.snapshot, self.controller.generation.seconds(tick)
         if ahead > now.timestamp + LONGEST_WAIT:
             raise RefusedError(
@@ -231,13 +219,9 @@ class ServedBox:
         self.steps.start(steps, finished)
 
     def apply(self, command: Command) -> Steps[Any]:
-        """Ask for something, and end after the cycle in which it was applied.
+        """Ask for something, and end after the cycle in which it was applied, with its result.
 
-        Returns:
-            The result of the command.
-
-        Raises:
-            RefusedError: it was refused.
+        RefusedError if it was refused.
         """
         outcome: Future[Any] = Future()
         self.submit(command, settle(outcome))
@@ -249,7 +233,6 @@ class ServedBox:
         """Start a program, and end after its first cycle.
 
         Args:
-            program: compiled.
             asked: when somebody asked for it, in monotonic time [s].
             loaded: it was loaded from a file and played.
 
@@ -262,11 +245,7 @@ class ServedBox:
         yield from self.apply(StartProgram(program, loaded=loaded))
 
     def in_worker(self, function: Callable[..., T], *arguments: Any) -> Steps[T]:
-        """Do something that takes longer than a cycle in the worker process, see `TaskQueue.submit`.
-
-        Returns:
-            Its result; what it raises is raised here.
-        """
+        """Do what takes longer than a cycle in the worker process; return its result."""
         outcome: Future[T] = Future()
 
         def done(result: Any, error: Exception | None) -> None:

@@ -157,7 +157,6 @@ class Task:
 
     Attributes:
         request: the pickled function with its arguments.
-        done: called at its end, unless it is dropped.
         failed: called with an error in `done`.
         is_dropped: its result is no longer wanted.
         began: when a process got it, or began itself [s, monotonic].
@@ -172,11 +171,7 @@ class Task:
 
 
 class _Process:
-    """A worker process.
-
-    Attributes:
-        memory_at_rest: what it held when it began [bytes].
-    """
+    """A worker process; `memory_at_rest` is what it held when it began [bytes]."""
 
     def __init__(self) -> None:
         self.child: Child = start_child(Role.WORKER)
@@ -225,7 +220,7 @@ class TaskQueue:
             done: called in the loop with its result, never before this returns.
             failed: called with an error in `done`.
             function: one that can be imported; it shares no memory with this process.
-            arguments: of the function; what can be pickled.
+            arguments: what can be pickled.
         """
         task = Task(ticket, pickle.dumps((function, arguments)), done, failed)
         self._waiting.append(task)

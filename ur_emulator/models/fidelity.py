@@ -153,8 +153,7 @@ class Fidelity:
 def read_fidelity(path: Path, fidelities: Sequence[Fidelity]) -> Fidelity:
     """The fidelity of a file: `base`, one of those of a generation, and other values of its fields.
 
-    Raises:
-        ModelError: the file cannot be read, a field does not exist or cannot hold its value.
+    ModelError if the file cannot be read, or a field does not exist or cannot hold its value.
     """
     values = _FILE.read_toml(path)
     bases = {it.name: it for it in fidelities if it.has_physics}

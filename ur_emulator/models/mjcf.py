@@ -26,11 +26,7 @@ GRAVITY = 9.81  # m/s²
 
 
 def arm_spec(robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float]) -> mujoco.MjSpec:
-    """Build the bare mechanism.
-
-    Args:
-        dh: six rows, nominal or calibrated.
-        mass_scale: six factors on the link masses (and inertias).
+    """Build the bare mechanism, of six DH rows and six factors on the links' masses and inertias.
 
     Returns:
         An editable specification with the joints JOINTS, the bodies LINKS and PAYLOAD (mass 0), and the

@@ -139,11 +139,7 @@ class RobotGeneration:
         return tick * self.period_us / 1e6
 
     def parse_version(self, text: str) -> SoftwareVersion:
-        """Return a version of this generation's software from its text.
-
-        Raises:
-            ModelError: the text is not a version, or one of another generation.
-        """
+        """Return a version of this generation's software from its text; ModelError if it is none."""
         try:
             version = SoftwareVersion.parse(text)
         except LocalProtocolError as error:
@@ -160,11 +156,7 @@ class RobotGeneration:
         return version
 
     def closed_ports(self, services: Iterable[str]) -> frozenset[str]:
-        """Return the names of the ports that stay closed if only these services are enabled.
-
-        Raises:
-            ModelError: there is no service of that name.
-        """
+        """Return the ports that stay closed if only these services are enabled; ModelError for others."""
         enabled = frozenset(services)
         for name in enabled:
             if name not in self.services:
@@ -177,8 +169,7 @@ class RobotGeneration:
     def fidelity(self, name: str) -> Fidelity:
         """Look a fidelity up by its name, in any letter case; a name that ends in .toml is a file.
 
-        Raises:
-            ModelError: no set has that name, or the file is wrong.
+        ModelError if no set has that name, or the file is wrong.
         """
         if name.endswith(".toml"):
             return read_fidelity(Path(name), self.fidelities)

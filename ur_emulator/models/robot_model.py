@@ -234,8 +234,7 @@ class RobotModel:
     def software_version(self, text: str | None) -> SoftwareVersion:
         """Return the version of the software from its text; None is the usual one.
 
-        Raises:
-            ModelError: the text is no version of the generation, or an older one than the arm needs.
+        ModelError if it is none of the generation, or older than the arm needs.
         """
         version = self.generation.parse_version(self.default_software if text is None else text)
         first = self.first_version

@@ -44,12 +44,8 @@ _ALSO = {E_SERIES: POLYSCOPE_X}
 def robot_by_name(name: str, version: str | None = None) -> RobotModel:
     """Look an arm up by its name, in any letter case; a name that ends in .toml is a file.
 
-    Args:
-        name: of the arm, or of the file.
-        version: software that it shall run; an arm of the e-Series may run PolyScope X.
-
-    Raises:
-        ModelError: no arm has that name, or the file is wrong.
+    `version` is the software that it shall run; an arm of the e-Series may run PolyScope X. ModelError if no
+    arm has that name, or the file is wrong.
     """
     robot = read_robot(Path(name)) if name.endswith(".toml") else ROBOTS.get(name.lower())
     if robot is None:
@@ -110,12 +106,7 @@ class LinkTables:
 
 @record
 class RobotFile:
-    """What a file may say of an arm: fields as in `RobotModel`; None: that of the base.
-
-    Attributes:
-        based_on: arm of the table that has all other numbers.
-        links: masses, centres and inertias.
-    """
+    """What a file may say of an arm: fields as in `RobotModel`; None: that of the arm `based_on`."""
 
     based_on: Annotated[str, word(ROBOTS)]
     title: Annotated[str, text(40)] | None = None
@@ -134,9 +125,8 @@ class RobotFile:
 def read_robot(path: Path) -> RobotModel:
     """The arm of a file: `based_on`, an arm of the table, and other values of its numbers.
 
-    Raises:
-        ModelError: the file cannot be read, a field does not exist or cannot hold its value, or the numbers
-            make no arm.
+    ModelError if the file cannot be read, a field does not exist or cannot hold its value, or the numbers
+    make no arm.
     """
     file = checked(RobotFile, _FILE.read_toml(path), str(path), ModelError)
     base = ROBOTS[file.based_on]

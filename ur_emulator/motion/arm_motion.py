@@ -44,12 +44,7 @@ RETURN_SPEED, RETURN_ACCELERATION = 0.25, 1.0
 
 
 class TimeScaling:
-    """The rate of time on the path: a factor that ramps between 1 and 0.
-
-    Attributes:
-        paused: the factor goes to 0, else to 1.
-        slowing: its rate of change to 0 [1/s].
-    """
+    """The rate of time on the path: a factor that ramps to 0 while `paused`, else to 1; `slowing` in 1/s."""
 
     def __init__(self) -> None:
         self.paused = False
@@ -76,12 +71,7 @@ class TimeScaling:
 
 
 class Suspended(NamedTuple):
-    """What continues after a pause.
-
-    Attributes:
-        generator: a move, or a stream if it is renewed.
-        q: where the move left its path [rad].
-    """
+    """What continues after a pause: a move that left its path at `q` [rad], or a stream if it is renewed."""
 
     generator: Generator
     owner: object | None
@@ -89,11 +79,7 @@ class Suspended(NamedTuple):
 
 
 class ReturnToPath:
-    """The return to where a move left its path; then the move continues.
-
-    Attributes:
-        back_to: joint angles on the path [rad].
-    """
+    """The return to where a move left its path, at `back_to` [rad]; then the move continues."""
 
     def __init__(self, move: Move, back_to: Vector6) -> None:
         self.move = move
@@ -225,11 +211,7 @@ class ArmMotion:
         return self._move if self._owner is owner else None
 
     def command(self, owner: object, generator: Generator) -> None:
-        """Move the arm with `generator` for `owner` from the next cycle on.
-
-        Raises:
-            OwnershipError: another owner has the arm.
-        """
+        """Move the arm for `owner` from the next cycle on; OwnershipError if another owner has the arm."""
         if self._owner is not None and self._owner is not owner:
             raise OwnershipError
         if isinstance(self._generator, Streamed):
@@ -241,8 +223,7 @@ class ArmMotion:
     def command_torque(self, owner: object, generator: DirectTorque) -> None:
         """Drive the arm by torque for `owner` in the next cycle; overlays end.
 
-        Raises:
-            OwnershipError: another owner has the arm.
+        OwnershipError if another owner has the arm.
         """
         self.command(owner, generator)
         self._chain.clear()
@@ -269,8 +250,7 @@ class ArmMotion:
     def pause(self, deceleration: float = 0.0) -> None:
         """Ramp the arm to rest on its path; a stream is stopped; overlays stand still too.
 
-        Args:
-            deceleration: of the leading axis, if that is faster than PAUSE_RATE [rad/s^2].
+        `deceleration` of the leading axis [rad/s²], if that is faster than PAUSE_RATE.
         """
         scaling = self._time_scaling
         if scaling.paused:

@@ -22,12 +22,10 @@ _NEAR, _TOO_NEAR = 0.1, 0.04
 
 
 class AxisHold:
-    """Holds the tool along some axes.
+    """Holds the tool, along some axes, where it is at q [rad].
 
-    Args:
-        axes: rotation vector of the feature in the base [rad].
-        blocked: by axis: x, y, z and the rotations about them.
-        q: joint angles where it is held [rad].
+    `axes` is the rotation vector of the feature in the base [rad]; `blocked` are x, y, z and the rotations
+    about them.
     """
 
     def __init__(self, tool: Tool, axes: Sequence[float], blocked: Sequence[bool], q: Vector6) -> None:

@@ -66,13 +66,11 @@ class Blend:
 def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     """Return the blend of two moves around the waypoint between them.
 
+    None when there is no length to blend, or the arm cannot follow the curve.
+
     Args:
-        first: the move that leads to the waypoint.
         r: radius [m]; reduced where it covers more than half of the second move.
         most: how much of the end of the first move it may replace.
-
-    Returns:
-        None when there is no length to blend, or the arm cannot follow the curve.
     """
     before = first.last_part(r, most)
     after = second.first_part(r, 0.5 * second.path.length)

@@ -60,12 +60,7 @@ class FrameType(IntEnum):
 
 
 class TaskFrame:
-    """A task frame in the base.
-
-    Args:
-        pose: as given to force_mode [m, rad].
-        kind: how it is turned.
-    """
+    """A task frame in the base: the pose as given to force_mode [m, rad], and how it is turned."""
 
     def __init__(self, pose: Pose, kind: FrameType) -> None:
         self.kind = kind
@@ -171,13 +166,7 @@ class ForceSettings:
 
 
 class Deviation(NamedTuple):
-    """The deviation of a stiff axis beyond its limit.
-
-    Attributes:
-        axis: 0..5.
-        size: deviation [m or rad].
-        limit: greatest allowed one [m or rad].
-    """
+    """The deviation of a stiff axis (0..5) beyond the greatest allowed one [m or rad]."""
 
     axis: int
     size: float
@@ -187,11 +176,8 @@ class Deviation(NamedTuple):
 class ForceMode:
     """The overlay; it begins without displacement and speed.
 
-    Args:
-        frame: its axes are compliant or stiff.
-        sensing: how the wrench is measured, which says how fast the mode may act.
-        stiffness: of the joint servos (6,) [Nm/rad].
-        measure: gives the present measurement.
+    How the wrench is sensed says how fast the mode may act; `stiffness` is that of the joint servos (6,)
+    [Nm/rad].
     """
 
     def __init__(
@@ -262,9 +248,7 @@ class ForceMode:
     def deviation(self, q: Sequence[float], position_error: Sequence[float]) -> Deviation | None:
         """Return the stiff axis on which the arm is further from its set-point than its limit allows.
 
-        Args:
-            q: joint angles (6,) [rad].
-            position_error: of the joints (6,) [rad].
+        `position_error` is that of the joints (6,) [rad].
         """
         if self.frame.axes is None or _LONGEST_LEVER * sum(map(abs, position_error)) < self._tightest:
             return None

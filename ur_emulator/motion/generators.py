@@ -19,13 +19,7 @@ from ur_emulator.motion.tool import Tool
 
 
 class JointTarget(NamedTuple):
-    """Set-point of all joints at the end of a control cycle.
-
-    Attributes:
-        q: joint positions [rad].
-        qd: joint velocities [rad/s].
-        qdd: joint accelerations during the cycle [rad/s^2].
-    """
+    """Set-point of all joints at the end of a control cycle [rad, rad/s]; `qdd` during the cycle [rad/s²]."""
 
     q: Vector6
     qd: Vector6 = ZERO6
@@ -52,21 +46,14 @@ PAUSE_DECELERATION = 4.0
 
 
 class Generator(Protocol):
-    """A motion, cycle by cycle.
-
-    Attributes:
-        done: the motion has reached its goal.
-    """
+    """A motion, cycle by cycle, until it is `done`: it has reached its goal."""
 
     done: bool
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Return the target at the end of the next cycle.
+        """Return the target at the end of the next cycle from that at the end of the last one.
 
-        Args:
-            target: target at the end of the last cycle.
-            dt: duration of a cycle [s].
-            scale: speed scaling 0..1 of the trajectory (speed slider).
+        `scale` is the speed scaling of the trajectory, 0..1 (speed slider).
         """
         ...
 
@@ -74,16 +61,11 @@ class Generator(Protocol):
 def ramp_towards(
     target: JointTarget, qd_goal: Sequence[float], acceleration: float, dt: float
 ) -> JointTarget:
-    """Return the target one cycle on, its velocity moved towards `qd_goal` on a straight line.
+    """Return the target one cycle on, its velocity moved towards `qd_goal` [rad/s] on a straight line.
 
-    The joint with the greatest change accelerates at `acceleration`; the others arrive together with it
-    ("acceleration of the leading axis"). The position is the integral of the linear velocity.
-
-    Args:
-        target: target at the end of the last cycle.
-        qd_goal: velocity to reach [rad/s], (6,).
-        acceleration: of the leading axis [rad/s^2], > 0.
-        dt: duration of a cycle [s].
+    The joint with the greatest change accelerates at `acceleration` [rad/s²], which is above 0; the others
+    arrive together with it ("acceleration of the leading axis"). The position is the integral of the linear
+    velocity.
     """
     qd = target.qd
     change = list(map(sub, qd_goal, qd))
@@ -185,11 +167,9 @@ class SpeedJ(Streamed):
 
 
 class StopJ:
-    """Decelerate all joints to rest, the leading axis at `a`. Source: URScript manual CB3 3.15, stopj.
+    """Decelerate all joints to rest, the leading axis at `a` [rad/s²].
 
-    Attributes:
-        a: deceleration that is asked for [rad/s^2].
-        allowed: the greatest that is allowed in the next cycle [rad/s^2].
+    `allowed` is the greatest deceleration in the next cycle. Source: URScript manual CB3 3.15, stopj.
     """
 
     def __init__(self, a: float) -> None:
@@ -406,11 +386,7 @@ class TorqueCommand(NamedTuple):
 
 
 class DirectTorque(Streamed):
-    """Follow the measured arm while the drives give a torque.
-
-    Args:
-        measure: gives the measured angles and speeds.
-    """
+    """Follow the measured arm while the drives give a torque; `measure` gives its angles and speeds."""
 
     done = False
 

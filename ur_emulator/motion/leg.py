@@ -74,9 +74,6 @@ class Leg:
         From rest to rest the trapezoid of `a` and `v` is stretched. An end with a blend has no ramp; there
         the speed is chosen for the given acceleration, if that is enough. Where `v_max` or `a_max` is in the
         way, the leg takes longer. Source: URScript manual CB3 3.15, movej: `t` has priority; how is chosen.
-
-        Args:
-            from_blend: the leg begins with a blend.
         """
         length, t, a = self.path.length, self.t, self.a
         if t <= 0.0 or length <= 0.0:
@@ -97,14 +94,10 @@ class Leg:
         return replace(self, v=min(v, self.v_max), a=min(a, self.a_max))
 
     def starting_at(self, q: Vector6, pose: Pose) -> Leg | None:
-        """Return the straight path to the same joint angles from another start.
+        """Return the straight path to the same joint angles from another start, at q [rad].
 
-        Args:
-            q: joint angles at the start [rad].
-
-        Returns:
-            None for an arc, since its circle depends on its start, and if the arm would arrive with other
-            joint angles.
+        None for an arc, since its circle depends on its start, and if the arm would arrive with other joint
+        angles.
         """
         path, limits = self.path, {"a": self.a, "v": self.v, "t": self.t, "r": self.r}
         if self.goal is None:
@@ -156,8 +149,7 @@ def move_j(
         start: joint angles at its beginning [rad], (6,).
         goal: joint angles to reach [rad], (6,).
         tool: kinematics, for blends.
-        a: acceleration of the leading axis [rad/s^2].
-        v: speed of the leading axis [rad/s].
+        a, v: acceleration [rad/s^2] and speed [rad/s] of the leading axis.
         t: duration [s]; above 0 it has priority over `a` and `v`.
         r: blend radius [m].
     """
@@ -180,8 +172,7 @@ def move_tool(
 
     Args:
         near: joint angles at its beginning [rad], (6,).
-        a: tool acceleration [m/s^2].
-        v: tool speed [m/s].
+        a, v: acceleration [m/s^2] and speed [m/s] of the tool.
         t: duration [s]; above 0 it has priority over `a` and `v`.
         r: blend radius [m].
         process: keep the speed through blends.

@@ -255,11 +255,7 @@ class Move:
         return False
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Advance on the path by `scale * dt`.
-
-        Raises:
-            UnreachableError: the arm cannot reach the path there.
-        """
+        """Advance on the path by `scale * dt`; UnreachableError if the arm cannot reach the path there."""
         self._cycle = dt
         self.n_joined = 0
         time = self._time + scale * dt

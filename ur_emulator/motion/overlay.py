@@ -19,11 +19,7 @@ from ur_emulator.motion.tool import Tool, UnreachableError
 
 
 class Overlay(Protocol):
-    """Displaces the tool, cycle by cycle.
-
-    Attributes:
-        tool: whose pose is displaced; it may change while the overlay is active.
-    """
+    """Displaces the tool, cycle by cycle; which tool may change while it is active."""
 
     tool: Tool
 
@@ -189,12 +185,7 @@ class BeltEstimate:
 
 @dataclass(frozen=True, slots=True)
 class LinearBelt:
-    """A belt that moves in a straight line.
-
-    Attributes:
-        direction: in the base frame, of any length above 0.
-        density: ticks per metre; below 0 it moves against the direction.
-    """
+    """A belt that moves in a straight line, at `density` ticks per metre; below 0: against the direction."""
 
     direction: Vector3
     density: float
@@ -250,12 +241,7 @@ class Conveyor:
         count: Callable[[], float],
         clock: Callable[[], float],
     ) -> None:
-        """Begin to track.
-
-        Args:
-            count: gives the ticks of the belt so far, without overflows.
-            clock: gives the time [s].
-        """
+        """Begin to track: `count` gives the ticks of the belt, without overflows, `clock` the time [s]."""
         self.tool = tool
         self._belt = belt
         self._count = count

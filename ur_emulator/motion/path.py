@@ -262,11 +262,8 @@ class JointPath(Protocol):
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
         """Return joint angles [rad] and their derivative [rad per unit of s].
 
-        Args:
-            near: joint angles close to those at s, for the inverse kinematics [rad].
-
-        Raises:
-            UnreachableError: the arm cannot reach that point.
+        `near` are joint angles close to those at s [rad], for the inverse kinematics. UnreachableError if the
+        arm cannot reach that point.
         """
         ...
 
@@ -295,8 +292,7 @@ class JointLine:
 class JointCurve:
     """A cubic in joint space, in the units of the first move of a blend.
 
-    Attributes:
-        speeds: greatest speed of each joint when s moves at 1, (6,).
+    `speeds` (6,) are the greatest speeds of the joints when s moves at 1.
     """
 
     def __init__(self, cubic: Cubic, length: float) -> None:

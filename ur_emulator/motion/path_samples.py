@@ -68,9 +68,7 @@ class Limits(NamedTuple):
 def sample_path(path: PosePath, tool: Tool, near: Vector6, speed: float) -> tuple[Sample, ...]:
     """Sample a path up to the first point that the arm cannot reach.
 
-    Args:
-        near: joint angles at the beginning [rad].
-        speed: of the tool [m/s].
+    `near` are the joint angles at the beginning [rad], `speed` is that of the tool [m/s].
     """
     samples: list[Sample] = []
     if path.length > 0.0 and _take(samples, path, tool, 0.0, near):

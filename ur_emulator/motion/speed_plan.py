@@ -62,12 +62,7 @@ class Phase(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SpeedPlan:
-    """Length and speed over time.
-
-    Attributes:
-        phases: in order.
-        times: when each begins; the first at 0.
-    """
+    """Length and speed over time; `times` are when each phase begins, the first at 0."""
 
     phases: tuple[Phase, ...]
     times: tuple[float, ...]
@@ -85,11 +80,9 @@ class SpeedPlan:
 
 
 class StoppingCurve(NamedTuple):
-    """The greatest squares of the speed from which the path can still come to rest at a point.
+    """The greatest squares z of the speed from which the path can still come to rest at a point.
 
-    Attributes:
-        knots: lengths, rising; the last is the point.
-        z: squares at them, straight lines between.
+    The knots are lengths, rising; the last is the point. Between them are straight lines.
     """
 
     knots: tuple[float, ...]
@@ -105,15 +98,7 @@ class StoppingCurve(NamedTuple):
 
 
 def plan(intervals: Sequence[Interval], entry: float) -> SpeedPlan | None:
-    """Return the fastest plan that comes to rest at the end.
-
-    Args:
-        intervals: of the path, in order; none for a path without length.
-        entry: speed at the beginning.
-
-    Returns:
-        None if the speed at the beginning is too high.
-    """
+    """Return the fastest plan that comes to rest at the end; None if the path begins too fast."""
     backward, slopes = _backward(intervals)
     z = entry * entry
     if z > backward[0] * _ROUNDING:
@@ -151,10 +136,9 @@ def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:
 
 
 def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
-    """Return the greatest z from which the arm can stop at the end.
+    """Return the greatest z from which the arm can stop at the end, at the ends of the intervals.
 
-    Returns:
-        z at the ends of the intervals, and the slopes between them.
+    With the slopes between them.
     """
     z = 0.0
     found, slopes = [z], []
@@ -172,9 +156,7 @@ def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
 def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tuple[float, float]]:
     """Return the corners (length, z) of a plan within one interval: rising, at the cap, falling.
 
-    Args:
-        z_end: greatest z at its end.
-        down: greatest slope towards it.
+    `z_end` is the greatest z at its end, `down` the greatest slope towards it.
     """
     length, cap, _ = interval
     up = interval.slope(z)
@@ -197,11 +179,7 @@ def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tupl
 
 
 class SmoothPlan:
-    """See the module; times as in SpeedPlan.
-
-    Args:
-        window: duration of the mean, in which the acceleration changes [s], above 0.
-    """
+    """See the module; `window` (above 0) is how long the mean is, in which the acceleration changes [s]."""
 
     def __init__(self, plan: SpeedPlan, window: float) -> None:
         self._plan = plan

@@ -110,12 +110,7 @@ def give_back(owner: object) -> None:
 
 
 def is_closed(address: str, port: int) -> bool:
-    """Whether scripts must not connect to a port.
-
-    Args:
-        address: IPv4, as `inet_ntoa` writes it.
-        port: number.
-    """
+    """Whether scripts must not connect to a port of an IPv4 address, as `inet_ntoa` writes it."""
     # Boxes in other threads come and go: a copy is made at once, an iteration is not.
     return port in tuple(_CLOSED.values()) and _is_of_this_machine(address)
 

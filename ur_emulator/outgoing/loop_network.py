@@ -15,11 +15,8 @@ class LoopNetwork:
     def __init__(self, loop: EventLoop, period_s: float, report: Report, own_address: str = "") -> None:
         """Prepare; nothing is opened.
 
-        Args:
-            period_s: control cycle [s].
-            report: called with an error of ours and what it has ended.
-            own_address: of the box. A robot calls from the address at which it is called, and clients that
-                listen for it check that.
+        A robot calls from the address at which it is called (`own_address`), and clients that listen for it
+        check that. `report` gets errors of ours and what they have ended.
         """
         self._loop = loop
         self._report = report

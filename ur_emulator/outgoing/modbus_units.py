@@ -46,12 +46,7 @@ _WRITE = {
 
 @dataclass(slots=True)
 class SentRequest:
-    """A request that waits for its answer.
-
-    Attributes:
-        signal: for which it was sent; None if its answer is not used.
-        sent_at: monotonic time [s].
-    """
+    """A request, sent at a monotonic time [s], that waits; without a signal its answer is not used."""
 
     signal: ModbusSignal | None
     pdu: bytes
@@ -115,9 +110,7 @@ class ModbusLink:
     def __init__(self, name: str, connect: Callable[[], ScriptSocket], period_s: float) -> None:
         """Prepare; nothing is connected before something is wanted.
 
-        Args:
-            name: address for messages.
-            period_s: control cycle [s]; a unit that does not answer gets the next request after one.
+        A unit that does not answer gets the next request after a control cycle.
         """
         self._name = name
         self._connect = connect
@@ -358,13 +351,7 @@ class ModbusClient:
         period_s: float,
         report: Report,
     ) -> None:
-        """Prepare; nothing is connected before there is a unit.
-
-        Args:
-            connect: begins to connect to a host and port.
-            period_s: control cycle [s].
-            report: called with an error of ours and what it has ended.
-        """
+        """Prepare; nothing is connected before there is a unit. `report` gets errors of ours."""
         self._loop = loop
         self._connect = connect
         self._period = period_s

@@ -19,12 +19,7 @@ _SHARE: Final = 4 * KIB
 
 
 class Buffers:
-    """Counts the bytes of the connections of one box.
-
-    Attributes:
-        connections: all that somebody still has, closed ones included.
-        unsent: bytes that wait to be sent.
-    """
+    """Counts the connections of a box that somebody still has, also closed ones, and their unsent bytes."""
 
     def __init__(self, loop: EventLoop, report: Report) -> None:
         self._loop = loop
@@ -86,18 +81,14 @@ _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOU
 class ScriptConnection(BufferedSocket):
     """One connection that a box has opened (see `scripting.network.ScriptSocket`).
 
-    Attributes:
-        is_connecting: the connection is being made.
-        problem: why there is no connection, if one could not be made.
+    `problem` says why there is none, if it could not be made.
     """
 
     def __init__(self, loop: EventLoop, buffers: Buffers, report: Report, own_address: str = "") -> None:
         """Prepare; nothing is connected.
 
-        Args:
-            buffers: counts the bytes of all connections of the box.
-            report: called with an error of ours in what the peer has caused; it ends the connection.
-            own_address: where to call from, if the peer can be reached from there; "" leaves it open.
+        `report` gets an error of ours in what the peer has caused; it ends the connection. `own_address` is
+        where to call from, if the peer can be reached from there; "" leaves it open.
         """
         super().__init__(loop, BUDGETS.unsent_bytes, _READ_SIZE)
         self._buffers = buffers

@@ -39,13 +39,7 @@ class UnansweredError(RemoteCallError):
 
 
 class ServerAddress:
-    """Where a server listens.
-
-    Attributes:
-        host: name or address.
-        port: number.
-        netloc: both, as the URL has them.
-    """
+    """Where a server listens; `netloc` is host and port as the URL has them."""
 
     def __init__(self, url: str) -> None:
         """Read a URL; RemoteCallError if it is not one of an XML-RPC server."""

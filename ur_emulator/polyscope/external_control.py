@@ -27,14 +27,10 @@ QUIET = 0.1
 def request_program(
     network: Network, pc: ExternalControlPc, clock: Callable[[], float] = time.monotonic
 ) -> Steps[str]:
-    """Ask a PC for its program, in steps.
+    """Ask a PC for its program, in steps; return what it has sent, one character a byte.
 
-    Args:
-        clock: real time [s].
-
-    Returns:
-        What it has sent, one character a byte; or, as the URCap does it, a program that shows what went wrong
-        and waits for somebody to close the popup.
+    If there is none: a program that shows what went wrong and waits for somebody to close the popup, as the
+    URCap does. The clock gives real time [s].
     """
     problem = ""
     received = bytearray()

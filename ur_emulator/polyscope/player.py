@@ -52,12 +52,9 @@ def follow_inputs(
     acts: Mapping[str, Callable[[], None]],
     is_effective: Callable[[], bool],
 ) -> Steps[None]:
-    """Do what inputs ask for.
+    """Do what inputs ask for, while the installation with these inputs is effective.
 
-    Args:
-        declared: (group of inputs as in the names of builtins, index, action).
-        acts: begins an action.
-        is_effective: the installation with these inputs is still loaded.
+    Each is declared by its group, as in the names of builtins, its index and its action, which `acts` begins.
     """
     inputs = [(group, index, acts[action]) for group, index, action in declared if action in acts]
     before = [True] * len(inputs)
@@ -76,8 +73,7 @@ def follow_inputs(
 def values_at_end(programs: ProgramRunner, variables: Mapping[str, str]) -> Steps[dict[str, str]]:
     """Wait for the end of the program that runs; return the values that the variables have then.
 
-    Args:
-        variables: name and value, as a literal; one that the program does not declare keeps it.
+    A variable, with its value as a literal, keeps it if the program does not declare it.
     """
     run = programs.latest
     while programs.is_running and programs.latest is run:
@@ -149,12 +145,7 @@ class ProgramPlayer:
     def __init__(
         self, box: ServedBox, folder: ProgramFolder, network: Network, *, skip_unknown: bool = False
     ) -> None:
-        """Begin with no program.
-
-        Args:
-            network: connects to the PCs of External Control.
-            skip_unknown: nodes that are not known are left out.
-        """
+        """Begin with no program; the network connects to the PCs of External Control."""
         self._skip_unknown = skip_unknown
         self._box = box
         self._network = network
@@ -187,8 +178,7 @@ class ProgramPlayer:
     def load(self, name: str, *, stops: bool = False) -> Steps[None]:
         """Load a program and its installation; what was loaded, and runs, stays if that fails.
 
-        Args:
-            stops: a program that runs is stopped once the file is read.
+        `stops`: a program that runs is stopped once the file is read.
         """
         yield from self._in_turn(self._load(name, stops=stops))
 
@@ -246,8 +236,7 @@ class ProgramPlayer:
     def play(self, client: str) -> Steps[None]:
         """Let a paused program go on, or start the loaded one from the top.
 
-        Args:
-            client: address of who wants it; External Control asks there if no PC is named.
+        `client` is the address of who wants it; External Control asks there if no PC is named.
         """
         asked = time.monotonic()
         self._must_be_able_to_play()

@@ -131,11 +131,7 @@ class ReportFolder:
 
     @property
     def folder(self) -> ProgramFolder:
-        """The folder of programs; a box without one gets a temporary folder now.
-
-        Raises:
-            ProgramFileError: that cannot be made.
-        """
+        """The folder of programs; a box without one gets a temporary folder now."""
         if not self._folder.exists:
             try:
                 self._temporary = TemporaryFolder()
@@ -152,22 +148,14 @@ class ReportFolder:
 
 
 def save_log(folder: ProgramFolder, facts: BoxFacts) -> str:
-    """Write the log, in place of what was written before; return the name of the file on the wire.
-
-    Raises:
-        ProgramFileError: it cannot be written.
-    """
+    """Write the log, in place of what was written before; return the name of the file on the wire."""
     return folder.write(PurePosixPath(LOG_NAME), facts.log.encode("utf-8")).wire_path
 
 
 def flight_report(folder: ProgramFolder, kind: str, facts: BoxFacts) -> str:
-    """Write a flight report; return its number.
+    """Write a flight report of one of `REPORT_KINDS`, "" for the last of them; return its number.
 
-    Args:
-        kind: one of `REPORT_KINDS`, or "" for the last of them.
-
-    Raises:
-        ProgramFileError: there is no such kind, the report is one too many, or it cannot be written.
+    ProgramFileError if there is no such kind, or the report is one too many.
     """
     if kind not in ("", *REPORT_KINDS):
         raise ProgramFileError(f"Unknown report type: {kind}")
@@ -184,11 +172,8 @@ def flight_report(folder: ProgramFolder, kind: str, facts: BoxFacts) -> str:
 def support_file(folder: ProgramFolder, directory: str, facts: BoxFacts) -> str:
     """Write a support file, which holds all flight reports and a new one; return its name.
 
-    Args:
-        directory: in the folder of programs, as a client names it.
-
-    Raises:
-        ProgramFileError: there is no such directory, the file is one too many, or it cannot be written.
+    The directory is in the folder of programs, as a client names it. ProgramFileError if there is none, or
+    the file is one too many.
     """
     try:
         place = folder.locate_folder(directory or "?")
@@ -206,11 +191,7 @@ def support_file(folder: ProgramFolder, directory: str, facts: BoxFacts) -> str:
 
 
 def flight_report_archive(folder: ProgramFolder, facts: BoxFacts) -> bytes:
-    """Return an archive of all flight reports, b"" without one.
-
-    Raises:
-        ProgramFileError: one cannot be read.
-    """
+    """Return an archive of all flight reports, b"" without one."""
     reports = _all_flight_reports(folder)
     return _zip(reports, facts.time) if reports else b""
 
@@ -231,11 +212,7 @@ def _flight_reports(folder: ProgramFolder, place: PurePosixPath) -> dict[int, Fo
 
 
 def _write_report(folder: ProgramFolder, inside: PurePosixPath, data: bytes) -> None:
-    """Write a report unless it is one too many: clients must not fill the disk.
-
-    Raises:
-        ProgramFileError: it is one too many, or cannot be written.
-    """
+    """Write a report unless it is one too many: clients must not fill the disk."""
     reports = [size for other, size in folder.sizes() if _REPORT.fullmatch(other.name)]
     if len(reports) >= BUDGETS.report_files or sum(reports) + len(data) > BUDGETS.report_bytes:
         raise ProgramFileError(

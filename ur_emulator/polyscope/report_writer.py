@@ -14,12 +14,9 @@ T = TypeVar("T")
 
 
 class ReportWriter:
-    """Writes reports about a box.
+    """Writes reports about a box; ProgramFileError for one that cannot be written.
 
-    Every function raises `ProgramFileError` for a report that cannot be written.
-
-    Args:
-        player: holds the loaded program, and the folder of programs.
+    The player holds the loaded program, and the folder of programs.
     """
 
     def __init__(self, box: ServedBox, player: ProgramPlayer) -> None:

@@ -254,11 +254,7 @@ class DashboardPort:
 
 
 class _DashboardSession(Session):
-    """A client.
-
-    Attributes:
-        lines: what it has sent, and how answers are written.
-    """
+    """A client; `lines` is what it has sent, and how answers are written."""
 
     def __init__(self, connection: Connection, box: ServedBox, answers: DashboardAnswers) -> None:
         super().__init__(connection, box)

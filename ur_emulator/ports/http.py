@@ -34,11 +34,7 @@ _OWN_SITES = ("none", "same-origin")
 
 
 class HttpError(Exception):
-    """A request that is answered with an error.
-
-    Attributes:
-        headers: what the answer says beside its text.
-    """
+    """A request that is answered with an error; `headers` are what the answer says beside its text."""
 
     def __init__(self, status: int, text: str, *headers: tuple[str, str]) -> None:
         super().__init__(text)
@@ -48,14 +44,7 @@ class HttpError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class HttpRequest:
-    """A whole request.
-
-    Attributes:
-        method: in capitals.
-        path: without the query.
-        query: behind the question mark, not decoded.
-        headers: by name in lower case.
-    """
+    """A whole request: the path without the query, the query not decoded, headers in lower case."""
 
     method: str
     path: str
@@ -71,11 +60,7 @@ class HttpRequest:
         return cls(head.method.decode("latin-1"), path, query, headers, body)
 
     def json_object(self) -> dict[str, Any]:
-        """Return the body as a JSON object; one without content is empty.
-
-        Raises:
-            HttpError: it is something else.
-        """
+        """Return the body as a JSON object, empty without content; HttpError if it is something else."""
         content_type = self.headers.get("content-type", "")
         if (self.body or content_type) and content_type.partition(";")[0].strip().lower() != JSON:
             raise HttpError(400, f"content type {ascii(content_type)[:60]} given: the body must be {JSON}")
@@ -92,11 +77,7 @@ class HttpRequest:
         return arguments
 
     def text(self, key: str) -> str:
-        """Return a text of the JSON object in the body.
-
-        Raises:
-            HttpError: there is none.
-        """
+        """Return a text of the JSON object in the body; HttpError if there is none."""
         try:
             text = self.json_object().get(key)
         except HttpError as error:
@@ -106,11 +87,7 @@ class HttpRequest:
         return text
 
     def word(self, key: str, allowed: Iterable[str]) -> str:
-        """Return a text of the body that must be one of some words.
-
-        Raises:
-            HttpError: it is another, or there is none.
-        """
+        """Return a text of the body that must be one of some words; HttpError if it is none of them."""
         word, words = self.text(key), tuple(allowed)
         if word not in words:
             raise HttpError(422, f"{key} {ascii(word)[:60]} given: choose one of {', '.join(words)}")
@@ -122,9 +99,8 @@ class HttpAnswer:
     """An answer.
 
     Attributes:
-        result: sent as JSON; bytes are sent as they are, and nothing with status 204.
+        result: sent as JSON; bytes are sent as they are, of the content type, and nothing with status 204.
         headers: beside the usual ones.
-        content_type: of bytes.
     """
 
     status: int
@@ -139,11 +115,7 @@ def too_long(limit: int) -> HttpError:
 
 
 def check_head(request: h11.Request) -> None:
-    """Refuse other versions of HTTP and long headers, before the body is read.
-
-    Raises:
-        HttpError: says why.
-    """
+    """Refuse other versions of HTTP and long headers with an HttpError, before the body is read."""
     if request.http_version not in (b"1.0", b"1.1"):
         raise HttpError(505, f"HTTP {request.http_version.decode('latin-1')} given: this port speaks 1.1")
     if len(request.target) + sum(len(name) + len(value) for name, value in request.headers) > MAX_HEADER:
@@ -151,16 +123,10 @@ def check_head(request: h11.Request) -> None:
 
 
 def check_origin(headers: Mapping[str, str], own_host: str) -> None:
-    """Refuse the requests of web pages: they must not control a box.
+    """Refuse the requests of web pages with an HttpError: they must not control a box.
 
-    A request must name the address of the box as its host (another name that resolves to 127.0.0.1 is
-    refused), and must not come from a page of another origin.
-
-    Args:
-        own_host: address that the port is bound to.
-
-    Raises:
-        HttpError: says why.
+    A request must name the address of the box, `own_host`, as its host (another name that resolves to
+    127.0.0.1 is refused), and must not come from a page of another origin.
     """
     host = headers.get("host", "")
     if not _is_own(host, own_host.lower()):
@@ -199,11 +165,7 @@ class Answers(Protocol):
     """What a port has to say."""
 
     def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
-        """Do what a request asks for.
-
-        Raises:
-            HttpError: it is answered with this error.
-        """
+        """Do what a request asks for; an HttpError is the answer, too."""
         ...
 
 

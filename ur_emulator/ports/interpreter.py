@@ -29,11 +29,9 @@ _REFUSED_AT_ONCE = 32
 # Without a text of its own: it may be long.
 @dataclass(eq=False, repr=False, slots=True)
 class _Line:
-    """A line that waits.
+    """A line that waits, numbered in the order of arrival.
 
     Attributes:
-        client: who has sent it.
-        number: in the order of arrival.
         run: number of the program that ran then.
         n_cleanups: how often that queue had been cleaned up.
     """

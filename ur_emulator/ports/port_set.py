@@ -112,9 +112,7 @@ def _no_line(text: str) -> None:
 class SendingPorts:
     """The ports that send in cycles, also to clients that ask for nothing.
 
-    Attributes:
-        realtime: frames, then the same without scripts.
-        messengers: primary and secondary port, then the same without scripts.
+    Behind those for frames, and those for states and messages, stand the same without scripts.
     """
 
     realtime: tuple[RealtimePort, RealtimePort]
@@ -159,11 +157,7 @@ def answering_ports(
     shut_down: Callable[[], None],
     host: str,
 ) -> dict[str, Port]:
-    """Make the ports that answer requests, by their names in `Ports`: those that the software has.
-
-    Args:
-        host: address that the box is bound to.
-    """
+    """Make the ports that answer requests, by their names in `Ports`: those that the software has."""
     software = box.identity.software
     ports: dict[str, Port] = {"modbus": ModbusPort(box)}
     if software.dashboard:

@@ -9,12 +9,7 @@ class RealtimePort(ScriptPort):
     """Streams realtime frames; there is no greeting."""
 
     def __init__(self, layout: RealtimeLayout, intake: ProgramIntake | None) -> None:
-        """Prepare the encoder.
-
-        Args:
-            layout: of the frames.
-            intake: takes script text; None makes the port read-only.
-        """
+        """Prepare the encoder; the intake takes script text, None makes the port read-only."""
         super().__init__(intake)
         self._encode = layout.encoder()
 

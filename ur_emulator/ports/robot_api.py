@@ -46,8 +46,8 @@ def page(calls: Iterable[robot_api.ApiCall], version: str) -> bytes:
     )
     return (
         f"<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>Robot API {escape(version)}</title>\n"
-        f'<h1>Robot API {escape(version)}</h1>\n<p>Below <code>{robot_api.BASE}</code>; <a href="{robot_api.BASE}/openapi.json">'
-        f"openapi.json</a> is for programs.</p>\n"
+        f"<h1>Robot API {escape(version)}</h1>\n<p>Below <code>{robot_api.BASE}</code>; "
+        f'<a href="{robot_api.BASE}/openapi.json">openapi.json</a> is for programs.</p>\n'
         f"<table>\n<tr><th>call</th><th>does</th><th>control</th></tr>\n{rows}\n</table>\n</html>\n"
     ).encode()
 
@@ -158,11 +158,7 @@ _POWER: dict[str, tuple[frozenset[RobotMode], frozenset[RobotMode], type[Command
 
 
 class RobotApiAnswers:
-    """Finds the answer to a request.
-
-    Args:
-        own_host: address that the port is bound to.
-    """
+    """Finds the answer to a request; `own_host` is the address that the port is bound to."""
 
     def __init__(
         self,

@@ -37,11 +37,7 @@ KINDS = (URPX_SUFFIX, PROGRAM_SUFFIX, SCRIPT_SUFFIX)
 
 
 def find_program(folder: ProgramFolder, name: str) -> FoundFile:
-    """Return the file of a program.
-
-    Raises:
-        FileMissingError: there is none of that name.
-    """
+    """Return the file of a program; FileMissingError if there is none of that name."""
     for kind in KINDS:
         if folder.has(name + kind):
             return folder.find(name + kind)
@@ -66,19 +62,14 @@ def _information(folder: ProgramFolder, name: str) -> Information:
 
 
 def read_program(folder: ProgramFolder, name: str) -> bytes:
-    """Return the file of a program.
-
-    Raises:
-        FileMissingError: there is none of that name.
-        ProgramFileError: it cannot be read.
-    """
+    """Return what is in the file of a program; FileMissingError or ProgramFileError if that fails."""
     return folder.read(find_program(folder, name), BUDGETS.program_bytes)
 
 
 def write_program(
     folder: ProgramFolder, content_type: str, body: bytes, is_new: bool, in_use: str
 ) -> tuple[str, StoreResult]:
-    """Write the file of a program, a new one or one that exists.
+    """Write the file of a program, a new one or one that exists; return its name, and what came of it.
 
     A `.urpx` program says itself what it is called; clients send it under any file name. Programs of other
     kinds have the name of their file.
@@ -87,9 +78,6 @@ def write_program(
         body: of a form with the field `file`.
         is_new: it must be one that does not exist, otherwise one that exists.
         in_use: name of a program that must stay as it is.
-
-    Returns:
-        Its name, and what came of it.
 
     Raises:
         FileMissingError: the name leads out of the folder, or the box has none.
@@ -120,11 +108,7 @@ def write_program(
 
 
 def _form_file(content_type: str, body: bytes) -> tuple[str, bytes]:
-    """Return name and content of the form field `file` of a multipart body.
-
-    Raises:
-        ProgramFileError: it has no such field.
-    """
+    """Return name and content of the form field `file` of a multipart body."""
     if content_type.lower().startswith("multipart/form-data"):
         head = f"Content-Type: {content_type}\r\n\r\n".encode("latin-1", "replace")
         form = BytesParser(policy=HTTP).parsebytes(head + body)

@@ -29,11 +29,7 @@ _INPUT_COST, _REQUEST_COST, _RECIPE_COST = 2, 8, 64
 
 
 class RtdePort:
-    """Streams data packages and takes inputs.
-
-    Args:
-        box: what the port belongs to; its software decides which variables there are.
-    """
+    """Streams data packages and takes inputs."""
 
     def __init__(self, box: ServedBox) -> None:
         self._box = box
@@ -102,11 +98,7 @@ class _RtdeSession(Session):
     def __init__(
         self, connection: Connection, box: ServedBox, answer: Callable[[_RtdeSession, object], None]
     ) -> None:
-        """Prepare.
-
-        Args:
-            answer: replies to a request for recipes, start, pause and the like.
-        """
+        """Prepare; `answer` replies to a request for recipes, start, pause and the like."""
         super().__init__(connection, box)
         software = box.identity.software
         self.protocol = RtdeServerConnection(software.version, software.rtde_outputs, software.rtde_inputs)

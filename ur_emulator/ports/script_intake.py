@@ -102,13 +102,9 @@ class Sender:
 
 @dataclass(eq=False, repr=False, slots=True)
 class Program:
-    """A program that waits.
+    """A program that waits; its ticket decides when it is compiled. A secondary one cannot be stopped.
 
-    Attributes:
-        sender: who has sent it.
-        ticket: decides when it is compiled.
-        stops: how often the program had been stopped when it arrived.
-        is_secondary: it is a `sec` program; it cannot be stopped.
+    `stops`: how often the program had been stopped when it arrived.
     """
 
     sender: Sender

@@ -27,12 +27,7 @@ CompileResult = CompiledProgram | ScriptFailed
 def compile_text(
     text: str, catalogue: Catalogue, name: str = "<program>", is_secondary: bool = False
 ) -> CompileResult:
-    """Compile a program.
-
-    Args:
-        text: of the program, one character a byte.
-        is_secondary: it is a `sec` program.
-    """
+    """Compile a program, one character a byte."""
     try:
         program = compile_program(text, catalogue=catalogue, name=name)
     except ScriptError as error:
@@ -86,15 +81,8 @@ def load_and_compile(
 ) -> tuple[LoadedProgram, CompileResult | None, CompileResult | None]:
     """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
 
-    Args:
-        before: installation that is effective.
-        skip_unknown: leaves out nodes that are not known.
-
-    Returns:
-        The program, what starts it, and what makes its installation effective; None if it is already.
-
-    Raises:
-        ProgramFileError: one of the files cannot be used.
+    Return the program, what starts it, and what makes its installation effective in place of the one before;
+    None if it is already. ProgramFileError: one of the files cannot be used.
     """
     loaded = load_program(folder, name, skip_unknown=skip_unknown)
     ready = None if loaded.pcs else compile_loaded(loaded, {}, catalogue)

@@ -25,11 +25,7 @@ PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX = ".urp", ".script", ".urpx"
 
 @dataclass(frozen=True, slots=True)
 class FoundFile:
-    """A file of the folder.
-
-    Attributes:
-        inside: its path from the folder on, without links.
-    """
+    """A file of the folder; `inside` is its path from the folder on, without links."""
 
     inside: PurePosixPath
 
@@ -57,13 +53,9 @@ class ProgramFolder:
         return self._root is not None
 
     def find(self, name: str) -> FoundFile:
-        """Return the file of that name.
+        """Return the file of that name, as a client gives it: with or without folder, with or without quotes.
 
-        Args:
-            name: as a client gives it: with or without folder, with quotes or without.
-
-        Raises:
-            FileMissingError: there is none, or the name leads out of the folder.
+        FileMissingError if there is none, or the name leads out of the folder.
         """
         inside = self.locate(name)
         if not _is(Path.is_file, self._known_root() / inside):
@@ -81,8 +73,7 @@ class ProgramFolder:
     def locate(self, name: str) -> PurePosixPath:
         """Return the path that a name stands for, from the folder on; nothing need exist there.
 
-        Raises:
-            FileMissingError: the name is too long or leads out of the folder, or there is no folder.
+        FileMissingError if the name is too long or leads out of the folder, or there is no folder.
         """
         # Before a path is made of it: each part costs a question to the file system.
         if len(name) > BUDGETS.path_length or name.count("/") >= BUDGETS.path_parts:
@@ -108,11 +99,7 @@ class ProgramFolder:
         raise FileMissingError(f"{name!r} lies outside of the programs folder: name a file in it")
 
     def locate_folder(self, name: str) -> PurePosixPath:
-        """Return the path of a folder in this folder, from there on.
-
-        Raises:
-            FileMissingError: there is none of that name.
-        """
+        """Return the path of a folder in this folder, from there on; FileMissingError if there is none."""
         inside = self.locate(name)
         if not _is(Path.is_dir, self._known_root() / inside):
             raise FileMissingError(f"there is no folder {name!r} in the programs folder")
@@ -121,19 +108,14 @@ class ProgramFolder:
     def beside(self, file: FoundFile, name: str) -> FoundFile:
         """Return the file that `file` refers to: by a path of the box, or by a name in the same folder.
 
-        Raises:
-            FileMissingError: there is none.
+        FileMissingError if there is none.
         """
         if self.has(name):
             return self.find(name)
         return self.find(str(file.inside.parent / PurePosixPath(name.replace("\\", "/")).name))
 
     def read(self, file: FoundFile, most: int) -> bytes:
-        """Return what is in a file.
-
-        Raises:
-            ProgramFileError: it cannot be read, or has more than `most` bytes.
-        """
+        """Return what is in a file; ProgramFileError if it has more than `most` bytes, or cannot be read."""
         try:
             data = _read(self._known_root(), file.inside, most + 1)
         except OSError as error:
@@ -143,11 +125,7 @@ class ProgramFolder:
         return data
 
     def write(self, inside: PurePosixPath, data: bytes) -> FoundFile:
-        """Write a file in one step: a reader never sees half of it.
-
-        Raises:
-            ProgramFileError: it cannot be written; no part of it stays.
-        """
+        """Write a file in one step: no part of it stays after a ProgramFileError."""
         try:
             _write(self._known_root(), inside, data)
         except OSError as error:
@@ -157,8 +135,7 @@ class ProgramFolder:
     def make_folder(self, name: str) -> PurePosixPath:
         """Make a folder directly in this folder, if there is none of that name; return its path.
 
-        Raises:
-            ProgramFileError: it cannot be made, or a link of that name leads out of this folder.
+        ProgramFileError if it cannot be made, or a link of that name leads out of this folder.
         """
         try:
             _make_folder(self._known_root(), name)
@@ -169,8 +146,7 @@ class ProgramFolder:
     def sizes(self) -> Iterator[tuple[PurePosixPath, int]]:
         """Yield path and size [bytes] of each file, those in inner folders too; links are left out.
 
-        Raises:
-            ProgramFileError: the folder has too many files.
+        ProgramFileError if the folder has too many files.
         """
         return _sizes(self._known_root(), BUDGETS.folder_files)
 
@@ -202,11 +178,7 @@ _CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
 
 
 def _read(root: Path, inside: PurePosixPath, most: int) -> bytes:
-    """Return the first `most` bytes of a file.
-
-    Raises:
-        OSError: it cannot be read, or is no regular file.
-    """
+    """Return the first `most` bytes of a file; OSError if it cannot be read, or is no regular file."""
     with _opened(root, inside.parent) as folder:
         descriptor = os.open(inside.name, _READ, dir_fd=folder)
     with open(descriptor, "rb") as file:
@@ -216,11 +188,7 @@ def _read(root: Path, inside: PurePosixPath, most: int) -> bytes:
 
 
 def _write(root: Path, inside: PurePosixPath, data: bytes) -> None:
-    """Write a file in one step, in place of what has its name.
-
-    Raises:
-        OSError: it cannot be written; no part of it stays.
-    """
+    """Write a file in one step, in place of what has its name; after an OSError no part of it stays."""
     with _opened(root, inside.parent) as folder:
         with suppress(FileNotFoundError):
             os.unlink(PART_NAME, dir_fd=folder)
@@ -236,11 +204,7 @@ def _write(root: Path, inside: PurePosixPath, data: bytes) -> None:
 
 
 def _make_folder(root: Path, name: str) -> None:
-    """Make a folder, unless something has its name.
-
-    Raises:
-        OSError: it cannot be made.
-    """
+    """Make a folder, unless something has its name."""
     with _opened(root, PurePosixPath()) as folder, suppress(FileExistsError):
         os.mkdir(name, dir_fd=folder)
 
@@ -248,8 +212,7 @@ def _make_folder(root: Path, name: str) -> None:
 def _sizes(root: Path, most: int) -> Iterator[tuple[PurePosixPath, int]]:
     """Yield path and size [bytes] of each regular file; folders that cannot be read are left out.
 
-    Raises:
-        ProgramFileError: there are more than `most` files and folders.
+    ProgramFileError if there are more than `most` files and folders.
     """
     waiting = [PurePosixPath()]
     for inside in waiting:

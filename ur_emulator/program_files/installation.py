@@ -23,12 +23,7 @@ NEW_HOME: Vector6 = (0.0, -pi / 2.0, 0.0, -pi / 2.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class ExternalControlPc:
-    """Where External Control gets its program.
-
-    Attributes:
-        host: name or address; "" if not given here.
-        port: of its script sender; 0 if not given here.
-    """
+    """Where External Control gets its program; "" or 0 is not given here."""
 
     host: str = ""
     port: int = 0
@@ -40,11 +35,9 @@ class ExternalControlPc:
 
 @dataclass(frozen=True, slots=True)
 class DeclaredPayload:
-    """The payload that is active when a program starts.
+    """The payload that is active when a program starts: mass [kg], centre of gravity in the flange frame [m].
 
-    Attributes:
-        mass: [kg].
-        cog: centre of gravity in the flange frame [m]; None: not given, the controller takes the TCP.
+    Without a centre of gravity the controller takes the TCP.
     """
 
     mass: float = 0.0
@@ -53,11 +46,9 @@ class DeclaredPayload:
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A pose or a plane that was taught.
+    """A pose or a plane that was taught, in the base frame [m, rotation vector in rad].
 
-    Attributes:
-        pose: in the base frame [m, rotation vector in rad].
-        is_variable: programs have it as a global variable of its name.
+    `is_variable`: programs have it as a global variable of its name.
     """
 
     pose: Vector6
@@ -84,8 +75,7 @@ class DeclaredSignal:
     """A Modbus signal of another unit.
 
     Attributes:
-        host: address of its unit.
-        slave: number of the unit behind that address.
+        slave: number of the unit behind the address `host`.
         address: of the coil or register.
         frequency: how often it is refreshed [Hz]; None: not given.
         rule: what an output does when programs start and stop.
@@ -108,8 +98,7 @@ class StartUp:
 
     Attributes:
         program: path of the program to load, from the programs folder on; "" for none.
-        start_line: name of the line that starts it; "" for none.
-        start_level: level of that line.
+        start_line: name of the line that starts it, at `start_level`; "" for none.
     """
 
     program: str = ""

@@ -53,20 +53,14 @@ NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))
 
 
 def load_installation(folder: ProgramFolder, name: str) -> Installation:
-    """Read an installation by the name that a client gives it.
-
-    Raises:
-        FileMissingError: there is none of that name.
-        ProgramFileError: it is not an installation.
-    """
+    """Read an installation by the name that a client gives it; FileMissingError or ProgramFileError."""
     return _read(ProgramReader(folder), name)
 
 
 def installation_of(reader: ProgramReader, tree: XmlTree, program: FoundFile) -> Installation:
     """Read the installation of a program: at its path from the program's folder, else by its name.
 
-    Raises:
-        ProgramFileError: there is none of that name, or the file is not an installation.
+    ProgramFileError if there is none of that name, or the file is not an installation.
     """
     given = tree.root.get("installationRelativePath") or tree.root.get("installation") or ""
     path = given.replace("\\", "/").removesuffix(SUFFIX) + SUFFIX if given else DEFAULT_NAME
@@ -145,11 +139,7 @@ _SIGNAL_TYPES = {kind.name: kind for kind in SignalType}
 def read_installation(tree: XmlTree, wire_path: str) -> Installation:
     """Return what an installation file declares; its variables stand in another file.
 
-    Args:
-        wire_path: its name on the wire.
-
-    Raises:
-        ProgramFileError: a value makes no sense, or there are too many.
+    ProgramFileError if a value makes no sense, or there are too many.
     """
     reader = _Reader(tree)
     pc, pc_name = reader.external_control()
@@ -189,8 +179,7 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
 def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
     """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
 
-    Raises:
-        ProgramFileError: the host is too long for a name, or the port is not a port number.
+    ProgramFileError if the host is too long for a name, or the port is not a port number.
     """
     host = data.get("host_ip", "")
     if len(host) > BUDGETS.host_length:
@@ -204,11 +193,7 @@ def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
 
 
 class _Values:
-    """Values of one file.
-
-    Attributes:
-        first: the first element of each kind.
-    """
+    """Values of one file; `first` is the first element of each kind."""
 
     def __init__(self, tree: XmlTree) -> None:
         self.tree = tree

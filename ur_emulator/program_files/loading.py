@@ -68,13 +68,9 @@ class LoadedProgram:
         return tuple(dict.fromkeys(part.pc for part in self.parts if isinstance(part, Gap)))
 
     def script(self, received: Callable[[ExternalControlPc], str]) -> str:
-        """Return the script, one character a byte.
+        """Return the script, one character a byte; `received` gives what a PC has sent.
 
-        Args:
-            received: gives what a PC has sent.
-
-        Raises:
-            ProgramFileError: what PCs have sent is longer than a box takes.
+        ProgramFileError if it becomes longer than a box takes.
         """
         texts: list[str] = []
         size = 0
@@ -102,12 +98,10 @@ class LoadedProgram:
 def as_one_program(text: str, name: str) -> str:
     """Return a script file as one program, one character a byte.
 
-    A file with one `def` and nothing else is a program, as PolyScope saves it beside a .urp.
-    Any other file is wrapped into a program with the name of the file, as a node of type script is: several
-    functions and a call of one of them, or statements alone, are a program then.
-
-    Raises:
-        ProgramFileError: the script is longer than a box takes.
+    A file with one `def` and nothing else is a program, as PolyScope saves it beside a .urp. Any other file
+    is wrapped into a program with the name of the file, as a node of type script is: several functions and a
+    call of one of them, or statements alone, are a program then. ProgramFileError: the script is longer than
+    a box takes.
     """
     plain = to_script_text(text).rstrip() + "\n"
     if len(plain) > MAX_PROGRAM:
@@ -134,14 +128,8 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
     """Read a program and its installation.
 
     A program file becomes the script that PolyScope makes of its nodes; the script beside it, which PolyScope
-    saved, only if a node is not known.
-
-    Args:
-        skip_unknown: leaves out nodes that are not known.
-
-    Raises:
-        FileMissingError: there is no such program.
-        ProgramFileError: it cannot be used; the text says why.
+    saved, only if a node is not known, unless such nodes are skipped. FileMissingError if there is no such
+    program, ProgramFileError if it cannot be used.
     """
     file = folder.find(name)
     reader = ProgramReader(folder)

@@ -26,29 +26,17 @@ class ProgramReader:
         self._marks_left = BUDGETS.program_marks
 
     def xml(self, file: FoundFile) -> XmlTree:
-        """Read an XML file, packed or not.
-
-        Raises:
-            ProgramFileError: it cannot be read, is not XML, or the program becomes too large with it.
-        """
+        """Read an XML file, packed or not; ProgramFileError also if the program becomes too large."""
         return self.parsed(file.name, self.unpacked(file))
 
     def unpacked(self, file: FoundFile) -> bytes:
-        """Read a file, packed or not.
-
-        Raises:
-            ProgramFileError: it cannot be read, or the program becomes too large with it.
-        """
+        """Read a file, packed or not; ProgramFileError also if the program becomes too large."""
         data = unpack(file.name, self.folder.read(file, self._bytes_left), self._bytes_left)
         self._bytes_left -= len(data)
         return data
 
     def parsed(self, name: str, data: bytes) -> XmlTree:
-        """Return the tree of an XML file.
-
-        Raises:
-            ProgramFileError: it is not XML, or the program becomes too large with it.
-        """
+        """Return the tree of an XML file; ProgramFileError also if the program becomes too large."""
         self._marks_left -= count_marks(data)
         if self._marks_left < 0:
             raise ProgramFileError(
@@ -57,11 +45,7 @@ class ProgramReader:
         return parse_xml(name, data)
 
     def script(self, file: FoundFile) -> str:
-        """Read a text file, UTF-8 or else Latin-1.
-
-        Raises:
-            ProgramFileError: it cannot be read, is not text, or the program becomes too large with it.
-        """
+        """Read a text file, UTF-8 or else Latin-1; ProgramFileError also if the program becomes too large."""
         data = self.folder.read(file, min(MAX_PROGRAM, self._bytes_left))
         self._bytes_left -= len(data)
         try:
@@ -86,18 +70,10 @@ _GZIP_MAGIC = b"\x1f\x8b"
 
 
 class XmlTree:
-    """A file that was read.
-
-    Attributes:
-        name: of the file, for messages.
-    """
+    """A file that was read; its name is for messages."""
 
     def __init__(self, name: str, root: Element) -> None:
-        """Take a tree.
-
-        Raises:
-            ProgramFileError: the elements are nested too deep.
-        """
+        """Take a tree; ProgramFileError if the elements are nested too deep."""
         self.name = name
         self.root = root
         self._parents: dict[Element, Element] = {}
@@ -111,8 +87,7 @@ class XmlTree:
     def resolve(self, element: Element) -> Element:
         """Return the element that `element` stands for, itself if it has no reference.
 
-        Raises:
-            ProgramFileError: the reference does not lead to an element.
+        ProgramFileError if the reference does not lead to an element.
         """
         for _ in range(_MAX_STEPS):
             reference = element.get("reference")
@@ -147,15 +122,7 @@ def count_marks(data: bytes) -> int:
 
 
 def parse_xml(name: str, data: bytes) -> XmlTree:
-    """Return the tree of a file.
-
-    Args:
-        name: of the file, for messages.
-        data: what is in it, unpacked.
-
-    Raises:
-        ProgramFileError: it is not XML as PolyScope writes it.
-    """
+    """Return the tree of a file, unpacked; ProgramFileError if it is not XML as PolyScope writes it."""
     if not _is_text(data):  # in another encoding the searches for marks and document types see nothing
         raise ProgramFileError(f"{name} is not text in UTF-8, as PolyScope's files are")
     if b"<!DOCTYPE" in data:
@@ -174,8 +141,7 @@ def parse_xml(name: str, data: bytes) -> XmlTree:
 def unpack(name: str, data: bytes, most: int) -> bytes:
     """Return what is in a file that may be packed with gzip.
 
-    Raises:
-        ProgramFileError: it is damaged, or has more than `most` bytes unpacked.
+    ProgramFileError if it is damaged, or has more than `most` bytes unpacked.
     """
     if not data.startswith(_GZIP_MAGIC):
         return data
@@ -207,11 +173,7 @@ _SHOWN = 100
 
 
 def number_text(tree: XmlTree, text: str | None, what: str) -> str:
-    """Return a finite number as it stands in the file, which is how a script has it.
-
-    Raises:
-        ProgramFileError: it is not a finite number.
-    """
+    """Return a finite number as it stands in the file, which is how a script has it, or ProgramFileError."""
     plain = (text or "").strip()
     if not _NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
         shown = None if text is None else text[:_SHOWN]
@@ -220,19 +182,14 @@ def number_text(tree: XmlTree, text: str | None, what: str) -> str:
 
 
 def number(tree: XmlTree, text: str | None, what: str) -> float:
-    """Return a finite number.
-
-    Raises:
-        ProgramFileError: it is not a finite number.
-    """
+    """Return a finite number; ProgramFileError if it is none."""
     return float(number_text(tree, text, what))
 
 
 def number_texts(tree: XmlTree, text: str | None, what: str, count: int = 6) -> list[str]:
     """Return numbers that have commas between, as they stand in the file.
 
-    Raises:
-        ProgramFileError: there are more or less, or one is not a finite number.
+    ProgramFileError if there are more or fewer than `count`, or one is not a finite number.
     """
     parts = text.split(",") if text else []
     if len(parts) != count:

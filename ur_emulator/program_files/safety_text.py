@@ -56,8 +56,7 @@ _SECTION = re.compile(r"\[(.*)\]")
 def safety_settings(file_name: str, texts: Iterable[str]) -> SafetySettings:
     """Return the limits in a text; those that it does not give are None.
 
-    Raises:
-        ProgramFileError: a limit is not a number or a list of six, or a speed or a force is not above 0.
+    ProgramFileError if a limit is not a number or a list of six, or a speed or a force is not above 0.
     """
     text = _SafetyText(file_name, _values("".join(texts)))
     return SafetySettings(

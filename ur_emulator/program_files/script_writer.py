@@ -86,9 +86,7 @@ def header_lines(installation: Installation) -> Iterator[str]:
 def setup_script(installation: Installation, before: Installation) -> str:
     """Return the secondary program that makes an installation effective while no program runs.
 
-    Args:
-        installation: to be effective.
-        before: what was; its rules and signals end.
+    The rules and signals of the installation before end.
     """
     lines = (
         *(_rule(OutputRule(rule.group, rule.index, RunState.KEEP)) for rule in before.output_rules),
@@ -162,12 +160,7 @@ def _numbers(values: Sequence[float]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A place for the program that a PC sends when the program is played.
-
-    Attributes:
-        pc: who sends it.
-        indent: blanks before each of its lines.
-    """
+    """A place for what a PC sends when the program is played; `indent` blanks before each line."""
 
     pc: ExternalControlPc
     indent: str
@@ -183,23 +176,14 @@ Part = str | Gap | Header
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place in a script.
-
-    Attributes:
-        parts: number of parts before it.
-        depth: number of open blocks.
-    """
+    """A place in a script: how many parts are before it, and in how many open blocks it is."""
 
     parts: int
     depth: int
 
 
 class ScriptWriter:
-    """The script so far.
-
-    Attributes:
-        parts: texts of whole lines, and places for others, in order.
-    """
+    """The script so far: texts of whole lines, and places for others, in order."""
 
     def __init__(self) -> None:
         self.parts: list[Part] = []
@@ -222,8 +206,7 @@ class ScriptWriter:
     def add(self, *texts: str) -> None:
         """Write lines, one character a byte; a text of several lines is written as it is, each one indented.
 
-        Raises:
-            ProgramFileError: the script becomes longer than a box takes.
+        ProgramFileError if the script becomes longer than a box takes.
         """
         indent = "  " * self._depth
         for text in texts:
@@ -234,20 +217,12 @@ class ScriptWriter:
             self.parts.append(indent + plain.replace("\n", "\n" + indent))
 
     def label(self, number: int, text: str, mark: str = "") -> None:
-        """Write the label of a node, with the number, the name and the mark that PolyScope shows.
-
-        Args:
-            mark: "breakAfter", "noBreak" or nothing.
-        """
+        """Write the label of a node as PolyScope does; the mark is "breakAfter", "noBreak" or nothing."""
         name = " ".join(text.splitlines()).replace('"', "'")
         self.add(f'$ {number} "{name}"' + (f' "{mark}"' if mark else ""))
 
     def gap(self, pc: ExternalControlPc) -> None:
-        """Add a gap for a program that comes later.
-
-        Raises:
-            ProgramFileError: there are too many.
-        """
+        """Add a gap for a program that comes later; ProgramFileError if there are too many."""
         self._gaps += 1
         if self._gaps > BUDGETS.external_control_nodes:
             raise ProgramFileError(

@@ -43,13 +43,9 @@ class Expression(NamedTuple):
 
 
 def expression_of(maker: UrpMaker, node: Node, element: Element | None = None) -> Expression:
-    """Return the expression of a node.
+    """Return the expression that an element is, or that of a node.
 
-    Args:
-        element: the expression; if it is not given, that of the node.
-
-    Raises:
-        ProgramFileError: there is none, or it has parts that are not known.
+    ProgramFileError if there is none, or it has parts that are not known.
     """
     found = node.find("expression") if element is None else node.source.tree.resolve(element)
     if found is None:
@@ -88,11 +84,7 @@ def _part(maker: UrpMaker, node: Node, element: Element) -> Expression:
 
 
 def variable_name(node: Node, element: Element | None) -> str:
-    """Return the name of the variable or feature that an element is, or stands for.
-
-    Raises:
-        ProgramFileError: it has none.
-    """
+    """Return the name of the variable or feature that an element is, or stands for; else ProgramFileError."""
     name = ""
     if element is not None:
         found = node.source.tree.resolve(element)
@@ -103,11 +95,9 @@ def variable_name(node: Node, element: Element | None) -> str:
 
 
 class TaughtWaypoint(NamedTuple):
-    """A fixed waypoint as a script has it.
+    """A fixed waypoint as a script has it: the pose of the tool it was taught with, and the joint angles.
 
-    Attributes:
-        pose: of the tool it was taught with, in the base frame; "" if the file has only the joint angles.
-        q: joint angles.
+    The pose is in the base frame; "" if the file has only the joint angles.
     """
 
     pose: str
@@ -117,8 +107,7 @@ class TaughtWaypoint(NamedTuple):
 def taught_waypoint(maker: UrpMaker, node: Node, element: Element | None, name: str) -> TaughtWaypoint:
     """Return a position that was taught: globals of its name, or in programs of CB3 the values themselves.
 
-    Raises:
-        ProgramFileError: there are no joint angles, or numbers are damaged.
+    ProgramFileError if there are no joint angles, or numbers are damaged.
     """
     position = position_of(node.source.tree, element, f"waypoint {name[:100]!r}")
     if position.pose is None:
@@ -187,12 +176,7 @@ _FIRST_TOOL_ANALOG = 2
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line.
-
-    Attributes:
-        n: its number, or the name of a Modbus signal.
-        label: how labels call it.
-    """
+    """A line; `n` is its number, or the name of a Modbus signal, and `label` how labels call it."""
 
     kind: LineKind
     n: str
@@ -209,11 +193,7 @@ class Line:
 
 
 def line_of(installation: Installation, name: str, file_name: str) -> Line:
-    """Return the line that a program calls by a name.
-
-    Raises:
-        ProgramFileError: there is none of that name.
-    """
+    """Return the line that a program calls by a name; ProgramFileError if there is none."""
     if any(signal.name == name for signal in installation.modbus):
         return Line(_MODBUS, name.replace('"', "'"), name)
     match = _OWN_NAME.fullmatch(installation.lines.get(name, name))
@@ -253,11 +233,7 @@ class Position:
 
 
 def pose_of(tree: XmlTree, text: str | None, what: str) -> Pose:
-    """Return the pose that six numbers with commas between are.
-
-    Raises:
-        ProgramFileError: they are not six numbers.
-    """
+    """Return the pose that six numbers with commas between are; ProgramFileError if they are not."""
     x, y, z, rx, ry, rz = _moderate(tree, number_texts(tree, text, what), what)
     return (x, y, z, rx, ry, rz)
 
@@ -285,8 +261,7 @@ def _decimals(value: float) -> str:
 def position_of(tree: XmlTree, element: Element | None, what: str) -> Position:
     """Return the position in a `<position>` element, or in one like it.
 
-    Raises:
-        ProgramFileError: there are no joint angles, or numbers are damaged.
+    ProgramFileError if there are no joint angles, or numbers are damaged.
     """
     if element is None:
         raise ProgramFileError(f"{tree.name}: {what} has no position")

@@ -13,11 +13,9 @@ from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """What is around a node.
+    """What is around a node: the `<Move>` that waypoints belong to, if there is one.
 
-    Attributes:
-        move: the `<Move>` that waypoints belong to, if there is one.
-        is_quiet: labels say that the program does not stop at them.
+    `is_quiet`: labels say that the program does not stop at them.
     """
 
     move: Node | None = None
@@ -59,11 +57,7 @@ class UrpMaker:
     left_out: list[str] = field(default_factory=list)
 
     def write(self, node: Node, around: Around) -> None:
-        """Write one node.
-
-        Raises:
-            UnknownNodeError: the node, or something in it, is not known.
-        """
+        """Write one node; UnknownNodeError if it, or something in it, is not known."""
         self.try_to(partial(self._write, node, around))
 
     def _write(self, node: Node, around: Around) -> None:
@@ -75,8 +69,7 @@ class UrpMaker:
     def try_to(self, action: Callable[[], None]) -> None:
         """Do something; what it has written is removed if it meets what is not known and may be left out.
 
-        Raises:
-            UnknownNodeError: something is not known, and must not be left out.
+        UnknownNodeError if that must not be left out.
         """
         place = self.writer.place
         try:

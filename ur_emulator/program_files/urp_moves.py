@@ -112,12 +112,7 @@ def _tool_parameters(node: Node, around: Around) -> list[str]:
 
 
 def _write_until(maker: UrpMaker, node: Node, n: int, acceleration: str, around: Around) -> None:
-    """Write the part of a loop that looks whether the motion has to end.
-
-    Args:
-        node: the `<Until>`.
-        n: number of the direction's label.
-    """
+    """Write the part of a loop that looks whether an `<Until>` ends the motion of label `n`."""
     writer, kind = maker.writer, node.get("type")
     label = f"Until ({kind.lower()})"
     match kind:
@@ -213,11 +208,7 @@ def write_move(maker: UrpMaker, node: Node, around: Around) -> None:
 
 
 def set_tcp(maker: UrpMaker, node: Node, tcp: Element) -> str:
-    """Return the statement that makes a TCP of the installation the active one.
-
-    Raises:
-        ProgramFileError: the installation has none of that name.
-    """
+    """Return the statement that makes a TCP of the installation the active one, or ProgramFileError."""
     name = tcp.get("referencedName", "")
     offset = maker.installation.tcps.get(name)
     if offset is None:
@@ -347,14 +338,9 @@ def _variable_feature(maker: UrpMaker, move: Node) -> str:
 
 
 def frame_of(maker: UrpMaker, node: Node, name: str, tool: str) -> str:
-    """Return the pose of the feature of that name in the base frame, as a script has it.
+    """Return the pose of a feature in the base frame, as a script has it; "" is the base.
 
-    Args:
-        name: of the feature; "" is the base.
-        tool: what a script has for the tool.
-
-    Raises:
-        ProgramFileError: the installation has none of that name.
+    `tool` is what a script has for the tool. ProgramFileError if the installation has no such feature.
     """
     if name in ("", _BASE):
         return ZERO_POSE
@@ -394,11 +380,7 @@ def _waypoint_name(node: Node) -> str:
 
 
 def _motion_parameters(maker: UrpMaker, motion: Node, waypoint: Node, move: Node) -> str:
-    """Return acceleration, speed and blend of a motion, or its time.
-
-    Args:
-        motion: the waypoint, or the circle that ends there.
-    """
+    """Return acceleration, speed and blend, or the time, of a waypoint or of the circle up to it."""
     tree = waypoint.source.tree
     kind = _motion(maker, move)
     _, acceleration, speed = _TYPES[kind]

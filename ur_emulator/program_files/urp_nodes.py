@@ -26,11 +26,7 @@ CB3 = 3
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file that nodes are in.
-
-    Attributes:
-        series: first number of the software that saved it.
-    """
+    """A file that nodes are in; `series` is the first number of the software that saved it."""
 
     file: FoundFile
     tree: XmlTree
@@ -82,11 +78,7 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class SubProgram:
-    """A sub-program.
-
-    Attributes:
-        node: its label's number and its nodes.
-    """
+    """A sub-program: the number of its label, and its nodes."""
 
     name: str
     node: Node
@@ -126,11 +118,7 @@ _VARIABLES = frozenset({"variable", "ProgramVariable"})
 
 
 def read_nodes(file: FoundFile, tree: XmlTree, reader: ProgramReader) -> ProgramNodes:
-    """Return the nodes of a program.
-
-    Raises:
-        ProgramFileError: there is no main program, or a limit is exceeded.
-    """
+    """Return the nodes of a program; ProgramFileError without a main program, or beyond a limit."""
     return _NodeReader(reader).program(_source(file, tree))
 
 

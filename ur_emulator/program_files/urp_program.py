@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class NodeKind:
-    """A kind of nodes that stand in programs.
-
-    Attributes:
-        becomes: what it is in the script.
-        write: writes a node of the kind.
-    """
+    """A kind of nodes that stand in programs, and what writes one; `becomes` is what it is in the script."""
 
     tag: str
     becomes: str
@@ -148,11 +143,9 @@ ROOT = "URProgram"
 
 @dataclass(frozen=True, slots=True)
 class MadeScript:
-    """The script of a program.
+    """The script of a program: texts, and places for what is known when the program is played.
 
-    Attributes:
-        parts: texts, and places for what is known when the program is played.
-        left_out: what is not known and was left out; one line each.
+    `left_out` is what is not known and was left out; one line each.
     """
 
     parts: tuple[Part, ...]
@@ -172,14 +165,10 @@ def make_script(
     *,
     skip_unknown: bool = False,
 ) -> MadeScript:
-    """Return the script of a program.
-
-    Args:
-        reader: reads files that it refers to.
-        skip_unknown: leaves out nodes that are not known, instead of an error.
+    """Return the script of a program; the reader reads files that it refers to.
 
     Raises:
-        UnknownNodeError: a node is not known.
+        UnknownNodeError: a node is not known, and must not be skipped.
         ProgramFileError: something in the file is damaged, or a limit is exceeded.
     """
     program = read_nodes(file, tree, reader)

@@ -31,7 +31,6 @@ class UrpxProgram:
     """What is read of such a file.
 
     Attributes:
-        name: by which clients know the program.
         information: what a list of programs says of it; a field that the file lacks is None.
         script: of application and program, in this order.
     """
@@ -42,11 +41,7 @@ class UrpxProgram:
 
 
 def read_urpx(file_name: str, data: bytes) -> UrpxProgram:
-    """Read a program.
-
-    Raises:
-        ProgramFileError: it has another form.
-    """
+    """Read a program; ProgramFileError if it has another form."""
     try:
         tree = json.loads(data)
     except (ValueError, RecursionError) as error:

@@ -30,8 +30,7 @@ _CONTROLS = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
 def read_variables(reader: ProgramReader, file: FoundFile) -> dict[str, str]:
     """Return name -> value of a file, in its order.
 
-    Raises:
-        ProgramFileError: it cannot be read, has too many variables, or something else than variables.
+    ProgramFileError if it cannot be read, has too many variables, or something else than variables.
     """
     data = reader.unpacked(file)
     items = _xml_items(reader, file, data) if data.lstrip().startswith(b"<") else _properties(data)
@@ -52,15 +51,7 @@ def read_variables(reader: ProgramReader, file: FoundFile) -> dict[str, str]:
 
 
 def write_variables(folder: ProgramFolder, installation: str, values: Mapping[str, str]) -> None:
-    """Write values into the file beside an installation; its form and its other content stay.
-
-    Args:
-        installation: its name on the wire.
-        values: name -> literal.
-
-    Raises:
-        ProgramFileError: the file cannot be read or written.
-    """
+    """Write literals by name into the file beside an installation; its form and its other content stay."""
     file = folder.find(str(PurePosixPath(installation).with_suffix(SUFFIX)))
     raw = folder.read(file, BUDGETS.program_bytes)
     data = unpack(file.name, raw, BUDGETS.program_bytes)

@@ -57,12 +57,7 @@ class BuiltinGroup:
 
 @dataclass(frozen=True, slots=True)
 class ScriptArm:
-    """The parts of the controller that move an arm.
-
-    Attributes:
-        motion: targets of the joints, and the thread that moves them.
-        safety: has the ranges of the joints.
-    """
+    """The parts of the controller that move an arm; `safety` has the ranges of the joints."""
 
     robot: RobotModel
     model: ArmModel

@@ -171,8 +171,7 @@ class ForceBuiltins(BuiltinGroup):
     def _measure(self, offset: Vector6) -> ArmMeasurement:
         """Return what force mode measures in this cycle.
 
-        Args:
-            offset: error of the wrench, at the flange in base axes [N, Nm].
+        `offset` is an error of the wrench, at the flange in base axes [N, Nm].
         """
         snapshot = self._past.snapshot
         wrench = snapshot.space.tcp_force

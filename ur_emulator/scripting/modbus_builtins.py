@@ -53,12 +53,7 @@ class ModbusBuiltins(BuiltinGroup):
     def __init__(
         self, modbus: ModbusSignals, configuration: IoConfiguration, clock: Clock, network: Network
     ) -> None:
-        """Bind the builtins.
-
-        Args:
-            configuration: says whether a program runs.
-            network: connects to units.
-        """
+        """Bind the builtins; the configuration says whether a program runs."""
         self._modbus = modbus
         self._configuration = configuration
         self._clock = clock

@@ -55,7 +55,6 @@ class MoveBuiltins(BuiltinGroup):
         Args:
             place_arm: puts it at joint angles [rad]; False where it would touch something.
             events: get warnings of overlapping blends.
-            planner: of moves whose limits follow from the arm.
             world: has the frames that goals can be given in.
         """
         self._arm = arm
@@ -158,11 +157,9 @@ class MoveBuiltins(BuiltinGroup):
     def _travel(
         self, thread: object, make: Callable[[Vector6, ToolPose], Leg], *, may_overlap: bool = False
     ) -> Cycles:
-        """Follow a leg; from rest, or out of a blend.
+        """Follow a leg, made for joint angles and tool pose at its start; from rest, or out of a blend.
 
-        Args:
-            make: makes the leg for joint angles and tool pose at its start.
-            may_overlap: no warning about a waypoint that is left out.
+        `may_overlap`: no warning about a waypoint that is left out.
         """
         arm, motion = self._arm, self._motion
         move = motion.move_of(thread)

@@ -59,8 +59,7 @@ def _wrenches(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what an acceleration of 1 and a speed of 1 along the path ask for.
 
-    Returns:
-        Magnitudes (points, 6) of the wrench in the frame of the limit: force [N], torque [Nm].
+    Both are magnitudes (points, 6) of the wrench in the frame of the limit: force [N], torque [Nm].
     """
     arm = leg.tool.arm
     places = np.linspace(0.0, leg.path.length, _POINTS)

@@ -51,11 +51,7 @@ class RemoteCall(Protocol):
         ...
 
     def result(self) -> Any:
-        """Return what the procedure returned.
-
-        Raises:
-            RemoteCallError: the call failed.
-        """
+        """Return what the procedure returned; RemoteCallError if the call failed."""
         ...
 
 

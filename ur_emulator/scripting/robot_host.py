@@ -26,11 +26,7 @@ from urscript.run.host import HostFunction
 
 
 def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotHost]:
-    """Bind the builtins of a box; return what makes the host of one program.
-
-    Args:
-        state: the parts of the controller; each group of builtins gets those that it acts on.
-    """
+    """Bind the builtins of a box, each group to its parts; return what makes the host of a program."""
     arm = ScriptArm(state.robot, state.arm, state.motion, state.tool, state.safety)
     step_time, past = state.clock.period_s, state.past
     settings = SettingBuiltins(state.robot, state.tool, state.force_sense, step_time)
@@ -70,12 +66,7 @@ class RobotHost:
     def __init__(
         self, state: ControllerState, network: Network, arm: ScriptArm, shared: Mapping[str, HostFunction]
     ) -> None:
-        """Bind the builtins that keep something for one program.
-
-        Args:
-            network: opens the program's sockets.
-            shared: the builtins of all programs of the box.
-        """
+        """Bind the builtins that keep something for one program; those of all programs are `shared`."""
         random = pure_builtins(state.seed)["random"]
         self.step_time = state.clock.period_s
         self._state = state

@@ -33,11 +33,7 @@ _CLOSE = "closeXMLRPCClientConnection"
 
 
 class RpcBuiltins(BuiltinGroup):
-    """The remote-procedure handles of one program.
-
-    Attributes:
-        has_structs: the language of the controller has structs.
-    """
+    """The remote-procedure handles of one program; `has_structs`: the controller's language has structs."""
 
     def __init__(self, network: Network, clock: Clock) -> None:
         self._network = network

@@ -30,11 +30,7 @@ class RtdeBuiltins(BuiltinGroup):
         force_sense: ForceSense,
         clock: Clock,
     ) -> None:
-        """Bind the builtins.
-
-        Args:
-            past: snapshot of the last cycle.
-        """
+        """Bind the builtins."""
         self._past = past
         self._outputs = {field.name: field for field in outputs if field.origin is not None}
         self._watchdogs = watchdogs

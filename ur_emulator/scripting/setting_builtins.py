@@ -34,13 +34,7 @@ class SettingBuiltins(BuiltinGroup):
     def __init__(
         self, robot: RobotModel, tool: ToolSettings, force_sense: ForceSense, step_time: float
     ) -> None:
-        """Bind the builtins.
-
-        Args:
-            robot: has the greatest payload.
-            force_sense: a sensor is zeroed with the payload.
-            step_time: duration of a cycle [s].
-        """
+        """Bind the builtins; a force sensor is zeroed with the payload. A cycle takes `step_time` [s]."""
         self._robot = robot
         self._tool = tool
         self._force_sense = force_sense
@@ -167,12 +161,7 @@ class WorldBuiltins(BuiltinGroup):
     """The world model: named frames to attach and move, their poses, and what they weigh."""
 
     def __init__(self, world: WorldModel, declare: HostFunction) -> None:
-        """Bind the builtins.
-
-        Args:
-            world: the frames.
-            declare: the builtin that declares a payload.
-        """
+        """Bind the builtins; `declare` is the one that declares a payload."""
         self._world = world
         self._declare = declare
 

@@ -39,19 +39,14 @@ class SocketReader:
 
 
 class TextSearch:
-    """A search for one text in an inbox that grows.
-
-    Attributes:
-        n_searched: bytes that it has looked at.
-    """
+    """A search for one text in an inbox that grows; it has looked at `n_searched` bytes."""
 
     def __init__(self, start: bytes, end: bytes, most: int = 0) -> None:
         """Begin a search.
 
         Args:
             start: the text begins behind it; what stands before it is taken too.
-            end: the text ends with it; without one it is all there is, at least a byte.
-            most: bytes of a text without an end.
+            end: the text ends with it; without one it is all there is, at least a byte and at most `most`.
         """
         self._start, self._end, self._most = start, end, most
         self.n_searched = 0
@@ -232,11 +227,8 @@ class SocketBuiltins(BuiltinGroup):
     ) -> Generator[Blocked, None, list[int]]:
         """Wait for big-endian numbers; a stream of commands passes here every cycle.
 
-        Args:
-            timeout: [s]; not above 0: none.
-            number: how many.
-            code: of one of them for `struct`.
-            width: its bytes.
+        A time-out [s] that is not above 0 is none; `code` is that of a number for `struct`, `width` its
+        bytes.
         """
         reader, clock, size = self._sockets.get(name), self._clock, width * number
         failed = [0] + [-1] * number

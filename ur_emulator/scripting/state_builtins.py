@@ -32,11 +32,7 @@ class StateBuiltins(BuiltinGroup):
     """State and clock, and kinematics of the arm."""
 
     def __init__(self, arm: ScriptArm, past: PastCycles, clock: Clock) -> None:
-        """Bind the builtins.
-
-        Args:
-            past: end of the last cycle, and positions before it.
-        """
+        """Bind the builtins."""
         self._arm = arm
         self._model = arm.model
         self._settings = arm.settings

@@ -43,10 +43,8 @@ class Encoder:
     """One encoder.
 
     Attributes:
-        decoder: how it counts pulses.
         is_fed: a program sets its count.
-        count: present one [ticks].
-        range_id: key of RANGES.
+        count: present one [ticks], within the range `range_id` of RANGES.
         travel: sum of all ticks, without wraps; it continues when the encoder is set up again.
     """
 

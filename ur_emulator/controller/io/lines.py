@@ -11,13 +11,7 @@ from typing import NamedTuple
 
 @dataclass(frozen=True, slots=True)
 class DigitalGroup:
-    """Digital lines side by side, inputs as well as outputs.
-
-    Attributes:
-        name: in builtins, RTDE variables and the control API.
-        first: bit of the first line in the digital word.
-        count: number of lines.
-    """
+    """Digital lines side by side, of inputs or outputs; `first` is their lowest bit in the digital word."""
 
     name: str
     first: int
@@ -193,8 +187,7 @@ _WHEN_UNSCHEDULED = _WHEN_STOPPED | {
 def level(rule: RunState, program_runs: bool, *, unscheduled: bool = False) -> bool | None:
     """Return the level of an output (True is high); None does not change it.
 
-    Args:
-        unscheduled: it has just been stopped, and not by itself or by a user.
+    `unscheduled`: the program has just been stopped, and not by itself or by a user.
     """
     if program_runs:
         return _WHEN_RUNNING.get(rule)

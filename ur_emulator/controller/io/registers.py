@@ -133,12 +133,7 @@ N_GENERAL = 128
 
 
 class MapMemory:
-    """Words that keep what is written, and the clock as it was latched.
-
-    Attributes:
-        words: the general purpose ones, 0 to 65535.
-        version: of the software, major and minor.
-    """
+    """Words of the Modbus map that keep what is written, 0 to 65535, and the clock as it was latched."""
 
     __slots__ = ("latched_tick", "version", "words")
 

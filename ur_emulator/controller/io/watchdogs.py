@@ -26,11 +26,7 @@ class WatchdogAction(Enum):
 
 
 class LateInput(NamedTuple):
-    """A variable was not written in time.
-
-    Attributes:
-        action: of its watchdog, PAUSE or STOP.
-    """
+    """A variable was not written in time; what its watchdog does: PAUSE or STOP."""
 
     report: ErrorReported
     action: WatchdogAction
@@ -60,10 +56,7 @@ class Watchdogs:
     def set(self, variable: str, min_frequency: float, action: WatchdogAction, tick: int) -> None:
         """Watch a variable from now on, as if it had just been written; replaces its earlier watchdog.
 
-        Args:
-            min_frequency: how often it must be written at least [Hz].
-            action: what to do when it is not.
-            tick: present one.
+        `min_frequency`: how often it must be written at least [Hz]; `action`: what to do when it is not.
         """
         self._watches.pop(variable, None)
         if min_frequency > 0.0 and action is not WatchdogAction.IGNORE:

@@ -49,13 +49,7 @@ class BoundaryMode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SafetyPlane:
-    """A safety plane in the base frame.
-
-    Attributes:
-        position: a point of the plane [m].
-        normal: unit vector, towards the allowed side.
-        mode: when it is active, and as what.
-    """
+    """A safety plane in the base frame: a point [m], and the unit vector towards the allowed side."""
 
     name: str
     position: Vector3
@@ -73,12 +67,9 @@ class SafetyPlane:
 
 @dataclass(frozen=True, slots=True)
 class ToolDirection:
-    """A cone that holds the z axis of the TCP.
+    """A cone around a unit vector in the base frame, which holds the z axis of the TCP; `deviation` in rad.
 
-    Attributes:
-        axis: of the cone, unit vector in the base frame.
-        deviation: largest angle from it [rad].
-        mode: when it is active; it never triggers reduced mode.
+    Its mode never triggers reduced mode.
     """
 
     axis: Vector3
@@ -96,12 +87,7 @@ class ToolDirection:
 
 @dataclass(frozen=True, slots=True)
 class Boundaries:
-    """Some boundaries, all of those of a box or the strict limits of a mode; none of them is false.
-
-    Attributes:
-        planes: at most `MOST_PLANES`.
-        tool_direction: None for any.
-    """
+    """Some boundaries, all of those of a box or the strict limits of a mode; none of them is false."""
 
     planes: tuple[SafetyPlane, ...] = ()
     tool_direction: ToolDirection | None = None
@@ -125,9 +111,7 @@ class Boundaries:
     def find_near(self, arm: CartesianState, ahead: Sequence[CartesianState]) -> ErrorReported | None:
         """Return why a protective stop begins before a limit that the arm approaches, or None.
 
-        Args:
-            arm: at the set-point.
-            ahead: the arm where it would go until it rests if it stopped now.
+        `arm` is that at the set-point, `ahead` where it would go if it stopped now, until it rests.
         """
         for plane in self.planes:
             then = zip(*(plane.gaps(later) for later in ahead), strict=True)

@@ -114,12 +114,7 @@ OPERATIONAL_MODES: dict[OperationalMode, OperationalRow] = {
 
 
 class OperationalModeChoice:
-    """Who has chosen which operational mode.
-
-    Attributes:
-        mode: that of the first source that has chosen one.
-        allows: what it allows.
-    """
+    """Who has chosen which operational mode; that of the first source that has chosen one holds."""
 
     def __init__(self) -> None:
         self._choices: dict[ModeSource, OperationalMode] = {}
@@ -145,11 +140,7 @@ class OperationalModeChoice:
 
 
 class Safeguard:
-    """A safeguard.
-
-    Attributes:
-        is_stopping: it is open, or closed and not reset.
-    """
+    """A safeguard; it stops the arm while it is open, or closed and not reset."""
 
     def __init__(self) -> None:
         self.is_stopping = False
@@ -208,11 +199,7 @@ _RELEASED = {
 
 
 class SafetyInputs:
-    """Which functions are active, and by whom.
-
-    Attributes:
-        assigned: pairs of configurable inputs that are set up.
-    """
+    """Which functions are active, and by whom; `assigned` pairs of configurable inputs are set up."""
 
     def __init__(
         self,
@@ -223,9 +210,7 @@ class SafetyInputs:
     ) -> None:
         """Begin with nothing active.
 
-        Args:
-            handle: called with each event.
-            chosen: called when the operational mode has changed.
+        `handle` is called with each event, `chosen` when the operational mode has changed.
         """
         self._handle = handle
         self._device = device

@@ -30,11 +30,7 @@ SPEED_TOLERANCE = 1.0 + 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """Why a protective stop begins.
-
-    Attributes:
-        blocked: the arm is away from its target, which must be dropped.
-    """
+    """Why a protective stop begins. `blocked`: the arm is away from its target, which must be dropped."""
 
     error: ErrorReported
     blocked: bool = False
@@ -65,12 +61,7 @@ class SetpointCheck:
     def find_invalid(
         self, limits: ConfiguredLimits, before: JointTarget, target: JointTarget
     ) -> Violation | None:
-        """Return what is wrong with the next set-point, or None.
-
-        Args:
-            before: set-point at the end of the last cycle.
-            target: set-point at the end of this one.
-        """
+        """Return what is wrong with the next set-point, which follows that `before`, or None."""
         if limits is not self._limits:
             # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
             self._limits = limits
@@ -113,12 +104,7 @@ UNREACHABLE_PATH = _stop(
 
 
 def most_loaded_joint(robot: RobotModel, currents: tuple[float, ...]) -> int:
-    """Return the joint whose drive needs the greatest part of its torque.
-
-    Args:
-        robot: torque constants and limits of the arm.
-        currents: of the drives [A], (6,).
-    """
+    """Return the joint whose drive needs the greatest part of its torque; currents [A], (6,)."""
     shares = torque_shares(robot, currents)
     return shares.index(max(shares))
 
@@ -148,10 +134,8 @@ class HighHoldingTorque:
     def step(self, is_enabled: bool, target_qd: Vector6, actual_qd: Vector6) -> float | None:
         """Return the deviation at which this cycle stops the arm [rad]; None for the usual limits.
 
-        Args:
-            is_enabled: a program runs and has not switched it off.
-            target_qd: of the set-point [rad/s].
-            actual_qd: measured [rad/s].
+        Speeds are those of the set-point and measured ones [rad/s]; it is enabled while a program runs that
+        has not switched it off.
         """
         may_hold = is_enabled and not any(target_qd)
         self._holds = may_hold and (self._holds or max(map(abs, actual_qd)) <= RESTING_SPEED)
@@ -163,11 +147,8 @@ def find_violation(
 ) -> Violation | None:
     """Return a violation by the measured state, or None.
 
-    Args:
-        robot: torque constants and limits of the arm.
-        sensed: measured state of the arm.
-        saturated_s: for how long a drive has been at its torque limit without a break [s].
-        holding_deviation: see `HighHoldingTorque.step`.
+    `saturated_s`: for how long a drive has been at its torque limit without a break [s]; for
+    `holding_deviation` see `HighHoldingTorque.step`.
     """
     errors = sensed.position_error
     most = MAX_POSITION_DEVIATION if holding_deviation is None else holding_deviation

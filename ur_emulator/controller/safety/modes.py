@@ -185,7 +185,6 @@ class EventRow:
     Attributes:
         brings: the mode whose cause it brings, or None. One that latches is not noted in a mode above it.
         cuts_power: the joints lose their power, whatever the mode.
-        meaning: who or what makes it happen.
     """
 
     brings: Mode | None

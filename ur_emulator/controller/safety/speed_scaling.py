@@ -32,11 +32,7 @@ AIM = 0.95
 
 @dataclass(frozen=True, slots=True)
 class ModeLimits:
-    """Limits that hold in a mode.
-
-    Attributes:
-        joints: speeds [rad/s].
-    """
+    """Limits that hold in a mode; those of the joints are speeds [rad/s]."""
 
     joints: Vector6
     arm: ArmLimits
@@ -45,11 +41,7 @@ class ModeLimits:
 def limits_of_mode(
     mode: SafetyMode, is_manual: bool, limits: ConfiguredLimits, rules: SafetyLimits
 ) -> ModeLimits | None:
-    """Return what is allowed in a mode; None where the rated joint speeds are all.
-
-    Args:
-        limits: of the arm and its installation.
-    """
+    """Return what is allowed in a mode; None where the rated joint speeds are all."""
     manual = rules.manual if is_manual else UNLIMITED
     match mode:
         case SafetyMode.REDUCED:
@@ -61,19 +53,10 @@ def limits_of_mode(
 
 
 class SpeedLimiter:
-    """Keeps speeds below the limits of a mode.
-
-    Attributes:
-        scale: speed scaling asked for in this cycle, 0..1.
-    """
+    """Keeps speeds below the limits of a mode; `scale` is the speed scaling asked for in this cycle, 0..1."""
 
     def __init__(self, limits: ModeLimits, scale: float, hard: bool) -> None:
-        """Begin.
-
-        Args:
-            scale: in force until now.
-            hard: slow down with the deceleration of a stop, else with the rate of the speed slider.
-        """
+        """Begin with the scale in force; `hard`: slow down as in a stop, else as the speed slider."""
         self.scale = scale
         self._limits = limits
         self._hard = hard
@@ -82,11 +65,7 @@ class SpeedLimiter:
     def step(self, motion: ArmMotion, arm: ArmModel, tcp: Vector6, slider: float, dt: float) -> float:
         """Return the scale for the next cycle; the path is slowed down to keep the limits.
 
-        Args:
-            motion: of the arm; the rate of its scaling is set.
-            tcp: tool centre point in the flange frame.
-            slider: speed slider, 0..1.
-            dt: duration of a cycle [s].
+        `tcp` is in the flange frame; `slider` 0..1; `dt` is the duration of a cycle [s].
         """
         target = motion.target
         ahead = six([qd + qdd * dt for qd, qdd in zip(target.qd, target.qdd, strict=True)])
@@ -108,10 +87,7 @@ class SpeedLimiter:
     def find_violation(self, sensed: PlantState, space: ArmInSpace, dt: float) -> Violation | None:
         """Return the protective stop for what has exceeded a limit for too long, or None.
 
-        Args:
-            sensed: measured state of the arm.
-            space: the arm in the last cycle.
-            dt: duration of a cycle [s].
+        `space` is the arm in the last cycle, `dt` the duration of a cycle [s].
         """
         error = self._joint_error(sensed.actual_qd) or self._arm_error(sensed, space)
         self._exceeded_s = 0.0 if error is None else self._exceeded_s + dt
@@ -154,12 +130,7 @@ def _tool_speed(arm: CartesianState) -> float:
 
 
 class SpeedScaling:
-    """Rate of the time on the path, by speed slider and safety mode.
-
-    Attributes:
-        slider: speed slider, 0..1.
-        limiter: keeps speeds below the limits of the mode; None in a mode that has none.
-    """
+    """Rate of the time on the path, by speed slider (0..1) and the limits of the safety mode."""
 
     __slots__ = ("limiter", "slider")
 

@@ -47,11 +47,7 @@ SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 
 
 def message_for(event: events.Event, timestamp: int) -> messages.RobotMessage | None:
-    """Return the message for an event; None for events that stand only in the log.
-
-    Args:
-        timestamp: microseconds since controller start.
-    """
+    """Return the message for an event, with a time stamp [us]; None for events that stand only in the log."""
     match event:
         case events.ProgramStarted(name):
             return messages.KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
@@ -115,8 +111,6 @@ class PrimaryPort(ScriptPort):
         """Prepare the greeting.
 
         Args:
-            software: decides sizes and contents, and stands in the greeting.
-            controller: its snapshot greets new clients.
             intake: takes script text; None makes the port read-only.
             states: encodes the states, shared by the ports of a box.
             all_messages: True on the primary port; the secondary one only sends the greeting.

@@ -50,8 +50,7 @@ _NONE = TypedValue(ValueType.NONE)
 def size_of(value: Any, most: int) -> tuple[int, int]:
     """Return at least how many bytes a value takes on the wire, and how many elements are encoded for it.
 
-    Args:
-        most: the bytes at which counting ends; so it takes no longer than encoding a value that fits.
+    Counting ends at `most` bytes; so it takes no longer than encoding a value that fits.
     """
     if isinstance(value, str):
         return len(value) + 3, 1 + len(value) // _CHARACTERS
@@ -140,10 +139,7 @@ class VariableReporter:
         """Return all names, and all values as they were sent last, encoded once a cycle.
 
         Without variables it is the empty update. Source: capture of a simulator without a program.
-
-        Args:
-            timestamp: microseconds since controller start.
-            is_first: nobody else listens, so the values have not been looked at for long.
+        `is_first`: nobody else listens, so the values have not been looked at for long.
         """
         if is_first and timestamp - self._looked_at >= _UPDATE_PERIOD:
             self.changes(timestamp, at_once=True)
@@ -157,13 +153,9 @@ class VariableReporter:
         return self._greeting
 
     def changes(self, timestamp: int, *, at_once: bool = False) -> list[bytes]:
-        """Return the packages with what has changed since it was sent.
+        """Return the packages with what has changed since it was sent; `at_once`: look at all variables.
 
         The elements that are encoded are bounded; the next update goes on where this one ends.
-
-        Args:
-            timestamp: microseconds since controller start.
-            at_once: look at all variables; otherwise at a part of a long list.
         """
         run, names, seen, sent = self._run, self._names, self._seen, self._sent
         if run is None or not names:
@@ -267,11 +259,7 @@ class LabelReporter:
         self._begun = self._run = None
 
     def message(self, timestamp: int) -> RobotMessage | None:
-        """Return the message of this cycle, or None if nothing has changed.
-
-        Args:
-            timestamp: microseconds since controller start.
-        """
+        """Return the message of this cycle, or None if nothing has changed."""
         if self._run is None:
             return None
         found = (

@@ -49,11 +49,7 @@ def dexterity(arm: ArmModel, snapshot: Snapshot) -> float:
 
 
 def state_records(snapshot: Snapshot, checksum: int = 0, dexterity: float = 0.0) -> tuple[SubPackage, ...]:
-    """Return the sub-packages that change from state to state.
-
-    Args:
-        dexterity: of the arm as it stands.
-    """
+    """Return the sub-packages that change from state to state."""
     snap = snapshot
     powered = snap.robot_mode in POWERED
     running = snap.runtime_state in RUNNING_STATES
@@ -139,13 +135,7 @@ class StateEncoder:
         safety: SafetyState,
         masterboard: int = SIMULATED_MASTERBOARD,
     ) -> None:
-        """Prepare what stays.
-
-        Args:
-            arm: the controller's kinematics.
-            safety: has the limits of the installation.
-            masterboard: its version, by which clients know the box.
-        """
+        """Prepare what stays; clients know the box by the version of its masterboard."""
         self._software = software
         self._arm = arm
         self._safety = safety
@@ -184,13 +174,7 @@ def setup_records(
     limits: ConfiguredLimits,
     masterboard: int = SIMULATED_MASTERBOARD,
 ) -> tuple[SubPackage, ...]:
-    """Return the sub-packages of the first state of a connection.
-
-    Args:
-        robot: type and nominal kinematics.
-        limits: of the arm and its installation.
-        masterboard: its version, by which clients know the box.
-    """
+    """Return the sub-packages of the first state of a connection; clients know the box by its masterboard."""
     checksum = zlib.crc32(repr(calibrated_dh).encode())  # of the calibration, the same for every joint
     return (
         layout.KinematicsInfo(
