@@ -11,7 +11,6 @@ which one comes out is not fixed. Vectors that come in may have any length.
 
 from collections.abc import Sequence
 from math import atan2, cos, hypot, sin, sqrt
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +32,10 @@ __all__ = [
     "rpy_to_rotvec",
 ]
 
-Vector3: TypeAlias = tuple[float, float, float]
-Pose: TypeAlias = tuple[float, float, float, float, float, float]
-_Quaternion: TypeAlias = tuple[float, float, float, float]  # w x y z, unit length
-_Flat: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]  # row by row
+Vector3 = tuple[float, float, float]
+Pose = tuple[float, float, float, float, float, float]
+_Quaternion = tuple[float, float, float, float]  # w x y z, unit length
+_Flat = tuple[float, float, float, float, float, float, float, float, float]  # row by row
 
 _TINY = 1e-150
 """Below this length a square underflows; sin(x)/x is then exactly 1 in floats anyway."""

@@ -21,7 +21,7 @@ The text is not checked here: the compiler reports errors, at the right line.
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple
 
 __all__ = [
     "CONTROLLER_WORDS",
@@ -88,7 +88,7 @@ def match_controller_word(line: str) -> tuple[ControllerWord, str] | None:
     return None
 
 
-ProgramKind: TypeAlias = Literal["def", "sec", "statement"]
+ProgramKind = Literal["def", "sec", "statement"]
 
 
 class ProgramText(NamedTuple):
@@ -123,7 +123,7 @@ class Overflow(NamedTuple):
     limit: int
 
 
-ScriptItem: TypeAlias = ProgramText | ControlLine | Overflow
+ScriptItem = ProgramText | ControlLine | Overflow
 
 MAX_LINE = 64 << 10
 """Longest line in bytes; the longest in the field (a matrix literal) has some kilobytes."""

@@ -6,8 +6,6 @@ with ControlBox(robot="ur3", pace="lockstep", seed=7) as box:
     print(box.host, box.ports.realtime)
 """
 
-from __future__ import annotations
-
 import sys
 from typing import TYPE_CHECKING, Any
 

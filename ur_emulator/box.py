@@ -10,14 +10,7 @@ from typing import Any
 
 from protocol.primary.messages import ReportLevel
 from protocol.serial_numbers import simulated_serial
-from protocol.ur_types import (
-    LOCKSTEP_MASTERBOARD,
-    SIMULATED_MASTERBOARD,
-    Ports,
-    RobotMode,
-    RobotType,
-    SoftwareVersion,
-)
+from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotType, SoftwareVersion
 from ur_emulator.box_log import BoxLog
 from ur_emulator.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
 from ur_emulator.control_api.operations import make
@@ -102,7 +95,6 @@ class _Choice:
             self.fidelity,
             options.seed,
             partial(robot_hosts, network=network),
-            mode=RobotMode.RUNNING,
             version=(self.version.major, self.version.minor),
         )
         controller.state.pendant.set_remote_control(options.remote_control)

@@ -12,7 +12,6 @@ RemoteProtocolError close the connection.
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from protocol.dashboard.commands import GREETING, DashboardCommand, match_command, unknown_command_reply
 from protocol.errors import LocalProtocolError, RemoteProtocolError
@@ -39,7 +38,7 @@ class UnknownCommand:
     answer: str
 
 
-DashboardEvent: TypeAlias = CommandReceived | UnknownCommand
+DashboardEvent = CommandReceived | UnknownCommand
 
 
 class DashboardConnection:

@@ -19,7 +19,7 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, TypeAlias, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.primary.framing import HEADER, PackageType, SubPackage, encode_package
@@ -250,7 +250,7 @@ class UnknownPackage:
     body: bytes
 
 
-Package: TypeAlias = RobotState | RobotMessage | ProgramStateMessage | SafetyTolerances | UnknownPackage
+Package = RobotState | RobotMessage | ProgramStateMessage | SafetyTolerances | UnknownPackage
 
 
 def sends_safety_tolerances(version: SoftwareVersion) -> bool:

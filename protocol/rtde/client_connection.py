@@ -6,7 +6,6 @@ After a LocalProtocolError nothing has changed; after a RemoteProtocolError clos
 
 from collections import deque
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from protocol.errors import RemoteProtocolError
 from protocol.rtde import codec
@@ -24,7 +23,7 @@ class DataReceived:
     values: tuple[RtdeValue, ...]
 
 
-ClientEvent: TypeAlias = codec.Reply | codec.RtdeTextMessage | DataReceived
+ClientEvent = codec.Reply | codec.RtdeTextMessage | DataReceived
 
 
 class RtdeClientConnection:

@@ -14,7 +14,6 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from typing import TypeAlias
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde.types import TextLevel
@@ -183,10 +182,8 @@ class DataPackage:
     recipe_id: int | None = None
 
 
-Request: TypeAlias = (
-    RequestProtocolVersion | GetControllerVersion | SetupOutputs | SetupInputs | Start | Pause
-)
-Reply: TypeAlias = (
+Request = RequestProtocolVersion | GetControllerVersion | SetupOutputs | SetupInputs | Start | Pause
+Reply = (
     RequestProtocolVersionReply
     | GetControllerVersionReply
     | SetupOutputsReply
@@ -194,7 +191,7 @@ Reply: TypeAlias = (
     | StartReply
     | PauseReply
 )
-Message: TypeAlias = Request | Reply | RtdeTextMessage | DataPackage
+Message = Request | Reply | RtdeTextMessage | DataPackage
 
 REQUESTS: dict[type[Request], type[Reply]] = {
     RequestProtocolVersion: RequestProtocolVersionReply,
@@ -393,7 +390,7 @@ def _decode_text(payload: bytes) -> RtdeTextMessage:
     )
 
 
-_Decoder: TypeAlias = Callable[[bytes, int], Message]
+_Decoder = Callable[[bytes, int], Message]
 
 _FROM_PC: dict[int, _Decoder] = {
     RtdePackageType.REQUEST_PROTOCOL_VERSION: lambda data, _: RequestProtocolVersion(

@@ -16,7 +16,7 @@ Source: UR RTDE guide; where it says nothing, what public clients need, as noted
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import codec
@@ -111,7 +111,7 @@ class InputReceived:
     values: tuple[RtdeValue, ...]
 
 
-ServerEvent: TypeAlias = codec.Request | codec.RtdeTextMessage | InputReceived
+ServerEvent = codec.Request | codec.RtdeTextMessage | InputReceived
 
 
 class RtdeServerConnection:

@@ -16,15 +16,7 @@ from ur_emulator.commands.power import needs_operational_modes
 from ur_emulator.controller.command import BoxParts
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.robot_mode import ModeCommand
-from ur_emulator.controller.safety.boundaries import (
-    MOST_PLANES,
-    Boundaries,
-    BoundaryMode,
-    SafetyPlane,
-    ToolDirection,
-)
-from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, Guard, SafetyInput
-from ur_emulator.controller.safety.modes import SafetyEvent
+from ur_emulator.controller.safety import boundaries, inputs, modes
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.models.robot_model import Vector3
 
@@ -50,11 +42,11 @@ class ReleaseEmergencyStop(CommandOperation):
 GuardName = Literal["permanent", "automatic mode"]
 
 
-def _guard_of(box: BoxParts, name: GuardName) -> Guard:
+def _guard_of(box: BoxParts, name: GuardName) -> inputs.Guard:
     """Return a safeguard; RefusedError if the box does not have it."""
-    if Guard(name) is Guard.AUTOMATIC:
+    if inputs.Guard(name) is inputs.Guard.AUTOMATIC:
         needs_operational_modes(box.state)
-    return Guard(name)
+    return inputs.Guard(name)
 
 
 class SafeguardStop(CommandOperation):
@@ -92,7 +84,7 @@ class UnlockProtectiveStop(CommandOperation):
             raise RefusedError(
                 f"there is no protective stop to unlock: the safety mode is {safety.mode.name}"
             )
-        box.safety.handle(SafetyEvent.UNLOCK)
+        box.safety.handle(modes.SafetyEvent.UNLOCK)
 
 
 class TriggerViolation(CommandOperation):
@@ -102,7 +94,7 @@ class TriggerViolation(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         box.state.events.append(ErrorReported(0, 0, ReportLevel.VIOLATION, self.text))
-        box.safety.handle(SafetyEvent.VIOLATION)
+        box.safety.handle(modes.SafetyEvent.VIOLATION)
 
 
 class TriggerFault(CommandOperation):
@@ -112,14 +104,14 @@ class TriggerFault(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         box.state.events.append(ErrorReported(0, 0, ReportLevel.FAULT, self.text))
-        box.safety.handle(SafetyEvent.FAULT)
+        box.safety.handle(modes.SafetyEvent.FAULT)
 
 
 class RestartSafety(CommandOperation):
     """Restart the safety system; the power is off then."""
 
     def apply(self, box: BoxParts) -> None:
-        box.safety.handle(SafetyEvent.RESTART)
+        box.safety.handle(modes.SafetyEvent.RESTART)
 
 
 class RequireSafeguardReset(CommandOperation):
@@ -147,11 +139,11 @@ class AssignSafetyInput(CommandOperation):
     Safety inputs have two channels: one that is low is enough to stop.
     """
 
-    pair: int = parameter("inputs 2 * pair and 2 * pair + 1", low=0, high=N_INPUT_PAIRS - 1)
-    function: str = parameter("of the pair", choices=("none", *(it.value for it in SafetyInput)))
+    pair: int = parameter("inputs 2 * pair and 2 * pair + 1", low=0, high=inputs.N_INPUT_PAIRS - 1)
+    function: str = parameter("of the pair", choices=("none", *(it.value for it in inputs.SafetyInput)))
 
     def apply(self, box: BoxParts) -> None:
-        function = None if self.function == "none" else SafetyInput(self.function)
+        function = None if self.function == "none" else inputs.SafetyInput(self.function)
         if function is not None and function.needs_operational_modes:
             needs_operational_modes(box.state)
         box.safety.assign_input(self.pair, function)
@@ -216,17 +208,17 @@ class SetSafetyPlane(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         x, y, z = self.position
-        plane = SafetyPlane(
-            self.name, (x, y, z), _unit(self.normal), BoundaryMode(self.mode), self.restrict_elbow
+        plane = boundaries.SafetyPlane(
+            self.name, (x, y, z), _unit(self.normal), boundaries.BoundaryMode(self.mode), self.restrict_elbow
         )
-        boundaries = box.state.safety.limits.boundaries
-        planes = (*(other for other in boundaries.planes if other.name != self.name), plane)
-        if len(planes) > MOST_PLANES:
+        before = box.state.safety.limits.boundaries
+        planes = (*(other for other in before.planes if other.name != self.name), plane)
+        if len(planes) > (most := boundaries.MOST_PLANES):
             raise RefusedError(
-                f"safety plane {self.name!r}: there are {MOST_PLANES} planes, no more are possible: "
-                f"give the name of one of them, {', '.join(other.name for other in boundaries.planes)}"
+                f"safety plane {self.name!r}: there are {most} planes, no more are possible: "
+                f"give the name of one of them, {', '.join(other.name for other in before.planes)}"
             )
-        _set(box, replace(boundaries, planes=planes))
+        _set(box, replace(before, planes=planes))
 
 
 class LimitToolDirection(CommandOperation):
@@ -242,12 +234,12 @@ class LimitToolDirection(CommandOperation):
         _unit(self.axis)
 
     def apply(self, box: BoxParts) -> None:
-        cone = ToolDirection(_unit(self.axis), self.deviation, BoundaryMode(self.mode))
+        cone = boundaries.ToolDirection(_unit(self.axis), self.deviation, boundaries.BoundaryMode(self.mode))
         _set(box, replace(box.state.safety.limits.boundaries, tool_direction=cone))
 
 
-def _set(box: BoxParts, boundaries: Boundaries) -> None:
-    box.safety.set_limits(replace(box.state.safety.limits, boundaries=boundaries))
+def _set(box: BoxParts, wanted: boundaries.Boundaries) -> None:
+    box.safety.set_limits(replace(box.state.safety.limits, boundaries=wanted))
 
 
 def _unit(vector: Sequence[float]) -> Vector3:

@@ -10,8 +10,7 @@ from protocol.ur_types import ProgramState
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller import events
 from ur_emulator.controller.state import ControllerState
-from urscript import CompiledProgram, ProgramStatus, RunningProgram
-from urscript.run.host import Host
+from urscript import CompiledProgram, Host, ProgramStatus, RunningProgram
 from urscript.run.metering import WorkBudget
 
 # Looked up once: a cycle asks for them several times.

@@ -32,20 +32,11 @@ class ModeCommand(Enum):
 
 # (mode, command) -> the modes to pass through, the last one to stay in. A pair that is not listed changes
 # nothing.
+_TO_RUNNING = (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
 TRANSITIONS: dict[tuple[RobotMode, ModeCommand], tuple[RobotMode, ...]] = {
     (RobotMode.POWER_OFF, ModeCommand.POWER_ON): (RobotMode.POWER_ON, RobotMode.IDLE),
-    (RobotMode.POWER_OFF, ModeCommand.BRAKE_RELEASE): (
-        RobotMode.POWER_ON,
-        RobotMode.IDLE,
-        RobotMode.BACKDRIVE,
-        RobotMode.RUNNING,
-    ),
-    (RobotMode.POWER_ON, ModeCommand.BRAKE_RELEASE): (
-        RobotMode.POWER_ON,
-        RobotMode.IDLE,
-        RobotMode.BACKDRIVE,
-        RobotMode.RUNNING,
-    ),
+    (RobotMode.POWER_OFF, ModeCommand.BRAKE_RELEASE): _TO_RUNNING,
+    (RobotMode.POWER_ON, ModeCommand.BRAKE_RELEASE): _TO_RUNNING,
     (RobotMode.IDLE, ModeCommand.BRAKE_RELEASE): (RobotMode.BACKDRIVE, RobotMode.RUNNING),
     (RobotMode.NO_CONTROLLER, ModeCommand.BOOT): (
         RobotMode.NO_CONTROLLER,

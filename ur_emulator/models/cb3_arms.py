@@ -200,3 +200,6 @@ UR10 = RobotModel(
     # Elbow up, tool forward and 45 degrees down, flange at about (.8, 0, .45) m.
     home_q=(0.2250, -1.8005, -1.8700, -0.2692, 1.4124, 1.7312),
 )
+
+# The first runs the software of the generation where no arm is named.
+ARMS = (UR3, UR5, UR10)

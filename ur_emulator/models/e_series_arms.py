@@ -499,3 +499,6 @@ UR30 = replace(
     home_q=(0.3190, -1.7911, -2.1424, -0.0193, 1.3472, 1.8002),
     first_version="5.15.0",
 )
+
+# The first runs the software of the generation where no arm is named.
+ARMS = (UR5E, UR3E, UR7E, UR10E, UR12E, UR16E, UR8LONG, UR15, UR18, UR20, UR30)

@@ -11,31 +11,13 @@ from typing import Annotated, Any
 import numpy as np
 
 from ur_emulator.errors import ModelError
-from ur_emulator.models.cb3_arms import UR3, UR5, UR10
-from ur_emulator.models.e_series_arms import (
-    UR3E,
-    UR5E,
-    UR7E,
-    UR8LONG,
-    UR10E,
-    UR12E,
-    UR15,
-    UR16E,
-    UR18,
-    UR20,
-    UR30,
-)
+from ur_emulator.models import cb3_arms, e_series_arms
 from ur_emulator.models.generations import E_SERIES, POLYSCOPE_X
 from ur_emulator.models.robot_model import RANGE_END, Link, RobotModel, Vector6, dh_table, six
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import checked, number, record, text, word
 
-# The first of each generation runs its software where no arm is named.
-_CB3 = (UR3, UR5, UR10)
-_E_SERIES = (UR5E, UR3E, UR7E, UR10E, UR12E, UR16E, UR8LONG, UR15, UR18, UR20, UR30)
-
-ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (*_CB3, *_E_SERIES)}
-
+ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (*cb3_arms.ARMS, *e_series_arms.ARMS)}
 
 # Software of another generation that the same arms run.
 _ALSO = {E_SERIES: POLYSCOPE_X}

@@ -4,8 +4,6 @@ Every action is done in steps (see `loop.steps`). What cannot be done is refused
 the box is switched on, the default installation of its folder says what is loaded and started.
 """
 
-from __future__ import annotations
-
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence

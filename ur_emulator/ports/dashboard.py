@@ -11,9 +11,7 @@ from protocol.dashboard.commands import OPERATIONAL_MODES, REMOTE_CONTROL_ONLY, 
 from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection
 from protocol.errors import ProtocolError
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
-from ur_emulator.commands.power import ChooseModeByDashboard, PowerOff, PowerOn, ReleaseBrakes
-from ur_emulator.commands.programs import ClosePopup, ShowPopup
-from ur_emulator.commands.safety import RestartSafety, UnlockProtectiveStop
+from ur_emulator.commands import power, programs, safety
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.safety.inputs import OperationalMode
@@ -54,8 +52,8 @@ class DashboardAnswers:
             "running": lambda row, *_: row.reply(running=str(player.is_running).lower()),
             "robotmode": lambda row, *_: row.reply(mode=RobotMode(box.snapshot.robot_mode).name),
             "get loaded program": self._loaded_program,
-            "popup": lambda row, text, _: self._applied(row, ShowPopup(text)),
-            "close popup": lambda row, *_: self._applied(row, ClosePopup()),
+            "popup": lambda row, text, _: self._applied(row, programs.ShowPopup(text)),
+            "close popup": lambda row, *_: self._applied(row, programs.ClosePopup()),
             "addToLog": self._add_to_log,
             "isProgramSaved": lambda row, *_: row.reply(saved="true", program=self._file_name),
             "programState": lambda row, *_: row.reply(state=self._state_word(), program=self._file_name),
@@ -71,15 +69,15 @@ class DashboardAnswers:
             "is in remote control": lambda row, *_: row.reply(
                 remote=str(bool(box.controller.state.pendant.remote_period)).lower()
             ),
-            "power on": lambda row, *_: self._applied(row, PowerOn()),
-            "power off": lambda row, *_: self._applied(row, PowerOff()),
-            "brake release": lambda row, *_: self._applied(row, ReleaseBrakes()),
+            "power on": lambda row, *_: self._applied(row, power.PowerOn()),
+            "power off": lambda row, *_: self._applied(row, power.PowerOff()),
+            "brake release": lambda row, *_: self._applied(row, power.ReleaseBrakes()),
             "safetymode": lambda row, *_: row.reply(mode=SafetyMode(box.snapshot.safety_mode).name),
             "safetystatus": lambda row, *_: row.reply(status=SafetyStatus(box.snapshot.safety_status).name),
             "unlock protective stop": self._unlock,
             "close safety popup": lambda row, *_: row.reply(),
             "load installation": self._load_installation,
-            "restart safety": lambda row, *_: self._applied(row, RestartSafety()),
+            "restart safety": lambda row, *_: self._applied(row, safety.RestartSafety()),
             "get serial number": lambda row, *_: row.reply(serial=box.identity.serial_number),
             "get robot model": lambda row, *_: row.reply(model=box.identity.wire_model),
             "generate flight report": self._flight_report,
@@ -153,10 +151,10 @@ class DashboardAnswers:
         return row.reply()
 
     def _unlock(self, row: DashboardCommand, *_: str) -> Answer:
-        safety = self._box.controller.state.safety
-        if safety.mode is SafetyMode.PROTECTIVE_STOP and not safety.may_unlock(self._box.snapshot.timestamp):
+        state, now = self._box.controller.state.safety, self._box.snapshot.timestamp
+        if state.mode is SafetyMode.PROTECTIVE_STOP and not state.may_unlock(now):
             return row.reply("too_early")
-        return self._applied(row, UnlockProtectiveStop())
+        return self._applied(row, safety.UnlockProtectiveStop())
 
     def _operational_mode(self) -> str:
         return self._box.controller.state.operational.mode.name
@@ -165,18 +163,18 @@ class DashboardAnswers:
         try:
             if mode.upper() not in OPERATIONAL_MODES:
                 raise RefusedError(f"operational mode {mode}: choose from {', '.join(OPERATIONAL_MODES)}")
-            yield from self._box.apply(ChooseModeByDashboard(OperationalMode[mode.upper()]))
+            yield from self._box.apply(power.ChooseModeByDashboard(OperationalMode[mode.upper()]))
         except RefusedError:
             return row.reply("failed", mode=mode)
         return row.reply(mode=self._operational_mode())
 
     def _clear_operational_mode(self, row: DashboardCommand, *_: str) -> Steps[str]:
-        yield from self._box.apply(ChooseModeByDashboard(None))
+        yield from self._box.apply(power.ChooseModeByDashboard(None))
         return row.reply(mode=self._operational_mode())
 
     def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps[str]:
         self._box.note(f"Shut down by {client}")
-        yield from self._box.apply(PowerOff())
+        yield from self._box.apply(power.PowerOff())
         self._shut_down()
         return row.reply()
 

@@ -18,15 +18,7 @@ from typing import Any
 from protocol.primary.messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptChannel
 from ur_emulator.budgets import BUDGETS, KIB, of_cycle
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
-from ur_emulator.commands.programs import (
-    PauseProgram,
-    ResumeProgram,
-    SetSpeedSlider,
-    StartProgram,
-    StopProgram,
-)
-from ur_emulator.commands.safety import ConfirmSafety, UnlockProtectiveStop
+from ur_emulator.commands import power, programs, safety
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.controller.snapshot import Snapshot
@@ -40,17 +32,17 @@ from ur_emulator.program_files.compiling import CompileResult, compile_text
 # Words that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.script_channel).
 WORDS: dict[str, Command | None] = {
-    "power on": PowerOn(),
-    "power off": PowerOff(),
-    "set robotmode run": ReleaseBrakes(),
-    "set robotmode freedrive": StartFreedrive(),
-    "set unlock protective stop": UnlockProtectiveStop(),
-    "stop program": StopProgram(),
-    "pause program": PauseProgram(),
-    "resume program": ResumeProgram(),
+    "power on": power.PowerOn(),
+    "power off": power.PowerOff(),
+    "set robotmode run": power.ReleaseBrakes(),
+    "set robotmode freedrive": power.StartFreedrive(),
+    "set unlock protective stop": safety.UnlockProtectiveStop(),
+    "stop program": programs.StopProgram(),
+    "pause program": programs.PauseProgram(),
+    "resume program": programs.ResumeProgram(),
     "set real": None,
     "set sim": None,
-    "confirm user safety parameters": ConfirmSafety(),
+    "confirm user safety parameters": safety.ConfirmSafety(),
 }
 SPEED_WORD = "set speed"
 
@@ -60,7 +52,7 @@ def word_command(item: ControlLine) -> Command | str | None:
     if item.word != SPEED_WORD:
         return WORDS.get(item.word, f"'{item.text}' is declared only: this box does not model it yet")
     try:
-        return SetSpeedSlider(float(item.argument))
+        return programs.SetSpeedSlider(float(item.argument))
     except (ValueError, ArgumentError):
         return f"'{item.text}' was ignored: the speed slider takes 0 to 1"
 
@@ -218,9 +210,9 @@ class ProgramIntake:
             return
         if command is not None:
             self._box.submit(command, in_place_of=item.word)
-        if isinstance(command, PauseProgram):
+        if isinstance(command, programs.PauseProgram):
             self._paused = time.monotonic()
-        elif isinstance(command, ResumeProgram):
+        elif isinstance(command, programs.ResumeProgram):
             self._paused = 0.0
 
     def _holds_too_much(self, sender: Sender) -> bool:
@@ -294,14 +286,14 @@ class ProgramIntake:
         if isinstance(outcome, ScriptFailed):
             self._box.announce(outcome)
         elif program.is_secondary:
-            self._box.submit(StartProgram(outcome))
+            self._box.submit(programs.StartProgram(outcome))
         elif program.stops != self._box.stops:
             self._warn(f"program {outcome.name} was stopped before it began")
         elif program.ticket.arrived < self._box.newest:
             self._warn(f"program {outcome.name} does not begin: a newer one was compiled before it")
         else:
             self._box.newest = program.ticket.arrived
-            self._box.submit(StartProgram(outcome, program.ticket.arrived < self._paused))
+            self._box.submit(programs.StartProgram(outcome, program.ticket.arrived < self._paused))
 
     def _drop_gone(self) -> None:
         """Drop programs of clients that have gone until the rest keeps its budget, the longest one aside.
@@ -309,10 +301,10 @@ class ProgramIntake:
         The client with most waiting programs loses its newest first; no client loses a program to others.
         """
         gone = [other for other in self._senders if not other.is_open]
-        programs = [program for other in gone for program in other.programs]
-        if not programs:
+        waiting = [program for other in gone for program in other.programs]
+        if not waiting:
             return
-        longest = max(programs, key=lambda program: (program.cost, -program.ticket.arrived))
+        longest = max(waiting, key=lambda program: (program.cost, -program.ticket.arrived))
         while self._held_gone - longest.cost > BUDGETS.script_bytes_gone:
             greediest = max(gone, key=lambda other: other.held - (other is longest.sender) * longest.cost)
             self._tell(greediest)

@@ -21,22 +21,11 @@ from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.program_files import installation, variables_file
 from ur_emulator.program_files.folder import WIRE_ROOTS, FoundFile, ProgramFolder
-from ur_emulator.program_files.installation import (
-    NEW_HOME,
-    STANDARD_GRAVITY,
-    DeclaredPayload,
-    DeclaredSignal,
-    ExternalControlPc,
-    Feature,
-    Installation,
-    OutputRule,
-    StartUp,
-)
+from ur_emulator.program_files.installation import Installation
 from ur_emulator.program_files.reader import ProgramReader, XmlTree, number
 from ur_emulator.program_files.safety_text import safety_settings
-from ur_emulator.program_files.variables_file import SUFFIX as VARIABLES_SUFFIX
-from ur_emulator.program_files.variables_file import read_variables
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -83,11 +72,11 @@ def _read(reader: ProgramReader, name: str) -> Installation:
         return NEW_BOX
     if file.inside.suffix != SUFFIX:
         raise ProgramFileError(f"{file.name} is not an installation: its name must end in {SUFFIX}")
-    installation = read_installation(reader.xml(file), file.wire_path)
-    variables = str(file.inside.with_suffix(VARIABLES_SUFFIX))
+    found = read_installation(reader.xml(file), file.wire_path)
+    variables = str(file.inside.with_suffix(variables_file.SUFFIX))
     if not reader.folder.has(variables):
-        return installation
-    return replace(installation, variables=read_variables(reader, reader.folder.find(variables)))
+        return found
+    return replace(found, variables=variables_file.read_variables(reader, reader.folder.find(variables)))
 
 
 # Contributor of a part of an installation. Source: the source text of the URCap.
@@ -144,7 +133,7 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
     reader = _Reader(tree)
     pc, pc_name = reader.external_control()
     tcps, active_tcp = reader.tcps()
-    installation = Installation(
+    found = Installation(
         wire_path,
         pc,
         pc_name,
@@ -168,15 +157,15 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
         else Installation(wire_path).safety,
         reader.start_up(),
     )
-    entries = len(tcps) + len(installation.features) + len(installation.lines) + len(installation.modbus)
+    entries = len(tcps) + len(found.features) + len(found.lines) + len(found.modbus)
     if entries > BUDGETS.installation_entries:
         raise ProgramFileError(
             f"{tree.name} has more than {BUDGETS.installation_entries} TCPs, features, lines and signals"
         )
-    return installation
+    return found
 
 
-def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
+def pc_from(data: dict[str, str], file_name: str) -> installation.ExternalControlPc:
     """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
 
     ProgramFileError if the host is too long for a name, or the port is not a port number.
@@ -189,7 +178,7 @@ def pc_from(data: dict[str, str], file_name: str) -> ExternalControlPc:
     port = data.get("port_nr", "")
     if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
         raise ProgramFileError(f"{file_name}: port {port[:20]!r} of External Control is none of 1 to 65535")
-    return ExternalControlPc(host, int(port or 0))
+    return installation.ExternalControlPc(host, int(port or 0))
 
 
 class _Values:
@@ -241,7 +230,7 @@ class _Values:
 class _Reader(_Values):
     """Looks up the parts of one file but its features."""
 
-    def external_control(self) -> tuple[ExternalControlPc, str]:
+    def external_control(self) -> tuple[installation.ExternalControlPc, str]:
         data: dict[str, str] = {}
         for part in self.tree.root.iter("Contributed"):
             if part.get("ownerId") == _EXTERNAL_CONTROL:
@@ -259,7 +248,7 @@ class _Reader(_Values):
         }
         return tcps, settings.get("activePose", "")
 
-    def payload(self) -> DeclaredPayload:
+    def payload(self) -> installation.DeclaredPayload:
         for payload in self.tree.root.iter("Payload"):
             if payload.get("defaultPayload") == "true":
                 mass, cog = payload.get("mass"), payload.get("centerOfGravity")
@@ -267,9 +256,9 @@ class _Reader(_Values):
         else:
             settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
             if settings is None:
-                return DeclaredPayload()
+                return installation.DeclaredPayload()
             mass, cog = settings.get("toolPayload"), settings.get("centerOfGravity")
-        return DeclaredPayload(
+        return installation.DeclaredPayload(
             self.number(mass, "mass of the payload") if mass else 0.0,
             self.vector3(cog, "centre of gravity") if cog else None,
         )
@@ -277,12 +266,13 @@ class _Reader(_Values):
     def gravity(self) -> Vector3:
         mounting = self.first.get("WorldtoMarshal")
         if mounting is None:
-            return (0.0, 0.0, STANDARD_GRAVITY)
+            return (0.0, 0.0, installation.STANDARD_GRAVITY)
         base = self.number(mounting.get("baseAngle", "0"), "angle of the base")
         tilt = self.number(mounting.get("tiltAngle", "0"), "tilt of the base")
         # The sign of y is seen; which of sine and cosine belongs to x is open: both were equal.
-        level = STANDARD_GRAVITY * math.sin(tilt)
-        return (level * math.cos(base), -level * math.sin(base), STANDARD_GRAVITY * math.cos(tilt))
+        g = installation.STANDARD_GRAVITY
+        level = g * math.sin(tilt)
+        return (level * math.cos(base), -level * math.sin(base), g * math.cos(tilt))
 
     def tool_voltage(self) -> int:
         given = self.attribute("ToolCommSettings", "toolOutputVoltage")
@@ -306,9 +296,9 @@ class _Reader(_Values):
             if action not in ("", "NONE")
         )
 
-    def output_rules(self) -> tuple[OutputRule, ...]:
+    def output_rules(self) -> tuple[installation.OutputRule, ...]:
         return tuple(
-            OutputRule(group, index, _RUN_STATES[action])
+            installation.OutputRule(group, index, _RUN_STATES[action])
             for kind, (group, count) in _OUTPUT_ACTIONS.items()
             for index, action in enumerate(self.items(kind)[:count])
             if action in _RUN_STATES
@@ -322,7 +312,7 @@ class _Reader(_Values):
                     names.setdefault(name, f"{own}[{index}]")
         return names
 
-    def signals(self) -> Iterator[DeclaredSignal]:
+    def signals(self) -> Iterator[installation.DeclaredSignal]:
         for unit in self.tree.root.iter("Unit"):
             for signal in unit.iter("ModbusSignal"):
                 kind = _SIGNAL_TYPES.get(signal.get("type", ""))
@@ -332,7 +322,7 @@ class _Reader(_Values):
                 rule = _RUN_STATES.get(signal.get("outputAction", ""), RunState.KEEP)
                 if signal.get("setLowAtProgramStop") == "true":
                     rule = RunState.LOW_WHEN_STOPPED
-                yield DeclaredSignal(
+                yield installation.DeclaredSignal(
                     signal.get("name", ""),
                     unit.get("ipAddress", ""),
                     int(self.number(signal.get("slaveAddress", "255"), "slave of a signal")),
@@ -346,20 +336,20 @@ class _Reader(_Values):
     def safe_home(self) -> Vector6:
         settings = self.first.get("SafeHomeSettings")
         position = "" if settings is None else self.value(settings, "position")
-        return self.vector6(position, "safe home") if position else NEW_HOME
+        return self.vector6(position, "safe home") if position else installation.NEW_HOME
 
-    def start_up(self) -> StartUp:
+    def start_up(self) -> installation.StartUp:
         settings = self.first.get("DefaultProgramSettings")
         if settings is None:
-            return StartUp()
-        return StartUp(
+            return installation.StartUp()
+        return installation.StartUp(
             settings.get("fileName", "") if settings.get("autoLoad") == "true" else "",
             settings.get("nameOfSensorToAutoStartProgram", ""),
             settings.get("triggerValueToStartProgram", "true") == "true",
         )
 
 
-def _features(file: _Values) -> Iterator[tuple[str, Feature]]:
+def _features(file: _Values) -> Iterator[tuple[str, installation.Feature]]:
     """Yield the features of an installation with their names."""
     container = file.first.get("Features", file.first.get("GeomFeatures"))
     if container is not None:
@@ -368,7 +358,7 @@ def _features(file: _Values) -> Iterator[tuple[str, Feature]]:
 
 def _features_in(
     file: _Values, node: Element, name: str, *, is_variable: bool
-) -> Iterator[tuple[str, Feature]]:
+) -> Iterator[tuple[str, installation.Feature]]:
     """Yield the features in a node; a feature may stand in another node that has its name."""
     for given in node:
         child = file.tree.resolve(given)
@@ -376,7 +366,7 @@ def _features_in(
         variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
         pose = _pose_of(file, child)
         if pose is not None and inner_name:
-            yield inner_name, Feature(pose, variable)
+            yield inner_name, installation.Feature(pose, variable)
         elif pose is None and given is child:
             yield from _features_in(file, child, inner_name, is_variable=variable)
 

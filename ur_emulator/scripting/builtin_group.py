@@ -16,8 +16,7 @@ from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
 from ur_emulator.motion.tool import Tool
-from urscript.errors import ScriptRuntimeError
-from urscript.run.host import HostFunction
+from urscript import HostFunction, ScriptRuntimeError
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 

@@ -7,15 +7,8 @@ from ur_emulator.controller.force_sense import ForceSense
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.kinematics.arm_model import moved_wrench
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.motion import force_mode
 from ur_emulator.motion.axis_hold import AxisHold, singularity_status
-from ur_emulator.motion.force_mode import (
-    MIN_DISTANCE,
-    ArmMeasurement,
-    ForceMode,
-    ForceSettings,
-    FrameType,
-    TaskFrame,
-)
 from ur_emulator.plant.drives import ServoGains
 from ur_emulator.scripting.builtin_group import BuiltinGroup, ScriptArm, builtin, floats, require_positive
 from urscript.errors import ScriptRuntimeError
@@ -105,7 +98,7 @@ class ForceBuiltins(BuiltinGroup):
                 f"allowed: numbers up to {MAX_FRAME_DISTANCE:g}"
             )
         settings = self._settings([bool(x) for x in selection_vector], tuple(wrench), limits)
-        self._begin_force(TaskFrame(frame, FrameType(int(type))), settings)
+        self._begin_force(force_mode.TaskFrame(frame, force_mode.FrameType(int(type))), settings)
 
     @builtin("screw_driving")
     def _screw_driving(self, thread: object, f: float, v_limit: float) -> None:
@@ -117,7 +110,7 @@ class ForceBuiltins(BuiltinGroup):
             [v_limit if i == 2 else _UNLIMITED for i in range(6)],
         )
         frame = self._arm.tcp_pose(self._arm.motion.target.q)
-        self._begin_force(TaskFrame(frame, FrameType.FIXED), settings)
+        self._begin_force(force_mode.TaskFrame(frame, force_mode.FrameType.FIXED), settings)
 
     @builtin("end_force_mode", "end_screw_driving")
     def _end_force(self, thread: object) -> None:
@@ -139,9 +132,9 @@ class ForceBuiltins(BuiltinGroup):
     def _get_gain_scaling(self, thread: object) -> float:
         return self._compliance.force_gain_scaling
 
-    def _settings(self, selection: list[bool], wrench: Any, limits: Any) -> ForceSettings:
+    def _settings(self, selection: list[bool], wrench: Any, limits: Any) -> force_mode.ForceSettings:
         compliance = self._compliance
-        return ForceSettings(
+        return force_mode.ForceSettings(
             tuple(selection),
             floats(wrench),
             floats(limits),
@@ -149,14 +142,14 @@ class ForceBuiltins(BuiltinGroup):
             compliance.force_gain_scaling,
         )
 
-    def _begin_force(self, frame: TaskFrame, settings: ForceSettings) -> None:
+    def _begin_force(self, frame: force_mode.TaskFrame, settings: force_mode.ForceSettings) -> None:
         """Go into force mode, or on in it with other settings."""
         tool, force_sense = self._arm.tool, self._force_sense
         distance = frame.distance(self._arm.tcp_pose(self._arm.motion.target.q))
-        if frame.kind is FrameType.POINT and distance < MIN_DISTANCE:
+        if frame.kind is force_mode.FrameType.POINT and distance < force_mode.MIN_DISTANCE:
             raise ScriptRuntimeError(
                 f"force_mode: the tool is {1000.0 * distance:.1f} mm from the origin of the task frame, "
-                f"type 1 needs at least {1000.0 * MIN_DISTANCE:g} mm"
+                f"type 1 needs at least {1000.0 * force_mode.MIN_DISTANCE:g} mm"
             )
         active = self._compliance.force_mode
         if active is not None and active.tool == tool:
@@ -165,10 +158,12 @@ class ForceBuiltins(BuiltinGroup):
             return
         offset = ZERO6 if force_sense.sensor is not None else force_sense.offset(self._past.steady_cycles)
         self._compliance.begin_force(
-            ForceMode(tool, frame, settings, self._sensing, self._stiffness, lambda: self._measure(offset))
+            force_mode.ForceMode(
+                tool, frame, settings, self._sensing, self._stiffness, lambda: self._measure(offset)
+            )
         )
 
-    def _measure(self, offset: Vector6) -> ArmMeasurement:
+    def _measure(self, offset: Vector6) -> force_mode.ArmMeasurement:
         """Return what force mode measures in this cycle.
 
         `offset` is an error of the wrench, at the flange in base axes [N, Nm].
@@ -179,4 +174,4 @@ class ForceBuiltins(BuiltinGroup):
             flange = self._arm.model.fk(snapshot.actual_q)
             moved = moved_wrench(offset, flange, snapshot.actual_tcp_pose)
             wrench = six([w - z for w, z in zip(wrench, moved, strict=True)])
-        return ArmMeasurement(snapshot.actual_q, wrench, snapshot.actual_tcp_speed)
+        return force_mode.ArmMeasurement(snapshot.actual_q, wrench, snapshot.actual_tcp_speed)

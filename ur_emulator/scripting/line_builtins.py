@@ -6,25 +6,11 @@ The catalogue has checked that a line or register exists; its number may be a fl
 from collections.abc import MutableSequence, Sequence
 from typing import Any, Final
 
+from ur_emulator.controller.io import lines
 from ur_emulator.controller.io.configuration import IoConfiguration, OutputKind
-from ur_emulator.controller.io.lines import (
-    CONFIGURABLE,
-    CURRENT,
-    DIGITAL_GROUPS,
-    N_EUROMAP,
-    STANDARD,
-    STANDARD_AND_TOOL,
-    TOOL,
-    VOLTAGE,
-    AnalogLine,
-    InputOutput,
-    RunState,
-    ToolLine,
-)
 from ur_emulator.controller.io.registers import Registers
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
-from urscript.errors import ScriptRuntimeError
-from urscript.run.host import HostFunction
+from urscript import HostFunction, ScriptRuntimeError
 
 # Bits per second of the tool's serial line. Source: URScript manual e-Series, set_tool_communication.
 BAUD_RATES: Final = (9600, 19200, 38400, 57600, 115200, 1_000_000, 2_000_000, 5_000_000)
@@ -37,24 +23,24 @@ class LineBuiltins(BuiltinGroup):
     drive. No port shows the light: its settings are checked and have no other effect.
     """
 
-    def __init__(self, io: InputOutput) -> None:
+    def __init__(self, io: lines.InputOutput) -> None:
         self._io = io
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
         io = self._io
         functions = super().functions()
-        groups = {f"{name}_": group.bits for name, group in DIGITAL_GROUPS.items()}
-        for name, bits in (groups | {"": STANDARD_AND_TOOL}).items():
+        groups = {f"{name}_": group.bits for name, group in lines.DIGITAL_GROUPS.items()}
+        for name, bits in (groups | {"": lines.STANDARD_AND_TOOL}).items():
             functions |= self._digital(name, bits)
-        for name, lines in (
+        for name, analog in (
             ("get_standard_analog_in", io.analog_in),
             ("get_tool_analog_in", io.tool_analog_in),
             ("get_standard_analog_out", io.analog_out),
             ("get_analog_in", [*io.analog_in, *io.tool_analog_in]),
             ("get_analog_out", io.analog_out),
         ):
-            functions[name] = _analog_reader(lines)
+            functions[name] = _analog_reader(analog)
         return functions
 
     def _digital(self, group: str, bits: Sequence[int]) -> dict[str, HostFunction]:
@@ -90,7 +76,9 @@ class LineBuiltins(BuiltinGroup):
             raise ScriptRuntimeError(
                 f"set_tool_communication: baud rate {baud_rate} is not supported; allowed: {allowed}"
             )
-        self._io.set_tool_line(ToolLine(enabled, int(baud_rate), int(parity), int(stop_bits), *idle_chars))
+        self._io.set_tool_line(
+            lines.ToolLine(enabled, int(baud_rate), int(parity), int(stop_bits), *idle_chars)
+        )
 
     @builtin("set_tool_output_mode")
     def _set_tool_output_mode(self, thread: object, mode: float) -> None:
@@ -105,8 +93,8 @@ class LineBuiltins(BuiltinGroup):
         """Accept a setting without effect; the catalogue checks its range."""
 
 
-def _analog_reader(lines: Sequence[AnalogLine]) -> HostFunction:
-    return lambda thread, n: lines[int(n)].value
+def _analog_reader(analog: Sequence[lines.AnalogLine]) -> HostFunction:
+    return lambda thread, n: analog[int(n)].value
 
 
 class RegisterBuiltins(BuiltinGroup):
@@ -158,23 +146,23 @@ _RUNSTATE_NAMES = {
 }
 # Meaning of the range codes of set_analog_inputrange on the ports of the box and of the tool. 0 to 5 V is
 # mapped to 0 to 10 V; ranges with negative voltages ended with CB2. Source: URScript manual CB3.
-_BOX_RANGES = {0: VOLTAGE, 2: VOLTAGE}
-_TOOL_RANGES = {0: VOLTAGE, 1: VOLTAGE, 2: CURRENT}
+_BOX_RANGES = {0: lines.VOLTAGE, 2: lines.VOLTAGE}
+_TOOL_RANGES = {0: lines.VOLTAGE, 1: lines.VOLTAGE, 2: lines.CURRENT}
 # The outputs that the undocumented list forms speak of, in the order of the old numbering.
-_LISTED_STANDARD = tuple((OutputKind.STANDARD, i) for i in range(STANDARD.count))
+_LISTED_STANDARD = tuple((OutputKind.STANDARD, i) for i in range(lines.STANDARD.count))
 _LISTED_OUTPUTS = {
     "set_runstate_standard_digital_outputs": _LISTED_STANDARD,
     "set_runstate_configurable_digital_outputs": tuple(
-        (OutputKind.CONFIGURABLE, i) for i in range(CONFIGURABLE.count)
+        (OutputKind.CONFIGURABLE, i) for i in range(lines.CONFIGURABLE.count)
     ),
-    "set_runstate_outputs": (*_LISTED_STANDARD, *((OutputKind.TOOL, i) for i in range(TOOL.count))),
+    "set_runstate_outputs": (*_LISTED_STANDARD, *((OutputKind.TOOL, i) for i in range(lines.TOOL.count))),
 }
 
 
 class LineSetupBuiltins(BuiltinGroup):
     """What lines stand for."""
 
-    def __init__(self, io: InputOutput, configuration: IoConfiguration) -> None:
+    def __init__(self, io: lines.InputOutput, configuration: IoConfiguration) -> None:
         self._io = io
         self._euromap = io.euromap
         self._configuration = configuration
@@ -182,12 +170,12 @@ class LineSetupBuiltins(BuiltinGroup):
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
         functions = super().functions()
-        for name, lines in (
+        for name, analog in (
             ("set_standard_analog_input_domain", self._io.analog_in),
             ("set_tool_analog_input_domain", self._io.tool_analog_in),
             ("set_analog_outputdomain", self._io.analog_out),
         ):
-            functions[name] = _domain_setter(lines)
+            functions[name] = _domain_setter(analog)
         for group in _INPUT_GROUPS:
             functions[f"set_{group}_input_action"] = self._action_setter(group)
         for kind, output in _RUNSTATE_NAMES.items():
@@ -230,19 +218,19 @@ class LineSetupBuiltins(BuiltinGroup):
 
     @builtin("set_euromap_runstate_dependent_choice")
     def _set_euromap_rule(self, thread: object, n: float, choice: float) -> None:
-        self._configuration.set_rule(OutputKind.EUROMAP, _euromap_port(n), RunState(int(choice)))
+        self._configuration.set_rule(OutputKind.EUROMAP, _euromap_port(n), lines.RunState(int(choice)))
 
     def _action_setter(self, group: str) -> HostFunction:
         return lambda thread, port, action: self._configuration.set_input_action(group, int(port), action)
 
     def _runstate_setter(self, kind: OutputKind, name: str) -> HostFunction:
         # The catalogue checks the codes of the others, which the e-Series has more of.
-        allowed = range(4) if kind in (OutputKind.GP_INTEGER, OutputKind.GP_FLOAT) else tuple(RunState)
+        allowed = range(4) if kind in (OutputKind.GP_INTEGER, OutputKind.GP_FLOAT) else tuple(lines.RunState)
 
         def set_runstate(thread: object, output: float, code: float) -> None:
             if code not in allowed:
                 raise ScriptRuntimeError(f"{name}: state {code:g} does not exist; allowed: 0 to 3")
-            self._configuration.set_rule(kind, int(output), RunState(int(code)))
+            self._configuration.set_rule(kind, int(output), lines.RunState(int(code)))
 
         return set_runstate
 
@@ -251,17 +239,19 @@ class LineSetupBuiltins(BuiltinGroup):
             if not all(type(i) in (int, float) and i in range(len(names)) for i in outputs):
                 raise ScriptRuntimeError(f"{function}: outputs are numbers from 0 to {len(names) - 1}")
             for i, (kind, index) in enumerate(names):
-                state = RunState.LOW_WHEN_STOPPED if i in outputs else RunState.KEEP
+                state = lines.RunState.LOW_WHEN_STOPPED if i in outputs else lines.RunState.KEEP
                 self._configuration.set_rule(kind, index, state)
 
         return set_list
 
 
-def _domain_setter(lines: Sequence[AnalogLine]) -> HostFunction:
-    return lambda thread, port, domain: lines[int(port)].set_domain(int(domain))
+def _domain_setter(analog: Sequence[lines.AnalogLine]) -> HostFunction:
+    return lambda thread, port, domain: analog[int(port)].set_domain(int(domain))
 
 
 def _euromap_port(number: float) -> int:
-    if not 0 <= number < N_EUROMAP:
-        raise ScriptRuntimeError(f"Euromap67 port {number:g} does not exist; allowed: 0 to {N_EUROMAP - 1}")
+    if not 0 <= number < lines.N_EUROMAP:
+        raise ScriptRuntimeError(
+            f"Euromap67 port {number:g} does not exist; allowed: 0 to {lines.N_EUROMAP - 1}"
+        )
     return int(number)

@@ -29,8 +29,7 @@ from ur_emulator.controller.modbus_map import MapAddressError
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network
-from urscript.errors import ScriptRuntimeError
-from urscript.run.waits import Blocked
+from urscript import Blocked, ScriptRuntimeError
 from urscript.values import is_number, log_form, wrap_int
 
 # Source: URScript manual, modbus_add_signal.

@@ -24,9 +24,7 @@ from ur_emulator.scripting.builtin_group import (
     require_range,
 )
 from ur_emulator.scripting.move_planner import MovePlanner
-from urscript.errors import ScriptRuntimeError
-from urscript.run.host import HostFunction
-from urscript.run.waits import NEXT_CYCLE
+from urscript import NEXT_CYCLE, HostFunction, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
 
 # Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.

@@ -17,8 +17,7 @@ from ur_emulator.scripting.builtin_group import (
     floats,
     require_positive,
 )
-from urscript.errors import ScriptRuntimeError
-from urscript.run.waits import NEXT_CYCLE
+from urscript import NEXT_CYCLE, ScriptRuntimeError
 from urscript.values import Pose, wrap_int
 
 # The encoder of the old builtins that give none.

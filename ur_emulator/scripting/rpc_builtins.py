@@ -17,9 +17,8 @@ from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.controller.clock import Clock
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
+from urscript import ScriptRuntimeError, ScriptThread
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
-from urscript.errors import ScriptRuntimeError
-from urscript.run.threads import ScriptThread
 from urscript.run.variables import same_type
 from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
 from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, Struct, a_type, to_script_text

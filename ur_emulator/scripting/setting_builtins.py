@@ -15,8 +15,7 @@ from ur_emulator.controller.settings import Payload, ToolSettings
 from ur_emulator.controller.world_model import WorldModel, WorldModelError
 from ur_emulator.models.robot_model import RobotModel, Vector3, six
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin, floats, vector
-from urscript.errors import ScriptRuntimeError
-from urscript.run.host import HostFunction
+from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
 
 # Greatest length of a tool [m] and of its rotation vector [rad]: beyond it poses lose precision.

@@ -12,9 +12,7 @@ from ur_emulator.controller.clock import CLOCK_EPOCH, Clock
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import ZERO6, six
 from ur_emulator.scripting.builtin_group import BuiltinGroup, ScriptArm, builtin
-from urscript.errors import ScriptRuntimeError
-from urscript.run.host import HostFunction
-from urscript.run.threads import ScriptThread
+from urscript import HostFunction, ScriptRuntimeError, ScriptThread
 from urscript.values import Matrix, Pose, Struct
 
 # is_steady(): zero target velocity for this long [s]. Source: URScript manual, later text of is_steady.

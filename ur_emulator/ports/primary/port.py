@@ -10,23 +10,11 @@ The primary port also reports the running program: its global variables at the r
 its threads stand in PolyScope's tree.
 """
 
-from protocol.primary import messages
+from protocol.primary import messages, packages
 from protocol.primary.framing import NO_TIME
-from protocol.primary.packages import (
-    encode_message_package,
-    encode_safety_tolerances,
-    sends_safety_tolerances,
-)
 from protocol.ur_types import RobotMode
 from ur_emulator.controller import events
 from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import (
-    Event,
-    ProgramStarted,
-    ProgramStopped,
-    RobotModeChanged,
-    SafetyModeChanged,
-)
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.loop.connection import Connection
 from ur_emulator.models.robot_generation import Software
@@ -124,10 +112,12 @@ class PrimaryPort(ScriptPort):
         self._variables = VariableReporter(version)
         self._labels = LabelReporter(version)
         self._was_running = controller.snapshot.robot_mode == RobotMode.RUNNING
-        self._greeting = encode_message_package(messages.version_message(version, software.built), version)
-        self._second_greeting = encode_message_package(messages.StartupMessage(), version)
-        if sends_safety_tolerances(version):
-            self._second_greeting += encode_safety_tolerances()
+        self._greeting = packages.encode_message_package(
+            messages.version_message(version, software.built), version
+        )
+        self._second_greeting = packages.encode_message_package(messages.StartupMessage(), version)
+        if packages.sends_safety_tolerances(version):
+            self._second_greeting += packages.encode_safety_tolerances()
         if all_messages and messages.HardwareInfoMessage.SINCE.covers(version):
             self._second_greeting += self._package(
                 messages.HardwareInfoMessage(robot_type=controller.state.robot.robot_type)
@@ -168,9 +158,9 @@ class PrimaryPort(ScriptPort):
         has_started, self._was_running = running and not self._was_running, running
         return (self._states.encode_first if has_started else self._states.encode)(snapshot)
 
-    def send_message(self, event: Event) -> None:
+    def send_message(self, event: events.Event) -> None:
         """Send the message for an event, on the primary port; with a state if it changes a mode."""
-        if isinstance(event, ProgramStopped):
+        if isinstance(event, events.ProgramStopped):
             if self._all_messages and self._clients:
                 self._send(*self._variables.changes(self._now, at_once=True))
             self._begin_report(None)  # also without clients: it holds the values
@@ -178,11 +168,11 @@ class PrimaryPort(ScriptPort):
             return
         message = message_for(event, self._now) if self._all_messages else None
         package = b"" if message is None else self._package(message)
-        if isinstance(event, RobotModeChanged | SafetyModeChanged):
+        if isinstance(event, events.RobotModeChanged | events.SafetyModeChanged):
             package += self._state()
         if package:
             self._send(package)
-        if self._all_messages and isinstance(event, ProgramStarted):
+        if self._all_messages and isinstance(event, events.ProgramStarted):
             self._begin_report(event.run)
             self._send(*self._variables.names(self._now))
 
@@ -192,7 +182,7 @@ class PrimaryPort(ScriptPort):
         return round(self._controller.snapshot.timestamp * 1e6)
 
     def _package(self, message: messages.RobotMessage) -> bytes:
-        return encode_message_package(message, self._version)
+        return packages.encode_message_package(message, self._version)
 
     def _begin_report(self, run: RunningProgram | None) -> None:
         """Turn to the variables and labels of a run, or to none."""

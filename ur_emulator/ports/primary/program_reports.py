@@ -15,19 +15,9 @@ from itertools import accumulate, groupby, islice
 from typing import Any
 
 from protocol.errors import LocalProtocolError
+from protocol.primary import values
 from protocol.primary.framing import NO_TIME
 from protocol.primary.messages import ProgramLabelMessage, ProgramThreadsMessage, RobotMessage, ThreadLabel
-from protocol.primary.values import (
-    MAX_NESTING,
-    GlobalVariablesUpdate,
-    TypedValue,
-    ValueType,
-    encode_names,
-    encode_program_state,
-    encode_value,
-    encode_values,
-    value_codes,
-)
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.budgets import BUDGETS
 from urscript import Matrix, Pose, RunningProgram, ScriptThread
@@ -44,7 +34,7 @@ _AT_ONCE = 8
 # Updates are so many microseconds apart; for clients that come, values are looked at no more often.
 _UPDATE_PERIOD = 100_000
 
-_NONE = TypedValue(ValueType.NONE)
+_NONE = values.TypedValue(values.ValueType.NONE)
 
 
 def size_of(value: Any, most: int) -> tuple[int, int]:
@@ -68,7 +58,7 @@ def size_of(value: Any, most: int) -> tuple[int, int]:
     return size, elements
 
 
-def typed_value(value: Any, depth: int = 0) -> TypedValue:
+def typed_value(value: Any, depth: int = 0) -> values.TypedValue:
     """Return a value of a script as it goes on the wire.
 
     Strings are constant strings, as in the document's example; threads are the numbers of their handles;
@@ -76,23 +66,27 @@ def typed_value(value: Any, depth: int = 0) -> TypedValue:
     """
     kind = _KINDS.get(type(value))
     if kind is not None:
-        return TypedValue(kind, value)
-    if depth < MAX_NESTING:
+        return values.TypedValue(kind, value)
+    if depth < values.MAX_NESTING:
         if isinstance(value, list):
-            return TypedValue(ValueType.LIST, tuple(typed_value(item, depth + 1) for item in value))
+            return values.TypedValue(
+                values.ValueType.LIST, tuple(typed_value(item, depth + 1) for item in value)
+            )
         if isinstance(value, Matrix):
-            return TypedValue(ValueType.MATRIX, tuple(tuple(map(typed_value, row)) for row in value.rows))
+            return values.TypedValue(
+                values.ValueType.MATRIX, tuple(tuple(map(typed_value, row)) for row in value.rows)
+            )
     if isinstance(value, ScriptThread):
-        return TypedValue(ValueType.INT, value.thread_id)
+        return values.TypedValue(values.ValueType.INT, value.thread_id)
     return _NONE
 
 
-_KINDS: dict[type, ValueType] = {
-    bool: ValueType.BOOL,
-    int: ValueType.INT,
-    float: ValueType.FLOAT,
-    str: ValueType.CONST_STRING,
-    Pose: ValueType.POSE,
+_KINDS: dict[type, values.ValueType] = {
+    bool: values.ValueType.BOOL,
+    int: values.ValueType.INT,
+    float: values.ValueType.FLOAT,
+    str: values.ValueType.CONST_STRING,
+    Pose: values.ValueType.POSE,
 }
 
 
@@ -101,8 +95,8 @@ class VariableReporter:
 
     def __init__(self, version: SoftwareVersion) -> None:
         self._version = version
-        self._none = encode_value(_NONE, version)
-        self._codes = value_codes(version)
+        self._none = values.encode_value(_NONE, version)
+        self._codes = values.value_codes(version)
         self._forget(None)
 
     def _forget(self, run: RunningProgram | None) -> None:
@@ -133,7 +127,7 @@ class VariableReporter:
 
     def names(self, timestamp: int) -> list[bytes]:
         """Return the packages with all names."""
-        return [encode_names(timestamp, start, part) for start, part in self._name_parcels]
+        return [values.encode_names(timestamp, start, part) for start, part in self._name_parcels]
 
     def greeting(self, timestamp: int, *, is_first: bool) -> list[bytes]:
         """Return all names, and all values as they were sent last, encoded once a cycle.
@@ -148,7 +142,8 @@ class VariableReporter:
             if self._names:
                 packages = [*self.names(timestamp), *self._packages(timestamp, 0, self._sent)]
             else:
-                packages = [encode_program_state(GlobalVariablesUpdate(timestamp=NO_TIME), self._version)]
+                nothing = values.GlobalVariablesUpdate(timestamp=NO_TIME)
+                packages = [values.encode_program_state(nothing, self._version)]
             self._greeting = [b"".join(packages[i : i + _AT_ONCE]) for i in range(0, len(packages), _AT_ONCE)]
         return self._greeting
 
@@ -197,13 +192,13 @@ class VariableReporter:
         if typed.type not in self._codes:
             return self._none, elements
         try:
-            data = encode_value(typed, self._version)
+            data = values.encode_value(typed, self._version)
         except LocalProtocolError:
             return self._none, elements
         return (data if len(data) <= most else self._none), elements
 
-    def _packages(self, timestamp: int, start: int, values: Sequence[bytes]) -> list[bytes]:
-        return [encode_values(timestamp, first, part) for first, part in _parcels(start, values)]
+    def _packages(self, timestamp: int, start: int, items: Sequence[bytes]) -> list[bytes]:
+        return [values.encode_values(timestamp, first, part) for first, part in _parcels(start, items)]
 
 
 def _parcels(start: int, items: Iterable[bytes]) -> list[tuple[int, list[bytes]]]:

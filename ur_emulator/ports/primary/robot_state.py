@@ -9,13 +9,7 @@ from protocol.primary import layout
 from protocol.primary.framing import SubPackage
 from protocol.primary.packages import encode_state
 from protocol.rtde.types import RobotStatusBits
-from protocol.ur_types import (
-    SIMULATED_MASTERBOARD,
-    ControlMode,
-    ProgramState,
-    RobotMode,
-    SafetyMode,
-)
+from protocol.ur_types import SIMULATED_MASTERBOARD, ControlMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller.robot_mode import POWERED
 from ur_emulator.controller.safety.modes import EMERGENCY_MODES, MOVING_MODES
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyState
