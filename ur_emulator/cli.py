@@ -18,13 +18,11 @@ from typer.core import TyperCommand
 
 from protocol.errors import ProtocolError
 from ur_emulator import check_platform
-from ur_emulator.box_log import printable
-from ur_emulator.box_options import TOKEN_VARIABLE
+from ur_emulator.box_log import LogEntry, printable
+from ur_emulator.box_options import TOKEN_VARIABLE, ServedAt
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
 if TYPE_CHECKING:
-    from ur_emulator.box_log import LogEntry
-    from ur_emulator.box_options import ServedAt
     from ur_emulator.loop.line_writer import LineWriter
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode, SafetyStatus
+from ur_emulator.controller.io.lines import DIGITAL_GROUPS
 from ur_emulator.models.robot_model import Vector3, Vector6
 
 if TYPE_CHECKING:
     from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.io.lines import DIGITAL_GROUPS
 
 # Slower than this counts as standing still [rad/s]: more than what the sensors make of an arm at rest.
 STANDING_SPEED = 0.01

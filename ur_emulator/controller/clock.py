@@ -11,7 +11,7 @@ CLOCK_EPOCH = datetime(2021, 11, 30, tzinfo=UTC)
 
 @dataclass(slots=True)
 class Clock:
-    """Counts the cycles of the controller, and those in which a primary program ran, or did not pause.
+    """Counts the cycles of the controller, and those in which a primary program ran and was not paused.
 
     Attributes:
         tick: number of the present cycle.

@@ -11,7 +11,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
-from math import hypot
 
 import numpy as np
 
@@ -143,10 +142,12 @@ class ForceSense:
             return 0
         before = _mean(forces[-self._n_early :])
         change = [now - then for now, then in zip(_mean(forces[: self._n_recent]), before, strict=True)]
-        size = hypot(*direction)
+        size = math.hypot(*direction)
         # The reaction of a contact points against the direction.
         against = (
-            [-x / size for x in direction] if size > 0.0 else [x / (hypot(*change) or 1.0) for x in change]
+            [-x / size for x in direction]
+            if size > 0.0
+            else [x / (math.hypot(*change) or 1.0) for x in change]
         )
         risen = _along(change, against)
         if risen < self._sensing.contact_force:

@@ -7,16 +7,12 @@ read. Source: script manual 5.11. Where ids begin anew, at the start of each pro
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from protocol.interpreter import MAX_ID, TOO_MANY
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import RefusedError
-from urscript.compile.interpreter_mode import NO_NAMES
-
-if TYPE_CHECKING:
-    from urscript.compile.interpreter_mode import CompiledStatements
-
+from urscript.compile.interpreter_mode import NO_NAMES, CompiledStatements
 
 # --- the log of interpreter mode, as the files of a controller hold it
 #

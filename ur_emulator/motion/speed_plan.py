@@ -136,10 +136,7 @@ def stopping_curve(intervals: Sequence[Interval], stop: float) -> StoppingCurve:
 
 
 def _backward(intervals: Sequence[Interval]) -> tuple[list[float], list[float]]:
-    """Return the greatest z from which the arm can stop at the end, at the ends of the intervals.
-
-    With the slopes between them.
-    """
+    """Return z at the ends of the intervals from which the arm can still stop, and the slopes between."""
     z = 0.0
     found, slopes = [z], []
     for k in range(len(intervals) - 1, -1, -1):

@@ -108,7 +108,7 @@ def write_program(
 
 
 def _form_file(content_type: str, body: bytes) -> tuple[str, bytes]:
-    """Return name and content of the form field `file` of a multipart body."""
+    """Return name and content of the form field `file` of a multipart body, or ProgramFileError."""
     if content_type.lower().startswith("multipart/form-data"):
         head = f"Content-Type: {content_type}\r\n\r\n".encode("latin-1", "replace")
         form = BytesParser(policy=HTTP).parsebytes(head + body)

@@ -24,7 +24,6 @@ from ur_emulator.program_files.script_writer import Header, Part, ScriptWriter, 
 from ur_emulator.program_files.urp_expressions import expression_of, variable_name
 from ur_emulator.program_files.urp_maker import Around, NodeWriter, UrpMaker
 from ur_emulator.program_files.urp_nodes import Node, read_nodes
-from ur_emulator.program_files.urp_statements import EXTERNAL_CONTROL, contributor
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -154,7 +153,8 @@ class MadeScript:
 
 def uses_external_control(tree: XmlTree) -> bool:
     """True for a program with a part that a PC sends when it is played."""
-    return any(contributor(node) == EXTERNAL_CONTROL for node in tree.root.iter("Contributed"))
+    nodes = tree.root.iter("Contributed")
+    return any(urp_statements.contributor(node) == urp_statements.EXTERNAL_CONTROL for node in nodes)
 
 
 def make_script(

@@ -25,7 +25,6 @@ from ur_emulator.controller.io.modbus_signals import (
     SignalType,
     UnitAddress,
 )
-from ur_emulator.controller.modbus_map import MapAddressError
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network
@@ -297,5 +296,5 @@ class MapBuiltins(BuiltinGroup):
     def _access(self, function: Callable[..., _T], address: float, *value: int | bool) -> _T:
         try:
             return function(self._state, int(address), *value)
-        except MapAddressError as error:
+        except modbus_map.MapAddressError as error:
             raise ScriptRuntimeError(str(error)) from None
