@@ -2,7 +2,7 @@
 
 import re
 from ast import literal_eval
-from functools import partial
+from functools import cache, partial
 
 from box_support import Bench
 from chunk_actions import act
@@ -16,8 +16,15 @@ from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.check.checking import check_program
+from urscript.errors import ScriptCompileError
 
 MAX_CYCLES = 6_000
+
+
+@cache
+def compiled(text, catalogue):
+    """The compiled program of a text, once for all tests."""
+    return compile_program(text, catalogue=catalogue)
 
 
 class ChunkBench(Bench):
@@ -54,7 +61,7 @@ class ChunkRun:
 
     def start(self, text, cycles_of_actions):
         """Start a program and run until it and the arm have come to rest."""
-        program = compile_program(text, catalogue=self.catalogue)
+        program = compiled(text, self.catalogue)
         actions = sorted(cycles_of_actions, key=lambda action: action[0])
         for cycle, action in actions:
             if cycle < 0:
@@ -126,8 +133,10 @@ class ChunkRun:
 def run_box_chunk(chunk):
     """Compile and run a chunk; asserts everything it expects."""
     run = ChunkRun(chunk)
-    compile_errors = check_program(chunk.text, catalogue=run.catalogue)[0]
-    if compile_errors:
+    try:
+        compiled(chunk.text, run.catalogue)
+    except ScriptCompileError:
+        compile_errors = check_program(chunk.text, catalogue=run.catalogue)[0]
         run.errors = [(False, error.line, error.column, error.message) for error in compile_errors]
         wire = compile_errors[0].wire_text
     else:

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 from box_support import Bench
-from chunk_bench import run_box_chunk
+from chunk_bench import compiled, run_box_chunk
 from chunk_marks import load_box_chunks
 
 import ur_emulator.scripting
 from ur_emulator.scripting.robot_host import robot_hosts
-from urscript import compile_program
 from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15, catalogue_for
 from urscript.catalogue.types import Support
@@ -147,7 +146,7 @@ def builtins_called():
         programs += [action.removeprefix("run ") for _, action in chunk.actions if action.startswith("run ")]
         for text in programs:
             with suppress(ScriptCompileError):
-                called.update(compile_program(text, catalogue=catalogue_for(chunk.software)).builtins)
+                called.update(compiled(text, catalogue_for(chunk.software)).builtins)
     return called
 
 

@@ -25,7 +25,7 @@ CHUNKS = load_chunks(*sorted((TESTS / "urscript" / "chunks").glob("*.script")))
 
 @pytest.mark.parametrize("chunk", CHUNKS, ids=str)
 def test_chunk(chunk):
-    run_chunk(chunk)
+    errors_of(chunk)
 
 
 @pytest.mark.parametrize("chunk", CHUNKS, ids=str)
@@ -111,6 +111,7 @@ def functions(tree, prefix=""):
             yield from functions(node, inner)
 
 
+@cache
 def makers():
     """Names of the functions that return an error, by what they declare."""
     return {
@@ -121,8 +122,13 @@ def makers():
     }
 
 
+@cache
 def error_sites():
     """File, function, first and last line of every expression that makes an error."""
+    return list(_error_sites())
+
+
+def _error_sites():
     making = ERROR_CLASSES | makers()
     for file, tree in modules():
         seen = set()
@@ -163,9 +169,9 @@ def patterns(expression):
             yield from patterns(left)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="module", autouse=True)
 def met():
-    """All errors that chunks end with; `passed` of each are the places it came through."""
+    """Returns all errors that chunks end with; `passed` of each are the places it came through."""
     make = errors.ScriptError.__init__
     home = f"{PACKAGE.as_posix()}/"
 
@@ -179,12 +185,19 @@ def met():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(errors.ScriptError, "__init__", note)
-        marked = [chunk for chunk in CHUNKS if chunk.errors or chunk.discarded]
-        return [error for chunk in marked for error in run_chunk(chunk)]
+        yield lambda: [
+            error for chunk in CHUNKS if chunk.errors or chunk.discarded for error in errors_of(chunk)
+        ]
+
+
+@cache
+def errors_of(chunk):
+    """Run a chunk, once for all tests; the errors that it met."""
+    return run_chunk(chunk)
 
 
 def test_every_error_is_made_by_a_chunk(met):
-    passed = set().union(*(error.passed for error in met))
+    passed = set().union(*(error.passed for error in met()))
     missing = {
         f"{file} {function}": line
         for file, function, line, last in error_sites()
@@ -195,13 +208,13 @@ def test_every_error_is_made_by_a_chunk(met):
 
 
 def test_every_part_of_a_text_occurs_in_a_chunk(met):
-    texts = [error.message for error in met]
+    texts = [error.message for error in met()]
     missing = {pattern for pattern in partial_texts() if not any(re.search(pattern, text) for text in texts)}
     assert missing == UNUSED_TEXTS
 
 
 def test_the_search_finds_the_places():
-    sites = list(error_sites())
+    sites = error_sites()
     assert len(sites) > 80
     assert {"type_error", "explain", "_syntax_error", "_out_of_range"} <= makers()
     assert {file for file, *_ in sites} >= {

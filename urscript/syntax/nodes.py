@@ -325,10 +325,12 @@ def all_statements(block: Block) -> Iterator[Statement]:
 
 
 def all_expressions(expression: Expression) -> Iterator[Expression]:
-    """An expression and every part of it."""
-    yield expression
-    for part in child_expressions(expression):
-        yield from all_expressions(part)
+    """An expression and every part of it, in the order of the text."""
+    todo = [expression]
+    while todo:
+        part = todo.pop()
+        yield part
+        todo += reversed(child_expressions(part))
 
 
 def same_tree(first: Block, second: Block) -> bool:
