@@ -6,6 +6,7 @@
 import os
 import threading
 
+import pytest
 from chunk_runner import InterpretingHost
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
@@ -22,7 +23,7 @@ from urscript.syntax import nodes
 from urscript.syntax.parser import parse
 from urscript.values import Struct, log_form, size_of
 
-EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "60"))
+EXAMPLES = int(os.environ.get("RANDOM_PROGRAMS", "40"))
 some = settings(max_examples=EXAMPLES, suppress_health_check=list(HealthCheck), print_blob=True)
 SMALL = Dialect(statement_budget=300, recursion_limit=20)
 
@@ -30,23 +31,8 @@ SMALL = Dialect(statement_budget=300, recursion_limit=20)
 # --- trees -------------------------------------------------------------------------------------------------
 
 
-@some
-@given(programs)
-def test_a_tree_prints_to_a_text_that_parses_to_it(tree):
-    text = print_program(tree)
-    assert parse(Source(text)) == tree
-    assert print_program(parse(Source(text))) == text
-    assert parse(Source(text.replace("\n", "\r\n"))) == tree
-
-
-@some
-@given(expressions)
-def test_an_expression_needs_no_more_brackets_than_it_gets(tree):
-    (statement,) = parse(Source(f"x = {print_expression(tree)}"))
-    assert statement.value == tree
-
-
-def test_the_trees_have_every_kind_of_node():
+@pytest.mark.hypothesis
+def test_trees_with_every_kind_of_node_print_to_a_text_that_parses_to_them():
     kinds = {
         kind
         for kind in vars(nodes).values()
@@ -54,13 +40,23 @@ def test_the_trees_have_every_kind_of_node():
     } - {nodes.Node}
     seen = set()
 
-    @settings(max_examples=60, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+    @some
     @given(programs)
-    def look(tree):
+    def prints_to_a_text_that_parses_to_it(tree):
         seen.update(node_classes(tree))
+        text = print_program(tree)
+        assert parse(Source(text)) == tree
+        assert parse(Source(text.replace("\n", "\r\n"))) == tree
 
-    look()
+    prints_to_a_text_that_parses_to_it()
     assert seen == kinds
+
+
+@some
+@given(expressions)
+def test_an_expression_needs_no_more_brackets_than_it_gets(tree):
+    (statement,) = parse(Source(f"x = {print_expression(tree)}"))
+    assert statement.value == tree
 
 
 # --- texts -------------------------------------------------------------------------------------------------
@@ -80,7 +76,11 @@ def compile_error(text):
 
 
 def assert_compiles_or_is_refused_at_a_place(text):
-    """Compiler, check and advice agree whether it is a program; every error has a place in the text."""
+    """Compiler, check and advice agree whether it is a program; every error has a place in the text.
+
+    Returns:
+        The errors without and with advice.
+    """
     errors, _ = check_program(text)
     error = compile_error(text)
     assert (error is None) == (errors == ())
@@ -98,6 +98,7 @@ def assert_compiles_or_is_refused_at_a_place(text):
         assert error.render()
     lines = [error.line for error in advised if isinstance(error, ScriptSyntaxError)]
     assert lines == sorted(set(lines))
+    return errors, advised
 
 
 @some
@@ -121,11 +122,9 @@ def test_random_bytes_compile_or_are_refused_at_a_place(text):
 @given(programs, st.data())
 def test_a_random_tree_and_what_is_left_of_it_compile_or_are_refused_at_a_place(tree, data):
     text = print_program(tree)
-    assert_compiles_or_is_refused_at_a_place(text)
+    errors, advised = assert_compiles_or_is_refused_at_a_place(text)
     # No rule of advice is for a program without syntax errors.
-    assert [error.message for error in check_with_advice(text)[0]] == [
-        error.message for error in check_program(text)[0]
-    ]
+    assert [error.message for error in advised] == [error.message for error in errors]
     start = data.draw(st.integers(0, len(text)))
     end = data.draw(st.integers(start, min(len(text), start + 8)))
     put = data.draw(st.sampled_from(["", " ", "\n", ";", "=", ")", "end", "x"]))
@@ -235,6 +234,7 @@ numbers = st.one_of(
 OPERATORS = ["+", "-", "*", "/", "%", "==", "!=", "<", "<=", ">", ">="]
 
 
+@some
 @given(numbers, numbers)
 def test_evident_types_and_unknown_types_compute_the_same(a, b):
     """The compiler's shortcuts for known types must not differ from the general operators."""
