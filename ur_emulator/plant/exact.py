@@ -28,11 +28,7 @@ class ExactPlant(Plant):
         self._physics.obstacles = _NoObstacles(self._physics.model, self._physics.q)
 
     def reset(self, q: Sequence[float]) -> None:
-        """Put the arm at rest at q (6,) [rad], brakes on.
-
-        Raises:
-            PlantError: when q is not six finite numbers.
-        """
+        """Put the arm at rest at q (6,) [rad], brakes on; PlantError if these are not six finite numbers."""
         super().reset(q)
         self._q: Vector6 = six([float(angle) for angle in q])
         self._qd = ZERO6
@@ -43,12 +39,9 @@ class ExactPlant(Plant):
         mode: ControlMode = ControlMode.POSITION,
         torque: TorqueCommand | None = None,
     ) -> None:
-        """Move to the target; see `Plant.step`.
+        """Move to the target; see `Plant.step`. PlantError if it is not finite.
 
         Without one, in freedrive and in torque control, the arm stands still.
-
-        Raises:
-            PlantError: the target is not finite.
         """
         self._state = None
         self.cycle += 1
@@ -99,19 +92,11 @@ class ExactPlant(Plant):
         return before
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Refuse: no load acts on this arm.
-
-        Raises:
-            RefusedError: always.
-        """
+        """Raise RefusedError: no load acts on this arm."""
         raise _refusal("payload")
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
-        """Refuse, unless the push is to end: no force acts on this arm.
-
-        Raises:
-            RefusedError: the force is not zero.
-        """
+        """Raise RefusedError unless the push is to end: no force acts on this arm."""
         if any(force):
             raise _refusal("push")
 

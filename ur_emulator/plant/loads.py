@@ -17,11 +17,7 @@ _DENSITY = 2700.0  # kg/m³, aluminium: gives a payload without a stated inertia
 
 
 def check_payload(mass: float, cog: Vector3) -> None:
-    """Check a payload.
-
-    Raises:
-        PlantError: when the mass is negative or a number is not finite.
-    """
+    """Raise PlantError for a mass that is negative or a number that is not finite."""
     if not (isfinite(mass) and mass >= 0.0 and len(cog) == 3 and all(isfinite(x) for x in cog)):
         raise PlantError(
             f"payload of {mass} kg at {list(cog)} given: a mass >= 0 and three finite lengths needed"
@@ -29,12 +25,9 @@ def check_payload(mass: float, cog: Vector3) -> None:
 
 
 def set_payload_body(model: mujoco.MjModel, mass: float, cog: Vector3, inertia: Vector6 = ZERO6) -> None:
-    """Set mass, centre of gravity and inertia of the payload body.
+    """Set mass [kg], centre of gravity [m, flange frame] and inertia of the payload body.
 
-    Args:
-        mass: [kg].
-        cog: centre of gravity in the flange frame [m].
-        inertia: Ixx Iyy Izz Ixy Ixz Iyz about it, axes of the flange [kg m²]; zero for that of a solid ball.
+    `inertia` is Ixx Iyy Izz Ixy Ixz Iyz about it, axes of the flange [kg m²]; zero for that of a solid ball.
     """
     body = model.body(PAYLOAD)
     radius = (3.0 * mass / (4.0 * pi * _DENSITY)) ** (1.0 / 3.0)
@@ -52,10 +45,7 @@ def set_payload_body(model: mujoco.MjModel, mass: float, cog: Vector3, inertia: 
 
 
 class Loads:
-    """The payload and the push on one arm.
-
-    Args:
-        model: the plant's model.
+    """The payload and the push on one arm, in the plant's model.
 
     Attributes:
         is_unexpected: something acts that the controller does not expect: see `wrench`.
@@ -78,8 +68,7 @@ class Loads:
     def declare(self, mass: float, cog: Vector3, inertia: Vector6) -> None:
         """Set the payload that the controller assumes, and the true one unless `attach` has set it.
 
-        Raises:
-            PlantError: when the mass [kg] is negative or a number is not finite.
+        Arguments and errors as in `set_payload_body` and `check_payload`.
         """
         check_payload(mass, cog)
         self._declared = (mass, cog)
@@ -87,11 +76,7 @@ class Loads:
             set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
-        """Set the true payload, which the controller does not know.
-
-        Raises:
-            PlantError: when the mass [kg] is negative or a number is not finite.
-        """
+        """Set the true payload, which the controller does not know; errors as in `check_payload`."""
         check_payload(mass, cog)
         self._hung = (mass, cog)
         set_payload_body(self._model, mass, cog)

@@ -89,16 +89,10 @@ class Obstacles:
         return tuple(self._slots)
 
     def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Add an obstacle; one of the same name is replaced.
+        """Add an obstacle, one of SHAPES with sizes as it wants them [m]; one of the same name is replaced.
 
-        Args:
-            name: to remove it by.
-            shape: one of SHAPES.
-            size: as the shape wants it [m].
-            pose: of its middle in the base frame [m, rad].
-
-        Raises:
-            RefusedError: it would overlap the arm, or there are too many; nothing changes.
+        The pose is that of its middle in the base frame [m, rad]. RefusedError if it would overlap the arm,
+        or there are too many; nothing changes then.
         """
         slot = next(i for i in range(SLOTS + 1) if i not in self._slots.values())
         if slot == SLOTS and name not in self._slots:

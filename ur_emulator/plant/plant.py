@@ -179,8 +179,7 @@ class Plant:
     def reset(self, q: Sequence[float]) -> None:
         """Put the arm at rest at q (6,) [rad], brakes on; payload, push and random streams stay.
 
-        Raises:
-            PlantError: when q is not six finite numbers.
+        PlantError when q is not six finite numbers.
         """
         angles = np.array(q, dtype=np.float64)
         if angles.shape != (6,) or not np.isfinite(angles).all():
@@ -197,13 +196,7 @@ class Plant:
     def set_payload(self, mass: float, cog: Vector3, inertia: Vector6 = ZERO6) -> None:
         """Set the payload that the controller assumes, and the true one unless `attach_load` has set it.
 
-        Args:
-            mass: [kg].
-            cog: centre of gravity in the flange frame [m].
-            inertia: see `set_payload_body`.
-
-        Raises:
-            PlantError: when the mass is negative or a number is not finite.
+        Arguments as in `set_payload_body`; PlantError when the mass is negative or a number is not finite.
         """
         self._be_current()
         self._physics.loads.declare(mass, cog, inertia)
@@ -217,14 +210,8 @@ class Plant:
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Set the true payload at the flange, which the controller does not know.
 
-        From now on `set_payload` only declares.
-
-        Args:
-            mass: [kg].
-            cog: centre of gravity in the flange frame [m].
-
-        Raises:
-            PlantError: when the mass is negative or a number is not finite.
+        From now on `set_payload` only declares. The mass is in kg, the centre of gravity in the flange frame
+        [m]. PlantError when the mass is negative or a number is not finite.
         """
         self._be_current()
         self._physics.loads.attach(mass, cog)
@@ -240,12 +227,8 @@ class Plant:
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
         """Push the flange from now on; a zero force ends it.
 
-        Args:
-            force: (3,) in base axes [N].
-            point: where it acts, in the flange frame [m]; None for the flange's origin.
-
-        Raises:
-            PlantError: when a number is not finite.
+        The force (3,) is in base axes [N]; the point where it acts in the flange frame [m], None for its
+        origin. PlantError when a number is not finite.
         """
         self._be_current()
         self._physics.loads.push(force, point)
@@ -314,10 +297,8 @@ class Plant:
     def report(self, before: PlantState) -> PlantState:
         """Return the state of the arm as the box publishes it: that of about the beginning of the cycle.
 
-        Measurements are that old already; target current and moment are those of the cycle before.
-
-        Args:
-            before: what `sense` gave in the cycle before.
+        Measurements are that old already; target current and moment are those of the cycle `before`, from
+        `sense`.
         """
         now = self.sense()
         if self._arm.moves_later:
@@ -349,10 +330,8 @@ class FlangePush:
     def begin(self, force: Vector3, point: Vector3, duration: float | None) -> None:
         """Push from this cycle on.
 
-        Args:
-            force: in base axes [N]; zero ends the push before.
-            point: where it acts, in the flange frame [m].
-            duration: of the push [s]; None: until the next one.
+        The force is in base axes [N], zero ends the push before; the point where it acts in the flange frame
+        [m]. Without a duration [s] it lasts until the next one.
         """
         n_cycles = 0 if duration is None else round(duration / self._plant.period_s)
         self._plant.push(force if duration is None or n_cycles else _NOTHING, point)

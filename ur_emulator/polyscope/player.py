@@ -6,7 +6,6 @@ the box is switched on, the default installation of its folder says what is load
 
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
@@ -14,9 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.programs import PROGRAM_RUNS, PauseProgram, ResumeProgram, SetUp, StopProgram
 from ur_emulator.controller.events import ScriptFailed
-from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
-from ur_emulator.controller.program_runner import ProgramRunner
 from ur_emulator.controller.safety.safety_state import limits_of
 from ur_emulator.controller.snapshot import RUNNING_STATES
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
@@ -38,83 +35,7 @@ from ur_emulator.scripting.network import Network
 if TYPE_CHECKING:
     from ur_emulator.program_files.loading import LoadedProgram
 
-# --- Inputs that start, pause and stop programs, as an installation sets them up
-#
-# Each acts on a rising edge. Source: the user manuals' page of I/O set-up, from memory. FREEDRIVE acts in the
-# controller.
-
-
-def follow_inputs(
-    lines: IoConfiguration,
-    declared: Sequence[tuple[str, int, str]],
-    acts: Mapping[str, Callable[[], None]],
-    is_effective: Callable[[], bool],
-) -> Steps[None]:
-    """Do what inputs ask for, while the installation with these inputs is effective.
-
-    Each is declared by its group, as in the names of builtins, its index and its action, which `acts` begins.
-    """
-    inputs = [(group, index, acts[action]) for group, index, action in declared if action in acts]
-    before = [True] * len(inputs)
-    while inputs and is_effective():
-        levels = [lines.is_high(group, index) for group, index, _ in inputs]
-        for (_, _, act), was_high, is_high in zip(inputs, before, levels, strict=True):
-            if is_high and not was_high:
-                act()
-        before = levels
-        yield
-
-
-# --- The variables of an installation, which keep the values that programs leave in them
-
-
-def values_at_end(programs: ProgramRunner, variables: Mapping[str, str]) -> Steps[dict[str, str]]:
-    """Wait for the end of the program that runs; return the values that the variables have then.
-
-    A variable, with its value as a literal, keeps it if the program does not declare it.
-    """
-    run = programs.latest
-    while programs.is_running and programs.latest is run:
-        yield
-    if run is None:
-        return dict(variables)
-    declared = set(run.program.declared_globals)
-    return {
-        name: (literal(run.read_global(name)) if name in declared else "") or old
-        for name, old in variables.items()
-    }
-
-
-# --- Whether a program plays, is paused, or may be played now
-
-
 _PAUSED = frozenset({ProgramState.PAUSING, ProgramState.PAUSED})
-
-
-def is_running(box: ServedBox) -> bool:
-    """Return True while a program plays, also one that a client has sent."""
-    return box.snapshot.runtime_state in RUNNING_STATES
-
-
-def is_paused(box: ServedBox) -> bool:
-    """Return True while a program is paused, or about to be."""
-    return box.snapshot.runtime_state in _PAUSED
-
-
-def obstacle_to_playing(box: ServedBox, *, has_program: bool) -> str:
-    """Return what stands against playing, "" if nothing does."""
-    state, mode = box.controller.state, box.snapshot.robot_mode
-    if not state.safety.lets_programs_run:
-        return "the robot is stopped for safety"
-    if mode != RobotMode.RUNNING:
-        return f"the robot is in {RobotMode(mode).name}, it must be RUNNING"
-    if is_running(box) and not is_paused(box):
-        return "a program plays already"
-    if state.pendant.requests:
-        return "a popup waits to be closed, or a question for its answer"
-    return "" if has_program or is_paused(box) else "no program is loaded"
-
-
 T = TypeVar("T")
 # Who External Control asks if neither a client has sent `play` nor a node or the installation names a PC.
 THIS_MACHINE = "127.0.0.1"
@@ -159,12 +80,12 @@ class ProgramPlayer:
     @property
     def is_running(self) -> bool:
         """True while a program plays, also one that a client has sent."""
-        return is_running(self._box)
+        return self._box.snapshot.runtime_state in RUNNING_STATES
 
     @property
     def is_paused(self) -> bool:
         """True while a program is paused, or about to be."""
-        return is_paused(self._box)
+        return self._box.snapshot.runtime_state in _PAUSED
 
     @property
     def script(self) -> str:
@@ -308,7 +229,7 @@ class ProgramPlayer:
         """Take an installation that is effective; the log says what of it is not."""
         if installation is not self.installation:
             self._declare(installation)
-            self._box.start_alone(self._follow_inputs())
+            self._box.start_alone(self._follow_inputs(installation.input_actions))
         if isinstance(set_up, ScriptFailed):
             text = set_up.log_text or set_up.text
             self._box.note(f"{installation.wire_path} has no effect: {text}")
@@ -324,19 +245,24 @@ class ProgramPlayer:
             self.loaded = replace(loaded, installation=installation)
             self._ready = None
 
-    def _follow_inputs(self) -> Steps[None]:
-        """Do what the inputs of the installation ask for, until another one is loaded."""
-        begin, declared = self._box.start_alone, self.installation.input_actions
-        return follow_inputs(
-            self._box.controller.state.io_configuration,
-            declared,
-            {
-                "START": lambda: begin(self._start_by_input()),
-                "PAUSE": lambda: begin(self.pause()),
-                "STOP": lambda: begin(self.stop()),
-            },
-            lambda: self.installation.input_actions is declared,
-        )
+    def _follow_inputs(self, declared: tuple[tuple[str, int, str], ...]) -> Steps[None]:
+        """Do what the inputs of the installation ask for, until another one is loaded.
+
+        Each is declared by its group, as in the names of builtins, its index and its action. It acts on a
+        rising edge. Source: the user manuals' page of I/O set-up, from memory. FREEDRIVE acts in the
+        controller.
+        """
+        lines = self._box.controller.state.io_configuration
+        acts = {"START": self._start_by_input, "PAUSE": self.pause, "STOP": self.stop}
+        inputs = [(group, index, acts[action]) for group, index, action in declared if action in acts]
+        before = [True] * len(inputs)
+        while inputs and self.installation.input_actions is declared:
+            levels = [lines.is_high(group, index) for group, index, _ in inputs]
+            for (_, _, act), was_high, is_high in zip(inputs, before, levels, strict=True):
+                if is_high and not was_high:
+                    self._box.start_alone(act())
+            before = levels
+            yield
 
     def _start_by_input(self) -> Steps[None]:
         if not self._box.controller.state.pendant.remote_period:
@@ -345,9 +271,16 @@ class ProgramPlayer:
 
     def _keep_variables(self) -> Steps[None]:
         """Wait for the end of the program, then keep the values of the installation's variables."""
-        installation = self.installation
-        values = yield from values_at_end(self._box.controller.programs, installation.variables)
-        if self.installation is not installation or values == installation.variables:
+        installation, programs = self.installation, self._box.controller.programs
+        run = programs.latest
+        while programs.is_running and programs.latest is run:
+            yield
+        if self.installation is not installation or run is None:
+            return
+        values = dict(installation.variables)
+        for name in values.keys() & set(run.program.declared_globals):
+            values[name] = literal(run.read_global(name)) or values[name]
+        if values == installation.variables:
             return
         self._declare(replace(installation, variables=values))
         try:
@@ -363,9 +296,17 @@ class ProgramPlayer:
 
     def _must_be_able_to_play(self) -> None:
         """Refuse to play while something stands against it."""
-        why = obstacle_to_playing(self._box, has_program=self.loaded is not None)
-        if why:
-            self._refuse("play", why)
+        state, mode = self._box.controller.state, self._box.snapshot.robot_mode
+        if not state.safety.lets_programs_run:
+            self._refuse("play", "the robot is stopped for safety")
+        if mode != RobotMode.RUNNING:
+            self._refuse("play", f"the robot is in {RobotMode(mode).name}, it must be RUNNING")
+        if self.is_running and not self.is_paused:
+            self._refuse("play", "a program plays already")
+        if state.pendant.requests:
+            self._refuse("play", "a popup waits to be closed, or a question for its answer")
+        if self.loaded is None and not self.is_paused:
+            self._refuse("play", "no program is loaded")
 
     def _prepare(self, client: str) -> Steps[CompileResult]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""

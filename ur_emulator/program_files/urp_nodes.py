@@ -1,7 +1,6 @@
 """The nodes of a program file as frozen records, numbered as PolyScope numbers its labels.
 
-References are followed: a node has the content of the element that it
-stands for.
+References are followed: a node has the content of the element that it stands for.
 """
 
 from __future__ import annotations

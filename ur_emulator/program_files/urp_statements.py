@@ -211,11 +211,7 @@ def _line(maker: UrpMaker, node: Node) -> Line:
 
 
 def _is_high(node: Node) -> bool:
-    """Return the level that a node names.
-
-    Raises:
-        ProgramFileError: it is none.
-    """
+    """Return the level that a node names; ProgramFileError if it names none."""
     text = node.text("digitalValue").lower()
     if text not in ("0", "1", "true", "false"):
         raise node.source.error(f"a <{node.kind}> node has the level {text[:100]!r}: it is 0 or 1")

@@ -13,6 +13,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.program_files.folder import FoundFile, ProgramFolder
 from ur_emulator.program_files.reader import ProgramReader, XmlTree, unpack
+from ur_emulator.program_files.script_writer import is_identifier
 from urscript.values import Pose
 
 SUFFIX = ".variables"
@@ -20,7 +21,6 @@ SUFFIX = ".variables"
 _DECIMALS = 5
 _MOST_ITEMS, _DEEPEST = 64, 1
 _ROOT = "InstallationVariables"
-_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 # A key, then the first `=` or `:` that is not escaped. Source: java.util.Properties.
 _PROPERTY = re.compile(r"\s*((?:\\.|[^\\=:\s])+)\s*[=:]\s*(.*)")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|(.))")
@@ -36,7 +36,7 @@ def read_variables(reader: ProgramReader, file: FoundFile) -> dict[str, str]:
     items = _xml_items(reader, file, data) if data.lstrip().startswith(b"<") else _properties(data)
     variables: dict[str, str] = {}
     for name, value in items:
-        if not _IDENTIFIER.fullmatch(name):
+        if not is_identifier(name):
             raise ProgramFileError(f"{file.name}: {name[:40]!r} is not the name of a variable")
         if not value or not value.isprintable():
             raise ProgramFileError(f"{file.name}: the value of {name[:40]} is not one line of text")
