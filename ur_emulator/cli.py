@@ -19,7 +19,8 @@ from typer.core import TyperCommand
 from protocol.errors import ProtocolError
 from ur_emulator import check_platform
 from ur_emulator.box_log import LogEntry, printable
-from ur_emulator.box_options import TOKEN_VARIABLE, ServedAt
+from ur_emulator.box_options import TOKEN_VARIABLE, BoxOptions, ServedAt, counted_up, is_loopback
+from ur_emulator.errors import EmulatorError
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
 if TYPE_CHECKING:
@@ -131,8 +132,6 @@ def serve(
     raise_descriptor_limit()
     prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
-    from ur_emulator.box_options import BoxOptions, counted_up
-    from ur_emulator.errors import EmulatorError
     from ur_emulator.loop.line_writer import LineWriter
     from ur_emulator.rack import LoopRack
 
@@ -250,8 +249,6 @@ def _ports_line(at: ServedAt) -> str:
 
 def _notices(served: Sequence[ServedAt]) -> Iterator[str]:
     """Yield what the user should know before the boxes run."""
-    from ur_emulator.box_options import is_loopback
-
     notices = [notice for at in served for notice in at.notices]
     if notices:
         others = f" (the same for {len(notices) - 1} more boxes)" if len(notices) > 1 else ""

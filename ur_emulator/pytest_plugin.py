@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from ur_emulator.errors import ControlError, EmulatorError, ModelError, PortError
+
 if TYPE_CHECKING:
     from ur_emulator import ControlBox
     from ur_emulator.models.robot_model import RobotModel
@@ -74,8 +76,6 @@ def pytest_configure(config: pytest.Config) -> None:
     robot, version = config.getoption("--ur-robot"), config.getoption("--ur-version")
     if version is None and robot == DEFAULT_ROBOT:
         return
-    from ur_emulator.errors import ModelError
-
     try:
         _robot(robot, version)
     except ModelError as error:
@@ -138,8 +138,6 @@ def pytest_runtest_makereport(
 
 def _shown_state(box: ControlBox) -> str:
     """Return modes, program and joints, for people."""
-    from ur_emulator.errors import ControlError
-
     try:
         now = box.state
     except ControlError as error:
@@ -154,8 +152,6 @@ def _shown_state(box: ControlBox) -> str:
 
 def _defaults(config: pytest.Config, robot: str | None) -> dict[str, Any]:
     """Return the options of a box that nobody has named; the default software is for arms that run it."""
-    from ur_emulator.errors import ModelError
-
     version = config.getoption("--ur-version")
     defaults = {**DEFAULTS, "robot": config.getoption("--ur-robot")}
     if version is not None:
@@ -186,7 +182,6 @@ def _checked(options: dict[str, Any], folder: Path) -> dict[str, Any]:
 def _start(options: dict[str, Any], stack: ExitStack) -> ControlBox:
     """Start a box that ends with the stack."""
     from ur_emulator.emulator import ControlBox
-    from ur_emulator.errors import EmulatorError, PortError
 
     own_address = options.pop("standard_ports", False)
     try:

@@ -64,20 +64,14 @@ def request_for(signal: ModbusSignal) -> bytes:
     return modbus.encode_write(function, signal.address, signal.output)
 
 
-def error_of(answer: bytes, request: bytes) -> int:
-    """Return the code of an answer that has no value: of its exception, or of a failure of the server."""
-    is_exception = answer[0] == request[0] | modbus.EXCEPTION_BIT and len(answer) > 1
-    return answer[1] if is_exception else modbus.ExceptionCode.SLAVE_DEVICE_FAILURE
-
-
-def problem_of(answer: bytes, request: bytes) -> str:
-    """Return what is wrong with an answer that has no value."""
-    if answer[0] == request[0] | modbus.EXCEPTION_BIT and len(answer) > 1:
-        code = answer[1]
-        known = code in modbus.ExceptionCode.__members__.values()
-        name = modbus.ExceptionCode(code).name.lower().replace("_", " ") if known else "unknown"
-        return f"answers with exception E{code} ({name})"
-    return "gives an answer that makes no sense"
+def problem_of(answer: bytes, request: bytes) -> tuple[int, str]:
+    """Return the exception code of an answer that has no value, and what is wrong with it in words."""
+    if answer[0] != request[0] | modbus.EXCEPTION_BIT or len(answer) < 2:
+        return modbus.ExceptionCode.SLAVE_DEVICE_FAILURE, "gives an answer that makes no sense"
+    code = answer[1]
+    known = code in modbus.ExceptionCode.__members__.values()
+    name = modbus.ExceptionCode(code).name.lower().replace("_", " ") if known else "unknown"
+    return code, f"answers with exception E{code} ({name})"
 
 
 # A signal may be without a valid answer for this long, unless a program says otherwise [s].
@@ -263,8 +257,8 @@ class ModbusLink:
             return
         values = modbus.decode_values(request.pdu, frame.pdu)
         if values is None:
-            self._waiting[signal].why = problem_of(frame.pdu, request.pdu)
-            signal.device_error, signal.connection_error = error_of(frame.pdu, request.pdu), 0
+            signal.device_error, self._waiting[signal].why = problem_of(frame.pdu, request.pdu)
+            signal.connection_error = 0
             return
         signal.trouble = ""
         signal.device_error = signal.connection_error = 0
