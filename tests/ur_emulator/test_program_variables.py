@@ -329,7 +329,7 @@ def large_values(n, length):
 def test_an_update_encodes_a_bounded_number_of_elements_and_all_take_turns(monkeypatch):
     encoded = []
     monkeypatch.setattr(
-        program_reports,
+        program_reports.values,
         "encode_value",
         lambda value, version: encoded.append(value) or encode_value(value, version),
     )
@@ -379,13 +379,13 @@ def encoded(monkeypatch):
     """The indices of the first names or values of packages that were encoded."""
     starts = {"encode_names": [], "encode_values": []}
     for name, found in starts.items():
-        encode = getattr(program_reports, name)
+        encode = getattr(program_reports.values, name)
 
         def count(timestamp, start, items, *, encode=encode, found=found):
             found.append(start)
             return encode(timestamp, start, items)
 
-        monkeypatch.setattr(program_reports, name, count)
+        monkeypatch.setattr(program_reports.values, name, count)
     return starts
 
 
