@@ -55,7 +55,7 @@ check-static: $(STAMP)
 check: check-static ## lint, types, fast tests
 	$(PYTEST) -m "not slow"
 
-bench: $(STAMP) ## measure speed, lateness, memory; writes bench/results.json
+bench: $(STAMP) ## measure speed, lateness, memory, tracking; writes bench/results.json
 	$(BIN)/python -m bench
 
 soak: $(STAMP) ## an hour (or SOAK_MINUTES) under load, with an attack every minute, into out/soak

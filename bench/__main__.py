@@ -19,6 +19,7 @@ from bench.clients import measure_clients
 from bench.compiling import measure_compiling
 from bench.connect_storm import measure_connect_storm
 from bench.lockstep import measure_lockstep
+from bench.paper_set import measure_paper_set
 from bench.realtime import measure_realtime
 from bench.script import measure_script
 from bench.script_in_box import measure_script_in_box
@@ -51,6 +52,7 @@ MEASUREMENTS: dict[str, Measurement] = {
     "e_series_realtime": lambda minutes: _on_e_series(measure_realtime(minutes, E_SERIES_ARM)),
     "e_series_boxes": lambda minutes: _on_e_series(measure_boxes(60.0 * min(minutes, 1.0), 5, E_SERIES_ARM)),
     "connect_storm": lambda minutes: measure_connect_storm(60.0 * min(minutes, 1.0)),
+    "paper_set": lambda minutes: measure_paper_set(),
 }
 # What the project asks of itself: measurement -> figure -> (sign, bound).
 ASKED: dict[str, dict[str, tuple[str, float]]] = {
@@ -92,6 +94,13 @@ ASKED: dict[str, dict[str, tuple[str, float]]] = {
         "connect_storm_leak_kb": ("<=", 1024.0),
         "connect_storm_leak_descriptors": ("<=", 0.0),
         "connect_storm_lost_cycles": ("<=", 0.0),
+    },
+    "paper_set": {
+        "paper_set_preview_lognormal_db": (">=", 35.0),
+        "paper_set_preview_uniform_db": (">=", 30.0),
+        "paper_set_preview_least_above_paper_db": (">=", 5.0),
+        "paper_set_best_third_least_above_floor_db": (">=", -1.0),
+        "paper_set_best_third_above_first_db": (">=", 0.0),
     },
 }
 

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
+import pytest
 import typer
 import yaml
 from typer.testing import CliRunner
@@ -42,6 +43,8 @@ CODE = re.compile(r"^(?:\$|ur-\w+|urscript|make|pip|import|from|def|git) ", re.M
 REASON = re.compile(r"<!-- not run: (.+) -->")
 NAME = re.compile(r"`([\w./-]+\.\w+)`:$")
 MAKE_TARGETS = set(re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+# What would meddle with the pytest that is running already.
+_PLAIN_PYTEST = ["-s", *(f"-pno:{name}" for name in ("cacheprovider", "faulthandler", "timeout", "xdist"))]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
@@ -140,7 +143,7 @@ class PageReader:
     def _python(self, block):
         if re.search(r"^def test_", block.text, re.MULTILINE):
             Path(f"test_line_{block.line}.py").write_text(block.text, encoding="utf-8")
-            self._process([sys.executable, "-m", "pytest", f"test_line_{block.line}.py"], block)
+            self._pytest([f"test_line_{block.line}.py"], block)
         else:
             exec(compile(self._here(block.text), str(block), "exec"), self._names)
 
@@ -179,6 +182,8 @@ class PageReader:
                 command_line.make_parser().parse_args(rest)
             case ["ur-emulator", *rest]:
                 parsed(ur_emulator.cli.app, rest)
+            case ["python", "-m", "pytest", *rest] if not parse_only:
+                self._pytest(rest, block)
             case ["python", *rest] if not parse_only:
                 self._process([sys.executable, *map(self._here, rest)], block)
             case [program, *_] if not parse_only and shutil.which(program):
@@ -224,11 +229,21 @@ class PageReader:
         return re.sub(r"\b192\.168\.0\.10\b", self._box.host, text)
 
     @staticmethod
+    def _pytest(words, block):
+        """Run tests of the page in this process, where the next box starts at once; their modules go again."""
+        kept, path = set(sys.modules), list(sys.path)
+        try:
+            assert pytest.main([*_PLAIN_PYTEST, *words]) == 0, f"{block}: pytest {words}"
+        finally:
+            sys.path[:] = path
+            for name in sys.modules.keys() - kept:
+                if Path(getattr(sys.modules[name], "__file__", None) or "/").is_relative_to(Path.cwd()):
+                    del sys.modules[name]
+
+    @staticmethod
     def _process(words, block):
         places = os.pathsep.join((os.getcwd(), str(ROOT)))
-        done = subprocess.run(
-            words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": places, "PYTEST_ADDOPTS": "-p no:cacheprovider"}
-        )  # fmt: skip
+        done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": places})
         assert done.returncode == 0, f"{block}: {words}\n{done.stdout}{done.stderr}"
 
 

@@ -1,25 +1,40 @@
-"""Every example runs, and says what its docstring promises."""
+"""Every example runs, and says what its docstring promises.
+
+They run in this process, where libraries are loaded and a box starts at once.
+"""
 
 import json
+import re
 import socket
-import subprocess
-import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.timeout(360)  # on a busy machine
-ROOT = Path(__file__).parent.parent
-EXAMPLES = ROOT / "examples"
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-def run(name, *arguments):
-    result = subprocess.run(
-        [sys.executable, str(EXAMPLES / name), *map(str, arguments)],
-        capture_output=True, text=True, cwd=ROOT, timeout=300, check=False,
-    )  # fmt: skip
-    assert result.returncode == 0, result.stderr
-    return result.stdout
+def load(name):
+    """An example as a module."""
+    spec = spec_from_file_location(Path(name).stem, EXAMPLES / name)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def run(monkeypatch, capfd):
+    """Run an example with arguments and with other values of its constants; returns what it says."""
+
+    def run(name, *arguments, **constants):
+        example = load(name)
+        vars(example).update(constants)
+        monkeypatch.setattr("sys.argv", [name, *map(str, arguments)])
+        assert not example.main()
+        return capfd.readouterr().out
+
+    return run
 
 
 @pytest.mark.parametrize(
@@ -32,7 +47,7 @@ def run(name, *arguments):
         ("06_contact.py", (), "Protective"),
     ],
 )
-def test_example(name, arguments, said):
+def test_example(run, name, arguments, said):
     assert said in run(name, *arguments)
 
 
@@ -52,18 +67,20 @@ def test_the_sample_program_of_polyscope_is_played(ur_box_factory):
 
 
 @pytest.mark.slow
-def test_draw(tmp_path):
+def test_draw(run, tmp_path):
     """Without a path it draws what is in the tree."""
-    said = run("draw.py", "--out", tmp_path, "--repeat", 1)
-    assert said.count("executed, aligned") == 3
+    said = run("draw.py", "--out", tmp_path, "--repeat", 1, SHOWN=["letter_i.txt"])
+    assert said.count("executed, aligned") == 1
     assert (tmp_path / "report.html").exists()
-    drawn = json.loads((tmp_path / "draw.json").read_text())["drawings"]
-    assert [one["name"] for one in drawn] == ["letter_i", "elle", "signature"]
+    (drawn,) = json.loads((tmp_path / "draw.json").read_text())["drawings"]
+    assert drawn["name"] == "letter_i"
+    assert all((EXAMPLES / "drawings" / name).is_file() for name in load("draw.py").SHOWN)
 
 
 @pytest.mark.slow
-def test_demo_and_plot(tmp_path):
-    said = run("demo.py", "--out", tmp_path, "--repeat", 1, "--movements", "lognorm_4_1,uniform_4_1")
+def test_demo_and_plot(run, tmp_path):
+    few = ("--repeat", 1, "--movements", "lognorm_4_1,uniform_4_1")
+    said = run("demo.py", "--out", tmp_path, *few, OTHER_NUMBERS=[(10.0, 5.0, 3.0)])
     assert f"report: {tmp_path / 'report.html'}" in said
     for words in ("real UR3", "published controller, preview: SIMULATED UR3", "19.02", "29.90"):
         assert words in said
@@ -71,6 +88,9 @@ def test_demo_and_plot(tmp_path):
     assert (found["paper"]["controller"], found["preview"]["controller"]) == ("paper", "preview")
     assert found["p10-i5-a3"]["controller"] == "paper with gain_p 10, gain_i 5"
     assert all(table["simulated"] is True and len(table["rows"]) == 2 for table in found.values())
+    # Ours follows far better than the paper's arm did; `make bench` has the means of the whole set.
+    for row, least in zip(found["preview"]["rows"], (30.0, 35.0), strict=True):
+        assert row["mean_snr_db"] >= max(least, row["paper_snr_db"] + 5.0)
     page = (tmp_path / "report.html").read_text()
     for table in found.values():
         assert f"{table['mean_snr_db']['lognormal']:.2f}" in page
@@ -80,21 +100,16 @@ def test_demo_and_plot(tmp_path):
 
 
 @pytest.mark.slow
-def test_ablation(tmp_path):
+def test_ablation(run, tmp_path):
     said = run("ablation.py", "--quick", "--out", tmp_path)
     assert len(said.splitlines()) == 1
     assert "| best | lag + gear + learning | typical |" in (tmp_path / "ablation.md").read_text()
+    (result,) = json.loads((tmp_path / "ablation.json").read_text())
+    for row in result["rows"].values():  # learning ends within a decibel of the floor
+        assert row["snr_db"][2] >= max(row["noise_floor_db"] - 1.0, row["snr_db"][0])
     assert (tmp_path / "ablation.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_no_example_is_left_out():
-    tested = {
-        "ablation.py",
-        "demo.py",
-        "draw.py",
-        "01_run_a_program.py",
-        "02_read_the_stream.py",
-        "03_script_without_a_robot.py",
-    }
-    tested |= {"04_plan_a_movement.py", "05_plot_a_recording.py", "06_contact.py"}
-    assert {path.name for path in EXAMPLES.glob("*.py")} == tested
+    tested = set(re.findall(r"\w+\.py", Path(__file__).read_text(encoding="utf-8")))
+    assert {path.name for path in EXAMPLES.glob("*.py")} - tested == set()

@@ -1,5 +1,7 @@
 """Every block of code of every page runs as it stands, or says why it does not."""
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -7,14 +9,15 @@ import numpy as np
 import pytest
 from page_blocks import ROOT, PageReader, blocks_of
 
-from pc_client.movements.movement import load_movement
+from pc_client.analysis.report import build_tables
+from pc_client.movements.movement import Movement, load_movement
 
 PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def drawing(path):
-    """A curved stroke of a pen: x, y in millimetres and t in seconds, 100 samples a second."""
-    movement = load_movement("lognorm_4_1")
+    """A curved stroke of a pen: x, y in millimetres and t in seconds, 100 samples a second, as fast as a hand."""
+    movement = load_movement("lognorm_4_1").stretched(0.15)
     t = np.arange(0.0, movement.duration, 0.01)
     path.write_text(
         "".join(f"{x} {y} {s}\n" for (x, y), s in zip(1e3 * movement.sample(t).p[:, :2], t, strict=True))
@@ -28,10 +31,15 @@ def drawings(path):
         archive.write("one.txt")
 
 
+def movement(path):
+    """A movement of 1.2 s."""
+    Movement.through([(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)], durations=[1.2]).save(path)
+
+
 STOCK = {
     "drawing.txt": drawing,
     "targets.csv": lambda path: path.write_text("x,y,z,t\n.3,-.1,.2,0\n.35,0,.25,2\n.3,.1,.2,3.5\n"),
-    "my_movement.toml": lambda path: load_movement("uniform_4_1").save(path),
+    "my_movement.toml": movement,
     "letter.txt": drawing,
     "reaches/": lambda path: drawing(path / "reach.txt"),
     "others.zip": drawings,
@@ -39,6 +47,13 @@ STOCK = {
     "my_programs": lambda path: (path / "pick.script").write_text('def hello():\n  textmsg("hello")\nend\n'),
 }
 """What a reader has before a page is read."""
+
+
+@contextmanager
+def one_thread(workers, dask):
+    """In place of processes, which cost more than the work of a page."""
+    with ThreadPoolExecutor(1) as executor:
+        yield executor
 
 
 @pytest.mark.slow
@@ -49,6 +64,9 @@ STOCK = {
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch, ur_box_factory):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
+    monkeypatch.setattr("pc_client.studies.executors.open_executor", one_thread)
+    # `ur-client report` draws the page of a run; `run` need not draw the same before.
+    monkeypatch.setattr("pc_client.commands.experiment.show_report", build_tables)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
 
     def make_box(**options):

@@ -31,7 +31,7 @@ _CornersOption = Annotated[
 @app.command("list", epilog=examples("ur-client movements list --set arcs"))
 def list_movements(set_name: SetOption = None) -> None:
     """List the movements that come with the package."""
-    from pc_client.movements.description import describe
+    from pc_client.movements.description import outline
     from pc_client.movements.library_sets import LIBRARY_SETS, library_names
     from pc_client.movements.movement import load_movement
     from pc_client.results.tables import Column, frame_of, to_rich
@@ -46,7 +46,7 @@ def list_movements(set_name: SetOption = None) -> None:
     )
     sets = [set_name] if set_name is not None else LIBRARY_SETS
     names = [name for chosen in sets for name in library_names(chosen)]
-    rows = [{**describe(load_movement(name)), "name": name} for name in names]
+    rows = [{**outline(load_movement(name)), "name": name} for name in names]
     console.print(to_rich(frame_of(rows, columns), columns))
 
 

@@ -19,10 +19,25 @@ _N_SAMPLES = 8001
 
 def describe(movement: Movement) -> dict[str, Any]:
     """Figures of a movement, in SI units named by their keys: plain numbers and lists, ready for JSON."""
+    figures = outline(movement) | {
+        "speed_rms_frequency_rad_s": speed_rms_frequency(movement),
+        "expected_snr_db": {f"{1e3 * delay:.0f} ms": snr_of_delay(movement, delay) for delay in _DELAYS},
+        "expected_vector_snr_db": {
+            f"{1e3 * delay:.0f} ms": snr_of_delay(movement, delay, vector=True) for delay in _DELAYS
+        },
+        "provenance": dict(movement.provenance),
+    }
+    if isinstance(movement.trajectory, SigmaLognormal):
+        figures["strokes"] = _describe_strokes(movement.trajectory)
+    return figures
+
+
+def outline(movement: Movement) -> dict[str, Any]:
+    """The first figures of `describe`: kind, size, duration and speed."""
     t = np.linspace(0.0, movement.duration, _N_SAMPLES)
     motion = movement.motion(t)
     speed = movement.speed(t)
-    figures: dict[str, Any] = {
+    return {
         "name": movement.name,
         "kind": movement.kind,
         "duration_s": movement.duration,
@@ -35,16 +50,7 @@ def describe(movement: Movement) -> dict[str, Any]:
         "end_speed_m_s": float(speed[-1]),
         "box_low_m": motion.p.min(axis=0).tolist(),
         "box_high_m": motion.p.max(axis=0).tolist(),
-        "speed_rms_frequency_rad_s": speed_rms_frequency(movement),
-        "expected_snr_db": {f"{1e3 * delay:.0f} ms": snr_of_delay(movement, delay) for delay in _DELAYS},
-        "expected_vector_snr_db": {
-            f"{1e3 * delay:.0f} ms": snr_of_delay(movement, delay, vector=True) for delay in _DELAYS
-        },
-        "provenance": dict(movement.provenance),
     }
-    if isinstance(movement.trajectory, SigmaLognormal):
-        figures["strokes"] = _describe_strokes(movement.trajectory)
-    return figures
 
 
 def speed_rms_frequency(movement: Movement) -> float:

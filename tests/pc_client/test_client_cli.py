@@ -12,10 +12,12 @@ from pathlib import Path
 import pytest
 import typer
 
+import pc_client.commands.experiment as experiment
 import pc_client.studies.comparison as comparison
 from pc_client import cli
 from pc_client.arm import QUESTION
 from pc_client.errors import DriverError
+from pc_client.movements.library_sets import library_names
 from pc_client.movements.movement import Movement
 from pc_client.recording.recording import load_recording
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
@@ -38,6 +40,7 @@ def test_no_words_at_all_show_the_help(capsys):
         (["experiment", "--robot", "127.0.0.1"], "--out"),
         (["experiment", "--robot", "x", "--out", "y", "--repeat", "0"], "repeat"),
         (["experiment", "--robot", "127.0.0.1", "--out", "y", "--port-base", "70000"], "port offset"),
+        (["experiment", "--robot", "x", "--out", "y", "--set", "arcs", "--movements", "z.toml"], "only one"),
         (["fly"], "fly"),
         (["movements"], "command"),
         (["doctor", "--robot", "x", "--quickly"], "quickly"),
@@ -71,6 +74,10 @@ def free_offset():
         ([*RUN, "--controller", "mine.toml"], "mine.toml: cannot be read"),
         ([*RUN, "--cell", "mine.toml"], "mine.toml: cannot be read"),
         (["doctor", "--robot", "127.0.0.1", "--cell", "mine.toml"], "mine.toml: cannot be read"),
+        (
+            ["experiment", "--robot", "127.0.0.1", "--out", "o", "--set", "mine"],
+            'no set of movements "mine": give one of paper, arcs',
+        ),
         (["report", "empty"], "no recordings"),
         (["export", "missing.mcap"], "missing.mcap"),
         (["run", "uniform_4_1", "--robot", "127.0.0.1", "--port-base", "FREE", "--out", "o"], "refuses"),
@@ -90,6 +97,17 @@ def test_what_does_not_work_is_one_line_and_exit_1(arguments, words, one_line, t
     assert cli.run(arguments) == 1
     assert words in one_line()
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize(("words", "prefix"), [([], ""), (["--set", "arcs"], "arcs_")])
+def test_an_experiment_has_the_ten_of_the_paper_or_of_the_set_that_is_named(
+    words, prefix, tmp_path, monkeypatch
+):
+    chosen = []
+    monkeypatch.setattr(experiment, "execute", lambda movements, *_: chosen.extend(movements))
+    monkeypatch.setattr(experiment, "show_report", lambda out: None)
+    assert cli.run(["experiment", "--robot", "x", "--out", str(tmp_path), *words]) == 0
+    assert [movement.name for movement in chosen] == [prefix + name for name in library_names("paper")]
 
 
 def test_a_box_in_the_way_refuses_the_run_before_anything_moves(robot, tmp_path, one_line):
