@@ -12,7 +12,7 @@ DOWN = "p[0.3,0,{z},3.14159265,0,0]"  # tool down, far from singularities
 def above_table(body, *, z=0.03, fidelity="typical", seed=7):
     """A bench whose arm rests with the tool at height z, and has just begun a program."""
     bench = Bench(fidelity=fidelity, seed=seed)
-    bench.run(f"movej({DOWN.format(z=z)}, a=3, v=2)")
+    bench.run(f"def p():\n  set_pos(get_inverse_kin({DOWN.format(z=z)}))\n  sleep(0.2)\nend\n")
     bench.events.clear()
     bench.start(f"def f():\n{body}\nend\n")
     return bench

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from box_support import Bench
+from box_support import Bench, program
 from compliance_support import TABLE, above_table, place, push, reported, truth
 
 from protocol.ur_types import ControlMode
@@ -27,7 +27,7 @@ def pressing(force, *, frame=BASE, sign=-1, limits=LIMITS):
 # --- on the table
 
 
-@pytest.mark.parametrize(("seed", "force"), [(1, 20), (2, 50), (8, 20)])
+@pytest.mark.parametrize(("seed", "force"), [(1, 20), (2, 50)])
 def test_the_true_force_on_the_table_comes_within_a_tenth_of_the_one_asked(seed, force):
     bench = above_table(pressing(force) + "  sleep(100)", seed=seed)
     forces, _ = truth(bench, 750)
@@ -35,10 +35,7 @@ def test_the_true_force_on_the_table_comes_within_a_tenth_of_the_one_asked(seed,
     assert reported(bench) == []
 
 
-@pytest.mark.parametrize(
-    ("fidelity", "scaling"),
-    [("ideal", 2.0), ("typical", 0.5), ("typical", 2.0), ("poor", 0.5), ("poor", 2.0)],
-)
+@pytest.mark.parametrize(("fidelity", "scaling"), [("typical", 2.0), ("poor", 0.5), ("poor", 2.0)])
 def test_pressing_is_stable(fidelity, scaling):
     bench = above_table(
         f"  force_mode_set_gain_scaling({scaling})\n" + pressing(30) + "  sleep(100)", fidelity=fidelity
@@ -64,7 +61,9 @@ def test_calling_it_again_and_again_changes_nothing():
         WAIT
         + f"  while True:\n    force_mode({BASE}, [0,0,1,0,0,0], [0,0,-20,0,0,0], 2, {LIMITS})\n    sync()\n  end"
     )
-    assert np.array_equal(truth(once, 600)[0], truth(looped, 600)[0])
+    forces = truth(once, 400)[0]
+    assert forces[-1, 2] > 10.0
+    assert np.array_equal(forces, truth(looped, 400)[0])
 
 
 def test_another_wrench_is_taken_on_without_letting_go():
@@ -88,7 +87,7 @@ def test_what_is_pressed_against_at_the_start_counts_as_contact():
 # --- moves on top
 
 
-@pytest.mark.parametrize("fidelity", ["ideal", "typical", "poor"])
+@pytest.mark.parametrize("fidelity", ["ideal", "poor"])
 def test_a_move_on_top_follows_its_path_and_keeps_the_force(fidelity):
     bench = above_table(
         pressing(20)
@@ -157,7 +156,7 @@ def test_in_free_space_it_moves_at_the_limit_speed():
 def free_bench(robot, generation, seconds, *forces, damping, scaling=1.0):
     """A bench whose arm, in a pose of ur_rtde's test suite, moves with each force along z for some seconds."""
     bench = Bench(robot=robot, generation=generation, fidelity="ideal")
-    bench.run("movej([-1.54, -1.83, -2.28, -0.59, 1.60, 0.023], a=3, v=2)", limit=20_000)
+    bench.run(program("set_pos([-1.54, -1.83, -2.28, -0.59, 1.60, 0.023])", "sleep(0.1)"))
     start = place(bench)
     settings = f"  force_mode_set_damping({damping})\n  force_mode_set_gain_scaling({scaling})\n"
     phases = "".join(
@@ -172,10 +171,11 @@ def free_bench(robot, generation, seconds, *forces, damping, scaling=1.0):
 @pytest.mark.parametrize(
     ("robot", "generation", "damping"),
     [
-        *(("ur5", CB3, damping) for damping in (0.0, 0.005, 0.025)),
-        *(("ur5", replace(CB3, period_us=period), 0.005) for period in (4_000, 2_000)),
+        *(("ur5", CB3, damping) for damping in (0.0, 0.025)),
+        ("ur5", replace(CB3, period_us=2_000), 0.005),
         ("ur10", CB3, 0.005),
-        *((robot, E_SERIES, damping) for robot in ("ur3e", "ur20") for damping in (0.0, 0.025)),
+        ("ur3e", E_SERIES, 0.025),
+        ("ur20", E_SERIES, 0.0),
     ],
     ids=lambda x: str(getattr(x, "period_us", x)),
 )
