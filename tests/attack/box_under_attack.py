@@ -422,7 +422,7 @@ def watching(box: BoxUnderAttack) -> Iterator[Seen]:
 
 def _bystander(*arguments: object) -> subprocess.Popen:
     process = subprocess.Popen(
-        [sys.executable, bystander.__file__, *map(str, arguments)],
+        [sys.executable, "-S", bystander.__file__, *map(str, arguments)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
