@@ -153,7 +153,7 @@ MISSED_CYCLES = round(MISSED_ALLOWED / PERIOD)
 ALLOWED = 0.3  # s
 WAITS_FOR_THE_READ = 1  # tick; a message may come right after the read of a cycle
 SPEED_UP, STEADY = 0.56, 0.08  # s
-WATCHED = 0.96  # s
+WATCHED = 0.56  # s
 
 # Away from the joint's end of the way; for the large joints with the arm stretched, which is hardest to stop.
 CLEAR_OF_THE_END = {

@@ -357,7 +357,7 @@ WAIT = "def p():\n  sleep(100)\nend\n"
 def bench_of(robot="ur5e", fidelity="typical", x=0.4, z=0.3, seed=7):
     """A bench whose arm rests with its flange down; no program runs."""
     bench = Bench(robot=robot, generation=E_SERIES, fidelity=fidelity, seed=seed)
-    bench.run(f"movej({DOWN.format(x=x, z=z)}, a=3, v=2)", limit=20_000)
+    bench.run(program(f"set_pos(get_inverse_kin({DOWN.format(x=x, z=z)}))", "sleep(0.2)"))
     bench.events.clear()
     return bench
 
@@ -451,7 +451,7 @@ def test_the_raw_channel_has_the_payload_and_the_axes_of_the_flange():
 
 @pytest.mark.parametrize(
     ("robot", "fidelity"),
-    [("ur3e", "poor"), ("ur5e", "typical"), ("ur10e", "ideal"), ("ur10e", "poor")],
+    [("ur3e", "poor"), ("ur5e", "typical"), ("ur10e", "ideal")],
 )
 def test_force_mode_holds_ten_newtons_on_the_table(robot, fidelity):
     """A real UR5e asked for 10 N held 8.95 to 13.26 N over its work space (doi 10.3390/s26051709)."""
@@ -473,7 +473,7 @@ def test_a_contact_is_found_that_a_cb3_would_not_notice():
         "    speedl([0,0,-0.01,0,0,0], 0.5, get_steptime())\n  end\n"
         '  textmsg("found")\n  stopl(3)\n  sleep(100)\nend\n'
     )
-    forces, places = truth(bench, 3000)
+    forces, places = truth(bench, 1600)
     assert bench.texts == ["found"]
     assert 4.0 < forces[:, 2].max() < 60.0
     assert places[-1, 2] < 0.0
