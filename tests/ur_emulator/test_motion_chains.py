@@ -319,7 +319,7 @@ def check_chain(makers):
     return targets, legs, outcomes
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(st.lists(moves, min_size=2, max_size=5))
 def test_moves_that_can_be_executed_one_by_one_can_be_executed_as_a_chain(makers):
     assume(can_be_executed_one_by_one(makers))
@@ -373,7 +373,7 @@ def test_chains_that_random_search_has_found_can_be_executed(name):
     check_chain(FOUND[name])
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(
     st.lists(st.tuples(places, radii), min_size=2, max_size=5),
     st.sampled_from([0.1, 0.25, 0.5]),

@@ -98,6 +98,10 @@ ENDLESS = MOVES.replace("  movej", "  while True:\n    movej", 1).replace("\nend
 INPUT_ACTION = 'def action():\n  set_standard_digital_input_action(0, "freedrive")\n  sleep(0.1)\nend\n'
 
 
+def _modes(now):
+    return now.robot_mode, now.safety_mode, now.runtime_state
+
+
 class Story(Bench):
     """A bench that boots, works, is touched, stopped in every way and comes back."""
 
@@ -116,11 +120,16 @@ class Story(Bench):
         self.moments.append((self.now, {n: read_register(state, n) for n in MODBUS}))
 
     def tick(self, n=1, *commands):
-        """Advance; of what follows, the first cycle, the last and every twelfth one count."""
+        """Advance; what counts is every twentieth cycle, those in which a mode changes, and the ends of several."""
         for i in range(n):
+            before = self.now
             super().tick(1, *commands)
             commands = ()
-            if hasattr(self, "moments") and (i % 12 == 0 or i == n - 1):
+            if hasattr(self, "moments") and (
+                len(self.snapshots) % 20 == 0
+                or _modes(self.now) != _modes(before)
+                or (n > 1 and i in (0, n - 1))
+            ):
                 self.note()
         return self.now
 
