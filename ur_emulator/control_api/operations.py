@@ -151,7 +151,7 @@ for _name, _member in vars(BoxOperations).items():
 
 
 def make(name: str, arguments: Mapping[str, Any]) -> Operation[Any]:
-    """Return an operation as it was asked for; ArgumentError for its name, or for an argument."""
+    """Return an operation as it was asked for; ArgumentError if its name or an argument is wrong."""
     if name not in OPERATIONS:
         raise ArgumentError(f"there is no operation {ascii(name)[:60]}: choose from {', '.join(OPERATIONS)}")
     rows = OPERATIONS[name].parameters

@@ -37,7 +37,7 @@ class Frame:
 class WorldModel:
     """The frames of a controller; `flange_pose` gives the pose of the flange in the base.
 
-    All methods raise WorldModelError for a frame that does not exist, or cannot be used so.
+    All methods raise WorldModelError for a frame that does not exist.
     """
 
     def __init__(self, flange_pose: Callable[[], Pose], tool: ToolSettings) -> None:
@@ -54,7 +54,7 @@ class WorldModel:
         return name in _OWN or name in self._frames
 
     def parent(self, name: str) -> str:
-        """Return what a frame is attached to; the world is attached to nothing."""
+        """Return what a frame is attached to; WorldModelError for the world."""
         return self._placed(name).parent
 
     def children(self, name: str) -> list[str]:
@@ -102,14 +102,20 @@ class WorldModel:
         self._frames[child] = replace(frame, parent=parent, pose=self.pose(child, parent))
 
     def move(self, name: str, pose: Pose, reference: str) -> None:
-        """Place a frame anew, at a pose in the reference frame; what is attached to it comes along."""
+        """Place a frame anew, at a pose in the reference frame; what is attached to it comes along.
+
+        WorldModelError for a frame that programs cannot move.
+        """
         frame = self._movable(name)
         in_world = pose_trans(self.pose(reference), pose)
         in_parent = pose_trans(self.pose(WORLD, frame.parent), in_world)
         self._frames[name] = replace(frame, pose=in_parent)
 
     def delete(self, name: str) -> None:
-        """Delete a frame; what is attached to it stays where it is, attached to the world."""
+        """Delete a frame; what is attached to it stays where it is, attached to the world.
+
+        WorldModelError for a frame of the robot.
+        """
         self._require(name)
         if name in _OWN:
             raise WorldModelError(f'"{name}" cannot be deleted, it belongs to the robot')

@@ -218,7 +218,7 @@ def prepare_children(role: Role) -> None:
 
 
 class _Server:
-    """The server of this process, or, without a process, that of the box process's parent."""
+    """The server of this process; in a box process it is the parent, and `process` is None."""
 
     def __init__(self, channel: socket.socket, process: subprocess.Popen[bytes] | None = None) -> None:
         self.channel = channel

@@ -156,7 +156,7 @@ class RobotGeneration:
         return version
 
     def closed_ports(self, services: Iterable[str]) -> frozenset[str]:
-        """Return the ports that stay closed if only these services are enabled; ModelError for others."""
+        """Return the ports that stay closed with these services enabled; ModelError for an unknown one."""
         enabled = frozenset(services)
         for name in enabled:
             if name not in self.services:

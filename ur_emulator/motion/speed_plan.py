@@ -176,7 +176,7 @@ def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tupl
 
 
 class SmoothPlan:
-    """See the module; `window` (above 0) is how long the mean is, in which the acceleration changes [s]."""
+    """See the module; the mean is over `window` [s], above 0, in which the acceleration changes."""
 
     def __init__(self, plan: SpeedPlan, window: float) -> None:
         self._plan = plan

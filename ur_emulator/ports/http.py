@@ -44,7 +44,7 @@ class HttpError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class HttpRequest:
-    """A whole request: the path without the query, the query not decoded, headers in lower case."""
+    """A whole request: path without the query, query not decoded, headers by name in lower case."""
 
     method: str
     path: str

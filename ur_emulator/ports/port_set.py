@@ -112,7 +112,7 @@ def _no_line(text: str) -> None:
 class SendingPorts:
     """The ports that send in cycles, also to clients that ask for nothing.
 
-    Behind those for frames, and those for states and messages, stand the same without scripts.
+    Those for frames, and those for states and messages, are followed by the same without scripts.
     """
 
     realtime: tuple[RealtimePort, RealtimePort]

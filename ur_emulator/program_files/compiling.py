@@ -27,7 +27,7 @@ CompileResult = CompiledProgram | ScriptFailed
 def compile_text(
     text: str, catalogue: Catalogue, name: str = "<program>", is_secondary: bool = False
 ) -> CompileResult:
-    """Compile a program, one character a byte."""
+    """Compile a program, given with one character a byte."""
     try:
         program = compile_program(text, catalogue=catalogue, name=name)
     except ScriptError as error:

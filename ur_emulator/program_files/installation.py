@@ -23,7 +23,7 @@ NEW_HOME: Vector6 = (0.0, -pi / 2.0, 0.0, -pi / 2.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class ExternalControlPc:
-    """Where External Control gets its program; "" or 0 is not given here."""
+    """Where External Control gets its program; an empty host or a port 0 is not given here."""
 
     host: str = ""
     port: int = 0

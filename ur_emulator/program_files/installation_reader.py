@@ -42,7 +42,7 @@ NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))
 
 
 def load_installation(folder: ProgramFolder, name: str) -> Installation:
-    """Read an installation by the name that a client gives it; FileMissingError or ProgramFileError."""
+    """Read an installation by the name that a client gives it; FileMissingError if there is none."""
     return _read(ProgramReader(folder), name)
 
 

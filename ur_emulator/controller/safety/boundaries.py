@@ -87,7 +87,7 @@ class ToolDirection:
 
 @dataclass(frozen=True, slots=True)
 class Boundaries:
-    """Some boundaries, all of those of a box or the strict limits of a mode; none of them is false."""
+    """The boundaries of a box, or those that are strict limits of a mode; without any it is false."""
 
     planes: tuple[SafetyPlane, ...] = ()
     tool_direction: ToolDirection | None = None

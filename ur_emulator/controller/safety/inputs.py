@@ -199,7 +199,7 @@ _RELEASED = {
 
 
 class SafetyInputs:
-    """Which functions are active, and by whom; `assigned` pairs of configurable inputs are set up."""
+    """Which functions are active, and by whom; `assigned` are the pairs of inputs that are set up."""
 
     def __init__(
         self,

@@ -61,7 +61,7 @@ class SetpointCheck:
     def find_invalid(
         self, limits: ConfiguredLimits, before: JointTarget, target: JointTarget
     ) -> Violation | None:
-        """Return what is wrong with the next set-point, which follows that `before`, or None."""
+        """Return what is wrong with the set-point `target`, which follows `before`; None: nothing."""
         if limits is not self._limits:
             # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
             self._limits = limits

@@ -41,7 +41,7 @@ class ModeLimits:
 def limits_of_mode(
     mode: SafetyMode, is_manual: bool, limits: ConfiguredLimits, rules: SafetyLimits
 ) -> ModeLimits | None:
-    """Return what is allowed in a mode; None where the rated joint speeds are all."""
+    """Return what is allowed in a mode; None where only the rated joint speeds hold."""
     manual = rules.manual if is_manual else UNLIMITED
     match mode:
         case SafetyMode.REDUCED:
