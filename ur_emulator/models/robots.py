@@ -1,7 +1,7 @@
 """The arms that the emulator can be: those of the table, by name, and one's own, by a file.
 
-A new arm of the table is its numbers in a file of arms and one row here. A file names the arm of the table
-that it is based on, and what is otherwise (docs/fidelity.md, examples/arms).
+A new arm of the table is its numbers in a file of arms and a name in `ARMS` there. A user's file names the
+arm that it is based on, and what is otherwise (docs/fidelity.md, examples/arms).
 """
 
 from dataclasses import fields, replace
