@@ -50,8 +50,7 @@ class FrameBuffer:
     def next_frame(self) -> bytes | None:
         """The next complete frame, length prefix included, or None when more bytes are needed.
 
-        Raises:
-            RemoteProtocolError: the length is invalid. The stream is lost, every further call raises again.
+        RemoteProtocolError: the length is invalid. The stream is lost, every further call raises again.
         """
         whole = self._whole
         if whole is not None:

@@ -80,11 +80,7 @@ class InterpreterConnection:
         self._lines: deque[str] = deque()
 
     def receive_data(self, data: bytes) -> None:
-        """Take what the socket gave.
-
-        Raises:
-            RemoteProtocolError: a line beyond `MAX_LINE`; close the connection.
-        """
+        """Take what the socket gave; after a RemoteProtocolError, a line beyond `MAX_LINE`, close it."""
         *lines, rest = data.split(b"\n")
         for line in lines:
             self._append(line)

@@ -131,12 +131,9 @@ class ModbusFrame(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ModbusRequest:
-    """A request to read or write neighbouring addresses.
+    """A request to read or write neighbouring addresses, at least one from the lowest; none is above 65535.
 
-    Attributes:
-        address: the lowest one.
-        count: how many addresses, at least one; none is above 65535.
-        values: what to write, 0 or 1 for a bit; empty for a read.
+    The values are those to write, 0 or 1 for a bit; empty for a read.
     """
 
     function: ModbusFunction
@@ -153,8 +150,7 @@ def encode_frame(transaction: int, unit: int, pdu: bytes) -> bytes:
 def take_frame(inbox: bytearray) -> ModbusFrame | None:
     """Take the first frame out of received bytes; None while it is not complete.
 
-    Raises:
-        RemoteProtocolError: the bytes are not Modbus TCP; the next frame cannot be found.
+    RemoteProtocolError: the bytes are not Modbus TCP; the next frame cannot be found.
     """
     if len(inbox) < _HEADER.size:
         return None
@@ -216,8 +212,7 @@ def decode_values(request: bytes, answer: bytes) -> tuple[int, ...] | None:
 def decode_request(pdu: bytes) -> ModbusRequest:
     """Return a request decoded.
 
-    Raises:
-        ModbusRequestError: the function is unknown, or count, sizes, values or addresses are not allowed.
+    ModbusRequestError: the function is unknown, or count, sizes, values or addresses are not allowed.
     """
     if pdu[0] not in _MAX_COUNTS:
         raise ModbusRequestError(ExceptionCode.ILLEGAL_FUNCTION)

@@ -37,7 +37,6 @@ class ApiCall:
     """One row.
 
     Attributes:
-        method: of HTTP.
         path: below `BASE`; a last part in braces is an argument.
         since: first PolyScope X software.
         does: description, with the fields of body and answer.

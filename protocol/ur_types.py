@@ -167,11 +167,7 @@ class SoftwareVersion(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> SoftwareVersion:
-        """Read `3.15`, `3.15.8` or `3.15.8.106339`.
-
-        Raises:
-            LocalProtocolError: the text is not two to four whole numbers with points between.
-        """
+        """Read `3.15`, `3.15.8` or `3.15.8.106339`; LocalProtocolError if the text is none of these."""
         parts = text.strip().split(".")
         if not 2 <= len(parts) <= 4 or not all(part.isascii() and part.isdigit() for part in parts):
             raise LocalProtocolError(
@@ -234,10 +230,7 @@ class Ports:
         """The vendor's ports, all moved by `offset` for machines where they are taken.
 
         Those of Modbus and of the Robot API, far below the others, are 0 (none) where they would leave the
-        TCP ports.
-
-        Raises:
-            LocalProtocolError: a moved port would leave 1..65535.
+        TCP ports. LocalProtocolError if another one would leave 1..65535.
         """
         low, high = 1 - cls().dashboard, 65535 - cls().interpreter
         if not low <= offset <= high:

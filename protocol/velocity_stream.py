@@ -63,11 +63,7 @@ def encode_velocity(mode: VelocityMode, qd: Sequence[float] | NDArray[np.float64
 
 
 def check_hello(data: bytes) -> None:
-    """Check the integer that the robot's program sends when it is ready.
-
-    Raises:
-        RemoteProtocolError: these bytes are not the hello, so something else has connected.
-    """
+    """Raise RemoteProtocolError for bytes that are not the hello: something else has connected."""
     if data != _HELLO:
         raise RemoteProtocolError(
             f"the caller sent {data[:16].hex(' ') or 'nothing'} instead of hello ({_HELLO.hex(' ')})"

@@ -186,8 +186,7 @@ class Codec(Generic[R]):
     def encode(self, source: Any) -> bytes:
         """Bytes of a record, or of any object or mapping that has its fields.
 
-        Raises:
-            LocalProtocolError: a field is missing or its value does not fit its type.
+        LocalProtocolError: a field is missing or its value does not fit its type.
         """
         get = source.__getitem__ if isinstance(source, Mapping) else partial(getattr, source)
         try:
@@ -207,8 +206,7 @@ class Codec(Generic[R]):
     def decode_fields(self, data: bytes) -> dict[str, Any]:
         """Values by field name; surplus bytes at the end are skipped, as the vendor asks of clients.
 
-        Raises:
-            RemoteProtocolError: the bytes end before the fields do.
+        RemoteProtocolError: the bytes end before the fields do.
         """
         return self._decode_from(data, 0)[0]
 
@@ -343,10 +341,8 @@ _codecs: dict[Any, Codec[Any]] = {}
 def codec_for(record: type[R], version: SoftwareVersion, present: tuple[str, ...] = ()) -> Codec[R]:
     """The codec of a record class as software `version` sends it; made once.
 
-    `present` names the conditions (`only_if`) that hold.
-
-    Raises:
-        LocalProtocolError: the software is older than `OLDEST`.
+    `present` names the conditions (`only_if`) that hold. LocalProtocolError if the software is older than
+    `OLDEST`.
     """
     if version < OLDEST:
         raise LocalProtocolError(

@@ -103,8 +103,7 @@ class _Choice:
     def served_at(self, options: BoxOptions, ports: Collection[str]) -> ServedAt:
         """Return where a box with these ports is to be found; they are not open yet.
 
-        Raises:
-            EmulatorError: the numbers of its ports are not all numbers of TCP.
+        EmulatorError if the numbers of its ports are not all numbers of TCP.
         """
         standard, without = standard_ports(options.port_base or 0), {CONTROL, *self.closed}
         return ServedAt(
@@ -131,15 +130,12 @@ class Box:
     def __init__(
         self, options: BoxOptions, *, loop: EventLoop, phase: float = 0.0, lead: float = WAKE_UP
     ) -> None:
-        """Assemble the box; nothing listens before `listen`.
+        """Assemble the box; nothing listens before `listen`. EmulatorError if an argument is not allowed.
 
         Args:
             loop: perhaps shared with other boxes.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
-
-        Raises:
-            EmulatorError: an argument is not among the allowed ones.
         """
         choice = _Choice.of(options)
         prepare_children(Role.WORKER)  # the compiler is loaded while the box is assembled

@@ -30,9 +30,7 @@ class LogEntry:
     """One line of the log.
 
     Attributes:
-        tick: controller cycle in which it was written.
-        time: seconds since controller start.
-        level: how serious it is.
+        tick: controller cycle in which it was written, at `time` seconds since controller start.
         source: part of the box: Program, Controller, Safety, Client, Dashboard.
         text: without line breaks at its end; as a client or a program has sent it.
         code: `C<code>A<argument>` of an error code, "" for everything else.
@@ -56,11 +54,7 @@ def printable(text: str) -> str:
 
 
 class BoxLog:
-    """The last entries; followers are called with new ones.
-
-    Attributes:
-        count: entries written so far, removed ones included.
-    """
+    """The last entries; followers are called with new ones. `count` includes those that were removed."""
 
     def __init__(self, generation: RobotGeneration) -> None:
         """Begin an empty log; the generation of the robot decides how long a cycle is."""

@@ -30,27 +30,9 @@ MAX_BOXES = 200
 
 @dataclass(frozen=True, slots=True)
 class BoxOptions:
-    """Arguments of a box.
+    """Arguments of a box, as `ur_emulator.emulator.ControlBox` describes them.
 
-    Attributes:
-        robot: type of the arm, such as "ur3" or "ur5e", or a file that ends in .toml (docs/fidelity.md).
-        version: software that the box pretends to run; decides layouts and builtins. None: the usual one.
-        host: address to listen on; other machines can reach the box only through an address of theirs.
-        pace: "realtime" or "lockstep".
-        speed: how many times as fast as real time (realtime pace only).
-        seed: of calibration, phases and noise; the same seed is the same arm.
-        fidelity: "exact" (no physics: measured equals asked), "ideal", "typical", "poor", or a file that ends
-            in .toml (docs/fidelity.md).
-        port_base: offset added to all standard ports; None takes free ports.
-        programs: folder of programs and installations, for the dashboard's `load`; None for none.
-        control_port: number of the port for the control API over HTTP (docs/control.md); 0: a free one,
-            None: none.
-        control_token: what requests on that port must show; None: nothing, on a loopback address only.
-        skip_unknown_nodes: run programs of PolyScope without the nodes that are not known, those of URCaps
-            above all; the log names each.
-        remote_control: clients may command the box; False: it starts in local control (e-Series).
-        services: of a PolyScope X box, whose ports stay closed until they are enabled: "primary" and "rtde".
-        generation: in place of that of the arm.
+    `generation` is that of the box in place of the arm's own.
     """
 
     robot: str | PathLike[str] = "ur3"

@@ -46,11 +46,8 @@ class ProcessRack:
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Start the process and have the boxes assembled; nothing listens yet.
 
-        Args:
-            options: arguments of each box. Two boxes need two addresses, or a `port_base` each.
-
-        Raises:
-            EmulatorError: an argument is not among the allowed ones, or there is no process to be had.
+        Two boxes need two addresses, or a `port_base` each. EmulatorError if an argument is not allowed, or
+        there is no process to be had.
         """
         try:
             self._child: Child = start_child(Role.BOX)

@@ -66,11 +66,7 @@ class DashboardCommand:
         return self.done_since is not None and version >= self.done_since
 
     def reply(self, key: str = "ok", /, **values: object) -> str:
-        """The reply line.
-
-        Raises:
-            LocalProtocolError: no such key, or a value that the template names is missing.
-        """
+        """The reply line; LocalProtocolError if the key, or a value that the template names, is missing."""
         template = self.replies.get(key)
         if template is None:
             raise LocalProtocolError(f"{self.name!r} has no reply {key!r}: use {', '.join(self.replies)}")

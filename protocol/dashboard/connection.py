@@ -42,11 +42,7 @@ DashboardEvent = CommandReceived | UnknownCommand
 
 
 class DashboardConnection:
-    """One connection, as the robot sees it.
-
-    Args:
-        commands: those that the robot's software knows, by name.
-    """
+    """One connection, as the robot sees it, with the commands that the robot's software knows, by name."""
 
     def __init__(self, commands: Mapping[str, DashboardCommand]) -> None:
         self._commands = commands
@@ -61,11 +57,7 @@ class DashboardConnection:
         return self._closed
 
     def receive_data(self, data: bytes) -> None:
-        """Take what the socket gave.
-
-        Raises:
-            RemoteProtocolError: a line beyond `MAX_LINE`; close the connection.
-        """
+        """Take what the socket gave; after a RemoteProtocolError, a line beyond `MAX_LINE`, close it."""
         if self._closed:
             return
         self._buffer += data

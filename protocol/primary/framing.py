@@ -51,11 +51,10 @@ NO_TIME = 2**64 - 1
 
 @dataclass(frozen=True, slots=True)
 class SubPackage:
-    """What all sub-packages share.
+    """What all sub-packages share; software of SINCE was the first to send it.
 
     Attributes:
         SUB_TYPE: number on the wire.
-        SINCE: software that first sent the sub-package.
         FIRST_STATE_ONLY: sent in the first state of a connection and when the configuration changes.
     """
 

@@ -87,11 +87,10 @@ _SINCE_3_3 = since((3, 3))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotMessage:
-    """What all messages share.
+    """What all messages share; software of SINCE was the first to send it.
 
     Attributes:
         MESSAGE_TYPE: number on the wire.
-        SINCE: software that first sent the message.
         timestamp: microseconds since controller start, or NO_TIME.
         source: sender, see MessageSource.
     """
@@ -335,8 +334,7 @@ def version_message(
 def encode_message(message: RobotMessage, version: SoftwareVersion) -> bytes:
     """Body of a message package, from the timestamp on, as software `version` sends it.
 
-    Raises:
-        LocalProtocolError: a value does not fit its field, or the message has no table.
+    LocalProtocolError: a value does not fit its field, or the message has no table.
     """
     if message.MESSAGE_TYPE not in _BY_TYPE:
         raise LocalProtocolError(f"{type(message).__name__} has no table and cannot be sent")
@@ -352,8 +350,7 @@ def encode_message(message: RobotMessage, version: SoftwareVersion) -> bytes:
 def decode_message(body: bytes, version: SoftwareVersion) -> RobotMessage:
     """The inverse of `encode_message`; a version message is decoded for the version that it contains.
 
-    Raises:
-        RemoteProtocolError: the body ends before the fields do.
+    RemoteProtocolError: the body ends before the fields do.
     """
     if len(body) < _HEADER.size:
         raise RemoteProtocolError(f"a robot message of {len(body)} bytes is shorter than its header")

@@ -84,9 +84,7 @@ def encode_sub_package(record: type[SubPackage], source: Any, version: SoftwareV
     """One sub-package, header included, as software `version` sends it.
 
     `source` is an instance of `record`, or any object or mapping with fields of these names.
-
-    Raises:
-        LocalProtocolError: a field is missing or its value does not fit its type.
+    LocalProtocolError: a field is missing or its value does not fit its type.
     """
     present = tuple(
         condition
@@ -152,8 +150,7 @@ def state_size(version: SoftwareVersion, *, first: bool) -> int:
 def decode_state(body: bytes) -> RobotState:
     """Read the body of a state package.
 
-    Raises:
-        RemoteProtocolError: sub-package sizes do not add up, or one is shorter than its oldest form.
+    RemoteProtocolError: sub-package sizes do not add up, or one is shorter than its oldest form.
     """
     return RobotState(tuple(decode_sub_package(*part) for part in split_state(body)))
 

@@ -134,8 +134,7 @@ def _types(column: int) -> Mapping[int, ValueType]:
 def encode_value(value: TypedValue, version: SoftwareVersion) -> bytes:
     """Code and value as software `version` sends them; a float beyond 32 bits becomes infinite.
 
-    Raises:
-        LocalProtocolError: this software does not have the type, or the value is not one of it.
+    LocalProtocolError: this software does not have the type, or the value is not one of it.
     """
     try:
         return _encode(value, value_codes(version), 0)
@@ -187,8 +186,7 @@ def _encode_float(number: float) -> bytes:
 def decode_value(data: bytes, position: int, version: SoftwareVersion) -> tuple[TypedValue, int]:
     """Read the value that begins at `position`; returns it and where it ends.
 
-    Raises:
-        RemoteProtocolError: the data end before the value does, or its type is unknown.
+    RemoteProtocolError: the data end before the value does, or its type is unknown.
     """
     try:
         return _decode(data, position, _types(_column(version)), 0)
@@ -268,9 +266,7 @@ _SIMPLE: dict[ValueType, tuple[Callable[[Any], bytes], Callable[[bytes, int], tu
 class ProgramStateMessage:
     """What all program state messages share.
 
-    Attributes:
-        SUB_TYPE: number on the wire.
-        timestamp: microseconds since controller start, or NO_TIME.
+    The time stamp is in microseconds since controller start, or NO_TIME; SUB_TYPE is the number on the wire.
     """
 
     SUB_TYPE: ClassVar[int]
@@ -376,8 +372,7 @@ def _package(timestamp: int, sub_type: int, body: bytes) -> bytes:
 def decode_program_state(body: bytes, version: SoftwareVersion) -> ProgramStateMessage:
     """Read the body of a package of type 25, from the timestamp on.
 
-    Raises:
-        RemoteProtocolError: the body ends before its fields do, or a value has no known type.
+    RemoteProtocolError: the body ends before its fields do, or a value has no known type.
     """
     if len(body) < _HEADER.size:
         raise RemoteProtocolError(f"a program state message of {len(body)} bytes is shorter than its header")

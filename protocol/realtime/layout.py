@@ -224,11 +224,7 @@ class RealtimeLayout:
         return LENGTH_SIZE + _FLOAT_SIZE * int(self.slices[column.attribute].start)
 
     def decode(self, frame: bytes) -> RealtimeFrame:
-        """Read one whole frame, length prefix included.
-
-        Raises:
-            RemoteProtocolError: the frame is not of this layout's size, by its length or by its prefix.
-        """
+        """Read one whole frame, length prefix included; RemoteProtocolError if its size is another."""
         if len(frame) != self.size or not frame.startswith(self._prefix):
             raise RemoteProtocolError(
                 f"a realtime frame of this robot has {self.size} bytes, this one {len(frame)} "
@@ -309,11 +305,7 @@ def _make_frame_type(layout: RealtimeLayout) -> type[RealtimeFrame]:
 
 @cache
 def layout_for_size(size: int) -> RealtimeLayout:
-    """The layout of frames of `size` bytes.
-
-    Raises:
-        RemoteProtocolError: no software sends frames of that size.
-    """
+    """The layout of frames of `size` bytes; RemoteProtocolError if no software sends such frames."""
     known = sorted({known_size for _, known_size in VERSIONS})
     if size not in known:
         raise RemoteProtocolError(
@@ -324,11 +316,7 @@ def layout_for_size(size: int) -> RealtimeLayout:
 
 
 def layout_for_version(version: SoftwareVersion) -> RealtimeLayout:
-    """The layout that a controller with this software sends.
-
-    Raises:
-        LocalProtocolError: no controller software has that version.
-    """
+    """The layout of a controller with this software; LocalProtocolError if there is no such software."""
     return layout_for_size(frame_size(version))
 
 

@@ -29,9 +29,7 @@ ClientEvent = codec.Reply | codec.RtdeTextMessage | DataReceived
 class RtdeClientConnection:
     """One connection, as the PC sees it.
 
-    Attributes:
-        protocol_version: 1 until another one is agreed on.
-        state: whether data packages flow.
+    `protocol_version` is 1 until another one is agreed on; `state` says whether data packages flow.
     """
 
     def __init__(self) -> None:

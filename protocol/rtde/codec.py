@@ -220,8 +220,7 @@ MAX_NAMES_SIZE = 2048
 def encode_message(message: Message, sender: Role, version: int) -> bytes:
     """Bytes of a package in a version of the protocol; only text messages depend on who sends them.
 
-    Raises:
-        LocalProtocolError: a name, text or number has no place on the wire.
+    LocalProtocolError: a name, text or number has no place on the wire.
     """
     try:
         kind, payload = _encode_payload(message, sender, version)
@@ -311,8 +310,7 @@ def _encode_names(names: tuple[str, ...]) -> bytes:
 def take_package(buffer: bytearray, max_size: int) -> tuple[int, bytes] | None:
     """Remove the first package from received bytes: its type byte and payload, or None if it is not whole.
 
-    Raises:
-        RemoteProtocolError: the header announces less than itself or more than `max_size` bytes.
+    RemoteProtocolError: the header announces less than itself or more than `max_size` bytes.
     """
     if len(buffer) < 2:
         return None
@@ -332,10 +330,8 @@ def take_package(buffer: bytearray, max_size: int) -> tuple[int, bytes] | None:
 def decode_message(kind: int, payload: bytes, sender: Role, version: int) -> Message | None:
     """Package from its type byte and what follows, or None if the type is unknown.
 
-    Surplus bytes after a fixed payload are skipped.
-
-    Raises:
-        RemoteProtocolError: the payload is too short for its type.
+    Surplus bytes after a fixed payload are skipped. RemoteProtocolError: the payload is too short for its
+    type.
     """
     decode = (_FROM_PC if sender is Role.PC else _FROM_ROBOT).get(kind)
     if decode is None:

@@ -83,14 +83,10 @@ def recipe_of(fields: Sequence[RtdeField]) -> Recipe:
 def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[Any], bytes]:
     """Make a function from snapshot to data package; the same one for the same recipe.
 
-    Args:
-        fields: the variables, all of them outputs.
-        header: the bytes before the values, the same in every package.
-
-    Returns:
-        A function of an object that has the attributes named by the fields' `comes_from`: tuples of numbers
-        for vectors, numbers otherwise. It raises `LocalProtocolError` when a value does not fit its type and
-        `AttributeError` when the object lacks an attribute.
+    The fields are outputs; the header is the same in every package. The function takes an object that has the
+    attributes named by the fields' `comes_from`: tuples of numbers for vectors, numbers otherwise. It raises
+    `LocalProtocolError` when a value does not fit its type and `AttributeError` when the object lacks an
+    attribute.
     """
     return _make_encoder(tuple(fields), header)
 

@@ -119,8 +119,7 @@ class RtdeServerConnection:
 
     Args:
         version: software of the robot, sent to clients on request.
-        outputs: variables that a client can subscribe to, by name.
-        inputs: variables that a client can write, by name.
+        outputs, inputs: variables that a client can subscribe to, and write, by name.
 
     Attributes:
         protocol_version: 1 until another one is agreed on.
@@ -152,11 +151,8 @@ class RtdeServerConnection:
     def next_event(self) -> ServerEvent | None:
         """The next package as an event, or None when more bytes are needed.
 
-        Data and text that cannot be read are skipped.
-
-        Raises:
-            RemoteProtocolError: the stream cannot be trusted any more; every further call raises again.
-            LocalProtocolError: the last request has no reply yet.
+        Data and text that cannot be read are skipped. RemoteProtocolError: the stream cannot be trusted any
+        more; every further call raises again. LocalProtocolError: the last request has no reply yet.
         """
         if self._unanswered is not None:
             raise LocalProtocolError(f"{self._unanswered!r} has no reply yet: one for each, in order")

@@ -35,9 +35,7 @@ class Compliance:
     """Requests for freedrive and force mode.
 
     Attributes:
-        by_program: a program has requested freedrive.
-        by_client: `set robotmode freedrive` has.
-        by_input: an input or the teach button has, and it acts.
+        by_program, by_client, by_input: who has requested freedrive; an input or the teach button also acts.
         force_mode: the overlay of force mode; None without it.
         force_damping: as programs have set it, for a force mode to come; 0..1.
         force_gain_scaling: likewise, 0..2.

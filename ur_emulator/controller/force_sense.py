@@ -63,9 +63,7 @@ _ONSET_SHARE = 0.2
 class ForceSense:
     """The wrench at the flange, in base axes [N, Nm], as measured from cycle to cycle.
 
-    Attributes:
-        zero: wrench that counts as zero; None until a program has set it.
-        sensor: an external sensor, which takes the place of the estimate; None without one.
+    `zero` counts as zero once a program has set it; an external sensor takes the place of the estimate.
     """
 
     def __init__(self, generation: RobotGeneration) -> None:

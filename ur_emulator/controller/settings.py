@@ -131,7 +131,6 @@ class PlanningSettings:
     Attributes:
         motion_version: 1, or 2: movej and movel are jerk-limited, and their limits are those of the arm.
         jerk_gain: share of the jerk limit, 0.01 to 1.
-        tool_wrench_limit: None if there is none.
     """
 
     motion_version: int = 1

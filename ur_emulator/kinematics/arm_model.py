@@ -54,14 +54,12 @@ _LONGEST_STEP = 0.5  # rad; greatest step of Newton's method, for convergence ne
 
 
 class CartesianState(NamedTuple):
-    """The Cartesian state of the arm, in the base frame.
+    """The Cartesian state of the arm, in the base frame: positions [m], speeds [m/s, rad/s].
 
     Attributes:
         tcp_pose: of the tool centre point [m, rad].
-        tcp_speed: its twist in base axes, linear first [m/s, rad/s].
-        elbow_position: origin of the second DH frame, on the axis of joint 3 [m].
-        elbow_velocity: [m/s].
-        flange_position: [m].
+        tcp_speed: its twist in base axes, linear first.
+        elbow_position: origin of the second DH frame, on the axis of joint 3.
         momentum: norm of the arm's linear momentum, without a payload [kg m/s].
     """
 

@@ -12,14 +12,7 @@ from ur_emulator.models.robot_model import ZERO6, DhRow, RobotModel, Vector6, si
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Differences to add to a nominal DH table, in the controller's own naming.
-
-    Attributes:
-        delta_theta: joint zero offsets [rad].
-        delta_a: [m].
-        delta_d: [m].
-        delta_alpha: [rad].
-    """
+    """Differences to add to a nominal DH table [rad, m], in the controller's own naming."""
 
     delta_theta: Vector6 = ZERO6
     delta_a: Vector6 = ZERO6

@@ -254,15 +254,11 @@ class ForceSensing:
 class Software:
     """One version of the software; `RobotGeneration.software` makes it.
 
+    Its tables are those of the generation, with what the version has; commands and variables by name.
+
     Attributes:
         version: four numbers; the last is the build.
         built: when; in the time of the box.
-        dashboard: commands of the dashboard server, by name.
-        robot_api: calls of the Robot API.
-        realtime: layout of the frames on port 30003.
-        sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
-        rtde_outputs: variables that a client can subscribe to, by name.
-        rtde_inputs: variables that a client can write, by name.
         has_interpreter: statements can be sent to a program in interpreter mode.
     """
 

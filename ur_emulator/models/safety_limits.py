@@ -45,9 +45,7 @@ class SafetyLimits:
         recovery_speed: joint speed of recovery mode [rad/s].
         speed_margin: how far a joint may exceed its rated speed before the safety system stops it [rad/s].
         acceleration: largest joint acceleration that the configuration data announce [rad/s^2].
-        reduced: in reduced mode.
-        recovery: in recovery mode.
-        manual: in the operational mode MANUAL, where the generation has it.
+        reduced, recovery, manual: in these modes, where the generation has them.
         has_programs_in_recovery: programs run in recovery mode.
         brakes_within_torque: a stop brakes no harder than the drives can with the declared payload.
     """

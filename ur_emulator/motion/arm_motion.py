@@ -389,14 +389,10 @@ class ArmMotion:
     # --- the cycle
 
     def step(self, dt: float, scale: float) -> JointTarget:
-        """Advance one cycle and return the new target.
+        """Advance one cycle of `dt` [s] and return the new target.
 
-        Args:
-            dt: duration of a cycle [s].
-            scale: commanded speed scaling, 0..1; during a motion it is reached gradually.
-
-        Raises:
-            UnreachableError: the arm cannot reach the path there.
+        `scale` is the commanded speed scaling, 0..1; during a motion it is reached gradually.
+        UnreachableError if the arm cannot reach the path there.
         """
         if self._is_special:
             return self._special_step(dt, scale)

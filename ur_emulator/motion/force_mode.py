@@ -148,14 +148,12 @@ class ArmMeasurement(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ForceSettings:
-    """Arguments of force_mode, and the damping and gain scaling set before it.
+    """Arguments of force_mode, and the damping (0..1) and gain scaling (0..2) set before it.
 
     Attributes:
         selection: by axis of the task frame, True for compliant.
         wrench: demanded from the tool on its environment, task axes [N, Nm].
         limits: speed of compliant axes [m/s, rad/s], deviation of stiff ones [m, rad].
-        damping: 0..1.
-        gain_scaling: 0..2.
     """
 
     selection: tuple[bool, ...]

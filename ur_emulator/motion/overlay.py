@@ -45,12 +45,9 @@ class LastDisplacement:
     LINEAR, ANGULAR = 1.0, 4.0
 
     def __init__(self, tool: Tool, shift: Pose, velocity: Vector6) -> None:
-        """Keep a displacement.
+        """Keep a displacement of a tool, and its rate of change [m/s, rad/s].
 
-        Args:
-            tool: whose pose it displaces.
-            shift: displacement in base axes: added to the position, turned onto the rotation [m, rad].
-            velocity: its rate of change [m/s, rad/s].
+        `shift` is in base axes: added to the position, turned onto the rotation [m, rad].
         """
         self.tool = tool
         self._shift = shift
@@ -101,16 +98,10 @@ class OverlayChain:
         self._shifts.clear()
 
     def displace(self, path: JointTarget, before: JointTarget, dt: float, share: float) -> JointTarget:
-        """Return the displaced target.
+        """Return the displaced target, from that along the path and the displaced one `before`.
 
-        Args:
-            path: target along the path at the end of the cycle.
-            before: displaced target at the end of the last one.
-            dt: control cycle [s].
-            share: part of it that the overlays advance by; 0 while they stand still.
-
-        Raises:
-            UnreachableError: the arm cannot be where the overlays want it.
+        The overlays advance by a share of the cycle `dt` [s]; 0 while they stand still. UnreachableError if
+        the arm cannot be where they want it.
         """
         arm = self.overlays[0].tool.arm
         flange = arm.fk(path.q)

@@ -146,15 +146,10 @@ class PoseArc:
     def __init__(
         self, start: Sequence[float], centre: Vector3, axis: Vector3, angle: float, goal: Pose, *, fixed: bool
     ) -> None:
-        """Describe the arc; `arc_through` finds the numbers.
+        """Describe the arc by what `arc_through` finds: its centre [m], and a unit vector as axis.
 
-        Args:
-            start: first pose.
-            centre: of the circle [m].
-            axis: unit vector of the rotation.
-            angle: turned in all, above 0 [rad].
-            goal: pose at the end.
-            fixed: the orientation turns with the tangent; that of `goal` is ignored.
+        The whole angle is above 0 [rad]. `fixed`: the orientation turns with the tangent; that of the goal is
+        ignored.
         """
         self._start = start
         self._centre = centre
@@ -193,13 +188,8 @@ def arc_through(
     """Return the arc from `start` through the position of `via` to `goal`.
 
     If the points are on a line, or two coincide, there is no circle: the tool moves in a straight line to the
-    goal (chosen, not documented).
-
-    Args:
-        start: first pose.
-        via: its rotation is ignored.
-        goal: last pose.
-        fixed: mode 1 of movec: orientation fixed to the tangent, the goal's rotation is ignored.
+    goal (chosen, not documented). `fixed` is mode 1 of movec: the orientation is fixed to the tangent, the
+    goal's rotation is ignored.
     """
     a, b, c = _position(start), _position(via), _position(goal)
     ab, ac = _minus(b, a), _minus(c, a)

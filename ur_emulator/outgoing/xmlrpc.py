@@ -186,13 +186,7 @@ class XmlRpcClient:
     """The servers that the scripts of one box call, and the connections to them."""
 
     def __init__(self, loop: EventLoop, connect: Callable[[str, int], ScriptSocket], report: Report) -> None:
-        """Prepare; nothing is connected before the first call.
-
-        Args:
-            loop: advances the calls.
-            connect: begins to connect to a host and port.
-            report: called with an error of ours and what it has ended.
-        """
+        """Prepare; nothing is connected before the first call. `report` gets errors of ours."""
         self._loop = loop
         self._report = report
         self.connect = connect

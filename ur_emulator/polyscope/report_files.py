@@ -37,11 +37,7 @@ class TemporaryFolder:
     """A folder for one box."""
 
     def __init__(self) -> None:
-        """Make it.
-
-        Raises:
-            OSError: it cannot be made.
-        """
+        """Make it; OSError if that fails."""
         while True:
             self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
             # Before it is locked, another box may take it for one that was left, and remove it.

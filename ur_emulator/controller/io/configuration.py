@@ -36,9 +36,7 @@ _INPUTS = {f"{group.name}_digital": group for group in (STANDARD, CONFIGURABLE, 
 class IoConfiguration:
     """What programs have configured; it stays when they end.
 
-    Attributes:
-        modbus: signals of other units, with actions and rules of their own.
-        input_actions: (group, index) to the action, where it is not the default.
+    `input_actions` are those of (group, index) where it is not the default.
     """
 
     io: InputOutput

@@ -46,13 +46,9 @@ ANALOG_RANGE = {CURRENT: (0.004, 0.020), VOLTAGE: (0.0, 10.0)}
 
 @dataclass(slots=True)
 class AnalogLines:
-    """All analogue lines of a box: standard inputs, standard outputs, tool inputs, two each.
+    """All analogue lines of a box: standard inputs, standard outputs, tool inputs, two each [V or A].
 
     They are kept as what is published every cycle: a write makes new tuples, a cycle without one nothing.
-
-    Attributes:
-        domains: CURRENT or VOLTAGE of each line.
-        values: of each line [A or V].
     """
 
     domains: tuple[int, ...] = (VOLTAGE, VOLTAGE, CURRENT, CURRENT, VOLTAGE, VOLTAGE)
@@ -111,10 +107,8 @@ class ToolLine(NamedTuple):
     """Settings of the serial line at the tool of an e-Series arm.
 
     Attributes:
-        is_enabled: it is in use.
         baud_rate: bits a second.
         parity: 0 none, 1 odd, 2 even.
-        stop_bits: 1 or 2.
         rx_idle_chars: characters of silence before what was received is passed on.
         tx_idle_chars: the same before sending.
     """

@@ -43,12 +43,8 @@ def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Viol
 class SetpointCheck:
     """Checks each set-point before the joints get it.
 
-    Joint ranges include the distance that a protective stop needs, so that the arm comes to rest within
-    them. A joint outside its range, because something pushed it, may move back.
-
-    Args:
-        stop_deceleration: of a protective stop [rad/s^2].
-        period_s: control cycle [s].
+    Joint ranges include the distance that a protective stop needs, with its deceleration [rad/s^2], so that
+    the arm comes to rest within them. A joint outside its range, because something pushed it, may move back.
     """
 
     def __init__(self, stop_deceleration: float, period_s: float) -> None:
@@ -118,13 +114,10 @@ def torque_shares(robot: RobotModel, currents: tuple[float, ...]) -> list[float]
 
 
 class HighHoldingTorque:
-    """Whether a resting arm gives way further, with all torque of its drives, before it is stopped.
+    """Whether a resting arm gives way further, by `deviation` [rad], with all torque, before it is stopped.
 
     Source: URScript manual e-Series 5.15, high_holding_torque_disable: while a program runs, no joint moves
     faster than 0.01 rad/s, and the target rests. Chosen: once it has begun it lasts until the target moves.
-
-    Args:
-        deviation: of a joint at which such an arm is stopped [rad].
     """
 
     def __init__(self, deviation: float) -> None:

@@ -39,12 +39,9 @@ class ProgramEffect(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ModeRow:
-    """A safety mode.
+    """A safety mode, and what it does to the arm and to the program.
 
     Attributes:
-        mode: its number.
-        arm: what it does to the arm.
-        program: what it does to the program.
         latches: its cause is not a button or input that somebody releases.
         remedy: what to do about it, for messages.
         why: source of the above.

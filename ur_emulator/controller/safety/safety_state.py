@@ -20,11 +20,9 @@ class SafetySettings:
     """The safety configuration in an installation; limits are None where it gives none.
 
     Attributes:
-        q_min: lower ends of the joint ranges [rad]; minus infinity where a joint has no limit.
-        q_max: upper ends [rad].
-        joint_speed: [rad/s].
-        reduced_joint_speed: in reduced mode [rad/s].
-        reduced_arm: in reduced mode.
+        q_min, q_max: ends of the joint ranges [rad]; infinite where a joint has no limit.
+        joint_speed, reduced_joint_speed: the second in reduced mode [rad/s].
+        arm, reduced_arm: likewise.
         unwatched: settings that the safety system does not watch, for the log.
         inputs: pairs of configurable inputs with functions that need operational modes.
     """
@@ -48,13 +46,10 @@ class ConfiguredLimits:
     """Limits of an arm.
 
     Attributes:
-        q_min: lower ends of the ranges [rad].
-        q_max: upper ends [rad].
+        q_min, q_max: ends of the joint ranges [rad].
         speed: at which the arm is stopped [rad/s].
-        reduced_speed: allowed in reduced mode [rad/s].
-        recovery_speed: allowed in recovery mode [rad/s].
-        arm: beside those of the joints.
-        reduced_arm: in reduced mode.
+        reduced_speed, recovery_speed: allowed in these modes [rad/s].
+        arm, reduced_arm: beside those of the joints; the second in reduced mode.
     """
 
     q_min: Vector6
