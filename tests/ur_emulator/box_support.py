@@ -14,7 +14,7 @@ from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.command import Submitted
-from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.controller import SETTLE_TIME, Controller
 from ur_emulator.loop.pacing import RealtimePacer
 from ur_emulator.loop.served_box import BoxIdentity, ServedBox
 from ur_emulator.models.generations import CB3
@@ -146,11 +146,16 @@ class Bench:
         return self.tick(1, StartProgram(compile_program(text), loaded=loaded))
 
     def run(self, text, limit=5000):
-        """Run a program to its end and the arm to rest; return the texts it printed."""
-        first = len(self.events)
+        """Run a program to its end and the arm to rest; return the texts it printed.
+
+        What is locked after a protective stop is not waited for.
+        """
+        first, box, rested = len(self.events), self.controller, 0
         self.start(text)
         for _ in range(limit):
-            if not self.controller.is_active:
+            moves = box.programs.has_work or box.state.motion.is_moving or box.state.mode.is_changing
+            rested = 0 if moves or box.safety.is_stopping else rested + 1
+            if not box.is_active or rested > box.generation.cycles(2 * SETTLE_TIME):
                 break
             self.tick()
         else:

@@ -110,7 +110,7 @@ ODD = st.recursive(
 
 
 @EVERY
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_whatever_comes_fits_or_is_refused_in_one_line(name, data):
     for parameter in OPERATIONS[name].parameters:
