@@ -112,7 +112,7 @@ class PeerNetwork(FakeNetwork):
 class Box(Bench):
     """A bench that takes bytes as a script port does."""
 
-    def __init__(self, *, peers=None, servers=None, software="3.15", robot="ur3", fidelity="ideal", seed=7):
+    def __init__(self, *, peers=None, servers=None, software="3.15", robot="ur3", fidelity="exact", seed=7):
         self.network = PeerNetwork(peers or {}, servers or {})
         self.controller = Controller(
             robot_by_name(robot), CB3.fidelity(fidelity), seed, partial(robot_hosts, network=self.network)

@@ -134,7 +134,9 @@ class WatchedBox(Box):
 
     def __init__(self):
         super().__init__(
-            peers={30001: frames(b"(1,2)"), 63352: peer, 1: None}, servers={"http://a": Server()}
+            peers={30001: frames(b"(1,2)"), 63352: peer, 1: None},
+            servers={"http://a": Server()},
+            fidelity="ideal",
         )
         self.robot = self.controller.state.robot
 
