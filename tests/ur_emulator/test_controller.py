@@ -121,7 +121,7 @@ SPIN = "def spin():\n  while True:\n    speedj([0.2,0,0,0,0,0], 2.0, get_steptim
 
 @pytest.fixture
 def bench():
-    return Bench(fidelity="ideal")
+    return Bench(fidelity="exact")
 
 
 def test_even_the_shortest_program_is_seen_to_run(bench):

@@ -94,7 +94,7 @@ def test_programs_have_its_builtins(box):
 
 
 def test_an_arm_is_as_good_as_one_of_its_fidelities():
-    bench = Bench(generation=SECOND, fidelity="ideal")
+    bench = Bench(generation=SECOND, fidelity="exact")
     assert bench.controller.plant.dead_time == pytest.approx(CB3.fidelity("ideal").dead_time + 0.004)
     with pytest.raises(EmulatorError, match="unknown fidelity 'poor': choose one of exact, ideal, typical"):
         ControlBox(in_process=True, fidelity="poor", generation=SECOND)
@@ -204,7 +204,7 @@ def test_what_takes_time_takes_the_same_time(generation, text, seconds):
 
 @every_generation
 def test_a_stream_of_speedj_reaches_its_speed_and_goes_as_far(generation):
-    bench = Bench(generation=generation, fidelity="ideal")
+    bench = Bench(generation=generation, fidelity="exact")
     q_before = bench.now.actual_q[0]
     bench.start(body("while True:\n  speedj([0.2, 0, 0, 0, 0, 0], 1, get_steptime())\nend"))
     bench.tick(generation.cycles(1.0))
@@ -216,7 +216,7 @@ def test_a_stream_of_speedj_reaches_its_speed_and_goes_as_far(generation):
 
 @every_generation
 def test_a_stream_of_servoj_follows_in_the_same_time(generation):
-    bench = Bench(generation=generation, fidelity="ideal")
+    bench = Bench(generation=generation, fidelity="exact")
     q_before = bench.now.actual_q[0]
     bench.start(
         body(

@@ -113,7 +113,7 @@ def test_a_polygon_that_is_nearly_a_circle_has_the_speed_of_one():
 
 
 def test_a_program_with_waypoints_close_together_runs_ahead_but_not_far():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     place = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
     bench.run(f"movej({place}, a=8, v=3)\n")
     bench.snapshots.clear()
@@ -162,7 +162,7 @@ def test_an_arc_begins_at_the_waypoint_before_it_also_where_blends_overlap(fixed
 
 
 def test_a_program_that_only_moves_to_one_place_with_a_blend_still_takes_time():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.start("def f():\n  p0 = get_target_tcp_pose()\n  while True:\n    movel(p0, r=0.01)\n  end\nend\n")
     bench.tick(20)
     assert bench.controller.programs.is_running
@@ -422,7 +422,7 @@ def test_the_waypoint_is_that_of_the_move_under_way_also_when_more_are_known():
     "second", ["movel(pose_add(p0,p[2,0,0,0,0,0]))", "movec(p0,pose_add(p0,p[0,3,0,0,0,0]))"]
 )
 def test_a_path_out_of_reach_after_a_blend_is_a_protective_stop_and_no_more(first, second):
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
     bench.events.clear()
     bench.start(
@@ -435,7 +435,7 @@ def test_a_path_out_of_reach_after_a_blend_is_a_protective_stop_and_no_more(firs
 
 
 def test_another_tool_does_not_join_a_chain():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
     bench.snapshots.clear()
     bench.run(

@@ -157,7 +157,7 @@ POSE = (0.25, -0.25, 0.25, 2.2, -2.2, 0.0)
 
 @pytest.fixture
 def bench():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.run(f"movej({PLACE}, a=8, v=3)\n")
     bench.events.clear()
     bench.snapshots.clear()
@@ -204,7 +204,7 @@ def test_servoc_may_be_called_with_the_same_pose_all_the_time(bench):
 def test_a_duration_that_the_arm_cannot_keep_is_made_longer(robot, generation, r):
     """As the maker's live tests ask: no stop."""
     bench = Bench(robot=robot, generation=generation)
-    bench.run("movej([-1.57,-1.57,0,-1.57,1.57,0], t=4)\n")
+    bench.run("set_pos([-1.57,-1.57,0,-1.57,1.57,0])\n")
     bench.run(
         f"def f():\n  movej([1.57,-1.57,0,-1.57,1.57,0], t=0.1, r={r})\n  movej([1.2,-1.4,-1.9,-1.4,1.57,0], t=0.1)\n"
         "  p = get_target_tcp_pose()\n  p[2] = p[2] - 0.1\n  movel(p, t=0.05)\nend\n"

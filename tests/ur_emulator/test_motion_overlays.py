@@ -235,7 +235,7 @@ def test_the_estimate_of_a_steady_belt_has_no_lag(first, speed):
 
 
 def test_a_count_that_jumps_never_makes_the_arm_jump():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
     bench.snapshots.clear()
     bench.start(

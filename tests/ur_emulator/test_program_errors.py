@@ -156,7 +156,7 @@ OVERLAPPING = (
     ],
 )  # fmt: skip
 def test_codes_and_levels(program, code, level):
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.start(program)
     bench.tick(400)
     (report,) = [e for e in bench.events if isinstance(e, ErrorReported)]
@@ -195,7 +195,7 @@ THREADS = (
     ],
 )
 def test_with_the_main_thread_everything_ends(end, error):
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.start(THREADS.replace("{end}", end))
     bench.tick(10)
     count = bench.controller.state.registers.outputs.integers[0]
@@ -212,7 +212,7 @@ def test_with_the_main_thread_everything_ends(end, error):
 
 def test_what_a_program_leaves_and_what_it_does_not():
     """Flags, TCP, payload and registers stay; watchdogs, sockets and pause codes go."""
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.run(
         "def f():\n  set_flag(3, True)\n  set_tcp(p[0,0,0.1,0,0,0])\n  set_payload(1.5, [0,0,0.1])\n"
         "  write_output_float_register(2, 0.5)\n  pause_on_error_code(153)\n"

@@ -76,7 +76,7 @@ class PortBench(Bench):
     """A bench with a primary port, published as a served box does."""
 
     def __init__(self, version=VERSION, *, all_messages=True):
-        super().__init__(fidelity="ideal")
+        super().__init__(fidelity="exact")
         self.port = PrimaryPort(
             CB3.software(version),
             self.controller,

@@ -222,7 +222,7 @@ def test_a_program_in_the_middle_of_its_cycle_does_not_wait_outside():
 
 @pytest.mark.parametrize("call", ['textmsg("hello ", i)', 'popup("hello", blocking=False)'])
 def test_messages_of_a_flood_are_bounded(call):
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.start(forever(call, 3_000))
     bench.tick(20)
     bench.events.clear()
@@ -232,7 +232,7 @@ def test_messages_of_a_flood_are_bounded(call):
 
 @pytest.mark.parametrize(("generation", "units"), [(CB3, 30_000), (E_SERIES, 7_500)])
 def test_a_cycle_has_its_part_of_the_units_of_8_ms(generation, units):
-    bench = Bench(fidelity="ideal", generation=generation)
+    bench = Bench(fidelity="exact", generation=generation)
     bench.start(forever("x = i", 50_000))
     bench.tick(20)
     used = []
@@ -249,7 +249,7 @@ def test_a_cycle_has_its_part_of_a_budget_and_at_least_one(period, part):
 
 def test_on_an_e_series_a_cycle_takes_the_longer_the_more_programs_do():
     def times(body):
-        bench = Bench(fidelity="ideal", robot="ur5e", generation=E_SERIES)
+        bench = Bench(fidelity="exact", robot="ur5e", generation=E_SERIES)
         own = bench.now.actual_execution_time
         bench.start(f"def p():\n  while True:\n{body}    sync()\n  end\nend\n")
         bench.tick(5)
@@ -275,7 +275,7 @@ def few_secondary_units(monkeypatch):
 
 @pytest.mark.usefixtures("few_secondary_units")
 def test_secondary_programs_share_units_of_their_own_and_come_in_turn():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.start("def p():\n  while True:\n    sync()\n  end\nend\n")
     for i in range(3):
         bench.start(f"sec s():\n{LOOP.format(n=8_000, body='x = i')}    textmsg({i})\nend\n")
@@ -292,7 +292,7 @@ def test_secondary_programs_share_units_of_their_own_and_come_in_turn():
 
 @pytest.mark.usefixtures("few_secondary_units")
 def test_a_secondary_program_that_fails_later_is_reported_and_gone():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.start(f"sec s():\n{LOOP.format(n=8_000, body='x = i')}    x = 1 / 0\nend\n")
     bench.tick(10)
     assert [e.text for e in bench.events if type(e).__name__ == "ScriptFailed"] == ["division by zero"]
@@ -300,7 +300,7 @@ def test_a_secondary_program_that_fails_later_is_reported_and_gone():
 
 
 def test_secondary_programs_that_come_faster_than_they_end_are_refused():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     sec = StartProgram(compile_program(f"sec s():\n{LOOP.format(n=50_000, body='x = i')}end\n"))
     bench.tick(1, *[sec] * (BUDGETS.secondary_programs + 2))
     refused = [event.text for event in bench.events if isinstance(event, ScriptFailed)]

@@ -142,7 +142,7 @@ def test_the_arm_may_go_back_from_a_plane_and_along_it():
     ],
 )
 def test_a_plane_is_a_limit_in_its_mode_only(mode, is_reduced, stops):
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.tick(1, plane(*ahead(bench, 0.05), mode), ReducedMode(is_reduced))
     bench.run(turn(0.5))
     assert ("PROTECTIVE_STOP" in modes(bench)) is stops
@@ -179,7 +179,7 @@ def test_recovery_ends_when_the_tool_is_back():
 
 @pytest.mark.parametrize("restricts", [False, True])
 def test_the_elbow_is_held_where_the_plane_restricts_it(restricts):
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     elbow = np.array(bench.now.space.actual.elbow_position)
     way = (elbow - tcp(bench)) * (1.0, 1.0, 0.0)  # the TCP is on the other side, and stays behind
     way /= np.linalg.norm(way)
@@ -223,7 +223,7 @@ def test_reduced_mode_of_a_plane_ends_when_the_plane_goes_and_stays_for_an_input
 
 
 def test_beyond_the_trigger_the_arm_is_slow():
-    bench = Bench(fidelity="ideal")
+    bench = Bench(fidelity="exact")
     bench.tick(2, plane(*ahead(bench, -0.05), "trigger reduced mode"))
     bench.run(turn(2.0, 3.0))
     assert bench.now.safety_mode == SafetyMode.REDUCED

@@ -54,7 +54,7 @@ FAST = (
 
 @pytest.fixture
 def bench():
-    return Bench(robot="ur5e", generation=E_SERIES, fidelity="ideal")
+    return Bench(robot="ur5e", generation=E_SERIES, fidelity="exact")
 
 
 def run(bench):
@@ -269,7 +269,7 @@ def test_a_mode_that_begins_slows_a_moving_arm_down(bench):
 
 
 def test_no_program_starts_in_recovery_mode():
-    bench = Bench(robot="ur5e", generation=E_SERIES, fidelity="ideal", mode=RobotMode.POWER_OFF)
+    bench = Bench(robot="ur5e", generation=E_SERIES, fidelity="exact", mode=RobotMode.POWER_OFF)
     q = (bench.controller.state.robot.q_max[0] + 0.05, *bench.now.actual_q[1:])
     bench.controller.plant.reset(q)
     bench.controller.state.motion.place(q)

@@ -115,7 +115,7 @@ def test_what_lies_under_a_mode_comes_back():
 
 
 def enter(mode, *, loaded=False):
-    bench = moving(fidelity="ideal", loaded=loaded)
+    bench = moving(fidelity="exact", loaded=loaded)
     entry = ENTRY[mode]
     if mode is M.RECOVERY:
         bench.controller.safety.handle(E.RANGE_LEFT)

@@ -258,7 +258,7 @@ MODES = [mode for mode in ENTRY if mode is not SafetyMode.RECOVERY]
 
 @pytest.mark.parametrize("mode", MODES)
 def test_ports_agree_in_every_cycle_of_a_mode(mode):
-    bench = moving(fidelity="ideal")
+    bench = moving(fidelity="exact")
     check_wires(bench)
     bench.tick(1, *([COMMANDS[ENTRY[mode]]] if ENTRY[mode] else []))
     for _ in range(BRAKING):
@@ -269,7 +269,7 @@ def test_ports_agree_in_every_cycle_of_a_mode(mode):
 
 
 def test_ports_agree_in_recovery_and_while_powering_up():
-    bench = moving(fidelity="ideal")
+    bench = moving(fidelity="exact")
     bench.tick(1, COMMANDS[SafetyEvent.POWERED_OFF])
     bench.tick(1, ReleaseBrakes())
     for _ in range(250):
