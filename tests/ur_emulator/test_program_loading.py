@@ -195,11 +195,12 @@ def test_a_packed_file_ends_at_its_end(tmp_path):
     assert load(tmp_path, data + bytes(100)).script(str) == load(tmp_path, data).script(str)
 
 
-def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path):
-    (tmp_path / "s.urp").write_bytes(urp("<Comment/>" * 20_000))
+def test_the_budgets_hold_for_all_files_of_a_program_together(tmp_path, monkeypatch):
+    monkeypatch.setattr(reader, "BUDGETS", replace(BUDGETS, program_marks=3_000))
+    (tmp_path / "s.urp").write_bytes(urp("<Comment/>" * 200))
     call = "<CallSubProgram><subprogram><programFile>s.urp</programFile></subprogram></CallSubProgram>"
     load(tmp_path, urp(call * 2))
-    assert "more than 300000 tags and attributes" in refused(tmp_path, urp(call * 100))
+    assert "more than 3000 tags and attributes" in refused(tmp_path, urp(call * 20))
     (tmp_path / "s.script").write_text("#" * 3_000_000 + "\n")
     node = '<Script type="File"><file>s.script</file></Script>'
     assert f"more than {MAX_PROGRAM} bytes" in refused(tmp_path, urp(node * 3))
