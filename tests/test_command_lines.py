@@ -3,9 +3,9 @@
 import argparse
 import re
 import shlex
-import subprocess
 import sys
 from functools import partial
+from importlib import import_module
 from importlib.metadata import version
 
 import pytest
@@ -24,11 +24,17 @@ APPS = {"ur-client": pc_client.cli.app, "ur-emulator": ur_emulator.cli.app, "urs
 MODULES = {"ur-client": "pc_client.cli", "ur-emulator": "ur_emulator.cli", "urscript": "urscript.cli"}
 
 
-def run(program, *words):
-    code = f"import sys; sys.argv[0] = {program!r}; from {MODULES[program]} import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60, check=False
-    )
+@pytest.fixture
+def run(monkeypatch, capfd):
+    """Run a command in this process; test_wheel.py starts the installed ones."""
+
+    def run(program, *words):
+        monkeypatch.setattr(sys, "argv", [program, *words])
+        with pytest.raises(SystemExit) as end:
+            import_module(MODULES[program]).main()
+        return end.value.code, *capfd.readouterr()
+
+    return run
 
 
 def commands(command, words):
@@ -55,26 +61,25 @@ def test_the_page_has_the_table_of_exit_codes():
 
 
 @pytest.mark.parametrize("program", APPS)
-def test_version_is_that_of_the_tool(program):
-    done = run(program, "--version")
-    assert (done.returncode, done.stdout) == (0, f"{program} {version('ur-hil')}\n")
+def test_version_is_that_of_the_tool(run, program):
+    assert run(program, "--version") == (0, f"{program} {version('ur-hil')}\n", "")
 
 
 @pytest.mark.parametrize("program", APPS)
 @pytest.mark.parametrize("words", [("nothing",), ("--nothing",)])
-def test_wrong_usage_is_one_line_and_2(program, words):
-    done = run(program, *words)
-    assert done.returncode == ExitCode.WRONG_USAGE
-    assert done.stderr.startswith(f"{program}: ")
-    assert done.stderr.count("\n") == 1
+def test_wrong_usage_is_one_line_and_2(run, program, words):
+    code, _, told = run(program, *words)
+    assert code == ExitCode.WRONG_USAGE
+    assert told.startswith(f"{program}: ")
+    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize("program", APPS)
-def test_without_words_the_commands_are_listed(program):
-    done = run(program)
-    assert done.returncode == 0
+def test_without_words_the_commands_are_listed(run, program):
+    code, shown, _ = run(program)
+    assert code == 0
     for words, _ in ALL:
-        assert words[0] != program or len(words) > 2 or words[1] in done.stdout
+        assert words[0] != program or len(words) > 2 or words[1] in shown
 
 
 @pytest.mark.parametrize(("words", "command"), ALL, ids=[" ".join(words) for words, _ in ALL])
@@ -152,30 +157,27 @@ def test_the_software_of_the_robot_keeps_its_old_option_in_serve_only():
     "words",
     [("ur-emulator", "serve", "--software", "3.99"), ("urscript", "check", "--software", "3.99", "a.script")],
 )
-def test_software_that_does_not_exist_is_named(words):
-    done = run(*words)
-    assert done.returncode == ExitCode.WRONG_USAGE
-    assert "no software 3.99 is known: that of CB3 ends with 3.15" in done.stderr
+def test_software_that_does_not_exist_is_named(run, words):
+    code, _, told = run(*words)
+    assert code == ExitCode.WRONG_USAGE
+    assert "no software 3.99 is known: that of CB3 ends with 3.15" in told
 
 
-def test_where_a_box_cannot_run_that_is_said(monkeypatch, capsys):
+def test_where_a_box_cannot_run_that_is_said(run, monkeypatch):
     for platform in ("linux", "darwin"):
         ur_emulator.check_platform(platform)
     monkeypatch.setattr(ur_emulator.cli, "check_platform", partial(ur_emulator.check_platform, "win32"))
-    monkeypatch.setattr(sys, "argv", ["ur-emulator", "serve"])
-    with pytest.raises(SystemExit) as left:
-        ur_emulator.cli.main()
-    assert left.value.code == ExitCode.FAILED
-    told = capsys.readouterr().err
-    assert (
-        told == "ur-emulator: the box needs Linux or macOS: on Windows, run it in WSL 2 (docs/commands.md)\n"
+    assert run("ur-emulator", "serve") == (
+        ExitCode.FAILED,
+        "",
+        "ur-emulator: the box needs Linux or macOS: on Windows, run it in WSL 2 (docs/commands.md)\n",
     )
 
 
-def test_a_host_that_does_not_exist_is_named_by_ctl():
-    done = run("ur-emulator", "ctl", "state", "--host", "nowhere.invalid")
-    assert done.returncode == ExitCode.FAILED
-    assert re.fullmatch(r".*nowhere\.invalid.*cannot be looked up.*\n", done.stderr)
+def test_a_host_that_does_not_exist_is_named_by_ctl(run):
+    code, _, told = run("ur-emulator", "ctl", "state", "--host", "nowhere.invalid")
+    assert code == ExitCode.FAILED
+    assert re.fullmatch(r".*nowhere\.invalid.*cannot be looked up.*\n", told)
 
 
 @pytest.mark.parametrize("name", MODULES)

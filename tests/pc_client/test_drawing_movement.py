@@ -23,7 +23,6 @@ from pc_client.studies.drawing.drawing import (
     least_factor,
     least_gaps,
     make_drawing,
-    paced,
     spatial,
 )
 from pc_client.studies.drawing.placement import (
@@ -282,9 +281,10 @@ def test_the_need_of_a_moment_is_what_planning_finds(large):
 
 
 def test_a_pen_up_move_that_is_too_fast_gets_time_and_the_marks_keep_theirs():
-    drawing = make_drawing(two_parts_and_a_dot(gap=0.05), "x", ARM, PlacementOptions(size=0.08, lift=0.08))
+    extraction = two_parts_and_a_dot(gap=0.05, dot=False)
+    drawing = make_drawing(extraction, "x", ARM, PlacementOptions(size=0.06, lift=0.06))
     marks = [mark.transformed(drawing.placement.similarity) for mark in drawing.marks]
-    gaps = least_gaps(marks, 0.08)
+    gaps = least_gaps(marks, 0.06)
     recorded = factor_needed("x", join(marks, gaps, drawing.placement.lift), ARM)[1].max()
     own = max(1.0, factor_needed("x", join(marks, gaps + 3.0, drawing.placement.lift), ARM)[1].max())
     assert recorded > 1.5 * own  # as recorded, the pen-up moves would slow the whole drawing down
@@ -292,8 +292,6 @@ def test_a_pen_up_move_that_is_too_fast_gets_time_and_the_marks_keep_theirs():
     assert np.all(drawing.joined.gaps >= gaps)
     assert drawing.joined.gaps[1] > gaps[1]
     assert drawing.delays[1] > 0.1
-    again = paced("x", marks, gaps, drawing.placement.lift, ARM)
-    np.testing.assert_array_equal(again.gaps, drawing.joined.gaps)
 
 
 def test_out_of_reach_is_planning_s_refusal_in_one_line():

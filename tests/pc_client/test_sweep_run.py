@@ -7,12 +7,14 @@ import signal
 import socket
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pytest
-from sweep_samples import case, deadly, faulty, interrupted, invented, process_id
+from sweep_samples import case, faulty, interrupted, invented, process_id
 
 import pc_client.studies.sweep.schedule as schedule
 from pc_client.errors import SweepError
@@ -51,24 +53,25 @@ def test_side_by_side_on_dask():
     assert dict(outcomes) == {case: keeping(case) for case in CASES}
 
 
-def test_a_job_that_kills_its_worker_costs_only_its_own_case():
-    outcomes = done_by(deadly, workers=1)
-    assert len(outcomes) == len(CASES)
-    assert statuses(outcomes) == {1: "done", 2: "done", 13: "failed", 3: "done", 4: "done", 5: "done"}
-    (error,) = [outcome.error for case, outcome in outcomes if case.arm.seed == 13]
-    assert "worker process died" in error
-
-
-def test_processes_last_for_all_batches_and_are_replaced_when_one_has_died():
+def test_a_job_that_kills_its_worker_costs_only_its_own_case_and_the_worker_is_replaced():
     with side_by_side(process_id, workers=1, dask=None) as run:
-        ids = [[outcome.error for _, outcome in run([case(seed=seed)])] for seed in (1, 2, 13, 3, 4)]
-    assert ids[0] == ids[1]
-    assert "worker process died" in ids[2][0]
-    assert ids[0] != ids[3] == ids[4]
+        outcomes = [*run(CASES), *run([case(seed=6)])]
+    assert len(outcomes) == len(CASES) + 1
+    assert statuses(outcomes) == {s: "failed" if s == 13 else "done" for s in (1, 2, 13, 3, 4, 5, 6)}
+    said = {case.arm.seed: outcome.error for case, outcome in outcomes}
+    assert "worker process died" in said[13]
+    assert said[1] == said[2] != said[4] == said[5] == said[6]  # one process lasts for all batches
 
 
-def test_a_mistake_in_the_job_is_a_row_too():
-    ((_, outcome),) = done_by(faulty, [case()], workers=1)
+@contextmanager
+def one_thread(workers, dask):
+    with ThreadPoolExecutor(1) as executor:
+        yield executor
+
+
+def test_a_mistake_in_the_job_is_a_row_too(monkeypatch):
+    monkeypatch.setattr(schedule, "open_executor", one_thread)
+    ((_, outcome),) = done_by(faulty, [case()])
     assert outcome == failed("ZeroDivisionError: division by zero")
 
 
