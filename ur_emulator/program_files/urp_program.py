@@ -34,81 +34,44 @@ class NodeKind:
     """A kind of nodes that stand in programs, and what writes one; `becomes` is what it is in the script."""
 
     tag: str
-    becomes: str
     write: NodeWriter
+    becomes: str
 
 
 _ROWS = (
-    NodeKind(
-        "Assignment",
-        "`global v=...`: an expression, or what the operator answers (Boolean, Integer, Float, String)",
-        urp_statements.write_assignment,
-    ),
-    NodeKind("CallSubProgram", "the call of a function, perhaps from another .urp", urp_flow.write_call),
-    NodeKind(
-        "CircleMove",
-        "`movec` through the first to the second waypoint, `mode=1` for a fixed orientation",
-        urp_moves.write_circle,
-    ),
-    NodeKind("Comment", "a comment", urp_statements.write_comment),
-    NodeKind("Contributed", "External Control: what a PC sends, see below", urp_statements.write_contributed),
-    NodeKind("Folder", "its nodes", urp_flow.write_folder),
-    NodeKind(
-        "Force",
-        "`force_mode` around its nodes; only the type Frame",
-        urp_moves.write_force,
-    ),
-    NodeKind("Halt", "`halt`", urp_statements.write_halt),
-    NodeKind(
-        "If",
-        "`if`, with ElseIf and Else; a condition that is checked continuously ends the thread of its nodes",
-        urp_flow.write_if,
-    ),
-    NodeKind(
-        "Loop",
-        "`while`: Forever, Counting with its variable, While; checked continuously as If",
-        urp_flow.write_loop,
-    ),
-    NodeKind(
-        "Move",
-        "a label and its nodes (MoveJ, MoveL, MoveP); `set_tcp` if it names a TCP",
-        urp_moves.write_move,
-    ),
-    NodeKind("Placeholder", "nothing", urp_statements.write_nothing),
-    NodeKind(
-        "Popup",
-        "`popup` of a text, a variable or an expression; one that halts the program does not wait",
-        urp_statements.write_popup,
-    ),
-    NodeKind(
-        "SafeHome",
-        "`movej` to the home position of the installation, or else to that of a new box: arm upright",
-        urp_moves.write_safe_home,
-    ),
-    NodeKind(
-        "Script",
-        "a line, or the text of a file, read from its path or else from the copy in the node",
-        urp_statements.write_script,
-    ),
-    NodeKind("Set", "a digital output, or the active TCP", urp_statements.write_set),
-    NodeKind("Switch", "`if`, `elif` and `else` for the default case", urp_flow.write_switch),
-    NodeKind("Timer", "a variable that a thread counts up while it is started", urp_statements.write_timer),
-    NodeKind(
-        "Wait",
-        "`sleep`, or a loop until a line has a level or a condition holds",
-        urp_statements.write_wait,
-    ),
-    NodeKind(
-        "Waypoint",
-        "`movej`, `movel` or `movep`: Fixed, Variable (also a feature), Relative; own speeds, blend or time",
-        urp_moves.write_waypoint,
-    ),
-    NodeKind(
-        "gui.program.direction.MoveDirectionNode",
-        "a motion in a thread that its `Until` nodes end: a distance, or a contact and a way back",
-        urp_moves.write_direction,
-    ),
-)
+    NodeKind("Assignment", urp_statements.write_assignment,
+        "`global v=...`: an expression, or what the operator answers (Boolean, Integer, Float, String)"),
+    NodeKind("CallSubProgram", urp_flow.write_call, "the call of a function, perhaps from another .urp"),
+    NodeKind("CircleMove", urp_moves.write_circle,
+        "`movec` through the first to the second waypoint, `mode=1` for a fixed orientation"),
+    NodeKind("Comment", urp_statements.write_comment, "a comment"),
+    NodeKind("Contributed", urp_statements.write_contributed, "External Control: what a PC sends, see below"),
+    NodeKind("Folder", urp_flow.write_folder, "its nodes"),
+    NodeKind("Force", urp_moves.write_force, "`force_mode` around its nodes; only the type Frame"),
+    NodeKind("Halt", urp_statements.write_halt, "`halt`"),
+    NodeKind("If", urp_flow.write_if,
+        "`if`, with ElseIf and Else; a condition that is checked continuously ends the thread of its nodes"),
+    NodeKind("Loop", urp_flow.write_loop,
+        "`while`: Forever, Counting with its variable, While; checked continuously as If"),
+    NodeKind("Move", urp_moves.write_move,
+        "a label and its nodes (MoveJ, MoveL, MoveP); `set_tcp` if it names a TCP"),
+    NodeKind("Placeholder", urp_statements.write_nothing, "nothing"),
+    NodeKind("Popup", urp_statements.write_popup,
+        "`popup` of a text, a variable or an expression; one that halts the program does not wait"),
+    NodeKind("SafeHome", urp_moves.write_safe_home,
+        "`movej` to the home position of the installation, or else to that of a new box: arm upright"),
+    NodeKind("Script", urp_statements.write_script,
+        "a line, or the text of a file, read from its path or else from the copy in the node"),
+    NodeKind("Set", urp_statements.write_set, "a digital output, or the active TCP"),
+    NodeKind("Switch", urp_flow.write_switch, "`if`, `elif` and `else` for the default case"),
+    NodeKind("Timer", urp_statements.write_timer, "a variable that a thread counts up while it is started"),
+    NodeKind("Wait", urp_statements.write_wait,
+        "`sleep`, or a loop until a line has a level or a condition holds"),
+    NodeKind("Waypoint", urp_moves.write_waypoint,
+        "`movej`, `movel` or `movep`: Fixed, Variable (also a feature), Relative; own speeds, blend or time"),
+    NodeKind("gui.program.direction.MoveDirectionNode", urp_moves.write_direction,
+        "a motion in a thread that its `Until` nodes end: a distance, or a contact and a way back"),
+)  # fmt: skip
 
 KINDS: Mapping[str, NodeKind] = MappingProxyType({row.tag: row for row in _ROWS})
 """By tag."""

@@ -82,64 +82,28 @@ _AGAIN = "then power on and brake release"
 
 # The modes by rank, the first cause that stands counts.
 MODES: tuple[ModeRow, ...] = (
-    ModeRow(
-        Mode.FAULT, _A.POWER_OFF, _P.END, True, f"restart safety, {_AGAIN}", "D; that the program ends C"
-    ),
-    ModeRow(
-        Mode.VIOLATION, _A.POWER_OFF, _P.END, True, f"restart safety, {_AGAIN}", "D; that the program ends C"
-    ),
-    ModeRow(
-        Mode.ROBOT_EMERGENCY_STOP,
-        _A.POWER_OFF,
-        _P.END,
-        False,
-        f"release the emergency stop, {_AGAIN}",
-        "stop category 1 D; that the program ends I",
-    ),
-    ModeRow(
-        Mode.SYSTEM_EMERGENCY_STOP,
-        _A.POWER_OFF,
-        _P.END,
-        False,
-        f"release the emergency stop, {_AGAIN}",
-        "stop category 1 D; that the program ends I",
-    ),
-    ModeRow(
-        Mode.PROTECTIVE_STOP,
-        _A.STOP,
-        _P.PAUSE_OR_END,
-        True,
-        "unlock the protective stop, on the dashboard 5 s after it",
-        "stop category 2 D; that it leaves the path C; the program I",
-    ),
-    ModeRow(
-        Mode.SAFEGUARD_STOP,
-        _A.PATH_STOP,
-        _P.PAUSE_FOR_A_WHILE,
-        False,
-        "close the safeguard",
-        "stop category 2 and automatic resume D",
-    ),
-    ModeRow(
-        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP,
-        _A.PATH_STOP,
-        _P.PAUSE_FOR_A_WHILE,
-        False,
-        "close the safeguard of automatic mode",
-        "e-Series; stop category 2 D; automatic resume I",
-    ),
-    ModeRow(
-        Mode.SYSTEM_THREE_POSITION_ENABLING_STOP,
-        _A.PATH_STOP,
-        _P.PAUSE_FOR_A_WHILE,
-        False,
-        "hold the enabling device in its middle position, after it was released",
-        "e-Series; stop category 2 D; automatic resume C",
-    ),
+    ModeRow(Mode.FAULT, _A.POWER_OFF, _P.END, True,
+            f"restart safety, {_AGAIN}", "D; that the program ends C"),
+    ModeRow(Mode.VIOLATION, _A.POWER_OFF, _P.END, True,
+            f"restart safety, {_AGAIN}", "D; that the program ends C"),
+    ModeRow(Mode.ROBOT_EMERGENCY_STOP, _A.POWER_OFF, _P.END, False,
+            f"release the emergency stop, {_AGAIN}", "stop category 1 D; that the program ends I"),
+    ModeRow(Mode.SYSTEM_EMERGENCY_STOP, _A.POWER_OFF, _P.END, False,
+            f"release the emergency stop, {_AGAIN}", "stop category 1 D; that the program ends I"),
+    ModeRow(Mode.PROTECTIVE_STOP, _A.STOP, _P.PAUSE_OR_END, True,
+            "unlock the protective stop, on the dashboard 5 s after it",
+            "stop category 2 D; that it leaves the path C; the program I"),
+    ModeRow(Mode.SAFEGUARD_STOP, _A.PATH_STOP, _P.PAUSE_FOR_A_WHILE, False,
+            "close the safeguard", "stop category 2 and automatic resume D"),
+    ModeRow(Mode.AUTOMATIC_MODE_SAFEGUARD_STOP, _A.PATH_STOP, _P.PAUSE_FOR_A_WHILE, False,
+            "close the safeguard of automatic mode", "e-Series; stop category 2 D; automatic resume I"),
+    ModeRow(Mode.SYSTEM_THREE_POSITION_ENABLING_STOP, _A.PATH_STOP, _P.PAUSE_FOR_A_WHILE, False,
+            "hold the enabling device in its middle position, after it was released",
+            "e-Series; stop category 2 D; automatic resume C"),
     ModeRow(Mode.RECOVERY, _A.SLOW, _P.NOTHING, True, "move the joints into their range", "D; programs C"),
     ModeRow(Mode.REDUCED, _A.SLOW, _P.NOTHING, False, "end reduced mode", "D"),
     ModeRow(Mode.NORMAL, _A.NOTHING, _P.NOTHING, False, "", "D"),
-)
+)  # fmt: skip
 ROW: dict[Mode, ModeRow] = {row.mode: row for row in MODES}
 _RANK = {row.mode: rank for rank, row in enumerate(MODES)}
 
