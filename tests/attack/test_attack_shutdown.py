@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import math
 import socket
 from collections.abc import Iterator
@@ -14,10 +13,6 @@ from attackers import crowd, until
 from box_under_attack import KINDS, PATIENCE, BoxUnderAttack, serving
 
 _LONG_PROGRAM = b"def long():\n" + b"  x = [1, 2, 3]\n" * 250_000 + b"end\n"  # 4 MB
-_WAIT = "<Wait type='Sleep'><waitTime>0.01</waitTime></Wait>"
-_URP = (
-    "<URProgram name='x'><children><MainProgram><children>{}</children></MainProgram></children></URProgram>"
-)
 _NO_NAMES = "import socket, threading\nsocket.getaddrinfo = lambda *names: threading.Event().wait()"
 
 
@@ -28,35 +23,13 @@ def worker_of(box: BoxUnderAttack) -> psutil.Process:
     return worker
 
 
-def wait_for_work(box: BoxUnderAttack) -> None:
-    """Wait until the worker process is at work."""
-    worker = worker_of(box)
-    before = worker.cpu_times().user
-    until(lambda: worker.cpu_times().user > before + 0.1, "the worker process works")
-
-
 @contextmanager
 def compiling(box: BoxUnderAttack) -> Iterator[None]:
     with box.connect("secondary") as sock:
+        worker = worker_of(box)
+        before = worker.cpu_times().user
         sock.sendall(_LONG_PROGRAM)
-        wait_for_work(box)
-        yield
-
-
-@contextmanager
-def flooded(box: BoxUnderAttack) -> Iterator[None]:
-    with crowd(box, "secondary", 8, 100_000 * b"a()\n"):
-        wait_for_work(box)
-        yield
-
-
-@contextmanager
-def loading(box: BoxUnderAttack) -> Iterator[None]:
-    program = box.programs / "long.urp"
-    program.write_bytes(gzip.compress(_URP.format(_WAIT * 40_000).encode()))
-    with box.connect("dashboard") as sock:
-        sock.sendall(b"load long.urp\n")
-        wait_for_work(box)
+        until(lambda: worker.cpu_times().user > before + 0.1, "the worker process works")
         yield
 
 
@@ -96,7 +69,7 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
     yield
 
 
-@pytest.mark.parametrize("busy", [compiling, flooded, loading, reporting, unread, calling, looking_up])
+@pytest.mark.parametrize("busy", [compiling, reporting, unread, calling, looking_up])
 def test_a_busy_box_ends(busy):
     with serving(KINDS["CB3"], prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):

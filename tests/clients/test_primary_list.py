@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from clients_support import TIMEOUT
+from clients_support import TIMEOUT, served_box
 from strict_clients import (
     CONFIGURATION,
     ERROR,
@@ -16,13 +16,6 @@ from strict_clients import (
     StrictRtde,
 )
 
-# In lockstep: nothing here needs a client that is in time.
-BOTH_GENERATIONS = pytest.mark.parametrize(
-    "box",
-    [("--pace", "lockstep"), ("--pace", "lockstep", "--robot", "ur5e", "--software", "5.25.1")],
-    indirect=True,
-    ids=["cb3", "e-series"],
-)
 POWER_OFF, IDLE, RUNNING = 3, 5, 7
 PROTECTIVE_STOP_CODE = 209
 WARNING = 2
@@ -44,13 +37,20 @@ def until(primary, condition):
     raise AssertionError("what was waited for did not come")
 
 
+@pytest.fixture(scope="module")
+def box(tmp_path_factory):
+    """In lockstep: nothing here needs a client that is in time."""
+    options = ("--pace", "lockstep", "--robot", "ur5e", "--software", "5.25.1")
+    with served_box(tmp_path_factory.mktemp("box"), *options) as served:
+        yield served
+
+
 @pytest.fixture
 def primary(box):
     with PrimaryWire(box) as wire:
         yield wire
 
 
-@BOTH_GENERATIONS
 def test_soon_after_connecting(box):
     """Version first; configuration and kinematics with the first states."""
     with PrimaryWire(box) as wire:
@@ -64,7 +64,6 @@ def test_soon_after_connecting(box):
     assert robot_mode(seen) == RUNNING
 
 
-@BOTH_GENERATIONS
 def test_power_words(primary):
     primary.write("power on\n")
     assert robot_mode(until(primary, lambda s: robot_mode(s) == RUNNING)) == RUNNING, "a running arm stays so"
@@ -81,7 +80,6 @@ def test_power_words(primary):
     until(primary, lambda s: robot_mode(s) == RUNNING)
 
 
-@BOTH_GENERATIONS
 def test_stop_program_may_be_said_again_and_again(primary):
     primary.write("stop program\nstop program\n")
     primary.write("def loop():\n\twhile True:\n\t\tsync()\n\tend\nend\n")
@@ -92,7 +90,6 @@ def test_stop_program_may_be_said_again_and_again(primary):
     assert robot_mode(primary.state()) == RUNNING
 
 
-@BOTH_GENERATIONS
 def test_started_text_stopped(primary):
     primary.write('def talk():\n\ttextmsg("hello from a program")\nend\n')
     assert primary.titles_and_texts(3) == [
@@ -108,13 +105,11 @@ def exception(primary):
     return *struct.unpack_from(">ii", body), body[8:].decode()
 
 
-@BOTH_GENERATIONS
 def test_an_unknown_function_is_named_with_its_place(primary):
     primary.write("def bad():\n  nothing_like_it()\nend\n")
     assert exception(primary) == (2, 3, "compile_error_name_not_found:nothing_like_it:")
 
 
-@BOTH_GENERATIONS
 def test_an_unreachable_joint_move_is_an_exception(primary):
     primary.write("def far():\n\tmovej(p[10, 0, 0, 0, 0, 0])\nend\n")
     line, _, text = exception(primary)
@@ -140,7 +135,6 @@ def unlock(primary):
     primary.write("stop program\n")
 
 
-@BOTH_GENERATIONS
 def test_an_unreachable_linear_move_is_a_protective_stop(primary):
     primary.write("def far():\n\tmovel(p[10, 0, 0, 0, 0, 0])\nend\n")
     codes = list(error_codes(primary))
@@ -149,7 +143,6 @@ def test_an_unreachable_linear_move_is_a_protective_stop(primary):
     unlock(primary)
 
 
-@BOTH_GENERATIONS
 def test_a_secondary_protective_stop_is_one_error_code(primary):
     primary.write("sec stop():\n\tprotective_stop()\nend\n")
     codes = [(code, argument) for code, argument, _ in error_codes(primary)]
@@ -157,14 +150,12 @@ def test_a_secondary_protective_stop_is_one_error_code(primary):
     unlock(primary)
 
 
-@BOTH_GENERATIONS
 def test_halt_alone_is_a_program(primary):
     primary.write("halt\n")
     titles = [title for title, _ in primary.titles_and_texts(2)]
     assert titles == ["PROGRAM_XXX_STARTED", "PROGRAM_XXX_STOPPED"]
 
 
-@BOTH_GENERATIONS
 def test_a_tool_that_is_set_is_the_tool(box, primary):
     tool = (0.01, -0.02, 0.12, 0.3, -0.2, 0.1)
     with StrictRtde(box) as rtde:

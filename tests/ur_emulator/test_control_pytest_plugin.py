@@ -201,31 +201,23 @@ def test_the_default_software_is_for_the_arms_that_run_it(suite):
     result.assert_outcomes(passed=2)
 
 
-needs_loopback = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has all of 127.0.0.0/8")
-
-STANDARD = """
-    import socket, pytest
-    @pytest.mark.ur(standard_ports=True)
-    @pytest.mark.parametrize("k", range(2))
-    def test_standard(ur_box, ur_box_factory, k):
-        other = ur_box_factory(standard_ports=True)
-        assert ur_box.host != other.host
-        for box in (ur_box, other):
-            assert (box.ports.dashboard, box.ports.primary, box.ports.rtde) == (29999, 30001, 30004)
-            with socket.create_connection((box.host, 29999), timeout=20) as sock:
-                assert sock.recv(100).startswith(b"Connected")
-    """
-
-
-@needs_loopback
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has all of 127.0.0.0/8")
 def test_boxes_with_standard_ports_have_addresses_of_their_own(suite):
-    suite(STANDARD).assert_outcomes(passed=2)
-
-
-@needs_loopback
-def test_parallel_workers_never_collide(suite):
-    pytest.importorskip("xdist")
-    suite(STANDARD, "-n", "2").assert_outcomes(passed=2)
+    result = suite(
+        """
+        import socket, pytest
+        @pytest.mark.ur(standard_ports=True)
+        @pytest.mark.parametrize("k", range(2))
+        def test_standard(ur_box, ur_box_factory, k):
+            other = ur_box_factory(standard_ports=True)
+            assert ur_box.host != other.host
+            for box in (ur_box, other):
+                assert (box.ports.dashboard, box.ports.primary, box.ports.rtde) == (29999, 30001, 30004)
+                with socket.create_connection((box.host, 29999), timeout=20) as sock:
+                    assert sock.recv(100).startswith(b"Connected")
+        """
+    )
+    result.assert_outcomes(passed=2)
 
 
 def test_workers_look_for_addresses_in_blocks_of_their_own(monkeypatch):
