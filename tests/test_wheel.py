@@ -17,6 +17,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client", "ur_hil")
+BARE = ("--no-deps", "--no-index", "--no-compile")
 PROGRAM = """
 import pathlib, sys
 import pc_client as ur
@@ -29,7 +30,9 @@ for package in (ur, protocol, urscript, sys.modules["ur_emulator"]):
 urscript.compile_program("def hello():\\n  movej([0, 0, 0, 0, 0, 0])\\nend\\n")
 with ControlBox(pace="lockstep", port_base=None, seed=7) as box:
     arm = ur.connect(box.host, box.ports)
-    run = arm.run(ur.Movement.library("lognorm_4_1"), ur.Controller.preview(), out="out")
+    ur.plan(ur.Movement.library("lognorm_4_1"), arm)
+    short = ur.Movement.through([(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)], durations=[1.5])
+    run = arm.run(short, ur.Controller.preview(), out="out")
 assert run.snr > 20
 assert ur_client(["report", "out"]) == 0
 assert pathlib.Path("out/report.html").stat().st_size > 10_000
@@ -131,7 +134,7 @@ def test_a_fresh_environment_with_the_wheel_moves_an_arm(wheel, tmp_path):
     home = tmp_path / "venv"
     venv.create(home, symlinks=True)
     python = home / "bin" / "python"
-    run(sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", wheel)
+    run(sys.executable, "-m", "pip", "--python", python, "install", "-q", *BARE, wheel)
     # The dependencies are those of this environment: its paths alone, so that its editable install is not seen.
     (own,) = (home / "lib").glob("python*/site-packages")
     (own / "dependencies.pth").write_text(

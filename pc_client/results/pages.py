@@ -8,7 +8,8 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
-from importlib import import_module, resources
+from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,12 +45,8 @@ def require_report_libraries() -> None:
         RecordingError: matplotlib, jinja2 or plotly is not installed.
     """
     for name in ("matplotlib", "jinja2", "plotly"):
-        try:
-            import_module(name)
-        except ImportError as error:
-            raise RecordingError(
-                f"the report needs {name}; install it with: pip install 'ur-hil[report]'"
-            ) from error
+        if find_spec(name) is None:  # importing them would take a second before the arm moves
+            raise RecordingError(f"the report needs {name}; install it with: pip install 'ur-hil[report]'")
 
 
 def render(template: str, *, scripts: bool = False, **values: Any) -> str:

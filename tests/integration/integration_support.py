@@ -283,8 +283,10 @@ def at(box):
 
 @contextmanager
 def run_in_movement(box, frames, out):
-    """A `ur-client run` on a box, no longer than the block, which begins well inside the movement."""
-    client = start("pc_client", "run", "lognorm_4_1", *at(box), "--out", out)
+    """A `ur-client run` of `reach` on a box, no longer than the block, which begins well inside the movement."""
+    out.mkdir(exist_ok=True)
+    reach().save(out / "reach.toml")
+    client = start("pc_client", "run", out / "reach.toml", *at(box), "--out", out)
     try:
         frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
         assert client.poll() is None
@@ -339,6 +341,13 @@ def serving(folder, *options, **process_options):
         if process.poll() is None:
             process.terminate()
         finish(process)
+
+
+def reach():
+    """A movement long enough for what shall happen in the midst of it."""
+    from pc_client.movements.movement import Movement
+
+    return Movement.through([(0.35, -0.1, 0.25), (0.35, 0.1, 0.3)], durations=[4.0], name="reach")
 
 
 def prepare_experiment(movements, *, repeat, out):

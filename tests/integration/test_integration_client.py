@@ -23,6 +23,7 @@ from integration_support import (
     in_background,
     prepare_experiment,
     programs_since,
+    reach,
     run_in_movement,
     send,
     start,
@@ -37,7 +38,6 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import DriverError
 from pc_client.experiment.checks import guarded
-from pc_client.experiment.experiment import load_movements
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model
@@ -206,7 +206,7 @@ def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(standard_bo
         done = finished_beside(frames, client)
     assert done.code == 1
     assert re.search(words, done.complaint())
-    recording = load_recording(tmp_path / "lognorm_4_1_r1.mcap")
+    recording = load_recording(tmp_path / "reach_r1.mcap")
     assert re.search(words, recording.aborted)
     if cycle is not None:
         assert round(recording.column("timestamp")[-1] / PERIOD) - cycle <= LONGEST_UNSEEN
@@ -273,7 +273,7 @@ class PushingDriver(UrDriver):
 
 
 def test_a_push_ends_the_run_before_the_box_protects_itself(lockstep_box, tmp_path):
-    experiment = prepare_experiment(load_movements(["lognorm_4_1"]), repeat=1, out=tmp_path)
+    experiment = prepare_experiment([reach()], repeat=1, out=tmp_path)
     with PushingDriver(lockstep_box) as driver:
         with pytest.raises(DriverError) as caught:
             ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
@@ -283,7 +283,7 @@ def test_a_push_ends_the_run_before_the_box_protects_itself(lockstep_box, tmp_pa
     assert "off its path" in message
     assert "allowed is 5 mm (path_tolerance)" in message
     assert "\n" not in message
-    recording = load_recording(tmp_path / "lognorm_4_1_r1.mcap")
+    recording = load_recording(tmp_path / "reach_r1.mcap")
     assert recording.summary == {"aborted": f"DriverError: {message}"}
     assert recording.column("actual_q").shape[0] > 80
 
