@@ -199,7 +199,7 @@ def test_another_sensor_begins_without_zero_and_past():
 
 
 # The tool points down at (.3, 0, .15) and goes 0.3 m along y.
-APPROACH = "movej(p[0.3,0,0.15,3.14159265,0,0], a=3, v=2)"
+APPROACH = "set_pos(get_inverse_kin(p[0.3,0,0.15,3.14159265,0,0]))"
 PUSH_ON = "def f():\n  movel(p[0.3,0.3,0.15,3.14159265,0,0], a=1, v=0.2)\nend\n"
 UPRIGHT = (0.0, 0.0, 0.0)
 ON_ITS_SIDE = (-math.pi / 2, 0.0, 0.0)
