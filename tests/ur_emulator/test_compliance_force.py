@@ -38,9 +38,10 @@ def test_the_true_force_on_the_table_comes_within_a_tenth_of_the_one_asked(seed,
 @pytest.mark.parametrize(("fidelity", "scaling"), [("typical", 2.0), ("poor", 0.5), ("poor", 2.0)])
 def test_pressing_is_stable(fidelity, scaling):
     bench = above_table(
-        f"  force_mode_set_gain_scaling({scaling})\n" + pressing(30) + "  sleep(100)", fidelity=fidelity
+        f"  sleep(0.8)\n  force_mode_set_gain_scaling({scaling})\n" + pressing(30) + "  sleep(100)",
+        fidelity=fidelity,
     )
-    forces, places = truth(bench, 900)
+    forces, places = truth(bench, 1000)
     last = forces[-300:, 2]
     assert last.min() > 20.0  # never lets go, never hammers
     assert last.max() < 40.0
