@@ -4,9 +4,9 @@ import subprocess
 import sys
 from inspect import signature
 
+import numpy  # noqa: F401 - cannot be loaded a second time, as pytester would
 import pytest
 
-import ur_emulator.emulator  # noqa: F401 - numpy cannot be loaded a second time, as pytester would
 from ur_emulator import ControlBox
 from ur_emulator.pytest_plugin import OPTIONS, _own_addresses
 
