@@ -50,43 +50,18 @@ class JointSize:
     viscous_fast: float
 
 
-# A, B: wrists of a UR3e.
-SIZE_0 = JointSize(
-    tau_max=9.0, torque_constant=3.600, armature=0.0712, coulomb=0.69, viscous=0.61, viscous_fast=0.63
-)
-# A, B: elbow of a UR3e.
-SIZE_1 = JointSize(
-    tau_max=28.0, torque_constant=7.571, armature=0.2118, coulomb=1.52, viscous=2.08, viscous_fast=1.26
-)
-# A, B: wrists of a UR10e; base and shoulder of a UR3e have nearly the same numbers.
-SIZE_2 = JointSize(
-    tau_max=54.0, torque_constant=10.763, armature=0.61, coulomb=3.15, viscous=3.8, viscous_fast=2.6
-)
-# A, B: elbow of a UR10e.
-SIZE_3 = JointSize(
-    tau_max=150.0, torque_constant=9.839, armature=1.93, coulomb=6.43, viscous=12.2, viscous_fast=7.2
-)
-# A, B: base and shoulder of a UR10e.
-SIZE_4 = JointSize(
-    tau_max=330.0, torque_constant=11.976, armature=5.95, coulomb=16.9, viscous=24.4, viscous_fast=9.8
-)
-
-# B: torque. C: the rest.
-WRIST_OF_UR15 = JointSize(
-    tau_max=70.0, torque_constant=10.8, armature=0.85, coulomb=4.1, viscous=4.9, viscous_fast=3.4
-)
-ELBOW_OF_UR15 = JointSize(
-    tau_max=204.0, torque_constant=9.8, armature=2.84, coulomb=8.7, viscous=16.6, viscous_fast=9.8
-)
-WRIST_OF_UR20 = JointSize(
-    tau_max=107.0, torque_constant=10.8, armature=1.44, coulomb=5.5, viscous=8.0, viscous_fast=4.0
-)
-ELBOW_OF_UR20 = JointSize(  # base and shoulder of a UR15 have the same torque
-    tau_max=433.0, torque_constant=12.0, armature=8.4, coulomb=22.0, viscous=32.0, viscous_fast=15.0
-)
-BASE_OF_UR20 = JointSize(
-    tau_max=738.0, torque_constant=12.0, armature=16.4, coulomb=37.0, viscous=55.0, viscous_fast=24.0
-)
+# tau_max, torque_constant, armature, coulomb, viscous, viscous_fast. Base and shoulder of a UR3e have nearly
+# the numbers of size 2; those of a UR15 have the torque of a UR20's elbow.
+SIZE_0 = JointSize(9.0, 3.600, 0.0712, 0.69, 0.61, 0.63)  # A, B: wrists of a UR3e
+SIZE_1 = JointSize(28.0, 7.571, 0.2118, 1.52, 2.08, 1.26)  # A, B: elbow of a UR3e
+SIZE_2 = JointSize(54.0, 10.763, 0.61, 3.15, 3.8, 2.6)  # A, B: wrists of a UR10e
+SIZE_3 = JointSize(150.0, 9.839, 1.93, 6.43, 12.2, 7.2)  # A, B: elbow of a UR10e
+SIZE_4 = JointSize(330.0, 11.976, 5.95, 16.9, 24.4, 9.8)  # A, B: base, shoulder of a UR10e
+WRIST_OF_UR15 = JointSize(70.0, 10.8, 0.85, 4.1, 4.9, 3.4)  # these five: B torque, C the rest
+ELBOW_OF_UR15 = JointSize(204.0, 9.8, 2.84, 8.7, 16.6, 9.8)
+WRIST_OF_UR20 = JointSize(107.0, 10.8, 1.44, 5.5, 8.0, 4.0)
+ELBOW_OF_UR20 = JointSize(433.0, 12.0, 8.4, 22.0, 32.0, 15.0)
+BASE_OF_UR20 = JointSize(738.0, 12.0, 16.4, 37.0, 55.0, 24.0)
 
 _REVERSAL_SPEED = 0.006  # rad/s; A: the sign has changed within .01-.015 rad/s
 
