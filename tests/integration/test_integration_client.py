@@ -24,7 +24,6 @@ from integration_support import (
     prepare_experiment,
     programs_since,
     reach,
-    run_in_movement,
     send,
     start,
 )
@@ -110,16 +109,6 @@ def test_only_a_box_in_lockstep_says_that_its_time_waits(lockstep_box, realtime_
 # --- the question
 
 
-PLAN = (
-    "UR3, software 3.15.8",
-    "speed slider",
-    "TCP offset",
-    "box of motion",
-    "top TCP speed",
-    "top joint speed",
-    "duration",
-    "joint range",
-)
 REACH = [(0.35, -0.06, 0.25), (0.35, 0.06, 0.3)]
 
 
@@ -142,17 +131,6 @@ def run_of_unknown_arm(ur_client, standard_box, short, tmp_path, monkeypatch, wi
     return run
 
 
-def test_without_a_yes_the_plan_is_shown_and_nothing_moves(run_of_unknown_arm, standard_box, tmp_path):
-    with Messages(standard_box) as primary:
-        done = run_of_unknown_arm("maybe\nno\n")
-        assert done.code == 1
-        assert all(words in done.out for words in PLAN)
-        assert done.err.splitlines()[-1] == "ur-client: aborted"
-        assert "Traceback" not in done.err
-        assert programs_since(primary, standard_box) == []
-    assert not (tmp_path / "out").exists()
-
-
 def test_where_nobody_can_be_asked_the_answer_is_no(run_of_unknown_arm, standard_box, tmp_path):
     with Messages(standard_box) as primary:
         done = run_of_unknown_arm(None)
@@ -168,7 +146,7 @@ def test_after_a_yes_it_runs(run_of_unknown_arm, standard_box, tmp_path):
         done = run_of_unknown_arm("y\n")
         assert done.code == 0, done.err
         assert "velocity_receiver" in programs_since(primary, standard_box)
-    assert all(words in done.out for words in PLAN)
+    assert "box of motion" in done.out
     assert (tmp_path / "out" / "short_r1.mcap").exists()
 
 
@@ -190,6 +168,38 @@ def moved_slider(box):
     return box.set_speed(0.95)
 
 
+class MeddlingDriver(UrDriver):
+    """A session in which something happens to the box in the midst of a movement; keeps the last frame."""
+
+    def __init__(self, box, meddle):
+        super().__init__(box.host, box.ports)
+        self._box, self._meddle = box, meddle
+        self.last_frame = None
+        self.answers = []
+
+    def stream(self, tracker, on_row, *, acceleration):
+        def on_row_and_meddle(frame, step):
+            on_row(frame, step)
+            self.last_frame = frame
+            of_a_movement = isfinite(step.point.p[0])  # neither approach nor excitation has a TCP path
+            if of_a_movement and step.t > 0.5 and not self.answers:
+                self.answers.append(self._meddle(self._box))
+
+        return super().stream(tracker, on_row_and_meddle, acceleration=acceleration)
+
+
+def stopped_run(driver, out):
+    """Run a movement that does not come to its end; returns the message, and the recording, which has it too."""
+    experiment = prepare_experiment([reach()], repeat=1, out=out)
+    with pytest.raises(DriverError) as caught:
+        ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
+    message = str(caught.value)
+    assert "\n" not in message
+    recording = load_recording(out / "reach_r1.mcap")
+    assert recording.summary == {"aborted": f"{type(caught.value).__name__}: {message}"}
+    return message, recording
+
+
 @pytest.mark.parametrize(
     ("meddle", "words"),
     [
@@ -199,18 +209,30 @@ def moved_slider(box):
         (moved_slider, "the robot's speed slider is 95 %, must be 100 %"),
     ],
 )
-def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(standard_box, tmp_path, meddle, words):
-    with Frames(standard_box) as frames, run_in_movement(standard_box, frames, tmp_path) as client:
-        cycle = meddle(standard_box)
-        frames.until(lambda f: not f.target_qd.any() and f.runtime_state == ProgramState.STOPPED)
-        done = finished_beside(frames, client)
-    assert done.code == 1
-    assert re.search(words, done.complaint())
-    recording = load_recording(tmp_path / "reach_r1.mcap")
-    assert re.search(words, recording.aborted)
+def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(lockstep_box, tmp_path, meddle, words):
+    with MeddlingDriver(lockstep_box, meddle) as driver:
+        message, recording = stopped_run(driver, tmp_path)
+    assert re.search(words, message)
+    cycle = driver.answers[0]
     if cycle is not None:
         assert round(recording.column("timestamp")[-1] / PERIOD) - cycle <= LONGEST_UNSEEN
-    assert not list(tmp_path.glob("table1.*"))
+    with Frames(lockstep_box) as frames:
+        frames.rest()
+
+
+def push(box):
+    """A shove [N] of so many seconds: more than the joints hold."""
+    return box.push((0.0, 240.0, 0.0), duration=0.05)
+
+
+def test_a_push_ends_the_run_before_the_box_protects_itself(lockstep_box, tmp_path):
+    with MeddlingDriver(lockstep_box, push) as driver:
+        message, recording = stopped_run(driver, tmp_path)
+        assert driver.last_frame.safety_mode == SafetyMode.NORMAL
+        driver.check_ready()
+    assert "off its path" in message
+    assert "allowed is 5 mm (path_tolerance)" in message
+    assert recording.column("actual_q").shape[0] > 80
 
 
 def finished_beside(frames, client):
@@ -245,47 +267,6 @@ def test_a_full_disk_stops_the_arm_says_what_is_saved_and_that_can_be_read(stand
     assert f"{recording.n_rows} of" in complaint
     assert recording.n_rows > 50
     assert abs(rest.actual_qd).max() < 2e-3
-
-
-PUSH, PUSH_DURATION = (0.0, 240.0, 0.0), 0.05
-"""A shove [N], [s]: more than the joints hold."""
-
-
-class PushingDriver(UrDriver):
-    """A session in which somebody pushes the flange in the midst of a movement; keeps the last frame."""
-
-    def __init__(self, box):
-        super().__init__(box.host, box.ports)
-        self._box = box
-        self.last_frame = None
-
-    def stream(self, tracker, on_row, *, acceleration):
-        pushed = []
-
-        def push(frame, step):
-            on_row(frame, step)
-            self.last_frame = frame
-            of_a_movement = isfinite(step.point.p[0])  # neither approach nor excitation has a TCP path
-            if of_a_movement and step.t > 0.5 and not pushed:
-                pushed.append(self._box.push(PUSH, duration=PUSH_DURATION))
-
-        return super().stream(tracker, push, acceleration=acceleration)
-
-
-def test_a_push_ends_the_run_before_the_box_protects_itself(lockstep_box, tmp_path):
-    experiment = prepare_experiment([reach()], repeat=1, out=tmp_path)
-    with PushingDriver(lockstep_box) as driver:
-        with pytest.raises(DriverError) as caught:
-            ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
-        assert driver.last_frame.safety_mode == SafetyMode.NORMAL
-        driver.check_ready()
-    message = str(caught.value)
-    assert "off its path" in message
-    assert "allowed is 5 mm (path_tolerance)" in message
-    assert "\n" not in message
-    recording = load_recording(tmp_path / "reach_r1.mcap")
-    assert recording.summary == {"aborted": f"DriverError: {message}"}
-    assert recording.column("actual_q").shape[0] > 80
 
 
 # --- a movement that the loop leads off its path
