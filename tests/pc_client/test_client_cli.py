@@ -254,28 +254,28 @@ def test_a_library_of_the_report_is_missed_before_the_arm_moves(
     assert robot.programs == []
 
 
-def test_ctrl_c_is_one_line_and_leaves_the_arm_stopped(robot, tmp_path, capsys):
+def test_ctrl_c_is_one_line_and_leaves_the_arm_stopped(robot, short, tmp_path, capsys):
     def interrupt(r):
         if r.program == "receiver" and len(r.received) == 300:
             robot.on_tick = None
             raise KeyboardInterrupt
 
     robot.on_tick = interrupt
-    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 130
+    assert cli.run(["run", short, "--robot", "127.0.0.1", "--out", str(tmp_path / "out")]) == 130
     err = [line for line in capsys.readouterr().err.splitlines() if line]
     assert err[-1].startswith("ur-client: interrupted")
     assert robot.at_rest
 
 
-def test_protective_stop_is_one_line(robot, tmp_path, one_line):
+def test_protective_stop_is_one_line(robot, short, tmp_path, one_line):
     def stop(r):
         if len(r.received) == 300:
             r.safety_mode = 3
 
     robot.on_tick = stop
-    assert cli.run(["run", "uniform_4_1", "--robot", "127.0.0.1", "--out", str(tmp_path)]) == 1
+    assert cli.run(["run", short, "--robot", "127.0.0.1", "--out", str(tmp_path / "out")]) == 1
     assert "PROTECTIVE_STOP" in one_line()
-    assert not list(tmp_path.glob("table1.*"))
+    assert not list(tmp_path.rglob("table1.*"))
 
 
 def test_doctor_says_ready(robot, capsys):

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import erf, ndtr
 
-from pc_client.movements.description import describe, snr_of_delay
+from pc_client.movements.description import describe, outline, snr_of_delay
 from pc_client.movements.durations import Fitts, Isochrony
 from pc_client.movements.generate import GENERATORS, uniform_twin
 from pc_client.movements.library_sets import library_names
@@ -427,7 +427,7 @@ def test_what_corners_cost(label: str, setback: float) -> None:
         for name in library_names("paper")[5:]
     ]
     assert float(acceleration.split()[0]) == pytest.approx(
-        max(describe(m)["peak_acceleration_m_s2"] for m in twins), rel=0.02
+        max(outline(m)["peak_acceleration_m_s2"] for m in twins), rel=0.02
     )
     assert float(joint.split()[0]) == pytest.approx(
         max(plan_movement(m).report.joint_acceleration.value for m in twins), rel=0.02

@@ -172,8 +172,7 @@ def test_the_movement_comes_back_from_the_table_of_strokes_alone(dim):
 
 def test_the_drawings_of_the_tree_reach_the_figures():
     """Of five kinds: straight marks, loops, a dot, sharp corners, a flourish; from a browser and a tablet."""
-    with open_executor(1) as executor:
-        table = table_of([outcome.row for outcome in extract_many(pen_sources([DRAWINGS]), executor)])
+    table = table_of([outcome.row for outcome in extract_many(pen_sources([DRAWINGS]), AtOnce())])
     assert len(table) == 5
     assert table["snr_v_db"].min() >= 20.0
     assert table["snr_t_db"].min() >= 30.0

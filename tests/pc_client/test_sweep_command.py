@@ -12,6 +12,7 @@ import typer
 from sweep_samples import write
 
 from pc_client import cli
+from pc_client.movements.movement import Movement
 from pc_client.recording.recording import load_recording
 
 GRID = """
@@ -237,23 +238,35 @@ def test_a_sweep_needs_a_folder(tmp_path, one_line):
     assert "--out DIR" in one_line()
 
 
-GIVEN = (
-    'movements = ["uniform_4_1"]\nrobot = "HOST"\nkeep_recordings = true\n[controller]\ngain_p = [4.0, 6.0]'
-)
+GIVEN = """
+movements = ["short.toml"]
+robot = "127.0.0.1"
+keep_recordings = true
+[controller]
+gain_p = [4.0, 6.0]
+"""
 
 
-def test_a_robot_that_is_there_runs_one_case_after_the_other(robot, tmp_path, capsys):
-    out, path = tmp_path / "out", write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
-    assert run(path, out, "--format", "csv") == 0
+@pytest.fixture
+def given(tmp_path):
+    """A sweep of a short movement over two gains, on a robot that is there."""
+    points = [(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)]
+    Movement.through(points, "robot", [1.2], name="short").save(tmp_path / "short.toml")
+    return write(tmp_path, GIVEN)
+
+
+def test_a_robot_that_is_there_runs_one_case_after_the_other(robot, given, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert run(given, out, "--format", "csv") == 0
     assert robot.at_rest
     rows = read_csv(out)
     assert [row["status"] for row in rows] == ["done", "done"]
     assert {(row["robot"], row["fidelity"], row["seed"]) for row in rows} == {("ur3", "", "")}
-    assert len(list(out.glob("recordings/*/uniform_4_1_r1.mcap"))) == 2
+    assert len(list(out.glob("recordings/*/short_r1.mcap"))) == 2
     assert "best of 2" in capsys.readouterr().out
 
 
-def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, monkeypatch):
+def test_a_real_arm_does_not_move_before_the_answer(robot, given, tmp_path, capsys, monkeypatch):
     robot.serial = "2017355123"
 
     def answer(question, abort):
@@ -261,25 +274,23 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
         raise typer.Abort
 
     monkeypatch.setattr(typer, "confirm", answer)
-    path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
-    assert run(path, tmp_path / "out") == 1
+    assert run(given, tmp_path / "out") == 1
     assert robot.programs == []
     told = capsys.readouterr()
     assert "2 runs of each" in told.out
     assert told.err == "ur-client: aborted\n"
 
 
-def test_a_robot_that_is_not_as_it_must_be_is_refused(robot, tmp_path, capsys):
+def test_a_robot_that_is_not_as_it_must_be_is_refused(robot, given, tmp_path, capsys):
     robot.tcp_offset = (0.0, 0.0, 0.15, 0.0, 0.0, 0.0)
-    path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
-    assert run(path, tmp_path / "out", "--yes") == 1
+    assert run(given, tmp_path / "out", "--yes") == 1
     told = capsys.readouterr().err
     assert told.startswith("ur-client: the robot's TCP offset is (0.0, 0.0, 150.0) mm")
     assert told.count("\n") == 1
     assert robot.programs == []
 
 
-def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
+def test_a_robot_that_stops_ends_the_sweep(robot, given, tmp_path, capsys):
     received = []
 
     def stop(r):
@@ -288,12 +299,11 @@ def test_a_robot_that_stops_ends_the_sweep(robot, tmp_path, capsys):
             r.safety_mode = 3
 
     robot.on_tick = stop
-    path = write(tmp_path, GIVEN.replace("HOST", "127.0.0.1"))
-    assert run(path, tmp_path / "out", "--format", "csv") == 1
+    assert run(given, tmp_path / "out", "--format", "csv") == 1
     (row,) = read_csv(tmp_path / "out")
     assert row["status"] == "failed"
     assert "PROTECTIVE_STOP" in row["error"]
-    (incident,) = tmp_path.glob("out/incidents/*/uniform_4_1_r1.mcap")
+    (incident,) = tmp_path.glob("out/incidents/*/short_r1.mcap")
     assert row["error"].endswith(f"recorded until then: {incident.relative_to(tmp_path / 'out')}")
     assert load_recording(incident).aborted
     assert "1 cases have not begun: look at the arm" in capsys.readouterr().out

@@ -195,7 +195,7 @@ def mean_level(controllers):
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "random"])
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(seed=st.integers(0, 2**32 - 1), trials=st.integers(1, 20), batch=st.integers(1, 6))
 def test_the_settings_lie_in_their_ranges_and_come_again(sampler, seed, trials, batch):
     search = Search(trials=trials, batch=batch, sampler=sampler, seed=seed)
