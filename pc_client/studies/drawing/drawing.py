@@ -179,7 +179,7 @@ def make_drawing(
     placement = place(marks, drawn, options, flat=flat)
     on_arm = [mark.transformed(placement.similarity) for mark in marks]
     size = placement.similarity.scale * float(np.ptp(drawn, axis=0).max())
-    joined = paced(name, on_arm, least_gaps(on_arm, size), placement.lift, arm)
+    joined = _paced(name, on_arm, least_gaps(on_arm, size), placement.lift, arm)
     guess = float(factor_needed(name, joined, arm)[1].max())
     facts = _facts(extraction, placement, joined)
 
@@ -373,7 +373,7 @@ def factor_needed(name: str, joined: Joined, arm: RobotModel) -> tuple[Array, Ar
     return plan.t / easy, easy * need
 
 
-def paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: RobotModel) -> Joined:
+def _paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: RobotModel) -> Joined:
     """Join marks with pen-up moves that ask no more of the arm than the marks do.
 
     Args:
