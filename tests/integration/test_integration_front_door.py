@@ -247,11 +247,6 @@ def test_samples_with_orientations_turn_the_tool(arm):
     assert turned[-1] < 0.01
 
 
-def test_what_the_arm_cannot_do_is_refused_before_it_moves(arm):
-    with pytest.raises(ur.PlanningError, match="singularity"):
-        arm.run(ur.Movement.through([(0.3, 0.0, 0.3), (1.3, 0.0, 0.3)]))
-
-
 def test_a_plan_for_another_arm_or_cell_is_refused_before_it_moves(arm):
     movement = ur.Movement.through(POINTS)
     stranger = ur.plan(movement, "ur5")
