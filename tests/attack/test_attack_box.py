@@ -7,7 +7,7 @@ import pytest
 from attack_record import attacked
 from attack_table import SECTIONS, described
 
-SECONDS = 0.2
+SECONDS = 0.1
 
 
 @pytest.mark.slow

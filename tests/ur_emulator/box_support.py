@@ -119,8 +119,8 @@ def printed(events):
 class Bench:
     """A controller on the bench: ticks when the test says so, remembers what was said."""
 
-    def __init__(self, *, robot="ur3", seed=7, fidelity="typical", generation=CB3, **kwargs):
-        self.network = FakeNetwork()
+    def __init__(self, *, robot="ur3", seed=7, fidelity="typical", generation=CB3, network=None, **kwargs):
+        self.network = network or FakeNetwork()
         self.controller = Controller(
             replace(robot_by_name(robot), generation=generation),
             generation.fidelity(fidelity),

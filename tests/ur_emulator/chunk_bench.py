@@ -2,7 +2,7 @@
 
 import re
 from ast import literal_eval
-from functools import cache, partial
+from functools import cache
 
 from box_support import Bench
 from chunk_actions import act
@@ -10,9 +10,7 @@ from chunk_peers import ChunkNetwork
 
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram
-from ur_emulator.controller.controller import Controller
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.models.generations import CB3, E_SERIES
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.check.checking import check_program
@@ -31,16 +29,14 @@ class ChunkBench(Bench):
     """A bench on the network of a chunk."""
 
     def __init__(self, chunk):
-        self.network = ChunkNetwork(chunk)
-        robot = robot_by_name("ur3" if chunk.software.startswith("3.") else "ur5e")
-        self.controller = Controller(
-            robot,
-            robot.generation.fidelity(chunk.fidelity),
-            chunk.seed,
-            partial(robot_hosts, network=self.network),
+        robot, generation = ("ur3", CB3) if chunk.software.startswith("3.") else ("ur5e", E_SERIES)
+        super().__init__(
+            robot=robot,
+            generation=generation,
+            fidelity=chunk.fidelity,
+            seed=chunk.seed,
+            network=ChunkNetwork(chunk),
         )
-        self.events = []
-        self.snapshots = []
 
 
 class ChunkRun:

@@ -4,17 +4,11 @@ A peer is a function of the bytes that came since it last answered: it returns w
 Nothing comes within the cycle in which it is asked for.
 """
 
-from functools import partial
-
 from box_support import Bench, FakeNetwork
 
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
 from ur_emulator.commands.programs import StartProgram, StopProgram
-from ur_emulator.controller.controller import Controller
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
 from ur_emulator.scripting.network import RemoteCallError
-from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError
@@ -112,13 +106,8 @@ class PeerNetwork(FakeNetwork):
 class Box(Bench):
     """A bench that takes bytes as a script port does."""
 
-    def __init__(self, *, peers=None, servers=None, software="3.15", robot="ur3", fidelity="exact", seed=7):
-        self.network = PeerNetwork(peers or {}, servers or {})
-        self.controller = Controller(
-            robot_by_name(robot), CB3.fidelity(fidelity), seed, partial(robot_hosts, network=self.network)
-        )
-        self.events = []
-        self.snapshots = []
+    def __init__(self, *, peers=None, servers=None, software="3.15", fidelity="exact"):
+        super().__init__(fidelity=fidelity, network=PeerNetwork(peers or {}, servers or {}))
         self._channel = ScriptChannel()
         self._catalogue = catalogue_for(software)
         self.compile_errors = []

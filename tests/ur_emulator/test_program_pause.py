@@ -308,7 +308,7 @@ def test_after_the_unlocking_it_stays_paused_until_it_is_resumed_and_goes_on_to_
     assert stopped.now.safety_mode == SafetyMode.NORMAL
     assert stopped.now.runtime_state == ProgramState.PAUSED
     assert at_rest(stopped)
-    stopped.tick(600, RESUME)
+    stopped.tick(300, RESUME)
     assert stopped.now.target_q == pytest.approx(GOAL)
     assert stopped.texts == ["there"]
     assert stopped.now.runtime_state == ProgramState.STOPPED
@@ -373,7 +373,7 @@ def test_a_stop_in_a_pause_on_the_way_into_it_or_out_of_it(at_work, cycles):
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     assert at_rest(bench)
     bench.tick(1, UNLOCK)
-    bench.tick(800, RESUME)
+    bench.tick(400, RESUME)
     assert bench.texts == ["there"]
     assert bench.now.target_q == pytest.approx(GOAL)
     assert np.abs(np.diff([s.target_q for s in bench.snapshots], axis=0)).max() <= 1.01 * 0.008
@@ -393,13 +393,13 @@ def test_a_secondary_program_that_stops_the_arm_gives_one_report():
 def test_a_path_that_leads_nowhere_stops_again_when_it_goes_on(bench):
     bench.start("def f():\n  movel(p[10,0,0,0,0,0])\nend\n", loaded=True)
     for _ in range(2):
-        bench.tick(700)
+        bench.tick(300)
         assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
         assert bench.now.runtime_state == ProgramState.PAUSED
         bench.tick(1, UNLOCK)
         bench.tick(1, RESUME)
     assert len([e for e in bench.events if isinstance(e, ErrorReported) and e.code == 204]) == 2
-    bench.tick(700)
+    bench.tick(300)
     bench.tick(1, UNLOCK)
     assert bench.run(MOVE) == ["there"]
 
@@ -416,8 +416,7 @@ def test_an_arm_that_was_pushed_off_its_path_goes_back_to_it():
     bench.controller.plant.push((0.0, 0.0, 0.0))
     bench.tick(100)
     bench.tick(1, UNLOCK)
-    bench.tick(1, RESUME)
-    bench.tick(800)
+    bench.tick(400, RESUME)
     assert bench.texts == ["there"]
     assert bench.now.target_q == pytest.approx(GOAL)
     assert [e for e in bench.events if isinstance(e, ProgramResumed)]
@@ -490,18 +489,3 @@ def test_flags_of_the_states(bench):
     bench.tick(5, PAUSE)
     bench.tick(1, STOP)
     assert flags(bench.now) == stopped
-
-
-def test_a_client_that_reuploads_after_a_protective_stop(box):
-    """As ur_rtde does: unlock, upload while the state is not playing, wait for playing."""
-    with connect(box, "realtime") as frames, connect(box, "secondary") as sock:
-        reader = FrameReader(frames)
-        sock.sendall(COUNT.encode())
-        reader.until(lambda f: f.runtime_state == ProgramState.PLAYING)
-        box.submit(TRIGGER)
-        reader.until(lambda f: f.safety_mode == SafetyMode.PROTECTIVE_STOP)
-        sock.sendall(b"set unlock protective stop\n")
-        frame = reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
-        assert frame.runtime_state != ProgramState.PLAYING
-        sock.sendall(COUNT.encode())
-        reader.until(lambda f: f.runtime_state == ProgramState.PLAYING)

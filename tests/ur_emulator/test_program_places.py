@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import PurePosixPath
 
@@ -233,7 +234,7 @@ def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):
         flight_report(ProgramFolder(folder), "", FACTS)
 
 
-@pytest.fixture
+@contextmanager
 def small_disk():
     """Files may have 1,000 bytes, as if the disk were full then."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -242,15 +243,16 @@ def small_disk():
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_full_disk_is_one_line_and_leaves_nothing(folder, small_disk):
+def test_a_full_disk_is_one_line_and_leaves_nothing(folder):
     place = ProgramFolder(folder)
     noise = replace(FACTS, log=os.urandom(5000).hex())
     writers = (
         lambda: save_log(place, noise), lambda: flight_report(place, "", noise), lambda: support_file(place, ".", noise)
     )  # fmt: skip
-    for write in writers:
-        with pytest.raises(ProgramFileError, match=r"^\S+ cannot be written: [^/\n]+$"):
-            write()
+    with small_disk():
+        for write in writers:
+            with pytest.raises(ProgramFileError, match=r"^\S+ cannot be written: [^/\n]+$"):
+                write()
     assert not parts_left(folder)
     assert not list(folder.rglob("*.zip"))
 

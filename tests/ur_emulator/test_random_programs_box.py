@@ -13,9 +13,7 @@ from hypothesis import strategies as st
 from program_support import Box, frames
 
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.programs import (
-    StopProgram,
-)
+from ur_emulator.commands.programs import StopProgram
 from ur_emulator.commands.safety import UnlockProtectiveStop
 from urscript.catalogue import CB3_3_15
 
@@ -200,9 +198,6 @@ def run_and_leave(text, cycles=60):
     box.leave()
     assert threading.active_count() == system_threads
     return box
-
-
-# --- builtins ----------------------------------------------------------------------------------------------
 
 
 # --- programs ----------------------------------------------------------------------------------------------

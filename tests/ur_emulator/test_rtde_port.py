@@ -4,7 +4,6 @@ Clients of one port share: a recipe is encoded once a cycle, however many client
 """
 
 import socket
-import struct
 from collections import Counter
 from itertools import pairwise
 
@@ -359,19 +358,6 @@ def test_a_recipe_that_is_set_up_again_begins_a_new_stream(bench):
 
 COUNT = "def c():\n  i = 0\n  while i < {}:\n    i = i + 1\n    write_output_integer_register(24, i)\n    sync()\n  end\nend\n"
 
-# What ur_rtde 1.6.5 asks of a 3.15, each list with its trailing comma.
-UR_RTDE_RECEIVE = (
-    "timestamp,target_q,target_qd,target_qdd,target_current,target_moment,actual_q,actual_qd,actual_current,"
-    "joint_control_output,actual_TCP_pose,actual_TCP_speed,actual_TCP_force,target_TCP_pose,target_TCP_speed,"
-    "actual_digital_input_bits,joint_temperatures,actual_execution_time,robot_mode,joint_mode,safety_mode,"
-    "actual_tool_accelerometer,speed_scaling,target_speed_fraction,actual_momentum,actual_main_voltage,"
-    "actual_robot_voltage,actual_robot_current,actual_joint_voltage,actual_digital_output_bits,runtime_state,"
-    "standard_analog_input0,standard_analog_input1,standard_analog_output0,standard_analog_output1,"
-    "robot_status_bits,safety_status_bits,payload,payload_cog,payload_inertia,output_int_register_2,"
-    + "".join(f"output_int_register_{i}," for i in range(12, 20))
-    + "".join(f"output_double_register_{i}," for i in range(12, 20))
-)
-
 
 @pytest.fixture
 def box():
@@ -390,34 +376,6 @@ def run(box, text):
         sock.sendall(text.encode())
 
 
-def next_package(stream):
-    size, kind = struct.unpack(">HB", stream.read(3))
-    return chr(kind), stream.read(size - 3)
-
-
-def ask_raw(stream, kind, payload=b""):
-    """One request in bytes, one package back: what a client that looks at nothing does."""
-    stream.write(struct.pack(">HB", 3 + len(payload), ord(kind)) + payload)
-    stream.flush()
-    return next_package(stream)
-
-
-def test_start_up_of_ur_rtde_reads_exactly_one_package_after_each_request(box):
-    with connect(box, "rtde") as sock, sock.makefile("rwb") as stream:
-        assert ask_raw(stream, "V", b"\0\2") == ("V", b"\1")
-        assert ask_raw(stream, "v") == ("v", struct.pack(">4I", 3, 15, 8, 106339))
-        kind, types = ask_raw(stream, "O", struct.pack(">d", 125.0) + UR_RTDE_RECEIVE.encode())
-        assert (kind, types[0]) == ("O", 1)
-        words = types[1:].decode().split(",")
-        names = UR_RTDE_RECEIVE.rstrip(",").split(",")
-        fields = output_fields(V3_15)
-        assert words == [fields[name].type.value for name in names]
-        assert ask_raw(stream, "S") == ("S", b"\1")
-        kind, values = next_package(stream)
-        assert (kind, values[0]) == ("U", 1)
-        assert len(values) == 1 + sum(fields[name].type.size for name in names)
-
-
 def test_no_cycle_is_lost_in_lockstep(box, client):
     client.subscribe("timestamp", "output_int_register_24", "runtime_state")
     run(box, COUNT.format(100))
@@ -430,34 +388,6 @@ def test_no_cycle_is_lost_in_lockstep(box, client):
     assert counts == list(range(1, 101))
     steps = [round((after - before) / 0.008, 6) for before, after in pairwise(stamps)]
     assert set(steps) == {1.0}
-
-
-def test_while_time_stands_still_packages_keep_coming(client):
-    client.subscribe("timestamp", "runtime_state")
-    last = client.data()
-    while (values := client.data()) != last:  # until time stands still
-        last = values
-    assert client.data() == client.data() == last
-
-
-def test_a_script_and_a_client_hand_values_to_and_fro(box, client):
-    command = client.own("input_int_register_24", "input_double_register_24")
-    client.subscribe("output_double_register_24", "output_int_register_24", "runtime_state")
-    client.write(command, 0, 0.0)
-    run(
-        box,
-        "def dialogue():\n"
-        "  write_output_integer_register(24, 1)\n"
-        "  while read_input_integer_register(24) != 7:\n    sync()\n  end\n"
-        "  write_output_float_register(24, 2 * read_input_float_register(24))\n"
-        "  write_output_integer_register(24, 2)\n"
-        "end\n",
-    )
-    client.until(lambda v: v["output_int_register_24"] == 1)
-    client.write(command, 7, 1.25)
-    done = client.until(lambda v: v["output_int_register_24"] == 2)
-    assert done["output_double_register_24"] == 2.5
-    client.until(lambda v: v["runtime_state"] == ProgramState.STOPPED)
 
 
 def test_a_client_that_does_not_read_gets_whole_packages_and_does_not_stop_the_others():

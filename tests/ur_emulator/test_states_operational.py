@@ -25,10 +25,7 @@ from ur_emulator.commands.safety import (
 )
 from ur_emulator.commands.surroundings import SetDigitalInput
 from ur_emulator.controller.safety.inputs import (
-    ACTIVE,
     OPERATIONAL_MODES,
-    STOPPING,
-    TRANSITIONS,
     EnablingAct,
     EnablingDevice,
     EnablingState,
@@ -143,9 +140,6 @@ def test_states_of_the_enabling_device(acts, then):
 
 
 def test_a_device_that_is_not_held_stops_the_arm_in_manual_mode_only(bench):
-    assert {S.NO_DEVICE, S.ENABLING} == set(S) - STOPPING
-    assert {S.ENABLING, S.TO_BE_RELEASED} == ACTIVE
-    assert set(TRANSITIONS.values()) <= set(S)
     run(bench)
     for mode in (SetOperationalMode("none"), AUTOMATIC):
         bench.tick(REST, RELEASE, mode)
@@ -244,8 +238,7 @@ def test_a_permanent_safeguard_comes_first(bench):
 )
 def test_tcp_and_elbow_keep_the_limit_of_the_mode(bench, commands, limit):
     bench.tick(1, *commands)
-    bench.start(FAST)
-    bench.tick(1500)
+    bench.run(FAST)
     speeds = [
         max(hypot(*now.target_tcp_speed[:3]), hypot(*now.space.target.elbow_velocity))
         for now in bench.snapshots
