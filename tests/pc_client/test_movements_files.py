@@ -252,6 +252,7 @@ def test_rest_outside_of_the_movement() -> None:
 
 def test_description_is_plain_data() -> None:
     human, robot = describe(load_movement("lognorm_5_2")), describe(load_movement("uniform_5_2"))
+    assert (human["kind"], robot["kind"]) == ("lognormal", "uniform")
     assert human["stroke_durations_s"] == robot["stroke_durations_s"]
     assert len(human["strokes"]) == 4
     assert "strokes" not in robot
