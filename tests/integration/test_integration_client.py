@@ -126,7 +126,8 @@ def run_of_unknown_arm(ur_client, standard_box, short, tmp_path, monkeypatch, wi
 
     def run(answer):
         monkeypatch.setattr(sys, "stdin", answer if answer is None else io.StringIO(answer))
-        return ur_client("run", short, *at(standard_box), "--out", tmp_path / "out")
+        words = ("experiment", "--movements", short, "--repeat", 1)
+        return ur_client(*words, *at(standard_box), "--out", tmp_path / "out")
 
     return run
 
