@@ -49,10 +49,7 @@ for _command, _examples in (
     (recordings.export, ("ur-client export out/run/lognorm_4_1_r1.mcap --to csv",)),
     (
         doctor.doctor,
-        (
-            "ur-client doctor --robot 127.0.0.1",
-            "ur-client doctor --robot 192.168.0.10 --seconds 10",
-        ),
+        ("ur-client doctor --robot 127.0.0.1", "ur-client doctor --robot 192.168.0.10 --seconds 10"),
     ),
 ):
     app.command(epilog=examples(*_examples))(_command)

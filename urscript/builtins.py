@@ -20,23 +20,12 @@ from typing import Any
 import numpy as np
 
 from protocol import pose as algebra
+from urscript import values
 from urscript.catalogue.calls import fit_int, integer, number, numbers, pose, string, type_error
 from urscript.catalogue.types import ParamType
 from urscript.dialect import LONGEST_LIST
 from urscript.errors import ScriptRuntimeError
-from urscript.values import (
-    INT_MAX,
-    INT_MIN,
-    TEXT_LIMIT,
-    Matrix,
-    Pose,
-    Struct,
-    a_type,
-    is_number,
-    list_with_capacity,
-    str_form,
-    wrap_int,
-)
+from urscript.values import Matrix, Pose, Struct, a_type, is_number
 
 # --- numbers ---------------------------------------------------------------------------------------------
 
@@ -228,7 +217,7 @@ _WORD = 32  # bits of an int
 def norm(a: Any) -> float:
     """Absolute value of a number (an int stays int), Euclidean length of a list or of all six of a pose."""
     if type(a) is int:
-        return wrap_int(abs(a))
+        return values.wrap_int(abs(a))
     if is_number(a):
         return abs(a)  # type: ignore[no-any-return]
     if type(a) is Pose or (isinstance(a, list) and all(map(is_number, a))):
@@ -242,12 +231,12 @@ def normalize(v: Any) -> list[float]:
     Raises:
         ScriptRuntimeError: the sum of the squares is zero.
     """
-    values = numbers("normalize", "v", v)
-    square = sum(value * value for value in values)
+    parts = numbers("normalize", "v", v)
+    square = sum(part * part for part in parts)
     if square == 0:
         raise ScriptRuntimeError("normalize: the sum of all squared elements is zero")
     length = math.sqrt(square)
-    return [value / length for value in values]
+    return [part / length for part in parts]
 
 
 def length(v: Any) -> int:
@@ -333,12 +322,12 @@ def make_list(length: Any, initial_value: Any, capacity: Any = None) -> list[Any
         raise ScriptRuntimeError(
             f"make_list: elements must be no lists, got {a_type(initial_value)}; a list of lists is a matrix"
         )
-    return list_with_capacity([initial_value] * count, most, initial_value)
+    return values.list_with_capacity([initial_value] * count, most, initial_value)
 
 
-def struct(names: tuple[str, ...], *values: Any) -> Struct:
+def struct(names: tuple[str, ...], *members: Any) -> Struct:
     """A struct of named values; the names are those of the arguments of the call."""
-    return Struct(dict(zip(names, values, strict=True)))
+    return Struct(dict(zip(names, members, strict=True)))
 
 
 # --- strings ---------------------------------------------------------------------------------------------
@@ -438,7 +427,7 @@ def to_num(number_text: Any) -> int | float:
 
 
 def _in_range(value: int, text: str) -> int:
-    if not INT_MIN <= value <= INT_MAX:
+    if not values.INT_MIN <= value <= values.INT_MAX:
         raise _out_of_range(text)
     return value
 
@@ -470,7 +459,7 @@ def _operand_text(function: str, value: Any) -> str:
             raise ScriptRuntimeError(
                 f"{function}: operand must be {_ALLOWED}, got a list with {a_type(odd[0])} in it"
             )
-    return str_form(value)
+    return values.str_form(value)
 
 
 def _limited(function: str, text: str) -> str:
@@ -479,9 +468,9 @@ def _limited(function: str, text: str) -> str:
     Raises:
         ScriptRuntimeError: more than 1023 characters.
     """
-    if len(text) > TEXT_LIMIT:
+    if len(text) > values.TEXT_LIMIT:
         raise ScriptRuntimeError(
-            f"{function}: the resulting string has {len(text)} characters, the limit is {TEXT_LIMIT}"
+            f"{function}: the resulting string has {len(text)} characters, the limit is {values.TEXT_LIMIT}"
         )
     return text
 

@@ -305,14 +305,7 @@ def movement_sheet(runs: Sequence[MeasuredRun]) -> Sheet:
         for colour, run in coloured.items()
     ]
     panels = (
-        Panel(
-            upper,
-            (desired, *actual),
-            "TCP speed",
-            ("", "TCP speed [mm/s]"),
-            (span, (0.0, None)),
-            "above",
-        ),
+        Panel(upper, (desired, *actual), "TCP speed", ("", "TCP speed [mm/s]"), (span, (0.0, None)), "above"),
         Panel(
             lower,
             errors,

@@ -9,15 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pc_client.commands.options import (
-    DaskOption,
-    TimeUnitOption,
-    WorkersOption,
-    check_workers,
-    console,
-    progress_bar,
-    say,
-)
+from pc_client.commands import options
+from pc_client.commands.options import console, progress_bar, say
 from pc_client.errors import RecordingError, one_line
 from pc_client.files import as_file_name
 from ur_hil.command_line import ExitCode
@@ -42,7 +35,7 @@ def extract(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for the figures and the strokes.")
     ],
-    time_unit: TimeUnitOption = "auto",
+    time_unit: options.TimeUnitOption = "auto",
     strokes_per_peak: Annotated[
         float | None,
         typer.Option(
@@ -58,8 +51,8 @@ def extract(
             "--figures", metavar="few|all|none", help=f"Pictures: of the first {_FEW_FIGURES}, all or none."
         ),
     ] = "few",
-    workers: WorkersOption = None,
-    dask: DaskOption = None,
+    workers: options.WorkersOption = None,
+    dask: options.DaskOption = None,
 ) -> None:
     """Find the strokes of recorded movements, and say how well they reconstruct them."""
     from pc_client.results.pages import write_files
@@ -67,14 +60,14 @@ def extract(
     from pc_client.studies.extraction.batch import STROKE_COLUMNS, table_of, to_json
     from pc_client.studies.extraction.extract import ExtractOptions
 
-    check_workers(workers, dask)
+    options.check_workers(workers, dask)
     if figures != "none":
         import matplotlib  # noqa: F401  # when it is missing, say so before the work is done
     sources, unusable = _look_up(files)
     n_pictures = {"few": _FEW_FIGURES, "all": len(sources), "none": 0}[figures]
-    options = ExtractOptions() if strokes_per_peak is None else ExtractOptions.strict(strokes_per_peak)
+    limits = ExtractOptions() if strokes_per_peak is None else ExtractOptions.strict(strokes_per_peak)
     unit = None if time_unit == "auto" else time_unit
-    outcomes = _run(sources, options, unit, n_pictures, workers, dask)
+    outcomes = _run(sources, limits, unit, n_pictures, workers, dask)
     rows = [outcome.row for outcome in outcomes if outcome.row is not None]
     strokes = [stroke for outcome in outcomes for stroke in outcome.strokes]
     contents: dict[str, str | bytes] = {
@@ -111,7 +104,7 @@ def _look_up(files: Sequence[str]) -> tuple[list[PenSource], list[str]]:
 
 def _run(
     sources: Sequence[PenSource],
-    options: ExtractOptions,
+    limits: ExtractOptions,
     time_unit: str | None,
     n_pictures: int,
     workers: int | None,
@@ -130,7 +123,7 @@ def _run(
     with progress_bar("extracting", TimeRemainingColumn()) as bar, open_executor(workers, dask) as executor:
         task = bar.add_task("extracting", total=len(sources))
         return extract_many(
-            sources, executor, options, time_unit, n_pictures, lambda outcome: bar.advance(task)
+            sources, executor, limits, time_unit, n_pictures, lambda outcome: bar.advance(task)
         )
 
 

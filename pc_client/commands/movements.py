@@ -157,8 +157,7 @@ def duplicate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Movement file to write, .toml.")],
     seed: Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same duplicate.")] = 0,
     share: Annotated[
-        float,
-        typer.Option("--share", min=0.0, max=1.0, help="Share of the published human variability."),
+        float, typer.Option("--share", min=0.0, max=1.0, help="Share of the published human variability.")
     ] = 1.0,
 ) -> None:
     """Vary a movement as people vary when they repeat one, check that the arm can do it, and save it.

@@ -100,8 +100,7 @@ _OverwriteOption = Annotated[
     bool, typer.Option("--overwrite", help="Replace simulated recordings of the same names.")
 ]
 _DryRunOption = Annotated[
-    bool,
-    typer.Option("--dry-run", help="Connect, check, plan and show what would happen; nothing moves."),
+    bool, typer.Option("--dry-run", help="Connect, check, plan and show what would happen; nothing moves.")
 ]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
 

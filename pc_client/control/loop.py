@@ -205,12 +205,7 @@ def loop_margins(loop: LoopModel, gain_p: float, gain_i: float, period: float) -
 
 
 def _gain_margin(
-    loop: LoopModel,
-    gain_p: float,
-    gain_i: float,
-    period: float,
-    hertz: Array,
-    values: NDArray[np.complex128],
+    loop: LoopModel, gain_p: float, gain_i: float, period: float, hertz: Array, values: NDArray[np.complex128]
 ) -> float:
     """The smallest factor k with a pole of 1 + k L on the unit circle: 1 over the largest crossing.
 

@@ -11,20 +11,13 @@ from types import TracebackType
 from typing import Self
 
 from pc_client.arrays import Array
-from pc_client.driver import watchdog
+from pc_client.driver import velocity_stream, watchdog
 from pc_client.driver.primary import PackageStream, raise_on_error
 from pc_client.driver.realtime import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.receiver import DIAL_TIMEOUT, STOP_DECELERATION, ReverseServer, receiver_script
 from pc_client.driver.report import UNKNOWN, RobotReport, StatePorts
 from pc_client.driver.transport import Network, TcpNetwork, Transport
-from pc_client.driver.velocity_stream import (
-    CommandSource,
-    RowSink,
-    S,
-    StreamReport,
-    VelocityStream,
-    collector_paused,
-)
+from pc_client.driver.velocity_stream import CommandSource, RowSink, S, StreamReport, VelocityStream
 from pc_client.errors import DriverError, RobotStoppedError, full_message
 from protocol.primary.messages import ErrorCodeMessage, TextMessage
 from protocol.realtime.layout import RealtimeFrame
@@ -183,7 +176,7 @@ class UrDriver:
             reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
             stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
             try:
-                with collector_paused():
+                with velocity_stream.collector_paused():
                     report = stream.run(source, on_row)
             except watchdog.ProgramEndedError as error:
                 raise watch.explain(error) from error

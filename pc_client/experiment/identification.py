@@ -11,13 +11,7 @@ import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.control.controller import Controller
-from pc_client.control.identification import (
-    BRISK_PULSE,
-    PULSE,
-    Excitation,
-    estimate_delay,
-    identify_loop,
-)
+from pc_client.control.identification import BRISK_PULSE, PULSE, Excitation, estimate_delay, identify_loop
 from pc_client.control.learning import LearningFilter, design_filter
 from pc_client.control.loop import LEAST_GAIN_MARGIN, LoopMargins, LoopModel, loop_margins
 from pc_client.control.reference import ReferenceTable

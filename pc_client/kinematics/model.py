@@ -149,14 +149,11 @@ class SingularityMeasure(NamedTuple):
     Attributes:
         sigma_min: (n,) smallest singular value: the twist that joint speed 1 gives in the worst direction.
         condition: (n,) largest over smallest singular value; inf when singular.
-        manipulability: (n,) product of all singular values, |det J|.
-            Source: Yoshikawa, "Manipulability of robotic mechanisms", 1985.
         critical_joint: (n,) joint that names the nearest singularity, a key of SINGULARITIES.
     """
 
     sigma_min: Array
     condition: Array
-    manipulability: Array
     critical_joint: NDArray[np.intp]
 
 
@@ -171,12 +168,7 @@ def measure_singularity(jacobians: ArrayLike) -> SingularityMeasure:
     with np.errstate(divide="ignore"):
         condition = sigma[:, 0] / sigma_min
     nearest = np.argmin(_determinant_factors(J), axis=1)
-    return SingularityMeasure(
-        sigma_min,
-        condition,
-        np.multiply.reduce(sigma, axis=1),
-        np.array(tuple(SINGULARITIES), dtype=np.intp)[nearest],
-    )
+    return SingularityMeasure(sigma_min, condition, np.array(tuple(SINGULARITIES), dtype=np.intp)[nearest])
 
 
 def _determinant_factors(J: Array) -> Array:
@@ -230,27 +222,18 @@ class IkSolution(NamedTuple):
     converged: bool
 
 
-def solve_ik(
-    model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike, *, max_iterations: int = _MAX_ITERATIONS
-) -> IkSolution:
-    """Find joint angles that bring the TCP to T_base_tcp (4, 4), from q_seed (6,) [rad]; check `.converged`.
-
-    `max_iterations` bounds the work.
-    """
+def solve_ik(model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike) -> IkSolution:
+    """Find joint angles for the TCP pose T_base_tcp (4, 4) from q_seed (6,) [rad]; check `.converged`."""
     goal = np.asarray(T_base_tcp, dtype=np.float64)
-    return solve_ik_se3(
-        model, pin.SE3(goal[:3, :3], goal[:3, 3]), np.asarray(q_seed, dtype=np.float64), max_iterations
-    )
+    return solve_ik_se3(model, pin.SE3(goal[:3, :3], goal[:3, 3]), np.asarray(q_seed, dtype=np.float64))
 
 
-def solve_ik_se3(
-    model: RobotModel, T_base_goal: Any, q_seed: Array, max_iterations: int = _MAX_ITERATIONS
-) -> IkSolution:
+def solve_ik_se3(model: RobotModel, T_base_goal: Any, q_seed: Array) -> IkSolution:
     """Do as `solve_ik` for a goal that is already a pin.SE3: the inner call of path following."""
     q = q_seed
     error = _pose_error(model, T_base_goal, q)
     damping = 0.0
-    for iteration in range(max_iterations):
+    for iteration in range(_MAX_ITERATIONS):
         if _is_small(error):
             return _solution(q, error, iteration, converged=True)
         step = _step(model, q, error, damping)
@@ -263,7 +246,7 @@ def solve_ik_se3(
             damping = max(damping * _DAMPING_UP, _FIRST_DAMPING)
             if damping > _MOST_DAMPING:
                 break  # no direction improves any more: out of reach
-    return _solution(q, error, max_iterations, converged=_is_small(error))
+    return _solution(q, error, _MAX_ITERATIONS, converged=_is_small(error))
 
 
 def nearest_posture(model: RobotModel, T_base_tcp: ArrayLike, q_near: ArrayLike) -> Array:

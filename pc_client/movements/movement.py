@@ -25,13 +25,7 @@ from pc_client.movements.library_sets import LIBRARY_SETS, library_path
 from pc_client.movements.movement_file import file_text, kind_of, read_record, trajectory_of
 from pc_client.movements.samples import JointTrajectory, SampledTrajectory, parse_rows
 from pc_client.movements.sigma_lognormal import leg_lengths, literal_strokes
-from pc_client.movements.trajectory import (
-    Motion,
-    Similarity,
-    Trajectory,
-    check_duration,
-    check_name,
-)
+from pc_client.movements.trajectory import Motion, Similarity, Trajectory, check_duration, check_name
 from pc_client.movements.uniform import SETBACK, Corners, uniform_trajectory
 from ur_hil.records import nearest
 

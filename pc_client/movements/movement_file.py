@@ -154,10 +154,7 @@ def read_record(values: Mapping[str, Any], source: str) -> MovementFile:
 
 
 def file_text(
-    name: str,
-    trajectory: Trajectory,
-    stroke_durations: Array,
-    provenance: Mapping[str, str | int | float],
+    name: str, trajectory: Trajectory, stroke_durations: Array, provenance: Mapping[str, str | int | float]
 ) -> str:
     """The TOML file of a movement in closed form, complete and readable."""
     kind = kind_of(trajectory)

@@ -20,7 +20,7 @@ import math
 import random
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +33,6 @@ from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, leg_lengths, literal_strokes
 from pc_client.movements.trajectory import Similarity, about_z
 
-#: Which rotations may be used: none, about the vertical, or any.
-_Rotate = Literal["none", "yaw", "any"]
-
 _N_SAMPLES = 2001
 
 
@@ -47,83 +44,36 @@ class Fit(NamedTuple):
     stretch: float
 
 
-def fit_movement(
-    movement: Movement,
-    box: Box = UR3_BOX,
-    *,
-    rotate: _Rotate = "yaw",
-    max_scale: float = math.inf,
-    max_speed: float | None = None,
-    may_slow_down: bool = False,
-) -> Fit:
-    """The movement as large as it fits into the box, in its middle.
+def fit_movement(movement: Movement, box: Box = UR3_BOX, *, max_speed: float | None = None) -> Fit:
+    """The movement as large as it fits into a box (base frame, m), in its middle.
 
-    Args:
-        box: where its path must lie, base frame, m.
-        rotate: "none"; "yaw": the angle about the vertical, of 360 half degrees, that allows the largest
-            scale; "any": the principal axes of the path are laid along the box's axes, the longest along the
-            longest.
-        max_scale: largest scale, so that a small movement need not be blown up; 1 for "only shrink".
-        max_speed: largest TCP speed, m/s, or None.
-        may_slow_down: whether the movement may be stretched in time to keep `max_speed`.
+    It is turned about the vertical by the angle, of 360 half degrees, that allows the largest scale. Where
+    its TCP would be faster than `max_speed` (m/s), it is slowed down.
 
     Raises:
-        MovementError: when the movement is a single point, or too fast and may not be slowed down.
+        MovementError: the movement is a single point.
     """
-    if not max_scale > 0.0:
-        raise MovementError(f"largest scale {max_scale}: give a number greater than 0")
     t = np.linspace(0.0, movement.duration, _N_SAMPLES)
     path = movement.sample(t).p
+    rotations = (about_z(math.radians(0.5 * step)) for step in range(360))
     rotation, scale = max(
-        ((R, _largest_scale(path @ R.T, box)) for R in _candidates(path, box, rotate)),
-        key=lambda found: found[1],
+        ((R, _largest_scale(path @ R.T, box)) for R in rotations), key=lambda found: found[1]
     )
     if not math.isfinite(scale):
         raise MovementError(
             f"movement {movement.name} stays at one point: there is nothing to fit into a box"
         )
-    scale = min(scale, max_scale)
     turned = scale * path @ rotation.T
     similarity = Similarity(scale, rotation, box.centre - 0.5 * (turned.min(axis=0) + turned.max(axis=0)))
     fitted = movement.transformed(similarity)
-    stretch = _needed_stretch(fitted, t, max_speed)
-    if stretch > 1.0:
-        if not may_slow_down:
-            raise MovementError(
-                f"movement {movement.name} reaches {stretch * (max_speed or 0.0):.3f} m/s in the box, "
-                f"{max_speed} are allowed: allow it to be slowed down, or give a smaller scale"
-            )
-        fitted = fitted.stretched(stretch)
-    return Fit(fitted, similarity, stretch)
-
-
-def _candidates(path: Array, box: Box, rotate: _Rotate) -> list[Array]:
-    if rotate == "none":
-        return [np.eye(3)]
-    if rotate == "yaw":
-        return [about_z(math.radians(0.5 * step)) for step in range(360)]
-    if rotate == "any":
-        _, axes = np.linalg.eigh(np.cov(path.T))
-        R = np.empty((3, 3))
-        R[np.argsort(box.size, kind="stable")] = axes.T
-        if np.linalg.det(R) < 0.0:
-            R[int(np.argmin(box.size))] *= -1.0
-        return [R]
-    raise MovementError(f'rotation "{rotate}": give "none", "yaw" or "any"')
+    stretch = 1.0 if max_speed is None else max(1.0, float(fitted.speed(t).max()) / max_speed)
+    return Fit(fitted.stretched(stretch) if stretch > 1.0 else fitted, similarity, stretch)
 
 
 def _largest_scale(path: Array, box: Box) -> float:
     extent = np.ptp(path.T.copy(), axis=1)  # six times as quick as along the columns
     scales = (room / need for room, need in zip(box.size, extent, strict=True) if need > 1e-12)
     return float(min(scales, default=math.inf))
-
-
-def _needed_stretch(movement: Movement, t: Array, max_speed: float | None) -> float:
-    if max_speed is None:
-        return 1.0
-    if not max_speed > 0.0:
-        raise MovementError(f"largest speed {max_speed} m/s: give a number greater than 0")
-    return max(1.0, float(movement.speed(t).max()) / max_speed)
 
 
 _TRIES_A_POINT = 100
@@ -235,21 +185,18 @@ HAND = HandRules(
 )
 
 
-def recipe_movement(n_targets: int, seed: int, name: str, box: Box = UR3_BOX) -> Movement:
-    """A movement by the recipe: as large as it fits into the box, as quick as `TOP_SPEED` allows.
+def recipe_movement(n_targets: int, seed: int, name: str) -> Movement:
+    """A movement by the recipe: as large as it fits into the UR3's box, as quick as `TOP_SPEED` allows.
 
     Numbers are rounded after the fit, points to .1 mm and durations to ms, so that files are readable.
 
-    Args:
-        n_targets: number of target points, at least 2.
-        seed: 0 or more; the same seed gives the same movement everywhere.
-        box: where, base frame, m.
+    There are at least 2 target points. The same seed, 0 or more, gives the same movement everywhere.
     """
     source = random.Random(seed)
     targets = random_targets(n_targets, HAND.box, source, HAND.targets)
     durations = _stroke_durations(targets, source)
     hand = Movement(name, literal_strokes(targets, durations), durations)
-    fit = fit_movement(hand, box.shrunk(_MARGIN), rotate="yaw", max_speed=TOP_SPEED, may_slow_down=True)
+    fit = fit_movement(hand, UR3_BOX.shrunk(_MARGIN), max_speed=TOP_SPEED)
     points = np.round(fit.movement.target_points, 4)
     rounded = np.round(fit.movement.stroke_durations, 3)
     facts: dict[str, str | int | float] = {

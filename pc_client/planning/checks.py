@@ -80,7 +80,6 @@ class PlanReport:
         joint_acceleration: top joint acceleration relative to its limit [rad/s²].
         sigma_min: least smallest singular value of the Jacobian.
         condition_max: largest condition number.
-        manipulability_min: least |det J|.
         floor_clearance: how near forearm, wrists and tool come to the floor.
         own_clearance: how near the arm and its tool come to themselves.
         cell_clearance: how near they come to walls and solids of the cell.
@@ -108,14 +107,12 @@ class PlanReport:
     joint_acceleration: Extreme
     sigma_min: Extreme
     condition_max: Extreme
-    manipulability_min: Extreme
     floor_clearance: LeastClearance
     own_clearance: LeastClearance
     cell_clearance: LeastClearance
     position_error: Extreme
     rotation_error: Extreme
     interpolation_error: Extreme
-    ik_iterations: float
 
     @property
     def clearances(self) -> tuple[LeastClearance, ...]:
@@ -255,14 +252,12 @@ def check_motion(
         joint_acceleration=_highest(qdd, np.array(limits.qdd_max)),
         sigma_min=_lowest(path.singularity.sigma_min, limits.sigma_min),
         condition_max=_highest(path.singularity.condition, np.inf),
-        manipulability_min=_lowest(path.singularity.manipulability, 0.0),
         floor_clearance=_least(clearance.floor, limits.floor_clearance_min),
         own_clearance=_least(clearance.own, limits.own_clearance_min),
         cell_clearance=_least(clearance.cell, limits.cell_clearance_min),
         position_error=_highest(path.position_error, limits.position_error_max),
         rotation_error=_highest(path.rotation_error, limits.rotation_error_max),
         interpolation_error=_highest(between_error, limits.interpolation_error_max),
-        ik_iterations=path.iterations / len(t),
     )
     _judge(names, report)
     return report

@@ -62,7 +62,6 @@ class JointPath:
     position_error: Array
     rotation_error: Array
     singularity: SingularityMeasure
-    iterations: int
 
 
 def follow_path(
@@ -93,13 +92,11 @@ def follow_path(
     q = np.empty((n, 6))
     errors = np.empty((n, 2))
     jacobians = np.empty((n, 6, 6))
-    iterations = 0
     goal = pin.SE3(rotations[0], names.p[0])
     seed, refusal = q_before, None
     for k in range(n):
         goal.rotation, goal.translation = rotations[k], names.p[k]
         solution = solve_ik_se3(model, goal, seed)
-        iterations += solution.iterations
         refusal = _refuse_step(model, names, k, solution, q_before, limits)
         if refusal is not None:
             q, jacobians = q[:k], jacobians[:k]
@@ -115,7 +112,7 @@ def follow_path(
     _refuse_singular(names, singularity, limits)
     if refusal is not None:
         raise refusal
-    return JointPath(q, errors[:, 0].copy(), errors[:, 1].copy(), singularity, iterations)
+    return JointPath(q, errors[:, 0].copy(), errors[:, 1].copy(), singularity)
 
 
 def _lead_in(

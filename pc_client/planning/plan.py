@@ -24,13 +24,8 @@ from pc_client.kinematics.model import (
 from pc_client.movements.movement import Movement
 from pc_client.movements.samples import JointTrajectory, SampledTrajectory
 from pc_client.movements.trajectory import Similarity
-from pc_client.planning.checks import (
-    CartesianSamples,
-    PlanReport,
-    check_motion,
-    check_samples,
-    measure_joint_range,
-)
+from pc_client.planning import checks
+from pc_client.planning.checks import CartesianSamples, PlanReport, check_motion, check_samples
 from pc_client.planning.joint_path import JointPath, fixed_tcp_rotation, follow_path
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits, limits_of
@@ -113,7 +108,7 @@ class JointPlan:
         offset = 2.0 * np.pi * whole
         report = self.report
         q = self.q + offset
-        joint_range = measure_joint_range(q, report.joint_limits, report.limits)
+        joint_range = checks.measure_joint_range(q, report.joint_limits, report.limits)
         if joint_range.share > 1.0:
             raise PathNames(self.name, self.t, self.p).refuse(
                 joint_range.sample,
@@ -212,7 +207,7 @@ def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> JointPlan:
     samples = CartesianSamples(t, p, v, between)
     names = PathNames(trajectory.name, t, p)
     exact = np.zeros(len(t))
-    path = JointPath(q, exact, exact, measure_singularity(jacobians), 0)
+    path = JointPath(q, exact, exact, measure_singularity(jacobians))
     report = check_motion(model, names, samples, check_samples(names, samples, limits), path, spline, limits)
     return JointPlan(trajectory.name, _frozen(t), _frozen(p), _frozen(q), spline, report)
 

@@ -342,12 +342,7 @@ class ArmView:
         self._desired_tcp = publisher("/desired_tcp_pose", POSE)
 
     def show(
-        self,
-        row: int,
-        log_time: int,
-        frame: Array,
-        ref_q: Iterable[float],
-        ref_p: Iterable[float],
+        self, row: int, log_time: int, frame: Array, ref_q: Iterable[float], ref_p: Iterable[float]
     ) -> None:
         """Write what shows the arm in one row, if its turn has come.
 

@@ -33,19 +33,9 @@ from scipy.io import savemat
 from pc_client.arrays import Array
 from pc_client.errors import RecordingError
 from pc_client.files import FILE_KINDS
+from pc_client.recording import rows
 from pc_client.recording.provenance import Provenance, Source
-from pc_client.recording.rows import (
-    COMMAND_SIGNALS,
-    PROVENANCE_RECORD,
-    REFERENCE_SIGNALS,
-    ROW_TOPICS,
-    SUMMARY_RECORD,
-    Phase,
-    Signal,
-    Topic,
-    check_row,
-    parse_schema_text,
-)
+from pc_client.recording.rows import Phase, Signal, Topic
 
 if TYPE_CHECKING:
     import polars
@@ -54,7 +44,7 @@ _RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD_BYTES = 40  # of one that is not compressed
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CRC = struct.Struct("<I")
-_NEEDED = (Signal("timestamp", 1, "s"), *REFERENCE_SIGNALS, *COMMAND_SIGNALS)
+_NEEDED = (Signal("timestamp", 1, "s"), *rows.REFERENCE_SIGNALS, *rows.COMMAND_SIGNALS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,15 +118,15 @@ def load_recording(path: Path | str) -> Recording:
     columns, missing = scan.columns(), scan.missing_signal()
     if missing and not scan.has_begun:  # stopped before its first chunk was whole: no rows
         columns, missing = {signal: _as_column(signal, np.empty((0, signal.count))) for signal in _NEEDED}, ""
-    if PROVENANCE_RECORD not in scan.metadata or missing:
+    if rows.PROVENANCE_RECORD not in scan.metadata or missing:
         reason = damage or (f"no signal {missing!r}" if missing else "no provenance")
         raise RecordingError(f"{path} holds no recording of this package: {reason}")
     try:
-        provenance = Provenance.from_metadata(scan.metadata[PROVENANCE_RECORD])
+        provenance = Provenance.from_metadata(scan.metadata[rows.PROVENANCE_RECORD])
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from error
     try:
-        summary = {key: json.loads(text) for key, text in scan.metadata.get(SUMMARY_RECORD, {}).items()}
+        summary = {key: json.loads(text) for key, text in scan.metadata.get(rows.SUMMARY_RECORD, {}).items()}
     except (ValueError, RecursionError) as error:
         summary, damage = {}, damage or f"damaged: the summary cannot be read ({error})"
     return Recording(
@@ -193,12 +183,12 @@ class _Scan:
 
     def columns(self) -> dict[Signal, Array]:
         """Return one array a signal; a row counts when all its messages are there."""
-        n_rows = min((len(rows) // self.sizes[channel] for channel, rows in self.rows.items()), default=0)
+        n_rows = min((len(taken) // self.sizes[channel] for channel, taken in self.rows.items()), default=0)
         columns = {}
         for channel, topic in self.topics.items():
-            rows = np.frombuffer(self.rows[channel], topic.dtype, n_rows)
+            messages = np.frombuffer(self.rows[channel], topic.dtype, n_rows)
             for signal in topic.signals:
-                columns[signal] = _as_column(signal, rows[signal.name].astype(np.float64))
+                columns[signal] = _as_column(signal, messages[signal.name].astype(np.float64))
         return columns
 
     def missing_signal(self) -> str:
@@ -233,7 +223,7 @@ class _Scan:
         self.rows[channel] += body[_MESSAGE_HEAD.size :]
 
     def _take_channel(self, channel: Channel) -> None:
-        if channel.topic not in ROW_TOPICS:
+        if channel.topic not in rows.ROW_TOPICS:
             if channel.id in self.topics:
                 raise ValueError(f"channel {channel.id} is defined twice")
             self.others.add(channel.id)
@@ -241,11 +231,11 @@ class _Scan:
         if channel.schema_id not in self.schemas:
             raise ValueError(f"topic {channel.topic} names the unknown schema {channel.schema_id}")
         schema = self.schemas[channel.schema_id]
-        topic = Topic(channel.topic, schema.name, parse_schema_text(schema.data.decode()))
+        topic = Topic(channel.topic, schema.name, rows.parse_schema_text(schema.data.decode()))
         if channel.id in self.others or self.topics.get(channel.id, topic) != topic:
             raise ValueError(f"channel {channel.id} is defined twice")
         others = [known for number, known in self.topics.items() if number != channel.id]
-        check_row([signal for known in (*others, topic) for signal in known.signals])
+        rows.check_row([signal for known in (*others, topic) for signal in known.signals])
         self.topics[channel.id] = topic
         self.sizes[channel.id] = topic.dtype.itemsize
         self.rows.setdefault(channel.id, bytearray())

@@ -181,12 +181,7 @@ class Bars:
 
 
 def bars_of_levels(
-    names: Sequence[str],
-    series: Sequence[Bars],
-    mark: str,
-    *,
-    title: str,
-    floors: Array | None = None,
+    names: Sequence[str], series: Sequence[Bars], mark: str, *, title: str, floors: Array | None = None
 ) -> Figure:
     """Draw groups of bars beside each other, in dB.
 

@@ -285,12 +285,7 @@ def _template(letters: float) -> Element:
         "hoverlabel": {"namelength": -1, "font": {"size": letters - 1}},
         "xaxis": axis,
         "yaxis": axis,
-        "scene": {
-            "xaxis": in_space,
-            "yaxis": in_space,
-            "zaxis": in_space,
-            "aspectmode": "manual",
-        },
+        "scene": {"xaxis": in_space, "yaxis": in_space, "zaxis": in_space, "aspectmode": "manual"},
         "shapedefaults": {"y0": 0, "y1": 1, "fillcolor": SHADE, "line": {"width": 0}, "layer": "below"},
         "annotationdefaults": {"showarrow": False, "xanchor": "left", "yanchor": "bottom"},
     }

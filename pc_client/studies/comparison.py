@@ -34,14 +34,8 @@ from pc_client.movements.generate import GENERATORS, generate_movement
 from pc_client.movements.movement import Movement
 from pc_client.results.sheet import BLUE, REFERENCE_GREY, Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.tables import Column, finite, to_markdown, to_rich
-from pc_client.studies.likeness import (
-    Likeness,
-    between_peaks,
-    fit_power_law,
-    log_dimensionless_jerk,
-    sparc,
-    speed_peaks,
-)
+from pc_client.studies import likeness
+from pc_client.studies.likeness import Likeness
 from pc_client.studies.signals import Trace, low_passed
 
 if TYPE_CHECKING:
@@ -162,17 +156,17 @@ def measured(signal: Sampled) -> dict[str, float]:
     """
     # Not `signal.speed`, which rounds otherwise: the first of equal samples is where a plateau has its peak.
     speed, rate = np.linalg.norm(signal.v, axis=1), 1.0 / signal.step
-    inner = between_peaks(speed)
-    law = fit_power_law(signal.v[inner], signal.a[inner])
-    likeness = Likeness(
-        peaks=speed_peaks(speed),
-        sparc=sparc(speed, rate),
-        log_jerk=log_dimensionless_jerk(speed, rate),
+    inner = likeness.between_peaks(speed)
+    law = likeness.fit_power_law(signal.v[inner], signal.a[inner])
+    figures = Likeness(
+        peaks=likeness.speed_peaks(speed),
+        sparc=likeness.sparc(speed, rate),
+        log_jerk=likeness.log_dimensionless_jerk(speed, rate),
         exponent=law.exponent,
         r_squared=law.r_squared,
     )
     top = {"peak_speed": speed.max(), "peak_acceleration": np.linalg.norm(signal.a, axis=1).max()}
-    return {name: float(value) for name, value in (asdict(likeness) | top).items()}
+    return {name: float(value) for name, value in (asdict(figures) | top).items()}
 
 
 COLUMNS = (
@@ -289,23 +283,18 @@ class Comparison:
 
 
 def build_comparison(
-    sets: Sequence[MovementSet], runs: Mapping[str, MeasuredRun] | None = None, *, rate: float = 125.0
+    sets: Sequence[MovementSet], runs: Mapping[str, MeasuredRun] | None = None
 ) -> Comparison:
-    """Measure all movements.
-
-    Args:
-        runs: the recordings by the movement's name; None where nothing was executed.
-        rate: of the samples, Hz, where nothing was executed.
+    """Measure all movements; `runs` are the recordings by the movement's name, if they were executed.
 
     Raises:
         ClientError: a movement has no recording although others have.
     """
+    rate, robot = 1.0 / SAMPLING_TIME, None
     if runs:
         run = next(iter(runs.values()))
         rate = _sampling_rate(run)
-        robot: str | None = f"{run.provenance.arm}, controller {run.provenance.controller}"
-    else:
-        robot = None
+        robot = f"{run.provenance.arm}, controller {run.provenance.controller}"
     rows = [
         row
         for one in sets

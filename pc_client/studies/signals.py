@@ -58,13 +58,7 @@ def velocity(t: Array, p: Array) -> Array:
 
 
 def low_passed(
-    p: Array,
-    rate: float,
-    *,
-    cutoff: float,
-    order: int,
-    padding: int,
-    ends: Literal["rest", "reflected"],
+    p: Array, rate: float, *, cutoff: float, order: int, padding: int, ends: Literal["rest", "reflected"]
 ) -> Array:
     """Low-pass positions by a Butterworth filter, run forwards and backwards so that nothing shifts in time.
 

@@ -15,21 +15,11 @@ from hypothesis import strategies as st
 
 from docs.generate.coverage_page import render
 from urscript.builtins import pure_builtins
-from urscript.catalogue import (
-    ALL_ROWS,
-    CB3_3_15,
-    REQUIRED,
-    Builtin,
-    Generation,
-    ParamType,
-    Support,
-    TimeClass,
-    Version,
-    catalogue_for,
-)
+from urscript.catalogue import ALL_ROWS, CB3_3_15, Builtin, Generation, TimeClass, catalogue_for
 from urscript.catalogue.calls import compile_check, fits, static_bind
 from urscript.catalogue.catalogue import read_rows
 from urscript.catalogue.methods import METHODS
+from urscript.catalogue.types import REQUIRED, ParamType, Support, Version
 from urscript.errors import ScriptTypeError
 from urscript.values import Matrix, Pose
 
@@ -180,15 +170,6 @@ def test_what_holds_by_default_ends_with_the_section():
 
 
 # --- catalogues
-
-
-def test_extra_names_are_switched_on_by_hand():
-    opened = catalogue_for("3.15", extra=["set_tool_communication", "movej"])
-    assert "set_tool_communication" in opened
-    assert opened["movej"] == CB3_3_15["movej"]
-    assert "set_tool_communication" not in CB3_3_15
-    with pytest.raises(ValueError, match="no builtin named 'no_such'"):
-        catalogue_for("3.15", extra=["no_such"])
 
 
 def test_versions():

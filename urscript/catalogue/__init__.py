@@ -5,36 +5,15 @@ checks arguments; `catalogue_for(version)` is the view of one release.
 """
 
 from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, Catalogue, catalogue_for
-from urscript.catalogue.types import (
-    REQUIRED,
-    STEP_TIME,
-    Builtin,
-    BuiltinArray,
-    Generation,
-    ModuleVariable,
-    Param,
-    ParamType,
-    PerGeneration,
-    Support,
-    TimeClass,
-    Version,
-)
+from urscript.catalogue.types import STEP_TIME, Builtin, Generation, TimeClass
 
 __all__ = [
     "ALL_ROWS",
     "CB3_3_15",
-    "REQUIRED",
     "STEP_TIME",
     "Builtin",
-    "BuiltinArray",
     "Catalogue",
     "Generation",
-    "ModuleVariable",
-    "Param",
-    "ParamType",
-    "PerGeneration",
-    "Support",
     "TimeClass",
-    "Version",
     "catalogue_for",
 ]

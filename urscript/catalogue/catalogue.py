@@ -28,23 +28,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+from urscript.catalogue import types
 from urscript.catalogue.calls import Slot, compile_check, static_bind
 from urscript.catalogue.methods import ValueMethod, methods_of
-from urscript.catalogue.types import (
-    EVERYWHERE,
-    REQUIRED,
-    Builtin,
-    BuiltinArray,
-    Generation,
-    ModuleVariable,
-    Param,
-    ParamType,
-    PerGeneration,
-    Support,
-    TimeClass,
-    Version,
-    releases,
-)
+from urscript.catalogue.types import Builtin, Generation, ModuleVariable, Param, PerGeneration, Version
 from urscript.errors import ScriptTypeError
 from urscript.values import Pose
 
@@ -59,10 +46,10 @@ _SOURCES: Final = {
     "FIELD_USE": "called by field scripts and public clients",
 }
 
-_TYPES: Final = {kind.name.lower().replace("_or_", "|"): kind for kind in ParamType}
+_TYPES: Final = {kind.name.lower().replace("_or_", "|"): kind for kind in types.ParamType}
 _WORDS: Final[dict[str, tuple[str, Any]]] = {
-    **{time.name.lower(): ("time", time) for time in TimeClass},
-    **{support.value: ("support", support) for support in Support},
+    **{time.name.lower(): ("time", time) for time in types.TimeClass},
+    **{support.value: ("support", support) for support in types.Support},
     "deprecated": ("deprecated", True),
     "nan ok": ("nan_ok", True),
     "any names": ("any_names", True),
@@ -105,7 +92,7 @@ def _row(module: str, head: str, lines: list[str], defaults: dict[str, Any]) -> 
     form = _HEAD.fullmatch(head)
     if form is None or not lines:
         raise ValueError(f"{module}: {head!r} is not a row; write name(...) -> type, and below what it does")
-    fields: dict[str, Any] = {"since": EVERYWHERE, "undocumented": frozenset()}
+    fields: dict[str, Any] = {"since": types.EVERYWHERE, "undocumented": frozenset()}
     fields |= defaults | _settings(lines[1:])
     if "source" not in fields:
         manuals = (Generation.CB3, "MANUAL_CB3"), (Generation.E_SERIES, "MANUAL_E")
@@ -129,7 +116,7 @@ def _params(text: str, head: str) -> Iterator[Param]:
         yield Param(
             found["name"],
             _TYPES[found["type"]],
-            REQUIRED if default is None else None if default[0] == "(" else _value(default),
+            types.REQUIRED if default is None else None if default[0] == "(" else _value(default),
             found["unit"] or "",
             None if found["low"] is None else _value(found["low"]),
             None if found["high"] is None else _value(found["high"]),
@@ -148,7 +135,7 @@ def _settings(lines: list[str]) -> dict[str, Any]:
     for line in lines:
         key, _, rest = line.partition(" ")
         if key in ("since", "until"):
-            fields[key] = releases(*(None if release == "-" else release for release in rest.split()))
+            fields[key] = types.releases(*(None if release == "-" else release for release in rest.split()))
         elif key == "undocumented":
             fields[key] = frozenset(map(Generation, rest.split(", ")))
         elif key == "source":
@@ -158,7 +145,7 @@ def _settings(lines: list[str]) -> dict[str, Any]:
             if unknown := set(words.split(", ")) - set(_WORDS):
                 raise ValueError(f"{', '.join(sorted(unknown))} in {line!r}; allowed: {', '.join(_WORDS)}")
             # A row's own line replaces the whole line of `by default:`.
-            fields |= {"time": TimeClass.ZERO, "deprecated": False, "nan_ok": False, "any_names": False}
+            fields |= {"time": types.TimeClass.ZERO, "deprecated": False, "nan_ok": False, "any_names": False}
             fields |= dict(_WORDS[word] for word in words.split(", "))
     return fields
 
@@ -184,38 +171,22 @@ VARIABLES: tuple[ModuleVariable, ...] = tuple(
     )
 )
 
-ARRAYS: tuple[BuiltinArray, ...] = (
-    BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out", _SOURCES["FIELD_USE"]),
+ARRAYS: tuple[types.BuiltinArray, ...] = (
+    types.BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out", _SOURCES["FIELD_USE"]),
 )
 
 _MOST_CALL_FORMS = 10_000
 
 
 class Catalogue:
-    """The builtins of one software version.
+    """The builtins of one software version."""
 
-    Args:
-        version: the release whose names are visible.
-        extra: names to make visible although this version does not know them, in their newest form.
-
-    Raises:
-        ValueError: for an `extra` name in no table.
-    """
-
-    def __init__(
-        self, version: Version, rows: tuple[Builtin, ...] = ALL_ROWS, extra: frozenset[str] = frozenset()
-    ) -> None:
+    def __init__(self, version: Version, rows: tuple[Builtin, ...] = ALL_ROWS) -> None:
         self.version = version
         self._rows = rows
-        self._extra = extra
         self._by_name: dict[str, Builtin] = {row.name: row for row in rows if row.is_in(version)}
-        for name in sorted(extra):
-            forms = [row for row in rows if row.name == name]
-            if not forms:
-                raise ValueError(f"no builtin named {name!r} in any software version")
-            self._by_name.setdefault(name, forms[-1])
         self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
-        self.arrays: Mapping[str, BuiltinArray] = {item.name: item for item in ARRAYS}
+        self.arrays: Mapping[str, types.BuiltinArray] = {item.name: item for item in ARRAYS}
         self.methods: Mapping[tuple[str, str], ValueMethod] = methods_of(version)
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
         self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
@@ -223,7 +194,7 @@ class Catalogue:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle it as its version, and its rows if they are others than those of the tables."""
         rows = () if self._rows is ALL_ROWS else (self._rows,)
-        return catalogue_for, (self.version, self._extra, *rows)
+        return catalogue_for, (self.version, *rows)
 
     def lookup(self, name: str) -> Builtin | None:
         """The builtin of that name, or None."""
@@ -298,26 +269,18 @@ def _fits(builtin: Builtin, n_positional: int, keyword_names: Sequence[str]) -> 
 
 
 @lru_cache(maxsize=32)
-def _view(version: Version, extra: frozenset[str]) -> Catalogue:
-    return Catalogue(version, extra=extra)
+def _of_all_rows(version: Version) -> Catalogue:
+    return Catalogue(version)
 
 
-def catalogue_for(
-    version: str | Sequence[int], extra: Iterable[str] = (), rows: tuple[Builtin, ...] = ALL_ROWS
-) -> Catalogue:
-    """The catalogue of a software version.
-
-    Args:
-        version: "3.15", "5.11.4", or a version tuple.
-        extra: names to accept beside those of the version, e.g. `["set_tool_communication"]` for a program
-            that was exported on an e-Series.
+def catalogue_for(version: str | Sequence[int], rows: tuple[Builtin, ...] = ALL_ROWS) -> Catalogue:
+    """The catalogue of a software version: "3.15", "5.11.4", or a version tuple.
 
     Raises:
-        ValueError: for a version of no known generation, or an extra name in no table.
+        ValueError: for a version of no known generation.
     """
-    if rows is not ALL_ROWS:
-        return Catalogue(Version.of(version), rows, frozenset(extra))
-    return _view(Version.of(version), frozenset(extra))
+    found = Version.of(version)
+    return _of_all_rows(found) if rows is ALL_ROWS else Catalogue(found, rows)
 
 
 CB3_3_15 = catalogue_for("3.15")

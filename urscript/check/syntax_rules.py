@@ -98,10 +98,8 @@ def number(problem: Problem) -> Advice | None:
         return advice_at(following, "there is no '\u00b0' in URScript", f"write d2r({text})", edit)
     if re.fullmatch(r"0[xX][0-9a-fA-F]{1,8}", text):
         value = int(text, 16)
-        message, hint = (
-            f"URScript has no hexadecimal numbers, got {text}",
-            f'write {value} or to_num("{text}")',
-        )
+        message = f"URScript has no hexadecimal numbers, got {text}"
+        hint = f'write {value} or to_num("{text}")'
         return advice_at(token, message, hint, replacement(token, str(value)))
     unit = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([A-Za-z]\w*)", text)
     if unit:
@@ -302,10 +300,8 @@ def foreign_end(problem: Problem) -> Advice | None:
     for index, token in enumerate(tokenized.tokens[: problem.index]):
         if not tokenized.is_first(index) or token.kind != "word":
             continue
-        second, third = (
-            tokenized.tokens[index + 1],
-            tokenized.tokens[min(index + 2, len(tokenized.tokens) - 1)],
-        )
+        second = tokenized.tokens[index + 1]
+        third = tokenized.tokens[min(index + 2, len(tokenized.tokens) - 1)]
         if token.text in words.BLOCK_ENDS and _is_elsewhere(second, token):
             return advice_at(
                 token, f"there is no '{token.text}' in URScript", "write end", replacement(token, "end")
@@ -452,10 +448,8 @@ def augmented_assignment(problem: Problem) -> Advice | None:
         return None
     variable = problem.neighbor(-2)
     name = variable.text if variable.kind == "word" else "x"
-    message, hint = (
-        f"there is no '{operator.text}=' in URScript",
-        f"write {name} = {name} {operator.text} ...",
-    )
+    message = f"there is no '{operator.text}=' in URScript"
+    hint = f"write {name} = {name} {operator.text} ..."
     edit = Edit(operator.start, token.end, f"= {name} {operator.text}")
     return advice_at(operator, message, hint, edit, last=token)
 
@@ -553,10 +547,8 @@ def function_head(problem: Problem) -> Advice | None:
         return advice_at(token, "a function has no return type", "remove it", edit, last=problem.following)
     word = problem.neighbor(-2).text
     if token.text in (":", "{") and word in ("def", "thread", "sec"):
-        message, hint = (
-            "a definition needs parentheses, also without parameters",
-            f"write {word} {before.text}():",
-        )
+        message = "a definition needs parentheses, also without parameters"
+        hint = f"write {word} {before.text}():"
         return advice_at(before, message, hint, Edit(before.end, before.end, "()"))
     if word == "run" and token.text != "(" and before.kind == "word":
         message, hint = "'run' needs parentheses after the name", f"write run {before.text}()"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from math import degrees
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from urscript.catalogue import TimeClass
 from urscript.commands.support import diagnostic_of, echo_json, show
@@ -34,30 +34,6 @@ LAST_LINES = {
 """The last line, by how the run ended."""
 
 
-class RunOutput(Protocol):
-    """Receives the events of a run."""
-
-    def compile_error(self, error: ScriptError) -> None:
-        """The program does not compile."""
-        ...
-
-    def report(self, report: Report) -> None:
-        """The robot reported something."""
-        ...
-
-    def move(self, move: WatchedMove) -> None:
-        """A move has ended."""
-        ...
-
-    def call(self, time: float, thread: str, name: str, arguments: Sequence[Any]) -> None:
-        """A builtin with an effect was called on the recording host."""
-        ...
-
-    def end(self, status: RunStatus, robot_time: float, robot: str, run: RunEnd | None) -> None:
-        """The run has ended; `robot` is its title, `run` its final state if there was one."""
-        ...
-
-
 class TextOutput:
     """Prints lines at once: what the program does to standard output, errors and the result to the other.
 
@@ -69,7 +45,7 @@ class TextOutput:
         self._quiet = quiet
 
     def compile_error(self, error: ScriptError) -> None:
-        """Print the error with its place."""
+        """Print the error of a program that does not compile, with its place."""
         show(error.render(), error=True)
 
     def report(self, report: Report) -> None:
@@ -88,7 +64,7 @@ class TextOutput:
             show(f"{report.time:9.3f} s  {kind.value} {text}")
 
     def move(self, move: WatchedMove) -> None:
-        """Print its target and duration."""
+        """Print the target and duration of a move that has ended."""
         if self._quiet:
             return
         goal = next((move.arguments[name] for name in TARGETS if name in move.arguments), None)
@@ -100,12 +76,12 @@ class TextOutput:
         show(f"{move.start:9.3f} s  {what}")
 
     def call(self, time: float, thread: str, name: str, arguments: Sequence[Any]) -> None:
-        """Print the call."""
+        """Print the call of a builtin that has an effect, on the recording host."""
         if not self._quiet:
             show(f"{time:9.3f} s  {thread}: {name}({', '.join(map(_argument, arguments))})")
 
     def end(self, status: RunStatus, robot_time: float, robot: str, run: RunEnd | None) -> None:
-        """Print the position of the arm, and the times."""
+        """Print the final position of the arm, if there was one, and the times; `robot` is its title."""
         if run is not None and not self._quiet:
             joints = ", ".join(f"{_decimal(degrees(angle), 2)}" for angle in run.joints)
             show(f"joints {_rounded(list(run.joints))} rad, [{joints}] deg")
@@ -175,6 +151,10 @@ class JsonOutput:
             events=self._events,
             diagnostics=[diagnostic_of(error, self._file)._asdict() for error in self._errors],
         )
+
+
+RunOutput = TextOutput | JsonOutput
+"""Receives the events of a run."""
 
 
 class _RobotError(ScriptError):

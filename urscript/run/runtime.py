@@ -18,7 +18,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from math import ceil, fmod, isfinite, nan
 from typing import Any, Final
 
-from urscript import dialect
+from urscript import dialect, values
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
 from urscript.catalogue.costs import OF_THREAD
@@ -38,9 +38,7 @@ from urscript.values import (
     Matrix,
     Pose,
     Struct,
-    a_type,
     is_number,
-    log_form,
     type_name,
     wrap_int,
 )
@@ -130,7 +128,7 @@ def neg(a: Any) -> Any:
         return Matrix([neg(item) for item in row] for row in a.rows)
     if is_number(a):
         return neg(_to_builtin(a))
-    raise ScriptRuntimeError(f"a sign needs a number, a list or a matrix of numbers, got {a_type(a)}")
+    raise ScriptRuntimeError(f"a sign needs a number, a list or a matrix of numbers, got {values.a_type(a)}")
 
 
 def pos(a: Any) -> Any:
@@ -230,7 +228,7 @@ def equal(a: Any, b: Any) -> bool:
         return len(a) == len(b) and all(map(equal, a, b))
     if dialect.MIXED_TYPES_COMPARE or a is None or b is None or same_kind(ta, b):
         return False
-    raise ScriptRuntimeError(f"cannot compare {a_type(a)} with {a_type(b)}")
+    raise ScriptRuntimeError(f"cannot compare {values.a_type(a)} with {values.a_type(b)}")
 
 
 def unequal(a: Any, b: Any) -> bool:
@@ -259,7 +257,7 @@ def truth(value: Any) -> bool:
         return value != ""
     if dialect.NUMBER_AS_CONDITION and (type(value) is float or type(value) is int):
         return bool(value != 0)
-    raise ScriptRuntimeError(f"a condition must be True or False, got {a_type(value)}")
+    raise ScriptRuntimeError(f"a condition must be True or False, got {values.a_type(value)}")
 
 
 # --- the names -------------------------------------------------------------------------------------------
@@ -355,7 +353,7 @@ def _flow_builtins(host: Host) -> dict[str, Callable[..., Any]]:
     """Builtins of the language: they need only the cycle time and the log of the robot."""
 
     def textmsg(thread: ScriptThread, first: Any, second: Any) -> None:
-        host.textmsg(log_form(first) + log_form(second))
+        host.textmsg(values.log_form(first) + values.log_form(second))
 
     def sleep(thread: ScriptThread, seconds: float) -> Generator[Wait, None, None]:
         # Whole cycles that cover the time; the small slack keeps 0.016 s at two.

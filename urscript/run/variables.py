@@ -8,7 +8,7 @@ Undocumented behaviour is decided in `dialect`. The manual says when a method fa
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 
-from urscript import dialect
+from urscript import dialect, values
 from urscript.catalogue.calls import integer, type_error
 from urscript.catalogue.methods import ValueMethod
 from urscript.catalogue.types import ParamType
@@ -16,19 +16,7 @@ from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.run.host import Handle
 from urscript.run.threads import ScriptThread
 from urscript.run.waits import Wait
-from urscript.values import (
-    TEXT_LIMIT,
-    TYPE_NAMES,
-    CapacityList,
-    Matrix,
-    Pose,
-    Struct,
-    a_type,
-    is_number,
-    list_with_capacity,
-    str_form,
-    type_name,
-)
+from urscript.values import CapacityList, Matrix, Pose, Struct, a_type, is_number, type_name
 
 
 class _Undefined:
@@ -147,7 +135,7 @@ def _into_list(value: list[Any], old: list[Any], kind: str, name: str) -> list[A
         raise ScriptRuntimeError(
             f"a list of {len(value)} elements does not fit into {kind} '{name}' with a capacity of {capacity}"
         )
-    return list_with_capacity(value, capacity, sample_of(old))
+    return values.list_with_capacity(value, capacity, sample_of(old))
 
 
 def _assign_other(value: Any, old: Any, kind: str, name: str) -> Any:
@@ -268,7 +256,7 @@ def store_item(value: Any, index: Any, target: Any) -> Any:
             raise not_an_element(value, old)
         changed = target.copy()
         changed[place] = fitted(value, old, "element", str(place)) if type(old) is Struct else value
-        return changed if kind is list else list_with_capacity(changed, capacity_of(target), old)
+        return changed if kind is list else values.list_with_capacity(changed, capacity_of(target), old)
     if kind is Pose:
         place = _position(index, 6)
         if not is_number(value):
@@ -368,7 +356,7 @@ class MethodCalls:
     ) -> Generator[Wait, None, Any]:
         """`target.method(...)`; what it changes is lost."""
         # The test of a protocol is slow: values come first.
-        if type(target) not in TYPE_NAMES and isinstance(target, Handle):
+        if type(target) not in values.TYPE_NAMES and isinstance(target, Handle):
             return (yield from target.call_method(thread, method, arguments, named))
         return self._result(target, method, arguments, named)[1]
 
@@ -389,7 +377,7 @@ class MethodCalls:
         target = root
         for step in steps:
             target = inside(target, step)
-        if type(target) not in TYPE_NAMES and isinstance(target, Handle):
+        if type(target) not in values.TYPE_NAMES and isinstance(target, Handle):
             return UNDEFINED, (yield from target.call_method(thread, method, arguments, named))
         changed, result = self._result(target, method, arguments, named)
         if changed is UNDEFINED or not steps:
@@ -418,23 +406,23 @@ def kept(changed: Changed, present: Any) -> Any:
 
 
 def _changed(target: list[Any], items: list[Any], result: Any = None) -> Changed:
-    return list_with_capacity(items, capacity_of(target), sample_of(target)), result
+    return values.list_with_capacity(items, capacity_of(target), sample_of(target)), result
 
 
-def _grown(target: list[Any], method: str, index: int, values: list[Any]) -> Changed:
-    """`target` with `values` before the element `index`."""
+def _grown(target: list[Any], method: str, index: int, items: list[Any]) -> Changed:
+    """`target` with `items` before the element `index`."""
     capacity = capacity_of(target)
-    if len(target) + len(values) > capacity:
+    if len(target) + len(items) > capacity:
         raise ScriptRuntimeError(
             f"{method}: a list of {len(target)} elements with a capacity of {capacity} has no room for "
-            f"{len(values)} more"
+            f"{len(items)} more"
         )
     sample = sample_of(target)
-    for value in values:
+    for value in items:
         if not same_type(sample, value):
             raise not_an_element(value, sample)
     grown = target.copy()
-    grown[index:index] = values
+    grown[index:index] = items
     return _changed(target, grown)
 
 
@@ -442,10 +430,10 @@ def _append(target: list[Any], value: Any) -> Changed:
     return _grown(target, "append", len(target), [value])
 
 
-def _extend(target: list[Any], values: Any) -> Changed:
-    if not isinstance(values, list):
-        raise type_error("extend", "values", ParamType.LIST, values)
-    return _grown(target, "extend", len(target), values)
+def _extend(target: list[Any], items: Any) -> Changed:
+    if not isinstance(items, list):
+        raise type_error("extend", "values", ParamType.LIST, items)
+    return _grown(target, "extend", len(target), items)
 
 
 def _insert(target: list[Any], index: Any, value: Any) -> Changed:
@@ -495,11 +483,11 @@ def _get_column(target: Matrix, index: Any) -> list[Any]:
 
 
 def _to_string(target: Any) -> str:
-    text = str_form(target)
-    if len(text) <= TEXT_LIMIT:
+    text = values.str_form(target)
+    if len(text) <= values.TEXT_LIMIT:
         return text
     end = f"...{text[-1]}"
-    return text[: TEXT_LIMIT - len(end)] + end
+    return text[: values.TEXT_LIMIT - len(end)] + end
 
 
 def _length(target: Struct) -> int:

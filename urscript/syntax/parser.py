@@ -245,7 +245,10 @@ def _check_lengths(source: Source) -> None:
             raise ScriptLexerError(text, line=token.line or 1, column=token.column or 1, width=len(token))
 
 
-def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxError]:
+_MOST_ERRORS = 20
+
+
+def find_syntax_errors(source: Source) -> list[ScriptSyntaxError]:
     """The first syntax errors of `source`: after each the parser continues with the next statement."""
     from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
@@ -269,7 +272,7 @@ def find_syntax_errors(source: Source, limit: int = 20) -> list[ScriptSyntaxErro
             if error.token.type == "$END":
                 return False
             lost_openers += _drop_statement(error)
-        return len(errors) < limit
+        return len(errors) < _MOST_ERRORS
 
     try:
         _lark().parse(source.text, on_error=recover)
