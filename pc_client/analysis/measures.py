@@ -346,13 +346,12 @@ class Errors:
 def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Errors:
     """Measure position and joint errors over the movement; the best shift is that of the velocity [s]."""
     moving = track.movement
-    error = track.p_actual[moving] - track.p_ref[moving]
     path_error = track.p_actual[moving] - _ShiftedReference(track).at(lag_s, moving)
     offset = path_error.mean(axis=0)
-    distance = 1e3 * np.linalg.norm(error, axis=1)
+    distance = 1e3 * position_errors(track)
     path_distance = 1e3 * np.linalg.norm(path_error - offset, axis=1)
     joint_error = 1e3 * joint_errors(recording, track)[moving]
-    ref_speed = np.linalg.norm(velocity(track.t, track.p_ref), axis=1)[track.movement_steps]
+    ref_speed = speed(track.t, track.p_ref)[track.movement_steps]
     noise = rest_noise(recording, track)
     x, y, z = (float(v) for v in 1e3 * offset)
     return Errors(

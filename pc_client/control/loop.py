@@ -87,10 +87,7 @@ class LoopModel:
 
 
 def velocity_response(loop: LoopModel, period: float) -> Array:
-    """Differenced position after a unit velocity that is commanded for one cycle.
-
-    Args:
-        period: control cycle [s].
+    """Differenced position after a unit velocity that is commanded for one control cycle, the period [s].
 
     Returns:
         (n,): (q_k - q_(k-1)) / period for k = 0, 1, ...; the command is held from k = 0 to k = 1. Sums to 1.
@@ -173,15 +170,9 @@ def sensitivity(
 
 
 def loop_margins(loop: LoopModel, gain_p: float, gain_i: float, period: float) -> LoopMargins:
-    """Measure the margins of the sampled loop.
+    """Measure the margins of a loop that is sampled once a period [s], with gains [1/s] and [1/s2], >= 0.
 
-    Args:
-        gain_p: proportional gain [1/s], >= 0.
-        gain_i: integral gain [1/s2], >= 0.
-        period: control cycle [s].
-
-    Returns:
-        The margins; without feedback all are infinite and the peak is 1.
+    Without feedback all are infinite and the peak is 1.
     """
     if gain_p == 0.0 and gain_i == 0.0:
         return LoopMargins(inf, inf, inf, 1.0)

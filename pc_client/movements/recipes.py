@@ -104,19 +104,12 @@ class TargetRules:
 def random_targets(
     n_targets: int, box: Box, source: random.Random, rules: TargetRules | None = None
 ) -> Array:
-    """Target points drawn evenly from a box and kept when they follow the rules.
+    """Draw at least 2 target points (n, 3), m, evenly from a box and keep those that follow the rules.
 
-    Args:
-        n_targets: how many, at least 2.
-        box: where, base frame, m.
-        source: random numbers; only its `random()` is used.
-        rules: what the points must keep to; `TargetRules()` if None.
-
-    Returns:
-        (n_targets, 3), m.
+    Only `random()` of the source is used. Without rules, those of `TargetRules()` hold.
 
     Raises:
-        MovementError: when no such points are found, because the box is too small for the rules.
+        MovementError: no such points are found, because the box is too small for the rules.
     """
     if n_targets < 2:
         raise MovementError(f"{n_targets} target points: a movement needs at least 2")
@@ -157,32 +150,19 @@ def _follows_rules(points: list[Array], point: Array, rules: TargetRules) -> boo
 _MARGIN = 0.015
 
 
-@dataclass(frozen=True, slots=True)
-class HandRules:
-    """The movement of a hand, before it is brought to the robot.
+#: Where the target points of a hand's movement lie, m: a word or a signature in the air. Only its proportions
+#: matter to the robot, for the movement is scaled.
+HAND_BOX = Box((0.0, 0.0, 0.0), (0.10, 0.05, 0.05))
 
-    Attributes:
-        box: where the target points lie, m: a word or a signature in the air. Only its proportions matter to
-            the robot, for the movement is scaled.
-        targets: what the points must keep to: legs of a quarter to a half of the box's length.
-        stroke: duration of a stroke of `leg`, s. Source: section II.B, "duration 0.1 sec".
-        leg: m.
-        isochrony: a stroke lasts stroke (length / leg)^isochrony: people need hardly more time for longer
-            strokes.
-        variability: factors on the duration from stroke to stroke, low and high.
-    """
+#: Legs of a hand are a quarter to a half of its box's length.
+HAND_TARGETS = TargetRules(min_leg=0.025, max_leg=0.05, min_apart=0.0125)
 
-    box: Box
-    targets: TargetRules
-    stroke: float = 0.1
-    leg: float = 0.0375
-    isochrony: float = ISOCHRONY
-    variability: tuple[float, float] = (0.92, 1.08)
+#: Duration of a hand's stroke of `_HAND_LEG`, s. Source: section II.B, "duration 0.1 sec".
+HAND_STROKE = 0.1
+_HAND_LEG = 0.0375
 
-
-HAND = HandRules(
-    Box((0.0, 0.0, 0.0), (0.10, 0.05, 0.05)), TargetRules(min_leg=0.025, max_leg=0.05, min_apart=0.0125)
-)
+#: Factors on the duration from stroke to stroke, low and high.
+_VARIABILITY = (0.92, 1.08)
 
 
 def recipe_movement(n_targets: int, seed: int, name: str) -> Movement:
@@ -193,7 +173,7 @@ def recipe_movement(n_targets: int, seed: int, name: str) -> Movement:
     There are at least 2 target points. The same seed, 0 or more, gives the same movement everywhere.
     """
     source = random.Random(seed)
-    targets = random_targets(n_targets, HAND.box, source, HAND.targets)
+    targets = random_targets(n_targets, HAND_BOX, source, HAND_TARGETS)
     durations = _stroke_durations(targets, source)
     hand = Movement(name, literal_strokes(targets, durations), durations)
     fit = fit_movement(hand, UR3_BOX.shrunk(_MARGIN), max_speed=TOP_SPEED)
@@ -209,42 +189,23 @@ def recipe_movement(n_targets: int, seed: int, name: str) -> Movement:
 
 
 def _stroke_durations(targets: Array, source: random.Random) -> Array:
-    low, high = HAND.variability
-    rule = Isochrony(HAND.isochrony, HAND.stroke / HAND.leg**HAND.isochrony)
+    low, high = _VARIABILITY
+    rule = Isochrony(ISOCHRONY, HAND_STROKE / _HAND_LEG**ISOCHRONY)
     factors = [low + (high - low) * source.random() for _ in pairwise(targets)]
     durations: Array = rule.durations(leg_lengths(targets)) * np.array(factors)
     return durations
 
 
-@dataclass(frozen=True, slots=True)
-class ArcRules:
-    """Ranges from which strokes are drawn evenly; (low, high) each.
+#: Window (s) of an arc between points so far apart (m), both tails included; the visible part between two
+#: speed minima is shorter by the overlap. Such a slow hand keeps a UR3 far from its joint limits.
+_ARC_WINDOW, _ARC_LEG = 2.7, 0.15
 
-    Attributes:
-        reference_leg: distance (m) that is run in `reference_window`.
-        reference_window: window (s) of a stroke of that distance, both tails included; the visible part
-            between two speed minima is shorter by the overlap. Such a slow hand keeps a UR3 far from its
-            joint limits.
-        isochrony: window = reference_window (leg / reference_leg)^isochrony: people hardly need longer for
-            longer strokes.
-        variability: factors on the window from stroke to stroke.
-        sigma: of the lognormals.
-        overlap: share of the shorter of two windows in which both strokes move.
-        arc_angle: bending of the arcs, rad.
-        rest: time at rest before the first and after the last window, s.
-    """
+#: Ranges from which arcs are drawn evenly: the sigma of the lognormals, the share of the shorter of two
+#: windows in which both strokes move, and the bending, rad.
+_SIGMA, _OVERLAP, _ARC_ANGLE = (0.10, 0.20), (0.35, 0.50), (0.1, 0.6)
 
-    reference_leg: float = 0.15
-    reference_window: float = 2.7
-    isochrony: float = ISOCHRONY
-    variability: tuple[float, float] = (0.92, 1.08)
-    sigma: tuple[float, float] = (0.10, 0.20)
-    overlap: tuple[float, float] = (0.35, 0.50)
-    arc_angle: tuple[float, float] = (0.1, 0.6)
-    rest: float = 0.1
-
-
-ARC_RULES = ArcRules()
+#: Time at rest before the first and after the last window, s.
+_REST = 0.1
 
 
 def arcs_movement(n_targets: int, seed: int, name: str) -> Movement:
@@ -272,20 +233,19 @@ def _movement(name: str, trajectory: SigmaLognormal, facts: dict[str, str | int 
 
 
 def _draw_strokes(targets: Array, source: random.Random) -> SigmaLognormal:
-    """Strokes between the targets, drawn from ARC_RULES; rounded to three decimals for readable files."""
-    rules = ARC_RULES
+    """Strokes between the targets, rounded to three decimals for readable files."""
 
     def draw(low: float, high: float) -> float:
         return round(low + (high - low) * source.random(), 3)
 
     strokes: list[Stroke] = []
-    end, window_before = rules.rest, math.inf
+    end, window_before = _REST, math.inf
     for a, b in pairwise(targets):
-        ease = (math.dist(a, b) / rules.reference_leg) ** rules.isochrony
-        window = round(rules.reference_window * ease * draw(*rules.variability), 3)
-        overlap = draw(*rules.overlap) * min(window, window_before) if strokes else 0.0
+        ease = (math.dist(a, b) / _ARC_LEG) ** ISOCHRONY
+        window = round(_ARC_WINDOW * ease * draw(*_VARIABILITY), 3)
+        overlap = draw(*_OVERLAP) * min(window, window_before) if strokes else 0.0
         start = round(end - overlap, 3)
-        timing = TwoSidedTiming(start, window, draw(*rules.sigma))
-        strokes.append(Stroke(timing, arc_angle=draw(*rules.arc_angle), tilt=draw(-math.pi, math.pi)))
+        timing = TwoSidedTiming(start, window, draw(*_SIGMA))
+        strokes.append(Stroke(timing, arc_angle=draw(*_ARC_ANGLE), tilt=draw(-math.pi, math.pi)))
         end, window_before = start + window, window
-    return SigmaLognormal(targets, tuple(strokes), round(end + rules.rest, 3))
+    return SigmaLognormal(targets, tuple(strokes), round(end + _REST, 3))

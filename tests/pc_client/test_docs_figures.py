@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import erf, ndtr
 
 from pc_client.movements.description import describe, outline, snr_of_delay
-from pc_client.movements.durations import Fitts, Isochrony
+from pc_client.movements.durations import ISOCHRONY, Fitts, Isochrony
 from pc_client.movements.generate import GENERATORS, uniform_twin
 from pc_client.movements.library_sets import library_names
 from pc_client.movements.lognormal import (
@@ -26,7 +26,7 @@ from pc_client.movements.lognormal import (
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.movement import load_movement
 from pc_client.movements.power_law import TORSION_EXPONENT, TWO_THIRDS
-from pc_client.movements.recipes import ARC_RULES, HAND
+from pc_client.movements.recipes import HAND_STROKE
 from pc_client.movements.sigma_lognormal import LEAD, SigmaLognormal, Stroke, sinc
 from pc_client.movements.uniform import SmoothedSquareWave
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED
@@ -274,11 +274,10 @@ SAID: list[tuple[str, list[float]]] = [
     ("16 ms cost a stroke of 1 s {20.0} dB", [-20.0 * math.log10(0.016 * rms_frequency())]),
     ("top speed {1.875} A / T at T / 2", [float(stroke_shape(0.5).rate)]),
     ("-ln 204.8 = {-5.32203}", [-math.log(204.8)]),
-    ("b of .1 to .5; both sets of the library draw with {.3}", [HAND.isochrony]),
-    ("both sets of the library draw with {.3}", [ARC_RULES.isochrony]),
+    ("b of .1 to .5; both sets of the library draw with {.3}", [ISOCHRONY]),
     (
         "a stroke of .1 s has a mu, {-1.89}, within the -2.2 to -1.6 of hands",
-        [LiteralTiming(0.0, HAND.stroke, LEAD * HAND.stroke).lognormal.mu],
+        [LiteralTiming(0.0, HAND_STROKE, LEAD * HAND_STROKE).lognormal.mu],
     ),
     (
         "a lead of half a window gives {-2.29}, of two {-1.38}",

@@ -26,7 +26,14 @@ from pc_client.movements.generate import GENERATORS, generate_movement, retimed_
 from pc_client.movements.library_sets import library_names
 from pc_client.movements.lognormal import FULL_COVERAGE, TwoSidedTiming
 from pc_client.movements.movement import Movement, load_movement
-from pc_client.movements.recipes import HAND, TargetRules, fit_movement, random_targets, recipe_movement
+from pc_client.movements.recipes import (
+    HAND_BOX,
+    HAND_TARGETS,
+    TargetRules,
+    fit_movement,
+    random_targets,
+    recipe_movement,
+)
 from pc_client.movements.samples import SampledTrajectory
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, leg_lengths, literal_strokes
 from pc_client.movements.trajectory import Similarity
@@ -377,8 +384,8 @@ def test_both_twins_run_the_straight_lines_and_rest_at_every_target_point(name: 
 def test_the_robots_movement_is_the_hands_moved_scaled_turned_and_slowed(name: str, seed: int) -> None:
     movement = load_movement(name)
     n = len(movement.target_points)
-    hand = random_targets(n, HAND.box, random.Random(seed), HAND.targets)
-    assert not np.allclose(HAND.box.size, UR3_BOX.size)
+    hand = random_targets(n, HAND_BOX, random.Random(seed), HAND_TARGETS)
+    assert not np.allclose(HAND_BOX.size, UR3_BOX.size)
     scale, stretch = (float(movement.provenance[fact]) for fact in ("scale", "time_stretch"))
     distances = [
         np.linalg.norm(points[:, None] - points, axis=2) for points in (hand, movement.target_points)
