@@ -206,6 +206,8 @@ class Ports:
         secondary_ro: as secondary; takes nothing.
         realtime_ro: as realtime; takes nothing.
         interpreter: takes statements for a program in interpreter mode; not on CB3. Source: script manual.
+        tool_line: the serial line at the tool (docs/grippers.md).
+        gripper: variables of a Robotiq gripper (docs/grippers.md).
     """
 
     robot_api: int = 80
@@ -219,6 +221,8 @@ class Ports:
     secondary_ro: int = 30012
     realtime_ro: int = 30013
     interpreter: int = 30020
+    tool_line: int = 54321
+    gripper: int = 63352
 
     @classmethod
     def of(cls, numbers: Mapping[str, int]) -> Ports:
@@ -229,13 +233,15 @@ class Ports:
     def standard(cls, offset: int = 0) -> Ports:
         """The vendor's ports, all moved by `offset` for machines where they are taken.
 
-        Those of Modbus and of the Robot API, far below the others, are 0 (none) where they would leave the
-        TCP ports. LocalProtocolError if another one would leave 1..65535.
+        Those of Modbus and of the Robot API, far below the others, and that of the gripper, far above them,
+        are 0 (none) where they would leave the TCP ports. LocalProtocolError if another one would leave
+        1..65535.
         """
         low, high = 1 - cls().dashboard, 65535 - cls().interpreter
         if not low <= offset <= high:
             raise LocalProtocolError(f"port offset {offset} leaves the TCP ports: use {low} to {high}")
-        return cls(**{name: max(0, port + offset) for name, port in asdict(cls()).items()})
+        moved = {name: port + offset for name, port in asdict(cls()).items()}
+        return cls(**{name: port if 1 <= port <= 65535 else 0 for name, port in moved.items()})
 
 
 SIMULATED_MASTERBOARD = 2099

@@ -45,6 +45,7 @@ def run(monkeypatch, capfd):
         ("03_script_without_a_robot.py", (), "did you mean 'textmsg'?"),
         ("04_plan_a_movement.py", (), "top joint speed"),
         ("06_contact.py", (), "Protective"),
+        ("07_pick_and_place.py", ("--times", 1), "carried 2"),
     ],
 )
 def test_example(run, name, arguments, said):

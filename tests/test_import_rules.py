@@ -63,7 +63,7 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"arm_in_space", "clock", "interpreter_queue", "pendant", "robot_mode"},
+    {"arm_in_space", "clock", "gripper", "interpreter_queue", "pendant", "robot_mode"},
     {"io"},
     {"safety"},
     {"settings"},
@@ -101,7 +101,8 @@ PROTOCOL_ORDER = (
         "ur_types",
         "wire_record",
     },
-    {"interpreter", "modbus", "robot_api", "script_channel", "velocity_stream", "xmlrpc"},
+    {"interpreter", "modbus", "robot_api", "robotiq", "script_channel", "velocity_stream", "xmlrpc"},
+    {"modbus_rtu"},
     {"realtime"},
     {"dashboard"},
     {"primary"},

@@ -28,11 +28,12 @@ from ur_emulator.loop.served_box import BoxIdentity, ServedBox
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.tools import ToolModel, tool_by_name
 from ur_emulator.outgoing.addresses import close_to_scripts, give_back
 from ur_emulator.outgoing.loop_network import LoopNetwork
 from ur_emulator.polyscope.player import ProgramPlayer, start_up
 from ur_emulator.polyscope.report_writer import ReportWriter
-from ur_emulator.ports.port_set import CONTROL, PortSet, SendingPorts, answering_ports
+from ur_emulator.ports.port_set import CONTROL, GRIPPER, TOOL_LINE, PortSet, SendingPorts, answering_ports
 from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.scripting.network import Network
@@ -49,6 +50,7 @@ class _Choice:
     pace: Pace
     closed: Collection[str]
     identity: BoxIdentity
+    tool: ToolModel | None
 
     @classmethod
     def of(cls, options: BoxOptions) -> _Choice:
@@ -75,7 +77,7 @@ class _Choice:
             serial_number=simulated_serial(model.robot_type, options.seed),
             masterboard=LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
         )
-        return cls(model, version, fidelity, pace, closed, identity)
+        return cls(model, version, fidelity, pace, closed, identity, tool_by_name(str(options.tool)))
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -96,6 +98,7 @@ class _Choice:
             options.seed,
             partial(robot_hosts, network=network),
             version=(self.version.major, self.version.minor),
+            tool=self.tool,
         )
         controller.state.pendant.set_remote_control(options.remote_control)
         return controller
@@ -234,6 +237,9 @@ class Box:
             raise
         if control_port := numbers.pop(CONTROL, 0):
             close_to_scripts(self, control_port)
+        for name in (GRIPPER, TOOL_LINE):
+            if name in numbers:
+                self._network.own_ports[getattr(Ports(), name)] = (self._options.host, numbers[name])
         self.served_at = dataclasses.replace(
             self.served_at,
             ports=Ports.of(numbers),
@@ -250,6 +256,8 @@ class Box:
         """Numbers of the ports to open by name; 0 takes a free one."""
         ports = dataclasses.asdict(self.served_at.ports)
         numbers = {name: number for name, number in ports.items() if number}
+        if self._choice.tool is not None and GRIPPER not in numbers:
+            numbers[GRIPPER] = 0  # moved beyond the ports of TCP
         if self._options.port_base is None:
             numbers = dict.fromkeys(numbers, 0)
         if self._options.control_port is not None:

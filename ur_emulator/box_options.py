@@ -50,6 +50,7 @@ class BoxOptions:
     remote_control: bool = True
     services: Collection[str] = ()
     generation: RobotGeneration | None = None
+    tool: str | PathLike[str] = "none"
 
     def check(self) -> None:
         """Check the arguments that need no table; EmulatorError for one that is not allowed."""

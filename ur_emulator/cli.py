@@ -74,6 +74,9 @@ def serve(
     boxes: Annotated[
         int, typer.Option(help="How many boxes; --host and --seed are those of the first, then counted up.")
     ] = 1,
+    tool: Annotated[
+        str, typer.Option(help="On the flange: none, robotiq-2f85 and others, or FILE.toml.")
+    ] = "none",
     programs: Annotated[
         Path | None,
         typer.Option(
@@ -138,6 +141,7 @@ def serve(
     try:
         first = BoxOptions(
             robot=robot,
+            tool=tool,
             version=software,
             host=host,
             pace=pace,

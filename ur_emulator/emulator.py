@@ -220,6 +220,7 @@ class ControlBox(_Running, BoxControl):
         skip_unknown_nodes: run programs of PolyScope without the nodes that are not known; it names them.
         remote_control: clients may command the box; False: it starts in local control (e-Series).
         services: of a PolyScope X box, closed until they are enabled: "primary" and "rtde".
+        tool: on the flange, such as "robotiq-2f85", or a file (docs/grippers.md).
         in_process: run in a thread of this process. A client that holds Python's lock while it waits for the
             box then waits for ever.
 
@@ -243,6 +244,7 @@ class ControlBox(_Running, BoxControl):
         skip_unknown_nodes: bool = False,
         remote_control: bool = True,
         services: Collection[str] = (),
+        tool: str | PathLike[str] = "none",
         *,
         in_process: bool = False,
         generation: RobotGeneration | None = None,
@@ -264,6 +266,7 @@ class ControlBox(_Running, BoxControl):
             remote_control,
             services,
             generation,
+            tool,
         )
         super().__init__(make_rack([options], in_process=in_process))
 

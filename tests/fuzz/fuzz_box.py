@@ -53,7 +53,7 @@ from urscript import compile_program
 
 # Kinds of boxes, as options.
 CB3 = {"robot": "ur3", "version": "3.15.8"}
-E_SERIES = {"robot": "ur5e", "version": "5.25.1"}
+E_SERIES = {"robot": "ur5e", "version": "5.25.1", "tool": "robotiq-2f85"}
 POLYSCOPE_X = {"robot": "ur5e", "version": "10.14.0", "services": ("primary", "rtde")}
 # Hostile clients of one port at a time.
 MAX_HOSTILE = 5

@@ -15,6 +15,7 @@ from protocol.dashboard.commands import GREETING
 from protocol.dashboard.connection import MAX_LINE
 from protocol.frame_buffer import FrameBuffer
 from protocol.modbus import take_frame
+from protocol.modbus_rtu import crc16
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE, PackageType
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_version
@@ -237,6 +238,42 @@ class ModbusReader:
         assert not self.buffer
 
 
+class GripperReader:
+    """Looks at answers of a gripper: bare values have no end, so letters, digits and some signs are all there is."""
+
+    def __init__(self, version):
+        self.answers = []
+
+    def feed(self, data):
+        assert re.fullmatch(rb"[A-Za-z0-9_.?, \[\]\n-]*", data), data
+        self.answers.append(data)
+        del self.answers[:-50]
+
+    def finish(self):
+        pass
+
+
+class ToolLineReader:
+    """Takes answers of the serial line apart by their checksums."""
+
+    def __init__(self, version):
+        self.buffer = bytearray()
+        self.answers = []
+
+    def feed(self, data):
+        self.buffer += data
+        for size in range(5, len(self.buffer) + 1):
+            if crc16(bytes(self.buffer[:size])) == 0:  # of a frame and its checksum
+                self.answers.append(bytes(self.buffer[:size]))
+                del self.buffer[:size]
+                del self.answers[:-50]
+                self.feed(b"")
+                break
+
+    def finish(self):
+        assert not self.buffer
+
+
 # An encoding or a version of HTTP that does not exist; every other one above 500 is a defect of the box.
 NOT_OURS = (501, 505)
 _STATUS = re.compile(rb"HTTP/1\.1 (\d{3}) [\x20-\x7e]*\r\n")
@@ -272,6 +309,8 @@ class HttpReader:
 
 
 READERS = {
+    "gripper": GripperReader,
+    "tool_line": ToolLineReader,
     "realtime": RealtimeReader,
     "realtime_ro": RealtimeReader,
     "primary": PrimaryReader,

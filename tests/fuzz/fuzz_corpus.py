@@ -3,9 +3,13 @@
 import json
 import struct
 
+from protocol import robotiq
 from protocol.dashboard.commands import COMMANDS
 from protocol.interpreter import Word
+from protocol.modbus import ModbusFunction, encode_read, encode_write
+from protocol.modbus_rtu import encode_rtu
 from protocol.robot_api import BASE, CALLS
+from protocol.robotiq import SID, VARIABLES
 from protocol.rtde.codec import (
     GetControllerVersion,
     Pause,
@@ -245,7 +249,33 @@ def robot_api_message(rng, lively):
     return f"{head}Content-Type: {kind}\r\nContent-Length: {len(body.encode())}\r\n\r\n{body}".encode()
 
 
+def gripper_message(rng, lively):
+    """A request for a variable, or one that sets some; nothing activates the gripper."""
+    names = [name for name in VARIABLES if name != "ACT"]
+    if rng.random() < 0.5:
+        return f"GET {rng.choice([*names, 'ACT', SID])}{rng.choice(['', chr(10)])}".encode()
+    pairs = " ".join(
+        f"{rng.choice(names)} {rng.choice([0, 1, 9, 255, 256])}" for _ in range(rng.randint(1, 4))
+    )
+    return f"SET {pairs}\n".encode()
+
+
+def tool_line_message(rng, lively):
+    """A request of Modbus RTU to the gripper; nothing activates it."""
+    address = rng.choice([robotiq.OUTPUTS, robotiq.INPUTS + 1, robotiq.INPUTS + 2, rng.randrange(1 << 16)])
+    read = ModbusFunction(rng.choice([3, 4]))
+    pdu = rng.choice(
+        [
+            encode_read(read, address, rng.randint(1, 6)),
+            encode_write(ModbusFunction(16), robotiq.INPUTS + 1, [7]),
+        ]
+    )
+    return encode_rtu(rng.choice([9, 9, 9, 1]), pdu)
+
+
 MESSAGES = {
+    "gripper": gripper_message,
+    "tool_line": tool_line_message,
     "realtime": script_message,
     "realtime_ro": script_message,
     "primary": script_message,

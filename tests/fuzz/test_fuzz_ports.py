@@ -17,7 +17,12 @@ from ur_emulator.budgets import BUDGETS
 
 KINDS = {"cb3": CB3, "e-series": E_SERIES, "polyscope-x": POLYSCOPE_X}
 # Ports that a box does not have.
-NOT_THERE = {"cb3": {"interpreter", "robot_api"}, "e-series": {"robot_api"}, "polyscope-x": {"dashboard"}}
+TOOL = {"gripper", "tool_line"}
+NOT_THERE = {
+    "cb3": {"interpreter", "robot_api"} | TOOL,
+    "e-series": {"robot_api"},
+    "polyscope-x": {"dashboard"} | TOOL,
+}
 PORTS = sorted(MESSAGES.keys() - NOT_THERE["cb3"])
 
 

@@ -38,7 +38,7 @@ class FakeSocket:
         self.problem = ""
         self.inbox = bytearray()
         self.sent = bytearray()
-        self.is_connecting = False
+        self.is_connecting = self.is_own = False
         self.is_open = True
 
     def send(self, data):

@@ -18,7 +18,7 @@ class ChunkSocket:
         self.problem = ""
         self.inbox = bytearray()
         self.sent = bytearray()
-        self.is_connecting = True
+        self.is_connecting, self.is_own = True, False
         self.is_open = False
         self._peer = peer
         self._replies = replies

@@ -25,7 +25,7 @@ from ur_emulator.models.e_series_arms import UR5E, UR10E
 from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robots import ROBOTS, robot_by_name
-from ur_emulator.plant.arm_physics import build_physics
+from ur_emulator.plant.arm_physics import compile_physics, physics_spec
 from ur_emulator.plant.drives import ServoGains
 from ur_emulator.plant.friction import Friction
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
@@ -286,7 +286,9 @@ def test_a_typical_arm_is_half_a_millisecond_behind_its_target(name, speed):
 def test_true_friction_rises_as_fast_as_the_compensation(robot, share):
     """Servos without gains press with a share of the dry friction: joints creep at that share of the speed."""
     no_gains = ServoGains(np.zeros(6), 0.0)
-    model = build_physics(robot, robot.dh, (1.0,) * 6, no_gains, robot.generation.substep_us * 1e-6)
+    model = compile_physics(
+        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, robot.generation.substep_us * 1e-6, None), robot
+    )
     model.opt.gravity[:] = 0.0
     model.dof_damping[:] = 0.0
     data = mujoco.MjData(model)

@@ -12,6 +12,7 @@ from ur_emulator.controller.command import BoxParts, inform
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.models.robot_model import Vector3, six
+from ur_emulator.plant.scene import Thing
 
 # --- What is wired to the inputs of the box and the tool
 
@@ -121,11 +122,7 @@ class AddObstacle(CommandOperation):
                 f"obstacle {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
                 f"numbers ({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
             )
-        if hypot(*self.pose[:3]) > FARTHEST:
-            raise ArgumentError(
-                f"obstacle {self.name}: pose {list(self.pose)} given: six finite numbers x, y, z, rx, ry, rz "
-                f"are needed, at most {FARTHEST:g} m away"
-            )
+        _check_distance(f"obstacle {self.name}", self.pose)
 
     def apply(self, box: BoxParts) -> None:
         try:
@@ -133,6 +130,14 @@ class AddObstacle(CommandOperation):
         except RefusedError as refusal:
             inform(box.state, str(refusal))
             raise
+
+
+def _check_distance(what: str, pose: Sequence[float]) -> None:
+    if hypot(*pose[:3]) > FARTHEST:
+        raise ArgumentError(
+            f"{what}: pose {list(pose)} given: six finite numbers x, y, z, rx, ry, rz are needed, at most "
+            f"{FARTHEST:g} m away"
+        )
 
 
 class RemoveObstacle(CommandOperation):
@@ -146,3 +151,82 @@ class RemoveObstacle(CommandOperation):
             there = f"are {', '.join(known)}" if known else "is none"
             raise RefusedError(f"there is no obstacle {self.name!r}: there {there}")
         box.plant.obstacles.remove(self.name)
+
+
+# --- Things that can be moved: what an arm grips, pushes and drops
+
+
+ThingShape = Literal["box", "cylinder", "sphere"]
+# What the sizes of each shape mean, in order [m].
+THING_SIZES: dict[ThingShape, tuple[str, ...]] = {
+    "box": ("edge along x", "edge along y", "edge along z"),
+    "cylinder": ("radius", "length along z"),
+    "sphere": ("radius",),
+}
+
+
+class AddThing(CommandOperation):
+    """Put a body with a mass somewhere, at rest; one of the same name is replaced."""
+
+    name: str = parameter("to move and remove it by")
+    shape: ThingShape = parameter("what it is")
+    size: Sequence[float] = parameter(
+        "box: three edges; cylinder: radius, length; sphere: radius", "m", lengths=(0, 3)
+    )
+    mass: float = parameter("evenly distributed", "kg", 0.001, 100.0)
+    pose: Sequence[float] = parameter(
+        "of its middle in the base frame, position in m and rotation vector in rad", lengths=(6, 6)
+    )
+    friction: float = parameter(
+        "coefficient of its surface; the pads of a tool have their own", low=0.0, high=2.0, default=0.5
+    )
+
+    def check_together(self) -> None:
+        if not (self.name and self.name.isprintable() and len(self.name) <= 60):
+            raise ArgumentError(f"name {ascii(self.name)[:60]} of a thing given: 1 to 60 printed characters")
+        wanted = THING_SIZES[self.shape]
+        if len(self.size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in self.size):
+            raise ArgumentError(
+                f"thing {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
+                f"numbers ({', '.join(wanted)}), each {SMALLEST:g} to {LARGEST:g} m"
+            )
+        _check_distance(f"thing {self.name}", self.pose)
+
+    def apply(self, box: BoxParts) -> None:
+        thing = Thing(self.name, self.shape, tuple(self.size), self.mass, self.friction, six(self.pose))
+        try:
+            box.plant.put_thing(thing)
+        except RefusedError as refusal:
+            inform(box.state, str(refusal))
+            raise
+
+
+class MoveThing(CommandOperation):
+    """Put a thing elsewhere, at rest."""
+
+    name: str = parameter("of the thing")
+    pose: Sequence[float] = parameter("as of `add_thing`", lengths=(6, 6))
+
+    def check_together(self) -> None:
+        _check_distance(f"thing {self.name}", self.pose)
+
+    def apply(self, box: BoxParts) -> None:
+        _known_thing(box, self.name)
+        box.plant.scene.move(self.name, six(self.pose))
+
+
+class RemoveThing(CommandOperation):
+    """Take a thing away."""
+
+    name: str = parameter("of the thing")
+
+    def apply(self, box: BoxParts) -> None:
+        _known_thing(box, self.name)
+        box.plant.scene.remove(self.name)
+
+
+def _known_thing(box: BoxParts, name: str) -> None:
+    known = [thing.name for thing in box.plant.scene.things]
+    if name not in known:
+        there = f"are {', '.join(known)}" if known else "is none"
+        raise RefusedError(f"there is no thing {name!r}: there {there}")

@@ -35,6 +35,23 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True)
+class ThingNow:
+    """A thing around the arm.
+
+    Attributes:
+        name: by which it is moved and removed.
+        pose: of its middle [m, rotation vector in rad].
+        speed: [m/s, rad/s].
+        touches_tool: it touches the arm or its tool.
+    """
+
+    name: str
+    pose: Vector6
+    speed: Vector6
+    touches_tool: bool
+
+
+@dataclass(frozen=True, slots=True)
 class BoxState:
     """The state of a box at the end of a cycle; SI units, base frame.
 
@@ -66,6 +83,8 @@ class BoxState:
         tool_analog_inputs: [V or A].
         tool_voltage: supply of the tool [V].
         obstacles: names of those that were added.
+        things: what can be moved around the arm.
+        gripper: width between the pads [m], then STA, OBJ and FLT of a Robotiq gripper; empty without one.
         popups: texts of the popups on the screen.
         questions: of programs, which wait for an answer.
     """
@@ -97,6 +116,8 @@ class BoxState:
     tool_analog_inputs: tuple[float, ...]
     tool_voltage: int
     obstacles: tuple[str, ...]
+    things: tuple[ThingNow, ...]
+    gripper: dict[str, float]
     popups: tuple[str, ...]
     questions: tuple[Question, ...]
 
@@ -139,6 +160,8 @@ def take_state(controller: Controller) -> BoxState:
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
         obstacles=controller.plant.obstacles.names,
+        things=_things(controller),
+        gripper={} if controller.state.gripper is None else controller.state.gripper.summary(),
         popups=(*pendant.shown, *popups),
         questions=tuple(
             Question(r.request_id, r.kind.name, r.text)
@@ -146,6 +169,12 @@ def take_state(controller: Controller) -> BoxState:
             if r.kind is not RequestedType.NONE
         ),
     )
+
+
+def _things(controller: Controller) -> tuple[ThingNow, ...]:
+    scene = controller.plant.scene
+    states = ((thing.name, scene.state(thing.name)) for thing in scene.things)
+    return tuple(ThingNow(name, now.pose, now.twist, now.touches_tool) for name, now in states)
 
 
 def _levels(word: int) -> Levels:

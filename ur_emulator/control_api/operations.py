@@ -105,6 +105,9 @@ class BoxOperations:
     attach_payload = method(surroundings.AttachPayload)
     add_obstacle = method(surroundings.AddObstacle)
     remove_obstacle = method(surroundings.RemoveObstacle)
+    add_thing = method(surroundings.AddThing)
+    move_thing = method(surroundings.MoveThing)
+    remove_thing = method(surroundings.RemoveThing)
     # --- safety
     emergency_stop = method(safety.PressEmergencyStop)
     release_emergency_stop = method(safety.ReleaseEmergencyStop)

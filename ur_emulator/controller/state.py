@@ -12,10 +12,11 @@ from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.events import EventQueue, ProgramRequests
 from ur_emulator.controller.force_sense import ForceSense
+from ur_emulator.controller.gripper import SUPPLY, TwoFingerGripper
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.encoders import Encoders
-from ur_emulator.controller.io.lines import InputOutput
+from ur_emulator.controller.io.lines import InputOutput, ToolLine
 from ur_emulator.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.controller.io.registers import MapMemory, Registers
 from ur_emulator.controller.io.watchdogs import Watchdogs
@@ -30,6 +31,7 @@ from ur_emulator.controller.snapshot import EnergyMeter
 from ur_emulator.controller.world_model import WorldModel
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6
+from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.arm_motion import ArmMotion
 
 
@@ -63,6 +65,7 @@ class ControllerState:
         requests: stops that programs and clients have asked for in this cycle.
         past: snapshot of the last cycle, and joint positions before it.
         events: messages of this cycle, in order, for ports and log.
+        gripper: the controller of the tool, if it has one of its own.
     """
 
     robot: RobotModel
@@ -97,6 +100,7 @@ class ControllerState:
     requests: ProgramRequests
     past: PastCycles
     events: EventQueue
+    gripper: TwoFingerGripper | None
 
 
 def make_state(
@@ -108,6 +112,7 @@ def make_state(
     mode: RobotModeMachine,
     place_arm: Callable[[Vector6], bool],
     version: tuple[int, int],
+    tool_model: ToolModel | None,
 ) -> ControllerState:
     """Return the parts of a controller, made in the order in which they need each other."""
     io, registers, speed, operational = InputOutput(), Registers(), SpeedScaling(), OperationalModeChoice()
@@ -116,6 +121,12 @@ def make_state(
     past, tool = PastCycles(clock.generation), ToolSettings()
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)
+    gripper = None
+    if tool_model is not None:
+        gripper = TwoFingerGripper(tool_model, clock.period_s)
+        # As the maker's installation does.
+        io.set_tool_voltage(SUPPLY)
+        io.set_tool_line(ToolLine(is_enabled=True))
     return ControllerState(
         robot=robot,
         arm=arm,
@@ -149,4 +160,5 @@ def make_state(
         requests=ProgramRequests(),
         past=past,
         events=EventQueue(),
+        gripper=gripper,
     )

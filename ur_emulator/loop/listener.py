@@ -98,7 +98,8 @@ def _limits(host: str, port: int) -> tuple[tuple[tuple[str | int, ...], int, str
 
 
 # The start of a request over HTTP; no script, no command of the dashboard and no package begins so.
-_WEB_REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|PATCH|DELETE|OPTIONS|CONNECT|TRACE) ")
+# GET without a path is a request of a gripper's port, too.
+_WEB_REQUEST = re.compile(rb"GET /|(HEAD|POST|PUT|PATCH|DELETE|OPTIONS|CONNECT|TRACE) ")
 # Buffer of the system for what a client sends and the box has not read yet.
 RECEIVE_BUFFER = 64 * 1024
 # How long not to listen when a client can be neither accepted nor refused [s].

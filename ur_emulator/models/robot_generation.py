@@ -274,6 +274,11 @@ class Software:
     has_interpreter: bool
 
     @property
+    def has_tool_line(self) -> bool:
+        """The arm has a serial line at its tool."""
+        return "set_tool_communication" in self.catalogue
+
+    @property
     def day(self) -> str:
         """The date as the dashboard writes it, "Nov 30 2021"."""
         return self.built.strftime("%b %d %Y")

@@ -8,9 +8,15 @@ from ur_emulator.outgoing.modbus_units import ModbusClient, ModbusLink
 from ur_emulator.outgoing.sockets import Buffers, ScriptConnection
 from ur_emulator.outgoing.xmlrpc import XmlRpcClient, XmlRpcServer
 
+_LOCAL = ("127.0.0.1", "localhost")
+
 
 class LoopNetwork:
-    """Opens connections in a loop (see `scripting.network.Network`)."""
+    """Opens connections in a loop (see `scripting.network.Network`).
+
+    Attributes:
+        own_ports: host and number of what programs expect at a port of 127.0.0.1: the software of a tool.
+    """
 
     def __init__(self, loop: EventLoop, period_s: float, report: Report, own_address: str = "") -> None:
         """Prepare; nothing is opened.
@@ -21,6 +27,7 @@ class LoopNetwork:
         self._loop = loop
         self._report = report
         self._own_address = own_address
+        self.own_ports: dict[int, tuple[str, int]] = {}
         self._buffers = Buffers(loop, report)
         self._modbus = ModbusClient(loop, self.open, period_s, report)
         self._remotes = XmlRpcClient(loop, self.open, report)
@@ -31,7 +38,9 @@ class LoopNetwork:
         if len(host) > BUDGETS.host_length:
             connection.refuse(f"{len(host)} characters given: a host has up to {BUDGETS.host_length}")
         elif len(self._buffers.connections) < BUDGETS.outgoing_connections:
-            connection.begin(host, port)
+            own = self.own_ports.get(port) if host in _LOCAL else None
+            connection.is_own = own is not None
+            connection.begin(*(own or (host, port)))
         else:
             connection.refuse(f"the box has {BUDGETS.outgoing_connections} connections, close one first")
         return connection

@@ -81,7 +81,7 @@ _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOU
 class ScriptConnection(BufferedSocket):
     """One connection that a box has opened (see `scripting.network.ScriptSocket`).
 
-    `problem` says why there is none, if it could not be made.
+    `problem` says why there is none, if it could not be made; `is_own` that it leads to the box itself.
     """
 
     def __init__(self, loop: EventLoop, buffers: Buffers, report: Report, own_address: str = "") -> None:
@@ -100,6 +100,7 @@ class ScriptConnection(BufferedSocket):
         self._counted_unsent = 0
         self.is_connecting = False
         self.problem = ""
+        self.is_own = False
 
     def begin(self, host: str, port: int) -> None:
         """Begin to connect; the loop never waits for the look-up of a name."""

@@ -7,6 +7,7 @@ so that it acts within every sub-step, in C, and implicitly in speed. The drives
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,10 +15,13 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.models.robot_model import DhRow, RobotModel
+from ur_emulator.models.tools import ToolModel
 from ur_emulator.plant.drives import Drives, ServoGains
 from ur_emulator.plant.friction import Presliding
+from ur_emulator.plant.hand import Hand, add_tool
 from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles, add_slots
+from ur_emulator.plant.scene import Scene
 from ur_emulator.plant.sensors import REC_Q, REC_QD
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
@@ -51,6 +55,7 @@ class ArmPhysics:
         substep: physics time step [s].
         presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
             memory of the path.
+        tool: on the flange.
 
     Attributes:
         q: motor positions (6,) [rad].
@@ -59,6 +64,8 @@ class ArmPhysics:
         flange_position: (3,) in the base frame [m], at the start of the last sub-step.
         flange_rotation: (3, 3), likewise.
         loads: payload and push at the flange.
+        hand: the fingers of the tool, if it has some.
+        scene: things that can be moved.
         bias: torque of the servos beside their law (6,) [Nm].
     """
 
@@ -70,37 +77,70 @@ class ArmPhysics:
         gains: ServoGains,
         substep: float,
         presliding: float,
+        tool: ToolModel | None = None,
     ) -> None:
-        self.model = model = build_physics(robot, dh, mass_scale, gains, substep)
-        self.data = data = mujoco.MjData(model)
-        self._before = mujoco.MjData(model)
-        # Views into MuJoCo's memory: one attribute lookup each, once.
-        self.q: NDArray[np.float64] = data.qpos
-        self.qd: NDArray[np.float64] = data.qvel
-        self.torque: NDArray[np.float64] = data.actuator_force
-        self._ctrl: NDArray[np.float64] = data.ctrl
-        self._raw: NDArray[np.float64] = data.sensordata
-        self._frictionloss: NDArray[np.float64] = model.dof_frictionloss
-        self._presliding: Presliding | None = None
-        if presliding:
-            self._presliding = Presliding(presliding, self.q, data.qfrc_applied)
+        self._spec = spec = physics_spec(robot, dh, mass_scale, gains, substep, tool)
+        model = compile_physics(spec, robot)
+        self._size = _Sizes(model.nbody, model.ngeom, model.nv, model.nu)
+        self._presliding = Presliding(presliding) if presliding else None
+        self.loads = Loads(tool)
+        self.obstacles = Obstacles()
+        self.scene = Scene(spec, self._recompile)
+        self.hand = None if tool is None else Hand(tool)
+        self._bind(model, mujoco.MjData(model))
+        if self.hand is not None:
+            self.hand.open_half()
+        if self._presliding is not None:
+            self._presliding.reset()
             self._frictionloss[:] = 0.0
+        self._servo_gain, self._servo_law = self._gain.copy(), self._law.copy()
+        self._servo_solimp = self._solimp.copy()
+
+    def _bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Take views into MuJoCo's memory: one attribute lookup each, once. The arm's six come first."""
+        self.model, self.data, self._before = model, data, mujoco.MjData(model)
+        self.q: NDArray[np.float64] = data.qpos[:6]
+        self.qd: NDArray[np.float64] = data.qvel[:6]
+        self.torque: NDArray[np.float64] = data.actuator_force[:6]
+        self._ctrl: NDArray[np.float64] = data.ctrl[:6]
+        self._raw: NDArray[np.float64] = data.sensordata
+        self._frictionloss: NDArray[np.float64] = model.dof_frictionloss[:6]
         site: int = model.site(FLANGE).id
         self.flange_position: NDArray[np.float64] = data.site_xpos[site]
         self.flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
-        self.loads = Loads(model, data)
-        self.obstacles = Obstacles(model, data.qpos)
-        self._gain = model.actuator_gainprm
-        self._law = model.actuator_biasprm
-        self._servo_gain, self._servo_law = self._gain.copy(), self._law.copy()
-        self._solimp = model.dof_solimp
-        self._servo_solimp = model.dof_solimp.copy()
+        # Whether a body is a part of the arm: of the tree that begins with its first link.
+        self._is_arm = model.body_rootid == model.body(LINKS[0]).id
+        self._gain = model.actuator_gainprm[:6]
+        self._law = model.actuator_biasprm[:6]
+        self._solimp = model.dof_solimp[:6]
         self.bias: NDArray[np.float64] = self._law[:, 0]
+        if self._presliding is not None:
+            self._presliding.bind(self.q, data.qfrc_applied[:6])
+        self.loads.bind(model, data)
+        self.obstacles.bind(model, data.qpos)
+        self.scene.bind(model, data)
+        if self.hand is not None:
+            self.hand.bind(model, data)
+
+    def _recompile(self) -> None:
+        """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
+        before = self.model
+        model, data = self._spec.recompile(before, self.data)
+        for fields, n in zip(_SET_LATER, self._size, strict=True):
+            for field in fields:
+                getattr(model, field)[:n] = getattr(before, field)[:n]
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        self._bind(model, data)
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
         return int(self.data.ncon)
+
+    @property
+    def has_company(self) -> bool:
+        """Fingers or things move beside the joints."""
+        return bool(self.model.nv > 6)
 
     @property
     def has_diverged(self) -> bool:
@@ -115,17 +155,16 @@ class ArmPhysics:
         """
         model, data = self.model, self.data
         wrench = np.zeros(6)
-        fixed_to = model.body_weldid
         in_contact_frame = np.zeros(6)
         for i in range(data.ncon):
             contact = data.contact[i]
-            first, second = (int(fixed_to[model.geom_bodyid[geom]]) for geom in contact.geom)
-            if (first == 0) == (second == 0):
+            first, second = (bool(self._is_arm[model.geom_bodyid[geom]]) for geom in contact.geom)
+            if first == second:
                 continue
             mujoco.mj_contactForce(model, data, i, in_contact_frame)
             # MuJoCo gives the force on the second body, in the contact's axes (rows of `frame`).
             force = contact.frame.reshape(3, 3).T @ in_contact_frame[:3]
-            if second == 0:
+            if first:
                 force = -force
             fx, fy, fz = force.tolist()
             rx, ry, rz = (contact.pos - self.flange_position).tolist()
@@ -142,9 +181,11 @@ class ArmPhysics:
         self._solimp[:] = _STICTION_SOLIMP if free else self._servo_solimp
 
     def place(self, q: NDArray[np.float64]) -> None:
-        """Put the motors at q (6,) [rad], at rest."""
+        """Put the motors at q (6,) [rad], at rest; the fingers stay where they are."""
+        beside = self.data.qpos[6:].copy()
         mujoco.mj_resetData(self.model, self.data)
         self.q[:] = q
+        self.data.qpos[6:] = beside
         if self._presliding is not None:
             self._presliding.reset()
 
@@ -156,7 +197,8 @@ class ArmPhysics:
     def touches(self, q: Sequence[float]) -> bool:
         """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
         data = mujoco.MjData(self.model)
-        data.qpos[:] = q
+        data.qpos[:] = self.data.qpos
+        data.qpos[:6] = q
         mujoco.mj_kinematics(self.model, data)
         mujoco.mj_collision(self.model, data)
         return int(data.ncon) > 0
@@ -189,6 +231,14 @@ class ArmPhysics:
             captured[REC_Q] = self.q
             captured[REC_QD] = self.qd
 
+    def run_beside(self, n_steps: int) -> None:
+        """Advance what moves beside the arm while the brakes hold it."""
+        q = self.q.copy()
+        for _ in range(n_steps):
+            mujoco.mj_step(self.model, self.data)
+            self.q[:] = q
+            self.qd[:] = 0.0
+
     def store_state(self) -> None:
         """Store the present state for `restore_state`."""
         mujoco.mj_copyData(self._before, self.model, self.data)
@@ -205,10 +255,43 @@ class ArmPhysics:
 # --- the model
 
 
-def build_physics(
-    robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float], gains: ServoGains, substep: float
-) -> mujoco.MjModel:
-    """Compile the plant's model; see `arm_spec` for the mechanism.
+class _Sizes(NamedTuple):
+    """How many bodies, geoms, degrees of freedom and actuators the arm has; those of things come after."""
+
+    body: int
+    geom: int
+    dof: int
+    actuator: int
+
+
+# What is set in a compiled model, by the arrays of `_Sizes`.
+_SET_LATER = (
+    ("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_contype", "body_conaffinity"),
+    (
+        "geom_type",
+        "geom_size",
+        "geom_aabb",
+        "geom_rbound",
+        "geom_pos",
+        "geom_quat",
+        "geom_sameframe",
+        "geom_contype",
+        "geom_conaffinity",
+    ),
+    ("dof_solimp", "dof_solref", "dof_frictionloss"),
+    ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
+)
+
+
+def physics_spec(
+    robot: RobotModel,
+    dh: Sequence[DhRow],
+    mass_scale: Sequence[float],
+    gains: ServoGains,
+    substep: float,
+    tool: ToolModel | None,
+) -> mujoco.MjSpec:
+    """Return the plant's model, not compiled; see `arm_spec` for the mechanism.
 
     Args:
         dh: its six true rows.
@@ -229,6 +312,13 @@ def build_physics(
     _add_drives(spec, robot, gains)
     _add_hulls(spec, robot, dh)
     _add_sensors(spec)
+    if tool is not None:
+        add_tool(spec, tool)
+    return spec
+
+
+def compile_physics(spec: mujoco.MjSpec, robot: RobotModel) -> mujoco.MjModel:
+    """Compile the specification of the plant's model."""
     model = spec.compile()
     if robot.friction_rise is not None:
         _set_friction_rise(model, robot.friction_rise)
@@ -243,10 +333,10 @@ def _set_friction_rise(model: mujoco.MjModel, speed: float) -> None:
     R = speed / (size step) and d t = 2 step make that f = -size / speed times the speed after the step.
     """
     step = model.opt.timestep
-    slope = step * model.dof_invweight0 * model.dof_frictionloss / speed
+    slope = step * model.dof_invweight0[:6] * model.dof_frictionloss[:6] / speed
     impedance = slope / (1.0 + slope)
-    model.dof_solimp[:, :2] = impedance[:, None]
-    model.dof_solref[:, 0] = 2.0 * step / impedance
+    model.dof_solimp[:6, :2] = impedance[:, None]
+    model.dof_solref[:6, 0] = 2.0 * step / impedance
 
 
 def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:

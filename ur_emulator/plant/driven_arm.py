@@ -23,10 +23,12 @@ from ur_emulator.models.calibration import Calibration, calibrated_dh
 from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
+from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives, ServoGains
 from ur_emulator.plant.feedback import Feedback
+from ur_emulator.plant.hand import FingerCommand
 
 # --- the dead time of an arm's drives: drawn once a box, or another one every cycle
 
@@ -76,12 +78,14 @@ class ArmCommand(NamedTuple):
         cycle: number of the cycle, for errors.
         target: set-point for its end; None puts or keeps the brakes on.
         torque: of free joints.
+        fingers: of the tool; None: they hold.
     """
 
     cycle: int
     target: JointTarget | None
     mode: ControlMode
     torque: TorqueCommand | None
+    fingers: FingerCommand | None
 
 
 class DrivenArm:
@@ -95,14 +99,21 @@ class DrivenArm:
     """
 
     def __init__(
-        self, robot: RobotModel, calibration: Calibration, fidelity: Fidelity, seed: int, dead_time: DeadTime
+        self,
+        robot: RobotModel,
+        calibration: Calibration,
+        fidelity: Fidelity,
+        seed: int,
+        dead_time: DeadTime,
+        tool: ToolModel | None,
     ) -> None:
         generation = robot.generation
         period, substep = generation.period_s, generation.substep_us * 1e-6
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
         gains = ServoGains.of(robot)
         dh, presliding = calibrated_dh(robot, calibration), fidelity.friction_presliding
-        self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding)
+        self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding, tool)
+        self._period, self._n_substeps = period, generation.n_substeps
         self.drives = Drives(robot, calibration, fidelity, seed, gains, dead_time.substeps, substep, period)
         age_substeps = max(1, round(fidelity.feedback_age / substep))
         self.moves_later = age_substeps >= generation.n_substeps and not self.drives.target_acts_later
@@ -152,7 +163,9 @@ class DrivenArm:
         Raises:
             PlantError: the target is not finite, or the simulation diverged.
         """
-        cycle, target, mode, torque = command
+        cycle, target, mode, torque, fingers = command
+        if (hand := self.physics.hand) is not None:
+            hand.drive(fingers, self._period)
         if target is None:
             self._stand_still()
             return
@@ -253,6 +266,8 @@ class DrivenArm:
         self.undo_run_ahead()
         if not self._is_braked:
             self._engage_brakes()
+        if self.physics.has_company:
+            self.physics.run_beside(self._n_substeps)
         self.feedback.take_rest()
         self.feedback.keep()
 

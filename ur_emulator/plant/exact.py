@@ -14,18 +14,22 @@ from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
+from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant, PlantState
+from ur_emulator.plant.scene import Thing
 
 
 class ExactPlant(Plant):
     """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
 
-    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
-        super().__init__(robot, fidelity, seed)
-        self._physics.obstacles = _NoObstacles(self._physics.model, self._physics.q)
+    def __init__(
+        self, robot: RobotModel, fidelity: Fidelity, seed: int, tool: ToolModel | None = None
+    ) -> None:
+        super().__init__(robot, fidelity, seed, tool)
+        self._physics.obstacles = _NoObstacles()
 
     def reset(self, q: Sequence[float]) -> None:
         """Put the arm at rest at q (6,) [rad], brakes on; PlantError if these are not six finite numbers."""
@@ -58,6 +62,8 @@ class ExactPlant(Plant):
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
+        if (hand := self._physics.hand) is not None:
+            hand.place(self._finger_command, self.period_s)
         self._thermometers.step(self._drives.target_current)
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
@@ -94,6 +100,10 @@ class ExactPlant(Plant):
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Raise RefusedError: no load acts on this arm."""
         raise _refusal("payload")
+
+    def put_thing(self, thing: Thing) -> None:
+        """Refuse: this arm would pass through it; RefusedError always."""
+        raise _refusal(f"thing {thing.name}")
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
         """Raise RefusedError unless the push is to end: no force acts on this arm."""

@@ -117,19 +117,19 @@ class Friction:
 class Presliding:
     """The bristles of six joints.
 
-    Args:
-        angle: over which they follow a reversal [rad], above 0.
-        q: positions (6,) [rad], followed from now on.
-        torque: takes the friction (6,) [Nm].
+    They follow a reversal over an angle [rad], above 0.
     """
 
-    def __init__(self, angle: float, q: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
+    def __init__(self, angle: float) -> None:
         self._angle = angle
-        self._now = q
-        self._torque = torque
-        self._last = q.copy()
+        self._last = np.zeros(6)
         self._bristles = np.zeros(6)
         self._stored = (self._last.copy(), self._bristles.copy())
+
+    def bind(self, q: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
+        """Follow positions (6,) [rad] from now on, and give the friction (6,) [Nm]."""
+        self._now = q
+        self._torque = torque
 
     def reset(self) -> None:
         """Begin at the present positions, with bristles that are not bent."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ur_emulator.errors import PlantError
 from ur_emulator.models.mjcf import FLANGE, GRAVITY, LINKS, PAYLOAD
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
+from ur_emulator.models.tools import ToolModel
 
 # --- the payload body of a compiled MuJoCo arm
 
@@ -47,23 +48,31 @@ def set_payload_body(model: mujoco.MjModel, mass: float, cog: Vector3, inertia: 
 class Loads:
     """The payload and the push on one arm, in the plant's model.
 
+    The mass of a tool is a part of the model; the controller knows it only as the payload that is declared.
+
     Attributes:
         is_unexpected: something acts that the controller does not expect: see `wrench`.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, tool: ToolModel | None = None) -> None:
+        self._push: NDArray[np.float64] | None = None
+        self._push_point = np.zeros(3)
+        self._push_wrench = np.zeros(6)
+        self._tool = () if tool is None else ((tool.mass, tool.cog),)
+        # What hangs on the flange; empty: what is declared does.
+        self._true: tuple[tuple[float, Vector3], ...] = self._tool
+        self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
+        self.is_unexpected = bool(self._true)
+        self._weigh()
+
+    def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Act in this model and its state from now on."""
         self._model = model
         self._data = data
         self._flange_link: int = model.body(LINKS[5]).id
         site: int = model.site(FLANGE).id
         self._flange_position: NDArray[np.float64] = data.site_xpos[site]
         self._flange_rotation: NDArray[np.float64] = data.site_xmat[site].reshape(3, 3)
-        self._push: NDArray[np.float64] | None = None
-        self._push_point = np.zeros(3)
-        self._push_wrench = np.zeros(6)
-        self._hung: tuple[float, Vector3] | None = None
-        self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
-        self.is_unexpected = False
 
     def declare(self, mass: float, cog: Vector3, inertia: Vector6) -> None:
         """Set the payload that the controller assumes, and the true one unless `attach` has set it.
@@ -72,13 +81,15 @@ class Loads:
         """
         check_payload(mass, cog)
         self._declared = (mass, cog)
-        if self._hung is None:
+        self._weigh()
+        if not self._true:
             set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
         """Set the true payload, which the controller does not know; errors as in `check_payload`."""
         check_payload(mass, cog)
-        self._hung = (mass, cog)
+        self._true = (*self._tool, (mass, cog))
+        self._weigh()
         set_payload_body(self._model, mass, cog)
         self.is_unexpected = True
 
@@ -93,7 +104,7 @@ class Loads:
         self._push = force_base if force_base.any() else None
         self._push_point = at
         self._data.xfrc_applied[self._flange_link] = 0.0
-        self.is_unexpected = self._push is not None or self._hung is not None
+        self.is_unexpected = self._push is not None or bool(self._true)
 
     def apply(self) -> None:
         """Apply the push to its body in MuJoCo, for the pose at the start of this cycle."""
@@ -110,9 +121,15 @@ class Loads:
     def wrench(self) -> NDArray[np.float64]:
         """Wrench (6,) that the controller does not expect, at the flange in base axes [N, Nm]."""
         wrench = np.zeros(6) if self._push is None else self._push_wrench.copy()
-        if self._hung is not None:
-            for sign, (mass, cog) in ((-GRAVITY, self._hung), (GRAVITY, self._declared)):
-                weight = np.array([0.0, 0.0, sign * mass])
-                wrench[:3] += weight
-                wrench[3:] += np.cross(self._flange_rotation @ cog, weight)
+        if self._true:
+            x, y, _ = (self._flange_rotation @ self._excess_moment).tolist()
+            wrench[2] -= GRAVITY * self._excess_mass
+            wrench[3] -= GRAVITY * y
+            wrench[4] += GRAVITY * x
         return wrench
+
+    def _weigh(self) -> None:
+        """Compute what hangs on the flange beyond what is declared."""
+        loads = [*self._true, (-self._declared[0], self._declared[1])]
+        self._excess_mass = sum(mass for mass, _ in loads)
+        self._excess_moment = sum((mass * np.array(cog) for mass, cog in loads), np.zeros(3))

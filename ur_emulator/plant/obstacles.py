@@ -69,19 +69,17 @@ def add_slots(spec: mujoco.MjSpec) -> None:
 
 
 class Obstacles:
-    """The obstacles of one arm.
+    """The obstacles of one arm, in a model with slots for them."""
 
-    Args:
-        model: of the arm, with slots for them.
-        q: hinge angles (6,) [rad], kept up to date by the physics: an obstacle must not overlap the arm.
-    """
+    def __init__(self) -> None:
+        self._slots: dict[str, int] = {}
 
-    def __init__(self, model: mujoco.MjModel, q: NDArray[np.float64]) -> None:
+    def bind(self, model: mujoco.MjModel, q: NDArray[np.float64]) -> None:
+        """Be in this model from now on; `q` has the positions of all joints: none must overlap the arm."""
         self._model = model
         self._q = q
         self._body: int = model.body(OBSTACLES).id
         self._first: int = model.geom(f"{OBSTACLES}_0").id
-        self._slots: dict[str, int] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -127,7 +125,7 @@ class Obstacles:
         model.geom_aabb[geom] = (0.0, 0.0, 0.0, *((0.0, 0.0, 0.0) if endless else half))
         model.geom_rbound[geom] = 0.0 if endless else hypot(*half)
         model.geom_pos[geom] = pose[:3]
-        model.geom_quat[geom] = _quaternion(pose[3:])
+        model.geom_quat[geom] = quaternion(pose[3:])
         # Left at "same frame as its body", the shape would not follow its own position.
         model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
         self._switch(geom, True)
@@ -165,7 +163,7 @@ class Obstacles:
         return any(geom in data.contact[i].geom for i in range(data.ncon))
 
 
-def _quaternion(vector: Sequence[float]) -> tuple[float, float, float, float]:
+def quaternion(vector: Sequence[float]) -> tuple[float, float, float, float]:
     """Quaternion (w, x, y, z) of a rotation vector [rad]."""
     angle = hypot(*vector)
     x, y, z = vector

@@ -26,9 +26,12 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
+from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
+from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.obstacles import Obstacles
+from ur_emulator.plant.scene import Scene, Thing
 
 
 class PlantState(NamedTuple):
@@ -111,6 +114,7 @@ class Plant:
         robot: type of the arm; its generation has the control cycle and the physics step.
         fidelity: how imperfect it is.
         seed: of calibration, gear phases, delays and noise.
+        tool: on the flange, fingers half open.
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
@@ -118,7 +122,9 @@ class Plant:
             where it wanders, its least value.
     """
 
-    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
+    def __init__(
+        self, robot: RobotModel, fidelity: Fidelity, seed: int, tool: ToolModel | None = None
+    ) -> None:
         generation = robot.generation
         self.robot = robot
         self.fidelity = fidelity
@@ -127,13 +133,14 @@ class Plant:
         self.calibration = draw_calibration(fidelity, seed)
         dead_time = draw_dead_time(fidelity, seed, generation)
         self.dead_time = dead_time.least_s
-        self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, dead_time)
+        self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, dead_time, tool)
         self._physics, self._drives, self._feedback = arm.physics, arm.drives, arm.feedback
         self._thermometers = Thermometers(generation)
         self._reports_control_as_target = generation.reports_control_as_target
         self._state: PlantState | None = None
         # The command of the present cycle, by which the arm has not moved yet.
         self._command: ArmCommand | None = None
+        self._finger_command: FingerCommand | None = None
         self.reset(robot.home_q)
 
     # --- state for tests and for the control API ---
@@ -143,6 +150,16 @@ class Plant:
         """Obstacles around the arm."""
         self._be_current()
         return self._physics.obstacles
+
+    @property
+    def scene(self) -> Scene:
+        """Things around the arm that can be moved."""
+        self._be_current()
+        return self._physics.scene
+
+    def put_thing(self, thing: Thing) -> None:
+        """Add a thing at rest, see `Scene.put`."""
+        self.scene.put(thing)
 
     @property
     def q_true(self) -> NDArray[np.float64]:
@@ -233,6 +250,16 @@ class Plant:
         self._be_current()
         self._physics.loads.push(force, point)
 
+    @property
+    def fingers(self) -> FingerState | None:
+        """The fingers as the last cycle that is computed left them; None without a tool that has some."""
+        hand = self._physics.hand
+        return None if hand is None else hand.state
+
+    def drive_fingers(self, command: FingerCommand | None) -> None:
+        """Set what the fingers do from the next cycle on; None: they hold."""
+        self._finger_command = command
+
     # --- the cycle ---
 
     def step(
@@ -256,7 +283,7 @@ class Plant:
         self._finish()
         self._state = None
         self.cycle += 1
-        self._command = ArmCommand(self.cycle, target, mode, torque)
+        self._command = ArmCommand(self.cycle, target, mode, torque, self._finger_command)
         if not self._arm.moves_later:
             self._finish()
 

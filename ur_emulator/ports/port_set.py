@@ -13,6 +13,7 @@ from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.polyscope.player import ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
 from ur_emulator.ports.dashboard import DashboardAnswers, DashboardPort
+from ur_emulator.ports.gripper import GripperPort
 from ur_emulator.ports.interpreter import InterpreterIntake, InterpreterPort
 from ur_emulator.ports.modbus import ModbusPort
 from ur_emulator.ports.primary.port import PrimaryPort
@@ -20,8 +21,11 @@ from ur_emulator.ports.primary.robot_state import StateEncoder
 from ur_emulator.ports.realtime import RealtimePort
 from ur_emulator.ports.rtde import RtdePort
 from ur_emulator.ports.script_intake import ProgramIntake
+from ur_emulator.ports.tool_line import ToolLinePort
 
 CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
+# Ports of the software of a tool.
+GRIPPER, TOOL_LINE = "gripper", "tool_line"
 # Ports whose numbers need privileges, and what the box lacks without them.
 _PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
 # Ports of web servers.
@@ -164,6 +168,10 @@ def answering_ports(
         ports["dashboard"] = DashboardPort(box, DashboardAnswers(box, player, reports, shut_down))
     if software.has_interpreter:
         ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
+    if (gripper := box.controller.state.gripper) is not None:
+        ports[GRIPPER] = software_of_gripper = GripperPort(box, gripper)
+        if software.has_tool_line:
+            ports[TOOL_LINE] = ToolLinePort(box, gripper, software_of_gripper)
     if software.robot_api:
         # A box without HTTP does not load it.
         from ur_emulator.ports.http import HttpPort

@@ -29,6 +29,11 @@ class ScriptSocket(Protocol):
         """True while the connection stands and the peer has not closed it."""
         ...
 
+    @property
+    def is_own(self) -> bool:
+        """True of a connection to a port of the box itself."""
+        ...
+
     def send(self, data: bytes) -> bool:
         """Queue bytes for sending; False if the connection is closed or its buffer is full."""
         ...

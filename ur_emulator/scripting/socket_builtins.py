@@ -240,14 +240,22 @@ class SocketBuiltins(BuiltinGroup):
         enough = size if size > 0 else BUDGETS.inbox_bytes
         if len(inbox) < enough and socket.is_open:
             end = clock.program_tick + math.ceil(timeout / clock.period_s) if timeout > 0.0 else math.inf
-            yield Blocked(
-                lambda: len(inbox) >= enough or not socket.is_open or clock.program_tick >= end, outside=True
-            )
+
+            def has_come(n_bytes: int) -> bool:
+                return len(inbox) >= n_bytes or not socket.is_open or clock.program_tick >= end
+
+            if socket.is_own:  # the box's own answer comes whole: what it lacks will not come
+                yield Blocked(lambda: has_come(1), outside=True)
+            yield Blocked(lambda: has_come(enough), outside=not socket.is_own)
         else:
             yield CHECKPOINT
         if not 0 < size <= len(inbox):
             if len(inbox) >= BUDGETS.inbox_bytes:
                 reader.take(BUDGETS.inbox_bytes)
+            elif width == 1 and 0 < len(inbox) < size:
+                # Bytes that have come by the time-out count: programs ask for more than an answer may have.
+                came = reader.take(len(inbox))
+                return [len(came), *came, *failed[len(came) + 1 :]]
             return failed
         return [number, *struct.unpack(f">{number}{code}", reader.take(size))]
 

@@ -1,0 +1,393 @@
+"""A gripper on the arm: its registers, its fingers, what they hold, and who reaches it."""
+
+import socket
+
+import numpy as np
+import pytest
+
+from protocol.robotiq import Fault, Objects, Status
+from ur_emulator import ControlBox
+from ur_emulator.controller.gripper import TwoFingerGripper
+from ur_emulator.errors import ArgumentError, ModelError, RefusedError
+from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.tools import TOOLS, tool_by_name
+from ur_emulator.motion.generators import JointTarget
+from ur_emulator.plant.hand import FingerCommand, FingerState
+from ur_emulator.plant.plant import Plant
+from ur_emulator.plant.scene import Thing
+
+PERIOD = 0.008
+HAND = TOOLS["robotiq-2f85"]
+
+
+class Fingers:
+    """A gripper whose fingers move as they are driven; `block` is in their way [m]."""
+
+    def __init__(self):
+        self.gripper = TwoFingerGripper(HAND, PERIOD)
+        self.width, self.block = 0.04, 0.0
+        self.has_power = True
+        self._speed = self._share = 0.0
+
+    def run(self, seconds):
+        for _ in range(round(seconds / PERIOD)):
+            state = FingerState(self.width, self._speed, self._share)
+            command = self.gripper.step(state, self.has_power)
+            self._speed = self._share = 0.0
+            if command is not None:
+                most = command.speed * PERIOD
+                wanted = self.width + max(-most, min(most, command.width - self.width))
+                stopped = max(wanted, min(self.block, self.width))
+                self._speed, self._share = (stopped - self.width) / PERIOD, float(stopped > wanted)
+                self.width = stopped
+
+    def set(self, **values):
+        for name, value in values.items():
+            self.gripper.set(name, value)
+
+    def get(self, *names):
+        return tuple(self.gripper.get(name) for name in names)
+
+    def activate(self):
+        self.run(0.1)
+        self.set(ACT=1)
+        self.run(3.0)
+        assert self.get("STA", "OBJ", "POS", "FLT") == (Status.ACTIVE, Objects.AT_TARGET, 3, Fault.NONE)
+
+
+@pytest.fixture
+def fingers():
+    return Fingers()
+
+
+def test_power_lets_it_be_activated(fingers):
+    fingers.has_power = False
+    fingers.run(0.1)
+    assert fingers.get("STA", "POS") == (None, None)
+    fingers.has_power = True
+    fingers.run(0.1)
+    assert fingers.get("ACT", "STA") == (0, Status.RESET)
+    fingers.set(GTO=1)
+    fingers.run(0.1)
+    assert fingers.get("FLT") == (Fault.NOT_ACTIVATED,)
+    fingers.set(GTO=0, ACT=1)
+    fingers.run(0.05)
+    assert fingers.get("ACT", "STA", "OBJ") == (1, Status.ACTIVATING, Objects.MOVING)
+    fingers.set(POS=100, GTO=1)
+    fingers.run(0.05)
+    assert fingers.get("FLT") == (Fault.ACTION_DELAYED,)
+    fingers.run(4.0)
+    assert fingers.get("STA", "FLT", "POS", "OBJ") == (Status.ACTIVE, Fault.NONE, 100, Objects.AT_TARGET)
+    fingers.has_power = False
+    fingers.run(0.1)
+    fingers.has_power = True
+    fingers.run(0.1)
+    assert fingers.get("ACT", "STA", "POS") == (0, Status.RESET, 100)
+
+
+def test_a_target_shows_together_with_the_motion_towards_it(fingers):
+    fingers.activate()
+    fingers.set(POS=255, SPE=255, GTO=1)
+    assert fingers.get("PRE", "OBJ") == (0, Objects.AT_TARGET)  # not yet taken
+    while fingers.get("PRE") != (255,):
+        fingers.run(PERIOD)
+    assert fingers.get("OBJ") == (Objects.MOVING,)
+    fingers.run(1.0)
+    assert fingers.get("OBJ", "POS") == (Objects.AT_TARGET, 230)
+    fingers.set(POS=0)
+    fingers.run(0.2)
+    fingers.set(GTO=0)
+    fingers.run(0.1)
+    (stopped,) = fingers.get("POS")
+    fingers.run(0.5)
+    assert fingers.get("POS") == (stopped,)
+    assert 3 < stopped < 230
+
+
+def test_what_is_in_the_way_is_gripped_and_its_loss_is_seen(fingers):
+    fingers.activate()
+    fingers.block = 0.04
+    fingers.set(POS=255, GTO=1)
+    fingers.run(1.0)
+    assert fingers.get("OBJ", "POS") == (Objects.CONTACT_CLOSING, HAND.count_of(0.04))
+    fingers.block = 0.0
+    fingers.run(1.0)
+    assert fingers.get("OBJ", "POS") == (Objects.AT_TARGET, 230)
+
+
+def test_automatic_release_needs_a_new_activation(fingers):
+    fingers.activate()
+    fingers.set(POS=255, GTO=1)
+    fingers.run(1.0)
+    fingers.set(ATR=1)
+    fingers.run(0.1)
+    assert fingers.get("FLT", "OBJ") == (Fault.RELEASING, Objects.MOVING)
+    fingers.run(6.0)
+    assert fingers.get("FLT", "STA", "POS") == (Fault.RELEASED, Status.RESET, 3)
+    fingers.set(POS=100, ATR=0)
+    fingers.run(1.0)
+    assert fingers.get("POS") == (3,)
+    fingers.set(ACT=0)
+    fingers.run(0.1)
+    assert fingers.get("FLT") == (Fault.NONE,)
+
+
+def test_registers_of_the_serial_line_are_those_of_the_manual(fingers):
+    gripper = fingers.gripper
+    fingers.run(0.1)
+    gripper.write_registers(0x03E8, (0, 0, 0))
+    gripper.write_registers(0x03E8, (0x0100,))
+    assert gripper.read_registers(0x07D0, 1) == [0x1100]  # a driver reads once, and does not wait if it is 0
+    fingers.run(3.0)
+    assert gripper.read_registers(0x07D0, 1) == [0x3100]
+    gripper.write_registers(0x03E8, (0x0900, 0x00FF, 0xFFFF))
+    assert gripper.read_registers(0x07D0, 2) == [0x3900, 0x00FF]
+    fingers.run(1.0)
+    assert gripper.read_registers(0x07D0, 6) == [0xF900, 0x00FF, 0xE600, 0, 0, 0]
+    assert gripper.read_registers(0x03E8, 3) == [0x0900, 0x00FF, 0xFFFF]
+    for address, count in ((0x07CF, 1), (0x07D0, 17), (0, 1)):
+        with pytest.raises(LookupError):
+            gripper.read_registers(address, count)
+    with pytest.raises(LookupError):
+        gripper.write_registers(0x03E8, (0,) * 4)
+
+
+# --- in the physics
+
+
+class Bench:
+    """An arm at rest with its gripper, and a block of 40 mm between its pads."""
+
+    def __init__(self, mass=0.2, friction=0.3):
+        robot = robot_by_name("ur5e")
+        self.plant = Plant(robot, robot.generation.fidelity("typical"), 7, HAND)
+        self.plant.set_payload(HAND.mass, HAND.cog)
+        # The fingers are level: what they hold can fall past both.
+        q = (0.0, -1.5, 1.5, -1.570796, -1.570796, 0.0)
+        self.plant.reset(q)
+        self._target = JointTarget(q, (0.0,) * 6, (0.0,) * 6)
+        self._period = robot.generation.period_s
+        self.run(0.6, 0.085)
+        physics = self.plant._physics
+        rotation = physics.flange_rotation.copy()
+        self.place = (*physics.flange_position + rotation @ [0.0, 0.0, HAND.length], np.pi, 0.0, 0.0)
+        self.scene = physics.scene
+        self.scene.put(Thing("block", "box", (0.04, 0.04, 0.06), mass, friction, self.place))
+
+    def run(self, seconds, width, force=50.0, held=False):
+        self.plant.drive_fingers(FingerCommand(width, 0.15, force))
+        for _ in range(round(seconds / self._period)):
+            self.plant.step(self._target)
+            self.plant.sense()
+            if held:
+                self.scene.move("block", self.place)
+
+    def grip(self, force):
+        self.run(0.6, 0.0, force, held=True)
+        self.run(0.2, 0.0, force)
+
+    @property
+    def drop(self):
+        """How far the block has fallen [m]."""
+        return self.place[2] - self.scene.state("block").pose[2]
+
+
+@pytest.mark.parametrize("force", [20.0, 120.0, 235.0])
+def test_a_block_is_gripped_with_the_force_and_at_the_place_of_the_table(force):
+    bench = Bench()
+    bench.grip(force)
+    physics = bench.plant._physics
+    assert abs(HAND.count_of(bench.plant.fingers.width) - HAND.count_of(0.04)) <= 3
+    assert float(np.abs(physics.data.actuator_force[6])) / 2.0 == pytest.approx(force, rel=0.1)
+    assert bench.drop < 0.001
+    assert bench.scene.state("block").touches_tool
+
+
+@pytest.mark.parametrize(("share", "holds"), [(0.85, True), (1.15, False)])
+def test_a_block_slips_at_the_load_that_friction_carries(share, holds):
+    force = 20.0
+    bench = Bench(mass=share * 2.0 * HAND.friction * force / 9.81)
+    bench.grip(force)
+    before = bench.drop
+    bench.run(1.0, 0.0, force)
+    assert bool(bench.drop - before < 0.002) is holds
+
+
+def test_the_load_that_nobody_declared_is_felt():
+    bench = Bench(mass=1.0)
+    bench.grip(100.0)
+    with_block = bench.plant.sense().tcp_force[2]
+    bench.scene.remove("block")
+    bench.run(0.5, 0.0, 100.0)
+    assert bench.plant.sense().tcp_force[2] - with_block == pytest.approx(9.81, abs=2.0)
+
+
+def test_things_come_and_go_and_the_arm_stays():
+    bench = Bench()
+    q = bench.plant.q_true.copy()
+    with pytest.raises(RefusedError, match="the arm is where it should be"):
+        bench.scene.put(Thing("anvil", "sphere", (0.2,), 5.0, 0.5, bench.place))
+    assert [thing.name for thing in bench.scene.things] == ["block"]
+    bench.scene.put(Thing("ball", "sphere", (0.03,), 0.1, 0.5, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0)))
+    bench.run(1.0, 0.085)
+    assert bench.scene.state("ball").pose[2] == pytest.approx(0.01, abs=0.002)  # on the table
+    np.testing.assert_allclose(bench.plant.q_true, q, atol=2e-4)
+    bench.scene.remove("block")
+    assert [thing.name for thing in bench.scene.things] == ["ball"]
+
+
+# --- tools
+
+
+def test_a_tool_of_a_file(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text('based_on = "robotiq-2f85"\nmass = 0.5\nstroke = 0.04\n')
+    tool = tool_by_name(str(path))
+    assert (tool.name, tool.mass, tool.stroke, tool.counts) == ("small", 0.5, 0.04, (3, 230))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('based_on = "hand"', r"based_on: 'hand'; give one of robotiq-2f85"),
+        ('based_on = "robotiq-2f85"\nmass = -1', "mass: -1; give a number from 0.001 to 100 kg"),
+        ('based_on = "robotiq-2f85"\nforce = [9, 3]', "force: 9 is not below 3; give the smaller one first"),
+        ('based_on = "robotiq-2f85"\nstroke = 0', "stroke: 0; give a number from 0.001 to 1 m"),
+    ],
+)
+def test_a_wrong_file_of_a_tool_is_one_line(tmp_path, text, said):
+    path = tmp_path / "wrong.toml"
+    path.write_text(text)
+    with pytest.raises(ModelError, match=said):
+        tool_by_name(str(path))
+
+
+def test_an_unknown_tool_is_named_with_those_that_are():
+    with pytest.raises(
+        ModelError, match=r"unknown tool 'hand': choose one of none, robotiq-2f85, .* or give FILE"
+    ):
+        tool_by_name("hand")
+
+
+# --- from outside, and from programs
+
+
+def ask(client, text):
+    client.sendall(text.encode())
+    return client.recv(1000).decode()
+
+
+@pytest.fixture(scope="module")
+def box():
+    with ControlBox(
+        "ur5e", in_process=True, pace="lockstep", port_base=None, seed=7, tool="robotiq-2f85"
+    ) as box:
+        yield box
+
+
+@pytest.fixture
+def client(box):
+    with socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as client:
+        yield client
+
+
+def test_a_client_activates_and_moves_it(client):
+    assert ask(client, "GET SID") == "[9]"
+    assert ask(client, "SET ACT 0 ATR 0\n") == "ack"
+    assert ask(client, "SET ACT 1\n") == "ack"
+    while ask(client, "GET STA\n") != "STA 3\n":
+        pass
+    for target, position in ((255, 230), (0, 3), (100, 100)):
+        assert ask(client, f"SET POS {target} SPE 255 FOR 1 GTO 1\n") == "ack"
+        while ask(client, "GET PRE\n") != f"PRE {target}\n":
+            pass
+        while ask(client, "GET OBJ\n") == "OBJ 0\n":
+            pass
+        assert ask(client, "GET OBJ\n") == "OBJ 3\n"
+        assert ask(client, "GET POS\n") == f"POS {position}\n"
+    assert ask(client, "GET SPEED\n") == "?\n"
+    assert ask(client, "SET POS 999\n") == "nak"
+    assert ask(client, "SET SID 2\n") == "ack"
+    assert ask(client, "GET POS\n") == "POS ?\n"
+
+
+PROGRAM = """
+def p():
+  socket_open("127.0.0.1", 63352, "g")
+  socket_send_string("GET SID", "g")
+  textmsg("sid ", socket_read_byte_list(5, "g", 0.1))
+  socket_set_var("ACT", 1, "g")
+  textmsg("ack ", socket_read_byte_list(3, "g"))
+  while socket_get_var("STA", "g") != 3:
+    sync()
+  end
+  socket_send_string("SET POS", "g")
+  socket_send_byte(32, "g")
+  socket_send_string(255, "g")
+  socket_send_line(" GTO 1", "g")
+  socket_read_byte_list(3, "g")
+  sleep(1.0)
+  socket_send_string("GET PRE", "g")
+  textmsg("pre ", socket_read_byte_list(3, "g"))
+  textmsg("pos ", socket_get_var("POS", "g"))
+  set_tool_voltage(0)
+  sleep(0.1)
+  socket_send_string("GET SID", "g")
+  textmsg("sid ", socket_read_byte_list(2, "g"))
+  set_tool_voltage(24)
+end
+"""
+
+
+def test_a_program_reaches_it_at_its_usual_port(box):
+    said = len(box.log)
+    box.run_program(PROGRAM, wait=True)
+    texts = [entry.text for entry in box.log[said:] if entry.source == "Program"]
+    assert [text for text in texts if text[:3] in ("sid", "ack", "pre", "pos")] == [
+        "sid [3,91,57,93,-1,-1]",
+        "ack [3,97,99,107]",
+        "pre [3,50,53,53]",
+        "pos 230",
+        "sid [2,91,93]",
+    ]
+
+
+def test_the_serial_line_is_silent_while_the_software_has_it(box, client):
+    request = bytes.fromhex("09 04 07 D0 00 03 B1 CE")
+    with socket.create_connection((box.host, box.ports.tool_line), timeout=0.3) as line:
+        line.sendall(request)
+        with pytest.raises(TimeoutError):
+            line.recv(100)
+        client.close()
+        line.settimeout(10.0)
+        box.wait_until(log="disconnected from gripper port")
+        line.sendall(request)
+        assert line.recv(100)[:3] == bytes.fromhex("09 04 06")
+
+
+def test_people_put_move_and_remove_things(box):
+    box.add_thing("ball", "sphere", (0.03,), 0.1, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0))
+    (ball,) = box.state.things
+    assert (ball.name, ball.touches_tool) == ("ball", False)
+    box.move_thing("ball", (0.5, 0.4, 0.01, 0.0, 0.0, 0.0))
+    assert box.state.things[0].pose[:2] == pytest.approx((0.5, 0.4), abs=1e-3)
+    with pytest.raises(RefusedError, match="there is no thing 'cube': there are ball"):
+        box.move_thing("cube", (0.5, 0.4, 0.1, 0.0, 0.0, 0.0))
+    with pytest.raises(ArgumentError, match="a cylinder needs 2 numbers"):
+        box.add_thing("can", "cylinder", (0.03,), 0.1, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0))
+    box.remove_thing("ball")
+    assert box.state.things == ()
+    assert box.state.gripper.keys() == {"width", "STA", "OBJ", "FLT"}
+
+
+def test_an_exact_arm_moves_its_fingers_and_has_no_things():
+    with ControlBox(
+        in_process=True, pace="lockstep", port_base=None, fidelity="exact", tool="robotiq-hande"
+    ) as box:
+        with pytest.raises(RefusedError, match="nothing acts on an arm of fidelity exact"):
+            box.add_thing("ball", "sphere", (0.03,), 0.1, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0))
+        with socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as client:
+            assert ask(client, "SET ACT 1 POS 255 GTO 1\n") == "ack"
+            while ask(client, "GET POS\n") != "POS 250\n":
+                pass
+        assert box.ports.tool_line == 0  # a CB3 arm has no such line

@@ -1,0 +1,188 @@
+"""The tool on the flange in MuJoCo: housing, two fingers with one drive, and their pads.
+
+Both fingers move on slides, joined so that they mirror each other, instead of on the maker's linkage: the
+width of a Robotiq gripper is then linear in its position, as all clients take it to be (docs/fidelity.md).
+The drive is a velocity servo whose force is limited: it moves with its speed until it is stopped, and presses
+with its limit from then on. Its screw holds by itself when there is no power.
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_emulator.models.mjcf import LINKS, PAYLOAD
+from ur_emulator.models.tools import ToolModel
+
+TOOL = "tool"
+PADS = ("tool_pad_left", "tool_pad_right")
+_FINGERS = ("tool_finger_left", "tool_finger_right")
+_DRIVE = "tool_drive"
+
+_FINGER_MASS = 0.05  # kg, of each finger; part of the tool's mass
+_THICKNESS = 0.004  # m, of a pad
+
+_GEAR_INERTIA = 1.0
+"""Mass of the drive as a finger feels it [kg]; assumed, a screw makes it large."""
+
+_SERVO = 500.0
+"""Force of the drive for an error of its speed [N s/m]."""
+
+_SERVO_RATE = 60.0
+"""Rate at which a lasting error of the speed raises the force [1/s]; to its limit in .25 s."""
+
+_APPROACH = 0.02
+"""Time constant with which the drive slows down before its target [s]; assumed."""
+
+# Hard enough that a pad gives .2 mm where 200 N squeeze a body of 200 g: at the coarser contacts of the arm
+# the body would sink in by centimetres, since MuJoCo's contacts give by mass.
+_PAD_SOLREF = (0.004, 1.0)
+_PAD_SOLIMP = (0.95, 0.995, 0.001, 0.5, 2.0)
+
+_IMPEDANCE_RATIO = 10.0
+"""Friction over normal impedance: with 1 what is held creeps out of the pads. Source: MuJoCo's own hands."""
+
+
+class FingerState(NamedTuple):
+    """The fingers after a cycle.
+
+    Attributes:
+        width: between the pads [m].
+        speed: of the width [m/s]; negative while they close.
+        share: force of the drive as a share of its limit.
+    """
+
+    width: float
+    speed: float
+    share: float
+
+
+class FingerCommand(NamedTuple):
+    """What the drive of the fingers does: go to a width [m] with a speed [m/s], pressing with a force [N]."""
+
+    width: float
+    speed: float
+    force: float
+
+
+def add_tool(spec: mujoco.MjSpec, tool: ToolModel) -> None:
+    """Add a tool to an arm whose flange is where its payload is."""
+    payload = spec.body(PAYLOAD)
+    hand = spec.body(LINKS[5]).add_body(name=TOOL, pos=payload.pos, quat=payload.quat)
+    hand.explicitinertial = True
+    hand.mass = tool.mass - 2.0 * _FINGER_MASS
+    hand.ipos = tool.cog
+    hand.inertia = tool.inertia
+    end = tool.length - tool.pad[1] - 0.03
+    radius = min(tool.body, 0.5 * end)
+    hand.add_geom(
+        name="tool_housing",
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=[0.0, 0.0, radius, 0.0, 0.0, max(end - radius, radius + 1e-3)],
+        size=[radius, 0.0, 0.0],
+        mass=0.0,
+    )
+    spec.option.impratio = _IMPEDANCE_RATIO
+    _add_fingers(spec, hand, tool)
+
+
+def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody, tool: ToolModel) -> None:
+    across, along = tool.pad
+    for name, pad, side in zip(_FINGERS, PADS, (1.0, -1.0), strict=True):
+        finger = hand.add_body(name=name, pos=[0.0, 0.0, tool.length])
+        joint = finger.add_joint(
+            name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[side, 0.0, 0.0], range=[0.0, 0.5 * tool.stroke]
+        )
+        joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        joint.armature = _GEAR_INERTIA
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        shape = {"type": box, "solref": _PAD_SOLREF, "solimp": _PAD_SOLIMP, "priority": 1, "condim": 4}
+        finger.add_geom(
+            name=pad,
+            size=[0.5 * _THICKNESS, across, along],
+            pos=[side * 0.5 * _THICKNESS, 0.0, 0.0],
+            mass=_FINGER_MASS,
+            friction=[tool.friction, 0.005, 0.0001],
+            **shape,
+        )
+        back = 0.5 * (along + 0.03)
+        finger.add_geom(
+            type=box,
+            size=[_THICKNESS, across, back],
+            pos=[side * 2.0 * _THICKNESS, 0.0, along - back],
+            mass=0.0,
+        )
+    couple = spec.add_equality(
+        name=_DRIVE,
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        name1=_FINGERS[0],
+        name2=_FINGERS[1],
+    )
+    couple.data[:2] = 0.0, 1.0
+    couple.solref = _PAD_SOLREF
+    half_width = spec.add_tendon(name=_DRIVE)
+    for name in _FINGERS:
+        half_width.wrap_joint(name, 0.5)
+    drive = spec.add_actuator(name=_DRIVE, target=_DRIVE, trntype=mujoco.mjtTrn.mjTRN_TENDON)
+    drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+    drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    drive.gainprm[0] = _SERVO
+    drive.biasprm[2] = -_SERVO
+    drive.forcelimited = True
+    drive.forcerange = [-1.0, 1.0]
+    spec.add_exclude(bodyname1=_FINGERS[0], bodyname2=_FINGERS[1])
+
+
+class Hand:
+    """The fingers of a tool in a compiled model."""
+
+    def __init__(self, tool: ToolModel) -> None:
+        self._stroke = tool.stroke
+        self._raised = 0.0
+
+    def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Move in this model and its state from now on."""
+        joint = model.joint(_FINGERS[0])  # that of the other finger follows
+        q, v, drive = int(joint.qposadr[0]), int(joint.dofadr[0]), int(model.actuator(_DRIVE).id)
+        self._q: NDArray[np.float64] = data.qpos[q : q + 2]
+        self._qd: NDArray[np.float64] = data.qvel[v : v + 2]
+        self._speed: NDArray[np.float64] = data.ctrl[drive : drive + 1]
+        self._force: NDArray[np.float64] = data.actuator_force[drive : drive + 1]
+        self._limit: NDArray[np.float64] = model.actuator_forcerange[drive]
+
+    def open_half(self) -> None:
+        """Put the fingers in the middle of their stroke, as they are found after power on."""
+        self._q[:] = 0.25 * self._stroke
+
+    @property
+    def state(self) -> FingerState:
+        """The fingers now."""
+        (first, second), (first_speed, second_speed) = self._q.tolist(), self._qd.tolist()
+        share = abs(float(self._force[0])) / float(self._limit[1])
+        return FingerState(first + second, first_speed + second_speed, share)
+
+    def drive(self, command: FingerCommand | None, period: float) -> None:
+        """Set what the drive does in the next cycle [s]; None: it holds, with the force that it has."""
+        if command is None:
+            if abs(float(self._force[0])) < 0.9 * float(self._limit[1]):
+                self._speed[0] = self._raised = 0.0
+            return
+        first, second = self._q.tolist()
+        fastest, ahead = 0.5 * command.speed, 0.5 * (command.width - first - second) / _APPROACH
+        wanted = min(fastest, max(-fastest, ahead))
+        most = 2.0 * command.force / _SERVO
+        error = wanted - 0.5 * float(self._qd.sum())
+        self._raised = min(most, max(-most, self._raised + _SERVO_RATE * period * error))
+        self._speed[0] = wanted + self._raised
+        self._limit[:] = -2.0 * command.force, 2.0 * command.force
+
+    def place(self, command: FingerCommand | None, period: float) -> None:
+        """Let the fingers be where the command leads them within a cycle [s]: nothing is in their way."""
+        first, second = self._q.tolist()
+        way = 0.0 if command is None else command.width - first - second
+        most = 0.0 if command is None else command.speed * period
+        moved = 0.5 * min(most, max(-most, way))
+        self._q += moved
+        self._qd[:] = moved / period

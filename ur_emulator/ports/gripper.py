@@ -1,0 +1,93 @@
+"""Port 63352: the variables of a Robotiq gripper, as the software of the maker offers them.
+
+Answers come at once, from the present state; what a SET writes the gripper has after its next exchange. All
+clients, and programs at 127.0.0.1, talk to the same gripper; only its number (SID) belongs to the connection.
+"""
+
+from collections import deque
+
+from protocol import robotiq
+from ur_emulator.controller.gripper import TwoFingerGripper
+from ur_emulator.loop.connection import Connection
+from ur_emulator.loop.served_box import ServedBox
+from ur_emulator.loop.steps import Steps
+from ur_emulator.ports.session import Session
+
+_REQUEST_COST = 2
+
+_TEXTS = {"NCY": "0", "SNU": "C-00000", "FWV": "GC3-1.6.16", "VER": "1.8.0"}
+"""Answers that are texts. The serial number is one that no real gripper has."""
+
+_CONSTANTS = {"DST": 4, "PCO": 0}
+
+
+class GripperPort:
+    """Answers requests for the variables of a gripper."""
+
+    def __init__(self, box: ServedBox, gripper: TwoFingerGripper) -> None:
+        self._box = box
+        self._gripper = gripper
+        self._sessions: dict[Connection, _GripperSession] = {}
+
+    @property
+    def has_clients(self) -> bool:
+        """Somebody uses the software of the gripper."""
+        return bool(self._sessions)
+
+    def opened(self, connection: Connection) -> None:
+        """The client speaks first."""
+        self._sessions[connection] = _GripperSession(connection, self._box, self._gripper)
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Answer requests in order."""
+        self._sessions[connection].receive(data)
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client."""
+        self._sessions.pop(connection, None)
+
+
+class _GripperSession(Session):
+    """A client."""
+
+    def __init__(self, connection: Connection, box: ServedBox, gripper: TwoFingerGripper) -> None:
+        super().__init__(connection, box)
+        self._gripper = gripper
+        self._parser = robotiq.GripperConnection()
+        self._requests: deque[robotiq.Request] = deque()
+        self._sid = robotiq.DEFAULT_SID
+
+    def _take(self, data: bytes) -> None:
+        self._requests.extend(self._parser.receive(data))
+
+    def _answer_next(self) -> Steps[int]:
+        if not self._requests:
+            return 0
+        if not self.connection.send(self._answer(self._requests.popleft())):
+            self.connection.close()  # without its answer, a client takes the next one for it
+        return _REQUEST_COST
+        yield  # a generator that never waits
+
+    def _answer(self, request: robotiq.Request) -> bytes:
+        match request:
+            case robotiq.Set(values=((robotiq.SID, sid),)):
+                self._sid = sid
+                return robotiq.ACK
+            case robotiq.Set(values=values):
+                if self._sid == robotiq.DEFAULT_SID:
+                    for name, value in values:
+                        self._gripper.set(name, value)
+                return robotiq.ACK
+            case robotiq.Get(name=name):
+                return robotiq.encode_value(request, self._value(name))
+            case robotiq.Malformed(is_set=is_set):
+                return robotiq.NAK if is_set else f"{robotiq.NOT_KNOWN}\n".encode()
+
+    def _value(self, name: str) -> int | str | list[int]:
+        gripper = self._gripper
+        if name == robotiq.SID:
+            return [robotiq.DEFAULT_SID] if gripper.has_power else []
+        if self._sid != robotiq.DEFAULT_SID or not gripper.has_power:
+            return robotiq.NOT_KNOWN
+        value = _TEXTS.get(name, _CONSTANTS.get(name, gripper.get(name)))
+        return robotiq.NOT_KNOWN if value is None else value

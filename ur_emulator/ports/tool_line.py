@@ -1,0 +1,121 @@
+"""Port 54321: the serial line at the tool of an e-Series arm, as the maker's forwarder passes it on.
+
+Bytes of Modbus RTU pass only while the tool has its supply and the line is set up as the gripper wants it;
+the program or the installation does both (`set_tool_voltage`, `set_tool_communication`). One client at a time
+has the line, the others wait. While a client of port 63352 is there, the software behind that port has it,
+and this port is silent, as where both of the maker's packages are installed (reference `grippers.md` 2).
+
+A gripper takes its time: an answer comes `_PACE` after its request. Otherwise a client that asks without a
+pause would ask thousands of times a second.
+"""
+
+from dataclasses import dataclass
+
+from protocol import modbus, modbus_rtu
+from ur_emulator.controller.command import BoxParts, Result
+from ur_emulator.controller.gripper import TwoFingerGripper
+from ur_emulator.controller.io.lines import ToolLine
+from ur_emulator.loop.connection import Connection
+from ur_emulator.loop.served_box import ServedBox
+from ur_emulator.loop.steps import Steps
+from ur_emulator.ports.gripper import GripperPort
+from ur_emulator.ports.session import Session
+
+_REQUEST_COST = 4
+_UNIT = 9
+_PACE = 0.004  # s
+_SETTINGS = ToolLine(is_enabled=True)
+
+
+class ToolLinePort:
+    """Passes requests of Modbus RTU on to a gripper."""
+
+    def __init__(self, box: ServedBox, gripper: TwoFingerGripper, software: GripperPort) -> None:
+        """`software` is the other user of the line."""
+        self._box = box
+        self._gripper = gripper
+        self._software = software
+        self._sessions: dict[Connection, _LineSession] = {}
+
+    def opened(self, connection: Connection) -> None:
+        """The client speaks first."""
+        self._sessions[connection] = _LineSession(connection, self._box, self)
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Pass on what the client that has the line sends; what others send is lost."""
+        self._sessions[connection].receive(data)
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client."""
+        self._sessions.pop(connection, None)
+
+    def has_line(self, connection: Connection) -> bool:
+        """Whether bytes of a client reach the gripper."""
+        line = self._box.controller.state.io.tool_line
+        return (
+            self._gripper.has_power
+            and line[:4] == _SETTINGS[:4]
+            and not self._software.has_clients
+            and next(iter(self._sessions)) is connection
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Exchange:
+    """A request on the line; None: a cycle in which it is on its way."""
+
+    pdu: bytes | None
+
+    def apply(self, box: BoxParts) -> Result:
+        gripper = box.state.gripper
+        return None if gripper is None or self.pdu is None else {"pdu": _answer(gripper, self.pdu)}
+
+
+def _answer(gripper: TwoFingerGripper, pdu: bytes) -> bytes:
+    """Return the answer of the gripper to a request."""
+    try:
+        if pdu[0] == modbus.ModbusFunction.READ_WRITE_REGISTERS:
+            read, write = modbus_rtu.decode_read_write(pdu)
+            gripper.write_registers(write.address, write.values)
+            values = gripper.read_registers(read.address, read.count)
+            return bytes((pdu[0], *modbus.encode_answer(read, values)[1:]))
+        request = modbus.decode_request(pdu)
+        if request.function.is_bits:
+            raise modbus.ModbusRequestError(modbus.ExceptionCode.ILLEGAL_FUNCTION)
+        if request.function.is_read:
+            return modbus.encode_answer(request, gripper.read_registers(request.address, request.count))
+        gripper.write_registers(request.address, request.values)
+        return modbus.encode_answer(request)
+    except modbus.ModbusRequestError as error:
+        return modbus.encode_exception(pdu[0], error.code)
+    except LookupError:
+        return modbus.encode_exception(pdu[0], modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
+
+
+class _LineSession(Session):
+    """A client."""
+
+    def __init__(self, connection: Connection, box: ServedBox, port: ToolLinePort) -> None:
+        super().__init__(connection, box)
+        self._port = port
+        self._inbox = bytearray()
+
+    def _take(self, data: bytes) -> None:
+        if self._port.has_line(self.connection):
+            self._inbox += data
+            del self._inbox[: -modbus_rtu.MOST_WAITING]
+
+    def _answer_next(self) -> Steps[int]:
+        frame = modbus_rtu.take_request(self._inbox)
+        if frame is None:
+            return 0
+        if frame.unit != _UNIT:
+            return _REQUEST_COST
+        for _ in range(1, round(_PACE / self._box.controller.period_s)):
+            yield from self._box.apply(_Exchange(None))
+        result = yield from self._box.apply(_Exchange(frame.pdu))
+        if self._port.has_line(self.connection):
+            answer = modbus_rtu.encode_rtu(frame.unit, result["pdu"])
+            if not self.connection.send(answer):
+                self.connection.close()
+        return _REQUEST_COST
