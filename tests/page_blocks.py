@@ -209,7 +209,9 @@ class PageReader:
 
     def _serve(self, words):
         given = parsed(ur_emulator.cli.app, ["serve", *words])
-        options = {name: given[name] for name in ("robot", "seed", "fidelity", "programs", "control_port")}
+        options = {
+            name: given[name] for name in ("robot", "seed", "fidelity", "tool", "programs", "control_port")
+        }
         options["version"] = given["software"]
         options["programs"] = given["programs"] and given["programs"].absolute()
         if given["boxes"] == 1:

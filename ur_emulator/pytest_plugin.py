@@ -43,6 +43,7 @@ OPTIONS = (
     "skip_unknown_nodes",
     "remote_control",
     "services",
+    "tool",
     "control_port",
     "control_token",
     "in_process",
