@@ -37,6 +37,10 @@ ROWS: tuple[MapRow, ...] = (
     MapRow(
         "interpreter", "an answer for each line", "on request", "statements of URScript", "interpreter.md"
     ),
+    MapRow("gripper", "an answer for each line", "on request", "variables of a gripper", "../grippers.md"),
+    MapRow(
+        "tool_line", "answers of a gripper", "on request", "Modbus RTU, e-Series arms only", "../grippers.md"
+    ),
     MapRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
 )
 """One row a port of `Ports`."""
@@ -50,7 +54,8 @@ Made from `docs/generate/ports_page.py` and `protocol/ur_types.py` by `make docs
 `ur-emulator serve` opens these ports, with the numbers of a real control box, which most clients
 have built in. `--port-base N` adds N to all of them. Several boxes can run side by side, each on
 its own loopback address. `--software` sets the software that the box reports, and with it the
-layouts. Port {Ports().interpreter} is that of e-Series software from 5.10 on.
+layouts. Port {Ports().interpreter} is that of e-Series software from 5.10 on; those of a gripper are there
+with `--tool`.
 
 All ports accept several clients at once: at most {BUDGETS.clients_of_port} from one address at one
 port, {_OF_ADDRESS} from one address, {BUDGETS.clients} at one box. Further clients are accepted and

@@ -38,6 +38,12 @@ def is_free(host, port):
     return True
 
 
+def free_port():
+    """Return a free port below those that the system gives to whoever calls, who may take it before it is used."""
+    luck = random.Random(os.getpid() + time.monotonic_ns())
+    return next(port for port in luck.sample(range(20_000, 30_000), 100) if is_free("0.0.0.0", port))
+
+
 def free_address():
     """Return a loopback address with all standard ports free."""
     luck = random.Random(os.getpid() + time.monotonic_ns())

@@ -5,12 +5,11 @@ at 125 Hz, speeds, forces, hand guiding.
 """
 
 import gzip
-import socket
 import time
 
 import numpy as np
 import pytest
-from clients_support import served_box, wait_until
+from clients_support import free_port, served_box, wait_until
 from ur_rtde_support import (
     ACCELERATION,
     CLOSE_X,
@@ -308,9 +307,7 @@ def external_control(port):
 @pytest.mark.slow
 def test_the_box_fetches_the_control_script_itself(tmp_path):
     """The URCap's way: the client uploads nothing, the box asks it for its script when its program is played."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
-    programs = tmp_path / "programs"
+    port, programs = free_port(), tmp_path / "programs"
     programs.mkdir()
     (programs / "external_control.urp").write_bytes(external_control(port))
     flags = RTDEControl.FLAG_USE_EXT_UR_CAP | RTDEControl.FLAG_NO_WAIT

@@ -159,7 +159,8 @@ def test_friction_with_hysteresis_follows_the_path_not_the_speed():
     def loop(n):
         """Torque along a path out and back, in n steps each."""
         q, torque = np.zeros(6), np.zeros(6)
-        friction = Presliding(angle, q, torque)
+        friction = Presliding(angle)
+        friction.bind(q, torque)
         seen = []
         for position in [*np.linspace(0, 0.01, n + 1)[1:], *np.linspace(0.01, 0.0, n + 1)[1:]]:
             q[:] = position

@@ -10,11 +10,11 @@ from ur_emulator import ControlBox
 from ur_emulator.controller.gripper import TwoFingerGripper
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
 from ur_emulator.models.robots import robot_by_name
+from ur_emulator.models.things import Thing
 from ur_emulator.models.tools import TOOLS, tool_by_name
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.scene import Thing
 
 PERIOD = 0.008
 HAND = TOOLS["robotiq-2f85"]

@@ -12,7 +12,7 @@ from ur_emulator.controller.command import BoxParts, inform
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.models.robot_model import Vector3, six
-from ur_emulator.plant.scene import Thing
+from ur_emulator.models.things import Thing
 
 # --- What is wired to the inputs of the box and the tool
 

@@ -14,12 +14,12 @@ from ur_emulator.errors import PlantError, RefusedError
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
+from ur_emulator.models.things import Thing
 from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant, PlantState
-from ur_emulator.plant.scene import Thing
 
 
 class ExactPlant(Plant):

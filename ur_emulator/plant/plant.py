@@ -26,12 +26,13 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
+from ur_emulator.models.things import Thing
 from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.obstacles import Obstacles
-from ur_emulator.plant.scene import Scene, Thing
+from ur_emulator.plant.scene import Scene
 
 
 class PlantState(NamedTuple):

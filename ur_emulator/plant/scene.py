@@ -5,13 +5,13 @@ everything else stays. Things that stand still for ever are obstacles (`obstacle
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from ur_emulator.errors import RefusedError
 from ur_emulator.models.robot_model import Vector6, six
+from ur_emulator.models.things import Thing, ThingState
 from ur_emulator.plant.obstacles import quaternion
 
 MOST_THINGS = 32
@@ -25,35 +25,6 @@ _GEOMS: dict[str, tuple[mujoco.mjtGeom, Callable[..., tuple[float, float, float]
 
 # As the pads of a tool: what is squeezed must not sink in, see `hand.py`.
 _SOLREF, _SOLIMP = (0.006, 1.0), (0.9, 0.99, 0.001, 0.5, 2.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Thing:
-    """A body that can be moved.
-
-    Attributes:
-        shape: "box", "cylinder" (along z) or "sphere".
-        size: three edges; radius and length; radius [m].
-        mass: evenly distributed [kg].
-        friction: coefficient of its surface; of two surfaces the greater counts, of a tool's pads their own.
-        pose: of its middle in the base frame [m, rad].
-    """
-
-    name: str
-    shape: str
-    size: tuple[float, ...]
-    mass: float
-    friction: float
-    pose: Vector6
-
-
-@dataclass(frozen=True, slots=True)
-class ThingState:
-    """Where a thing is now: pose in the base frame [m, rad], linear and angular velocity [m/s, rad/s]."""
-
-    pose: Vector6
-    twist: Vector6
-    touches_tool: bool
 
 
 class Scene:

@@ -1,0 +1,34 @@
+"""Things around an arm that can be moved, as people put them there and as they are now."""
+
+from dataclasses import dataclass
+
+from ur_emulator.models.robot_model import Vector6
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """A body that can be moved.
+
+    Attributes:
+        shape: "box", "cylinder" (along z) or "sphere".
+        size: three edges; radius and length; radius [m].
+        mass: evenly distributed [kg].
+        friction: coefficient of its surface; of two surfaces the greater counts, of a tool's pads their own.
+        pose: of its middle in the base frame [m, rad].
+    """
+
+    name: str
+    shape: str
+    size: tuple[float, ...]
+    mass: float
+    friction: float
+    pose: Vector6
+
+
+@dataclass(frozen=True, slots=True)
+class ThingState:
+    """Where a thing is now: pose in the base frame [m, rad], linear and angular velocity [m/s, rad/s]."""
+
+    pose: Vector6
+    twist: Vector6
+    touches_tool: bool
