@@ -307,17 +307,24 @@ def external_control(port):
 @pytest.mark.slow
 def test_the_box_fetches_the_control_script_itself(tmp_path):
     """The URCap's way: the client uploads nothing, the box asks it for its script when its program is played."""
-    port, programs = free_port(), tmp_path / "programs"
+    programs = tmp_path / "programs"
     programs.mkdir()
-    (programs / "external_control.urp").write_bytes(external_control(port))
+
+    def port():
+        number = free_port()
+        (programs / "external_control.urp").write_bytes(external_control(number))
+        return number
+
     flags = RTDEControl.FLAG_USE_EXT_UR_CAP | RTDEControl.FLAG_NO_WAIT
     with (
         served_box(tmp_path, "--programs", programs) as box,
         connected(RTDEReceive, box.host) as receive,
-        connected(RTDEControl, box.host, -1.0, flags, port) as control,
+        connected(RTDEControl, box.host, -1.0, flags, port=port) as control,
     ):
         dashboard = Dashboard(box.host)
-        dashboard.connect()
+        dashboard.connect(
+            20_000
+        )  # ms; the usual two seconds may pass until a busy machine has compiled the script
         dashboard.loadURP("external_control.urp")
         dashboard.play()
         wait_until(control.isProgramRunning, "the program")

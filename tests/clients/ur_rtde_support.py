@@ -2,7 +2,7 @@
 
 import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,17 +30,16 @@ TRIES = 3  # before the last
 
 
 @contextmanager
-def connected(interface, *arguments):
+def connected(interface, *arguments, port=None):
     """Connect one of ur_rtde's interfaces and disconnect it: one that outlives its box ends the whole process.
 
-    The client gives its script five seconds to start, by the wall clock. A busy machine gets more tries.
+    The client gives its script five seconds to start, by the wall clock. A busy machine gets more tries. `port` gives
+    the last argument, another one each time: a client that has failed keeps the port that it listens on.
     """
-    for _ in range(TRIES):
-        with suppress(RuntimeError):
-            client = interface(*arguments)
+    for tries_left in range(TRIES, -1, -1):
+        with suppress(RuntimeError) if tries_left else nullcontext():
+            client = interface(*arguments, *([] if port is None else [port()]))
             break
-    else:
-        client = interface(*arguments)
     try:
         yield client
     finally:
