@@ -31,7 +31,18 @@ _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 WANTED_DESCRIPTORS = 65_536
 
 # Ports of the line that says that a box is ready.
-_SHOWN_PORTS = ("robot_api", "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter", "modbus")
+_SHOWN_PORTS = (
+    "robot_api",
+    "dashboard",
+    "primary",
+    "secondary",
+    "realtime",
+    "rtde",
+    "interpreter",
+    "modbus",
+    "gripper",
+    "tool_line",
+)
 
 app = new_app("An emulated Universal Robots control box.")
 
