@@ -199,18 +199,13 @@ class GripperConnection:
         return requests
 
 
-def encode_value(request: Get, value: int | str | Sequence[int]) -> bytes:
-    """Return the answer to a GET.
-
-    Args:
-        value: of the variable; NOT_KNOWN if it has none; of SID the grippers that are there.
-    """
-    if request.name == SID:
-        return str(list(value)).encode() if not isinstance(value, (int, str)) else b"[]"
-    if not request.bare:
+def encode_value(request: Get, value: int | str) -> bytes:
+    """Return the answer to a GET: the value of a variable, NOT_KNOWN if it has none, or the text of SID."""
+    if request.name != SID and not request.bare:
         return f"{request.name} {value}\n".encode()
-    width = VARIABLES[request.name].width
-    return (f"{value:0{width}d}" if isinstance(value, int) and width else str(value)).encode()
+    if isinstance(value, str):
+        return value.encode()
+    return f"{value:0{VARIABLES[request.name].width}d}".encode()
 
 
 def _parse(text: str) -> Request:

@@ -63,8 +63,8 @@ def test_no_bytes_are_kept_without_end(segments):
         (Get("POS", bare=False), 77, b"POS 77\n"),
         (Get("POS", bare=False), "?", b"POS ?\n"),
         (Get("VER", bare=True), "1.8.0", b"1.8.0"),
-        (Get("SID", bare=False), [9, 2], b"[9, 2]"),
-        (Get("SID", bare=True), [], b"[]"),
+        (Get("SID", bare=False), "[9, 2]", b"[9, 2]"),
+        (Get("SID", bare=True), "[]", b"[]"),
     ],
 )
 def test_answers_have_the_widths_that_programs_read(request_, value, answer):

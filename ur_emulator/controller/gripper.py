@@ -117,7 +117,7 @@ class TwoFingerGripper:
             return None
         match name:
             case "POS":
-                return self._tool.count_of(self._fingers.width)
+                return self._position
             case "PRE":
                 return self._held.POS
             case "STA":
@@ -127,8 +127,16 @@ class TwoFingerGripper:
             case "FLT":
                 return int(self._fault)
             case "COU":
-                return _MOVING_CURRENT if abs(self._fingers.speed) > _RESTS else 0
+                return self._current
         return getattr(self._held, name, None)
+
+    @property
+    def _position(self) -> int:
+        return self._tool.count_of(self._fingers.width)
+
+    @property
+    def _current(self) -> int:
+        return _MOVING_CURRENT if abs(self._fingers.speed) > _RESTS else 0
 
     def summary(self) -> dict[str, float]:
         """What people want to know of it: the width between its pads [m], and its state."""
@@ -180,8 +188,8 @@ class TwoFingerGripper:
             objects=self._objects if self._held.GTO or self._held.ATR else Objects.MOVING,
             fault=self._fault,
             requested=self._held.POS,
-            position=self._tool.count_of(self._fingers.width),
-            current=_MOVING_CURRENT if abs(self._fingers.speed) > _RESTS else 0,
+            position=self._position,
+            current=self._current,
         )
         return (*status, *[0] * _MORE_REGISTERS)
 

@@ -83,10 +83,10 @@ class _GripperSession(Session):
             case robotiq.Malformed(is_set=is_set):
                 return robotiq.NAK if is_set else f"{robotiq.NOT_KNOWN}\n".encode()
 
-    def _value(self, name: str) -> int | str | list[int]:
+    def _value(self, name: str) -> int | str:
         gripper = self._gripper
         if name == robotiq.SID:
-            return [robotiq.DEFAULT_SID] if gripper.has_power else []
+            return f"[{robotiq.DEFAULT_SID}]" if gripper.has_power else "[]"
         if self._sid != robotiq.DEFAULT_SID or not gripper.has_power:
             return robotiq.NOT_KNOWN
         value = _TEXTS.get(name, _CONSTANTS.get(name, gripper.get(name)))
