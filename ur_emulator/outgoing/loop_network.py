@@ -34,12 +34,13 @@ class LoopNetwork:
 
     def open(self, host: str, port: int) -> ScriptConnection:
         """Begin to connect to `host`:`port`."""
-        connection = ScriptConnection(self._loop, self._buffers, self._report, self._own_address)
+        own = self.own_ports.get(port) if host in _LOCAL else None
+        connection = ScriptConnection(
+            self._loop, self._buffers, self._report, self._own_address, is_own=own is not None
+        )
         if len(host) > BUDGETS.host_length:
             connection.refuse(f"{len(host)} characters given: a host has up to {BUDGETS.host_length}")
         elif len(self._buffers.connections) < BUDGETS.outgoing_connections:
-            own = self.own_ports.get(port) if host in _LOCAL else None
-            connection.is_own = own is not None
             connection.begin(*(own or (host, port)))
         else:
             connection.refuse(f"the box has {BUDGETS.outgoing_connections} connections, close one first")

@@ -84,7 +84,15 @@ class ScriptConnection(BufferedSocket):
     `problem` says why there is none, if it could not be made; `is_own` that it leads to the box itself.
     """
 
-    def __init__(self, loop: EventLoop, buffers: Buffers, report: Report, own_address: str = "") -> None:
+    def __init__(
+        self,
+        loop: EventLoop,
+        buffers: Buffers,
+        report: Report,
+        own_address: str = "",
+        *,
+        is_own: bool = False,
+    ) -> None:
         """Prepare; nothing is connected.
 
         `report` gets an error of ours in what the peer has caused; it ends the connection. `own_address` is
@@ -100,7 +108,7 @@ class ScriptConnection(BufferedSocket):
         self._counted_unsent = 0
         self.is_connecting = False
         self.problem = ""
-        self.is_own = False
+        self.is_own = is_own
 
     def begin(self, host: str, port: int) -> None:
         """Begin to connect; the loop never waits for the look-up of a name."""

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ur_emulator.models.mjcf import LINKS, PAYLOAD
 from ur_emulator.models.tools import ToolModel
 
-TOOL = "tool"
-PADS = ("tool_pad_left", "tool_pad_right")
+_TOOL = "tool"
+_PADS = ("tool_pad_left", "tool_pad_right")
 _FINGERS = ("tool_finger_left", "tool_finger_right")
 _DRIVE = "tool_drive"
 
@@ -69,7 +69,7 @@ class FingerCommand(NamedTuple):
 def add_tool(spec: mujoco.MjSpec, tool: ToolModel) -> None:
     """Add a tool to an arm whose flange is where its payload is."""
     payload = spec.body(PAYLOAD)
-    hand = spec.body(LINKS[5]).add_body(name=TOOL, pos=payload.pos, quat=payload.quat)
+    hand = spec.body(LINKS[5]).add_body(name=_TOOL, pos=payload.pos, quat=payload.quat)
     hand.explicitinertial = True
     hand.mass = tool.mass - 2.0 * _FINGER_MASS
     hand.ipos = tool.cog
@@ -89,7 +89,7 @@ def add_tool(spec: mujoco.MjSpec, tool: ToolModel) -> None:
 
 def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody, tool: ToolModel) -> None:
     across, along = tool.pad
-    for name, pad, side in zip(_FINGERS, PADS, (1.0, -1.0), strict=True):
+    for name, pad, side in zip(_FINGERS, _PADS, (1.0, -1.0), strict=True):
         finger = hand.add_body(name=name, pos=[0.0, 0.0, tool.length])
         joint = finger.add_joint(
             name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[side, 0.0, 0.0], range=[0.0, 0.5 * tool.stroke]
