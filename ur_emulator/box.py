@@ -18,7 +18,7 @@ from ur_emulator.control_api.runner import OperationRunner
 from ur_emulator.control_api.step_operations import Context
 from ur_emulator.controller.command import Command, Done
 from ur_emulator.controller.controller import Controller
-from ur_emulator.errors import EmulatorError, NotRunningError
+from ur_emulator.errors import EmulatorError, ModelError, NotRunningError
 from ur_emulator.loop.event_loop import WAKE_UP, EventLoop
 from ur_emulator.loop.listener import Port
 from ur_emulator.loop.memory import MemoryWatch
@@ -28,7 +28,6 @@ from ur_emulator.loop.served_box import BoxIdentity, ServedBox
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.tools import ToolModel, tool_by_name
 from ur_emulator.outgoing.addresses import close_to_scripts, give_back
 from ur_emulator.outgoing.loop_network import LoopNetwork
 from ur_emulator.polyscope.player import ProgramPlayer, start_up
@@ -38,6 +37,7 @@ from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import robot_hosts
+from ur_hil.tools import ToolModel, tools_by_name
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class _Choice:
     pace: Pace
     closed: Collection[str]
     identity: BoxIdentity
-    tool: ToolModel | None
+    tools: tuple[ToolModel, ...]
 
     @classmethod
     def of(cls, options: BoxOptions) -> _Choice:
@@ -77,7 +77,8 @@ class _Choice:
             serial_number=simulated_serial(model.robot_type, options.seed),
             masterboard=LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
         )
-        return cls(model, version, fidelity, pace, closed, identity, tool_by_name(str(options.tool)))
+        tools = tools_by_name(str(options.tool), ModelError)
+        return cls(model, version, fidelity, pace, closed, identity, tools)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -98,7 +99,7 @@ class _Choice:
             options.seed,
             partial(robot_hosts, network=network),
             version=(self.version.major, self.version.minor),
-            tool=self.tool,
+            tools=self.tools,
         )
         controller.state.pendant.set_remote_control(options.remote_control)
         return controller
@@ -256,7 +257,7 @@ class Box:
         """Numbers of the ports to open by name; 0 takes a free one."""
         ports = dataclasses.asdict(self.served_at.ports)
         numbers = {name: number for name, number in ports.items() if number}
-        if self._choice.tool is not None and GRIPPER not in numbers:
+        if any(tool.kind == "robotiq" for tool in self._choice.tools) and GRIPPER not in numbers:
             numbers[GRIPPER] = 0  # moved beyond the ports of TCP
         if self._options.port_base is None:
             numbers = dict.fromkeys(numbers, 0)

@@ -7,14 +7,15 @@ import pytest
 
 from protocol.robotiq import Fault, Objects, Status
 from ur_emulator import ControlBox
-from ur_emulator.controller.gripper import TwoFingerGripper
+from ur_emulator.controller.grippers.robotiq import RobotiqGripper
+from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.things import Thing
-from ur_emulator.models.tools import TOOLS, tool_by_name
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.plant import Plant
+from ur_hil.tools import TOOLS, tools_by_name
 
 PERIOD = 0.008
 HAND = TOOLS["robotiq-2f85"]
@@ -24,15 +25,15 @@ class Fingers:
     """A gripper whose fingers move as they are driven; `block` is in their way [m]."""
 
     def __init__(self):
-        self.gripper = TwoFingerGripper(HAND, PERIOD)
+        self.gripper = RobotiqGripper(HAND, PERIOD)
         self.width, self.block = 0.04, 0.0
-        self.has_power = True
+        self.has_power, self.io = True, InputOutput()
         self._speed = self._share = 0.0
 
     def run(self, seconds):
         for _ in range(round(seconds / PERIOD)):
             state = FingerState(self.width, self._speed, self._share)
-            command = self.gripper.step(state, self.has_power)
+            command = self.gripper.step(state, self.has_power, self.io)
             self._speed = self._share = 0.0
             if command is not None:
                 most = command.speed * PERIOD
@@ -160,7 +161,7 @@ class Bench:
 
     def __init__(self, mass=0.2, friction=0.3):
         robot = robot_by_name("ur5e")
-        self.plant = Plant(robot, robot.generation.fidelity("typical"), 7, HAND)
+        self.plant = Plant(robot, robot.generation.fidelity("typical"), 7, (HAND,))
         self.plant.set_payload(HAND.mass, HAND.cog)
         # The fingers are level: what they hold can fall past both.
         q = (0.0, -1.5, 1.5, -1.570796, -1.570796, 0.0)
@@ -175,7 +176,7 @@ class Bench:
         self.scene.put(Thing("block", "box", (0.04, 0.04, 0.06), mass, friction, self.place))
 
     def run(self, seconds, width, force=50.0, held=False):
-        self.plant.drive_fingers(FingerCommand(width, 0.15, force))
+        self.plant.drive_fingers([FingerCommand(width, 0.15, force)])
         for _ in range(round(seconds / self._period)):
             self.plant.step(self._target)
             self.plant.sense()
@@ -197,7 +198,7 @@ def test_a_block_is_gripped_with_the_force_and_at_the_place_of_the_table(force):
     bench = Bench()
     bench.grip(force)
     physics = bench.plant._physics
-    assert abs(HAND.count_of(bench.plant.fingers.width) - HAND.count_of(0.04)) <= 3
+    assert abs(HAND.count_of(bench.plant.fingers[0].width) - HAND.count_of(0.04)) <= 3
     assert float(np.abs(physics.data.actuator_force[6])) / 2.0 == pytest.approx(force, rel=0.1)
     assert bench.drop < 0.001
     assert bench.scene.state("block").touches_tool
@@ -242,7 +243,7 @@ def test_things_come_and_go_and_the_arm_stays():
 def test_a_tool_of_a_file(tmp_path):
     path = tmp_path / "small.toml"
     path.write_text('based_on = "robotiq-2f85"\nmass = 0.5\nstroke = 0.04\n')
-    tool = tool_by_name(str(path))
+    (tool,) = tools_by_name(str(path), ModelError)
     assert (tool.name, tool.mass, tool.stroke, tool.counts) == ("small", 0.5, 0.04, (3, 230))
 
 
@@ -259,14 +260,14 @@ def test_a_wrong_file_of_a_tool_is_one_line(tmp_path, text, said):
     path = tmp_path / "wrong.toml"
     path.write_text(text)
     with pytest.raises(ModelError, match=said):
-        tool_by_name(str(path))
+        tools_by_name(str(path), ModelError)
 
 
 def test_an_unknown_tool_is_named_with_those_that_are():
     with pytest.raises(
         ModelError, match=r"unknown tool 'hand': choose one of none, robotiq-2f85, .* or give FILE"
     ):
-        tool_by_name("hand")
+        tools_by_name("hand", ModelError)
 
 
 # --- from outside, and from programs
@@ -377,7 +378,7 @@ def test_people_put_move_and_remove_things(box):
         box.add_thing("can", "cylinder", (0.03,), 0.1, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0))
     box.remove_thing("ball")
     assert box.state.things == ()
-    assert box.state.gripper.keys() == {"width", "STA", "OBJ", "FLT"}
+    assert box.state.grippers[0].keys() == {"SID", "width", "STA", "OBJ", "FLT"}
 
 
 def test_an_exact_arm_moves_its_fingers_and_has_no_things():
@@ -391,3 +392,62 @@ def test_an_exact_arm_moves_its_fingers_and_has_no_things():
             while ask(client, "GET POS\n") != "POS 250\n":
                 pass
         assert box.ports.tool_line == 0  # a CB3 arm has no such line
+
+
+# --- a cup
+
+
+CUP_PROGRAM = """
+def p():
+  set_tcp(p[0, 0, 0.12, 0, 0, 0])
+  set_payload(0.5, [0, 0, 0.04])
+  there = p[0.5, 0.2, 0.022, 3.14159, 0, 0]
+  above = pose_trans(there, p[0, 0, -0.1, 0, 0, 0])
+  movej(get_inverse_kin(above), a=1.0, v=0.8)
+  set_tool_digital_out(0, True)
+  sleep(0.5)
+  textmsg("in the air ", get_tool_digital_in(0))
+  movel(there, a=0.5, v=0.1)
+  while not get_tool_digital_in(0):
+    sync()
+  end
+  movel(above, a=0.5, v=0.2)
+  sleep(0.5)
+  textmsg("carried ", get_tool_digital_in(0))
+  set_tool_digital_out(0, False)
+  sleep(0.5)
+  textmsg("let go ", get_tool_digital_in(0))
+end
+"""
+
+
+@pytest.mark.parametrize(("mass", "carried"), [(0.5, "True"), (8.0, "False")])
+def test_a_cup_lifts_what_it_can_hold_and_reports_its_vacuum(mass, carried):
+    with ControlBox("ur5e", in_process=True, pace="lockstep", port_base=None, seed=7, tool="vacuum") as box:
+        box.add_thing("plate", "box", (0.1, 0.1, 0.04), mass, (0.5, 0.2, 0.0, 0.0, 0.0, 0.0))
+        box.run_program(CUP_PROGRAM, wait=True)
+        texts = [entry.text for entry in box.log if entry.source == "Program"]
+        assert texts[1:4] == ["in the air False", f"carried {carried}", "let go False"]
+        assert box.state.things[0].pose[2] < 0.01
+        assert box.ports.gripper == 0
+
+
+def test_two_grippers_on_a_flange_are_reached_by_their_numbers():
+    with (
+        ControlBox(
+            "ur5e",
+            in_process=True,
+            pace="lockstep",
+            port_base=None,
+            tool="robotiq-2f85,robotiq-hande",
+        ) as box,
+        socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as first,
+        socket.create_connection((box.host, box.ports.gripper), timeout=10.0) as second,
+    ):
+        assert ask(first, "GET SID") == "[9, 2]"
+        assert ask(second, "SET SID 2\n") == "ack"
+        assert ask(second, "SET ACT 1 POS 255 GTO 1\n") == "ack"
+        while ask(second, "GET POS\n") != "POS 250\n":
+            pass
+        assert ask(first, "GET STA\n") == "STA 0\n"
+        assert [gripper["SID"] for gripper in box.state.grippers] == [9, 2]

@@ -84,7 +84,8 @@ class BoxState:
         tool_voltage: supply of the tool [V].
         obstacles: names of those that were added.
         things: what can be moved around the arm.
-        gripper: width between the pads [m], then STA, OBJ and FLT of a Robotiq gripper; empty without one.
+        grippers: of each tool: width between the pads [m] and SID, STA, OBJ and FLT of a Robotiq gripper; the
+            vacuum of a cup as a share of the full one.
         popups: texts of the popups on the screen.
         questions: of programs, which wait for an answer.
     """
@@ -117,7 +118,7 @@ class BoxState:
     tool_voltage: int
     obstacles: tuple[str, ...]
     things: tuple[ThingNow, ...]
-    gripper: dict[str, float]
+    grippers: tuple[dict[str, float], ...]
     popups: tuple[str, ...]
     questions: tuple[Question, ...]
 
@@ -161,7 +162,7 @@ def take_state(controller: Controller) -> BoxState:
         tool_voltage=now.tool_output_voltage,
         obstacles=controller.plant.obstacles.names,
         things=_things(controller),
-        gripper={} if controller.state.gripper is None else controller.state.gripper.summary(),
+        grippers=tuple(gripper.summary() for gripper in controller.state.grippers),
         popups=(*pendant.shown, *popups),
         questions=tuple(
             Question(r.request_id, r.kind.name, r.text)

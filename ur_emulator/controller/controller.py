@@ -5,7 +5,7 @@ with the check of its set-points, plant, sensors, safety, snapshot. Must not kno
 time is the tick.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 
 from protocol.primary.messages import ReportLevel
@@ -16,7 +16,7 @@ from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import ErrorReported, RobotModeChanged
 from ur_emulator.controller.force_sense import VARIABLE
-from ur_emulator.controller.gripper import SUPPLY, TwoFingerGripper
+from ur_emulator.controller.grippers import SUPPLY
 from ur_emulator.controller.io.watchdogs import WatchdogAction
 from ur_emulator.controller.program_runner import ProgramRunner
 from ur_emulator.controller.robot_mode import JOINT_VECTORS, ModeCommand, RobotModeMachine
@@ -38,12 +38,12 @@ from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6
-from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.motion.tool import UnreachableError
 from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import FlangePush, Plant, PlantState
+from ur_hil.tools import ToolModel
 from urscript.run.host import Host
 
 # --- The snapshot of a cycle: the records of target, sensors and box one after the other
@@ -139,7 +139,7 @@ class Controller:
         *,
         mode: RobotMode = RobotMode.RUNNING,
         version: tuple[int, int] | None = None,
-        tool: ToolModel | None = None,
+        tools: Sequence[ToolModel] = (),
     ) -> None:
         """Assemble the box.
 
@@ -149,12 +149,12 @@ class Controller:
             make_robot: called once with the parts of the controller; what it returns makes the robot as one
                 program sees it.
             version: of the software, major and minor; None: the usual one of the generation.
-            tool: on the flange.
+            tools: on the flange.
         """
         self.generation = generation = robot.generation
         self.period_s = generation.period_s
         make_plant = Plant if fidelity.has_physics else ExactPlant
-        self.plant = make_plant(robot, fidelity, seed, tool)
+        self.plant = make_plant(robot, fidelity, seed, tools)
         q = robot.home_q
         if self.plant.touches(q):
             raise ModelError(f"{robot.name}: at home_q the arm would touch itself or the table; give another")
@@ -179,7 +179,7 @@ class Controller:
             RobotModeMachine(mode, self.period_s),
             self._place_arm,
             version or generation.parse_version(generation.default_version)[:2],
-            tool,
+            tools,
         )
         if generation.limits.brakes_within_torque:
             motion.braking = self.state.dynamics.greatest_deceleration
@@ -212,7 +212,7 @@ class Controller:
             or self.safety.is_stopping
             or self._settle > self._settle_cycles
             or self.push.will_end
-            or (self.state.gripper is not None and self.state.gripper.is_busy)
+            or any(gripper.is_busy for gripper in self.state.grippers)
         )
 
     @property
@@ -240,8 +240,8 @@ class Controller:
         running = state.mode.mode is RobotMode.RUNNING
         control, target, torque = self._step_motion(running)
         self.plant.step(target if running else None, control, torque)
-        if state.gripper is not None:
-            self._step_gripper(state.gripper)
+        if state.grippers:
+            self._step_grippers()
         sensed = self.plant.sense()
         state.energy.step(state.mode.mode, sensed.actual_current)
         self._watch(sensed, control, running)
@@ -301,12 +301,16 @@ class Controller:
         torque = state.motion.torque
         return control if torque is None else compliance.drive_by_torque(), target, torque
 
-    def _step_gripper(self, gripper: TwoFingerGripper) -> None:
-        """Let the gripper see its fingers, and drive them in the next cycle."""
-        fingers = self.plant.fingers
-        assert fingers is not None
-        has_power = self.state.io.tool_voltage == SUPPLY and self.state.mode.mode >= RobotMode.POWER_ON
-        self.plant.drive_fingers(gripper.step(fingers, has_power))
+    def _step_grippers(self) -> None:
+        """Let the grippers see their fingers, and drive them in the next cycle."""
+        state, plant = self.state, self.plant
+        has_power = state.io.tool_voltage == SUPPLY and state.mode.mode >= RobotMode.POWER_ON
+        plant.drive_fingers(
+            [
+                gripper.step(fingers, has_power, state.io)
+                for gripper, fingers in zip(state.grippers, plant.fingers, strict=True)
+            ]
+        )
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if the measured state violates a limit, or a stop was requested."""

@@ -3,7 +3,7 @@
 The record itself is frozen. Scripts, commands and ports get the parts that they act on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ur_emulator.controller.arm_dynamics import ArmDynamics
@@ -12,7 +12,7 @@ from ur_emulator.controller.clock import Clock
 from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.events import EventQueue, ProgramRequests
 from ur_emulator.controller.force_sense import ForceSense
-from ur_emulator.controller.gripper import SUPPLY, TwoFingerGripper
+from ur_emulator.controller.grippers import SUPPLY, Gripper, make_grippers
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.encoders import Encoders
@@ -31,8 +31,8 @@ from ur_emulator.controller.snapshot import EnergyMeter
 from ur_emulator.controller.world_model import WorldModel
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector6
-from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.arm_motion import ArmMotion
+from ur_hil.tools import ToolModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class ControllerState:
         requests: stops that programs and clients have asked for in this cycle.
         past: snapshot of the last cycle, and joint positions before it.
         events: messages of this cycle, in order, for ports and log.
-        gripper: the controller of the tool, if it has one of its own.
+        grippers: the controllers of the tools on the flange.
     """
 
     robot: RobotModel
@@ -100,7 +100,7 @@ class ControllerState:
     requests: ProgramRequests
     past: PastCycles
     events: EventQueue
-    gripper: TwoFingerGripper | None
+    grippers: tuple[Gripper, ...]
 
 
 def make_state(
@@ -112,7 +112,7 @@ def make_state(
     mode: RobotModeMachine,
     place_arm: Callable[[Vector6], bool],
     version: tuple[int, int],
-    tool_model: ToolModel | None,
+    tools: Sequence[ToolModel],
 ) -> ControllerState:
     """Return the parts of a controller, made in the order in which they need each other."""
     io, registers, speed, operational = InputOutput(), Registers(), SpeedScaling(), OperationalModeChoice()
@@ -121,10 +121,8 @@ def make_state(
     past, tool = PastCycles(clock.generation), ToolSettings()
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)
-    gripper = None
-    if tool_model is not None:
-        gripper = TwoFingerGripper(tool_model, clock.period_s)
-        # As the maker's installation does.
+    if tools:
+        # As the installations of their makers do.
         io.set_tool_voltage(SUPPLY)
         io.set_tool_line(ToolLine(is_enabled=True))
     return ControllerState(
@@ -160,5 +158,5 @@ def make_state(
         requests=ProgramRequests(),
         past=past,
         events=EventQueue(),
-        gripper=gripper,
+        grippers=make_grippers(tools, clock.period_s),
     )

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.models.robot_model import DhRow, RobotModel
-from ur_emulator.models.tools import ToolModel
 from ur_emulator.plant.drives import Drives, ServoGains
 from ur_emulator.plant.friction import Presliding
-from ur_emulator.plant.hand import Hand, add_tool
+from ur_emulator.plant.hand import add_tool, make_hand
 from ur_emulator.plant.loads import Loads
 from ur_emulator.plant.obstacles import Obstacles, add_slots
 from ur_emulator.plant.scene import Scene
 from ur_emulator.plant.sensors import REC_Q, REC_QD
+from ur_hil.tools import ToolModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
@@ -55,7 +55,7 @@ class ArmPhysics:
         substep: physics time step [s].
         presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
             memory of the path.
-        tool: on the flange.
+        tools: on the flange.
 
     Attributes:
         q: motor positions (6,) [rad].
@@ -64,7 +64,7 @@ class ArmPhysics:
         flange_position: (3,) in the base frame [m], at the start of the last sub-step.
         flange_rotation: (3, 3), likewise.
         loads: payload and push at the flange.
-        hand: the fingers of the tool, if it has some.
+        hands: fingers or cup of each tool.
         scene: things that can be moved.
         bias: torque of the servos beside their law (6,) [Nm].
     """
@@ -77,19 +77,19 @@ class ArmPhysics:
         gains: ServoGains,
         substep: float,
         presliding: float,
-        tool: ToolModel | None = None,
+        tools: Sequence[ToolModel] = (),
     ) -> None:
-        self._spec = spec = physics_spec(robot, dh, mass_scale, gains, substep, tool)
+        self._spec = spec = physics_spec(robot, dh, mass_scale, gains, substep, tools)
         model = compile_physics(spec, robot)
         self._size = _Sizes(model.nbody, model.ngeom, model.nv, model.nu)
         self._presliding = Presliding(presliding) if presliding else None
-        self.loads = Loads(tool)
+        self.loads = Loads(tools)
         self.obstacles = Obstacles()
         self.scene = Scene(spec, self._recompile)
-        self.hand = None if tool is None else Hand(tool)
+        self.hands = tuple(make_hand(tool, i) for i, tool in enumerate(tools))
         self._bind(model, mujoco.MjData(model))
-        if self.hand is not None:
-            self.hand.open_half()
+        for hand in self.hands:
+            hand.open_half()
         if self._presliding is not None:
             self._presliding.reset()
             self._frictionloss[:] = 0.0
@@ -119,8 +119,8 @@ class ArmPhysics:
         self.loads.bind(model, data)
         self.obstacles.bind(model, data.qpos)
         self.scene.bind(model, data)
-        if self.hand is not None:
-            self.hand.bind(model, data)
+        for hand in self.hands:
+            hand.bind(model, data)
 
     def _recompile(self) -> None:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
@@ -289,7 +289,7 @@ def physics_spec(
     mass_scale: Sequence[float],
     gains: ServoGains,
     substep: float,
-    tool: ToolModel | None,
+    tools: Sequence[ToolModel],
 ) -> mujoco.MjSpec:
     """Return the plant's model, not compiled; see `arm_spec` for the mechanism.
 
@@ -312,8 +312,8 @@ def physics_spec(
     _add_drives(spec, robot, gains)
     _add_hulls(spec, robot, dh)
     _add_sensors(spec)
-    if tool is not None:
-        add_tool(spec, tool)
+    for i, tool in enumerate(tools):
+        add_tool(spec, tool, i)
     return spec
 
 

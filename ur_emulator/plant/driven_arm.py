@@ -10,6 +10,7 @@ Angles: the physics' hinge is the motor side of the gear, which the drive holds;
 gear's transmission error. Links move with the hinge: collisions leave out that error of 0.1 mrad.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import ge, truediv
 from typing import NamedTuple
@@ -23,12 +24,12 @@ from ur_emulator.models.calibration import Calibration, calibrated_dh
 from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
-from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
 from ur_emulator.plant.drives import TARGET_MAX, Drives, ServoGains
 from ur_emulator.plant.feedback import Feedback
 from ur_emulator.plant.hand import FingerCommand
+from ur_hil.tools import ToolModel
 
 # --- the dead time of an arm's drives: drawn once a box, or another one every cycle
 
@@ -78,14 +79,14 @@ class ArmCommand(NamedTuple):
         cycle: number of the cycle, for errors.
         target: set-point for its end; None puts or keeps the brakes on.
         torque: of free joints.
-        fingers: of the tool; None: they hold.
+        fingers: of each tool; None: they hold.
     """
 
     cycle: int
     target: JointTarget | None
     mode: ControlMode
     torque: TorqueCommand | None
-    fingers: FingerCommand | None
+    fingers: Sequence[FingerCommand | None]
 
 
 class DrivenArm:
@@ -105,14 +106,14 @@ class DrivenArm:
         fidelity: Fidelity,
         seed: int,
         dead_time: DeadTime,
-        tool: ToolModel | None,
+        tools: Sequence[ToolModel],
     ) -> None:
         generation = robot.generation
         period, substep = generation.period_s, generation.substep_us * 1e-6
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
         gains = ServoGains.of(robot)
         dh, presliding = calibrated_dh(robot, calibration), fidelity.friction_presliding
-        self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding, tool)
+        self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding, tools)
         self._period, self._n_substeps = period, generation.n_substeps
         self.drives = Drives(robot, calibration, fidelity, seed, gains, dead_time.substeps, substep, period)
         age_substeps = max(1, round(fidelity.feedback_age / substep))
@@ -164,8 +165,8 @@ class DrivenArm:
             PlantError: the target is not finite, or the simulation diverged.
         """
         cycle, target, mode, torque, fingers = command
-        if (hand := self.physics.hand) is not None:
-            hand.drive(fingers, self._period)
+        for hand, finger_command in zip(self.physics.hands, fingers, strict=True):
+            hand.drive(finger_command, self._period)
         if target is None:
             self._stand_still()
             return

@@ -15,20 +15,20 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.models.things import Thing
-from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant, PlantState
+from ur_hil.tools import ToolModel
 
 
 class ExactPlant(Plant):
     """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
 
     def __init__(
-        self, robot: RobotModel, fidelity: Fidelity, seed: int, tool: ToolModel | None = None
+        self, robot: RobotModel, fidelity: Fidelity, seed: int, tools: Sequence[ToolModel] = ()
     ) -> None:
-        super().__init__(robot, fidelity, seed, tool)
+        super().__init__(robot, fidelity, seed, tools)
         self._physics.obstacles = _NoObstacles()
 
     def reset(self, q: Sequence[float]) -> None:
@@ -62,8 +62,8 @@ class ExactPlant(Plant):
                 f"target {target} in cycle {self.cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=self.cycle,
             )
-        if (hand := self._physics.hand) is not None:
-            hand.place(self._finger_command, self.period_s)
+        for hand, command in zip(self._physics.hands, self._finger_commands, strict=True):
+            hand.place(command, self.period_s)
         self._thermometers.step(self._drives.target_current)
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd

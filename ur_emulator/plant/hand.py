@@ -1,24 +1,22 @@
-"""The tool on the flange in MuJoCo: housing, two fingers with one drive, and their pads.
+"""The tools on the flange in MuJoCo: housing, and two fingers with one drive and their pads, or a cup.
 
 Both fingers move on slides, joined so that they mirror each other, instead of on the maker's linkage: the
 width of a Robotiq gripper is then linear in its position, as all clients take it to be (docs/fidelity.md).
 The drive is a velocity servo whose force is limited: it moves with its speed until it is stopped, and presses
-with its limit from then on. Its screw holds by itself when there is no power.
+with its limit from then on. Its screw holds by itself when there is no power. A cup is MuJoCo's adhesion: it
+pulls at what it touches.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_emulator.models.mjcf import LINKS, PAYLOAD
-from ur_emulator.models.tools import ToolModel
+from ur_hil.tools import ToolModel
 
-_TOOL = "tool"
-_PADS = ("tool_pad_left", "tool_pad_right")
-_FINGERS = ("tool_finger_left", "tool_finger_right")
-_DRIVE = "tool_drive"
+_SIDES = ("left", "right")
 
 _FINGER_MASS = 0.05  # kg, of each finger; part of the tool's mass
 _THICKNESS = 0.004  # m, of a pad
@@ -37,20 +35,27 @@ _APPROACH = 0.02
 
 # Hard enough that a pad gives .2 mm where 200 N squeeze a body of 200 g: at the coarser contacts of the arm
 # the body would sink in by centimetres, since MuJoCo's contacts give by mass.
-_PAD_SOLREF = (0.004, 1.0)
-_PAD_SOLIMP = (0.95, 0.995, 0.001, 0.5, 2.0)
+_PAD_CONTACT: dict[str, Any] = {
+    "solref": (0.004, 1.0),
+    "solimp": (0.95, 0.995, 0.001, 0.5, 2.0),
+    "priority": 1,
+    "condim": 4,
+}
+
+_LIP = 0.003
+"""Distance over which the lip of a cup seals [m]; assumed."""
 
 _IMPEDANCE_RATIO = 10.0
 """Friction over normal impedance: with 1 what is held creeps out of the pads. Source: MuJoCo's own hands."""
 
 
 class FingerState(NamedTuple):
-    """The fingers after a cycle.
+    """The fingers after a cycle; a cup has only the last.
 
     Attributes:
         width: between the pads [m].
         speed: of the width [m/s]; negative while they close.
-        share: force of the drive as a share of its limit.
+        share: force of the drive as a share of its limit; of a cup 1 while it is on something, else 0.
     """
 
     width: float
@@ -66,45 +71,68 @@ class FingerCommand(NamedTuple):
     force: float
 
 
-def add_tool(spec: mujoco.MjSpec, tool: ToolModel) -> None:
-    """Add a tool to an arm whose flange is where its payload is."""
-    payload = spec.body(PAYLOAD)
-    hand = spec.body(LINKS[5]).add_body(name=_TOOL, pos=payload.pos, quat=payload.quat)
+def add_tool(spec: mujoco.MjSpec, tool: ToolModel, number: int) -> None:
+    """Add a tool to an arm whose flange is where its payload is; `number` makes its names its own."""
+    name = f"tool_{number}"
+    payload, turn = spec.body(PAYLOAD), np.zeros(4)
+    mujoco.mju_mulQuat(turn, payload.quat, np.array(tool.quaternion))
+    hand = spec.body(LINKS[5]).add_body(name=name, pos=payload.pos, quat=turn)
     hand.explicitinertial = True
-    hand.mass = tool.mass - 2.0 * _FINGER_MASS
+    hand.mass = tool.mass - (2.0 * _FINGER_MASS if tool.stroke else 0.0)
     hand.ipos = tool.cog
     hand.inertia = tool.inertia
-    end = tool.length - tool.pad[1] - 0.03
+    across, along = tool.pad
+    end = tool.length - along - (0.03 if tool.stroke else 0.0)
     radius = min(tool.body, 0.5 * end)
     hand.add_geom(
-        name="tool_housing",
+        name=f"{name}_housing",
         type=mujoco.mjtGeom.mjGEOM_CAPSULE,
         fromto=[0.0, 0.0, radius, 0.0, 0.0, max(end - radius, radius + 1e-3)],
         size=[radius, 0.0, 0.0],
         mass=0.0,
     )
     spec.option.impratio = _IMPEDANCE_RATIO
-    _add_fingers(spec, hand, tool)
+    if tool.stroke:
+        _add_fingers(spec, hand, tool, name)
+        return
+    cup = hand.add_body(name=f"{name}_cup", pos=[0.0, 0.0, tool.length - 0.5 * along])
+    cup.add_geom(
+        name=f"{name}_cup",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[across, 0.5 * along, 0.0],
+        mass=0.0,
+        friction=[tool.friction, 0.005, 0.0001],
+        margin=_LIP,
+        gap=_LIP,
+        **_PAD_CONTACT,
+    )
+    suction = spec.add_actuator(name=name, target=f"{name}_cup", trntype=mujoco.mjtTrn.mjTRN_BODY)
+    suction.ctrllimited = True
+    suction.ctrlrange = [0.0, tool.force[1]]
 
 
-def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody, tool: ToolModel) -> None:
+def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody, tool: ToolModel, name: str) -> None:
     across, along = tool.pad
-    for name, pad, side in zip(_FINGERS, _PADS, (1.0, -1.0), strict=True):
-        finger = hand.add_body(name=name, pos=[0.0, 0.0, tool.length])
+    fingers = [f"{name}_{side}" for side in _SIDES]
+    for finger_name, side in zip(fingers, (1.0, -1.0), strict=True):
+        finger = hand.add_body(name=finger_name, pos=[0.0, 0.0, tool.length])
         joint = finger.add_joint(
-            name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[side, 0.0, 0.0], range=[0.0, 0.5 * tool.stroke]
+            name=finger_name,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[side, 0.0, 0.0],
+            range=[0.0, 0.5 * tool.stroke],
         )
         joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         joint.armature = _GEAR_INERTIA
         box = mujoco.mjtGeom.mjGEOM_BOX
-        shape = {"type": box, "solref": _PAD_SOLREF, "solimp": _PAD_SOLIMP, "priority": 1, "condim": 4}
         finger.add_geom(
-            name=pad,
+            name=f"{finger_name}_pad",
+            type=box,
             size=[0.5 * _THICKNESS, across, along],
             pos=[side * 0.5 * _THICKNESS, 0.0, 0.0],
             mass=_FINGER_MASS,
             friction=[tool.friction, 0.005, 0.0001],
-            **shape,
+            **_PAD_CONTACT,
         )
         back = 0.5 * (along + 0.03)
         finger.add_geom(
@@ -114,38 +142,44 @@ def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody, tool: ToolModel) -> 
             mass=0.0,
         )
     couple = spec.add_equality(
-        name=_DRIVE,
+        name=name,
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
-        name1=_FINGERS[0],
-        name2=_FINGERS[1],
+        name1=fingers[0],
+        name2=fingers[1],
     )
     couple.data[:2] = 0.0, 1.0
-    couple.solref = _PAD_SOLREF
-    half_width = spec.add_tendon(name=_DRIVE)
-    for name in _FINGERS:
-        half_width.wrap_joint(name, 0.5)
-    drive = spec.add_actuator(name=_DRIVE, target=_DRIVE, trntype=mujoco.mjtTrn.mjTRN_TENDON)
+    couple.solref = _PAD_CONTACT["solref"]
+    half_width = spec.add_tendon(name=name)
+    for finger_name in fingers:
+        half_width.wrap_joint(finger_name, 0.5)
+    drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
     drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
     drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
     drive.gainprm[0] = _SERVO
     drive.biasprm[2] = -_SERVO
     drive.forcelimited = True
     drive.forcerange = [-1.0, 1.0]
-    spec.add_exclude(bodyname1=_FINGERS[0], bodyname2=_FINGERS[1])
+    spec.add_exclude(bodyname1=fingers[0], bodyname2=fingers[1])
+
+
+def make_hand(tool: ToolModel, number: int) -> "Hand | Cup":
+    """Return what moves of a tool that `add_tool` has added."""
+    return Hand(tool, number) if tool.stroke else Cup(number)
 
 
 class Hand:
     """The fingers of a tool in a compiled model."""
 
-    def __init__(self, tool: ToolModel) -> None:
+    def __init__(self, tool: ToolModel, number: int) -> None:
+        self._name = f"tool_{number}"
         self._stroke = tool.stroke
         self._raised = 0.0
 
     def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Move in this model and its state from now on."""
-        joint = model.joint(_FINGERS[0])  # that of the other finger follows
-        q, v, drive = int(joint.qposadr[0]), int(joint.dofadr[0]), int(model.actuator(_DRIVE).id)
+        joint = model.joint(f"{self._name}_{_SIDES[0]}")  # that of the other finger follows
+        q, v, drive = int(joint.qposadr[0]), int(joint.dofadr[0]), int(model.actuator(self._name).id)
         self._q: NDArray[np.float64] = data.qpos[q : q + 2]
         self._qd: NDArray[np.float64] = data.qvel[v : v + 2]
         self._speed: NDArray[np.float64] = data.ctrl[drive : drive + 1]
@@ -186,3 +220,34 @@ class Hand:
         moved = 0.5 * min(most, max(-most, way))
         self._q += moved
         self._qd[:] = moved / period
+
+
+class Cup:
+    """The suction cup of a tool in a compiled model; methods as of `Hand`."""
+
+    def __init__(self, number: int) -> None:
+        self._name = f"tool_{number}"
+
+    def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Pull in this model and its state from now on."""
+        drive = int(model.actuator(self._name).id)
+        self._geom: int = model.geom(f"{self._name}_cup").id
+        self._data = data
+        self._force: NDArray[np.float64] = data.ctrl[drive : drive + 1]
+
+    def open_half(self) -> None:
+        """Do nothing: it has no fingers."""
+
+    @property
+    def state(self) -> FingerState:
+        """Whether it is on something."""
+        data = self._data
+        touches = data.ncon > 0 and bool((data.contact.geom == self._geom).any())
+        return FingerState(0.0, 0.0, float(touches))
+
+    def drive(self, command: FingerCommand | None, period: float) -> None:
+        """Pull with the force of the command in the next cycle."""
+        self._force[0] = 0.0 if command is None else command.force
+
+    def place(self, command: FingerCommand | None, period: float) -> None:
+        """Do nothing: nothing is there to pull at."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ur_emulator.errors import PlantError
 from ur_emulator.models.mjcf import FLANGE, GRAVITY, LINKS, PAYLOAD
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
-from ur_emulator.models.tools import ToolModel
+from ur_hil.tools import ToolModel
 
 # --- the payload body of a compiled MuJoCo arm
 
@@ -48,19 +48,19 @@ def set_payload_body(model: mujoco.MjModel, mass: float, cog: Vector3, inertia: 
 class Loads:
     """The payload and the push on one arm, in the plant's model.
 
-    The mass of a tool is a part of the model; the controller knows it only as the payload that is declared.
+    The mass of tools is a part of the model; the controller knows it only as the payload that is declared.
 
     Attributes:
         is_unexpected: something acts that the controller does not expect: see `wrench`.
     """
 
-    def __init__(self, tool: ToolModel | None = None) -> None:
+    def __init__(self, tools: Sequence[ToolModel] = ()) -> None:
         self._push: NDArray[np.float64] | None = None
         self._push_point = np.zeros(3)
         self._push_wrench = np.zeros(6)
-        self._tool = () if tool is None else ((tool.mass, tool.cog),)
+        self._tools = tuple((tool.mass, tool.at_flange(tool.cog)) for tool in tools)
         # What hangs on the flange; empty: what is declared does.
-        self._true: tuple[tuple[float, Vector3], ...] = self._tool
+        self._true: tuple[tuple[float, Vector3], ...] = self._tools
         self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
         self.is_unexpected = bool(self._true)
         self._weigh()
@@ -88,7 +88,7 @@ class Loads:
     def attach(self, mass: float, cog: Vector3) -> None:
         """Set the true payload, which the controller does not know; errors as in `check_payload`."""
         check_payload(mass, cog)
-        self._true = (*self._tool, (mass, cog))
+        self._true = (*self._tools, (mass, cog))
         self._weigh()
         set_payload_body(self._model, mass, cog)
         self.is_unexpected = True

@@ -27,12 +27,12 @@ from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
 from ur_emulator.models.things import Thing
-from ur_emulator.models.tools import ToolModel
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.scene import Scene
+from ur_hil.tools import ToolModel
 
 
 class PlantState(NamedTuple):
@@ -115,7 +115,7 @@ class Plant:
         robot: type of the arm; its generation has the control cycle and the physics step.
         fidelity: how imperfect it is.
         seed: of calibration, gear phases, delays and noise.
-        tool: on the flange, fingers half open.
+        tools: on the flange, fingers half open.
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
@@ -124,7 +124,7 @@ class Plant:
     """
 
     def __init__(
-        self, robot: RobotModel, fidelity: Fidelity, seed: int, tool: ToolModel | None = None
+        self, robot: RobotModel, fidelity: Fidelity, seed: int, tools: Sequence[ToolModel] = ()
     ) -> None:
         generation = robot.generation
         self.robot = robot
@@ -134,14 +134,14 @@ class Plant:
         self.calibration = draw_calibration(fidelity, seed)
         dead_time = draw_dead_time(fidelity, seed, generation)
         self.dead_time = dead_time.least_s
-        self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, dead_time, tool)
+        self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, dead_time, tools)
         self._physics, self._drives, self._feedback = arm.physics, arm.drives, arm.feedback
         self._thermometers = Thermometers(generation)
         self._reports_control_as_target = generation.reports_control_as_target
         self._state: PlantState | None = None
         # The command of the present cycle, by which the arm has not moved yet.
         self._command: ArmCommand | None = None
-        self._finger_command: FingerCommand | None = None
+        self._finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
         self.reset(robot.home_q)
 
     # --- state for tests and for the control API ---
@@ -252,14 +252,13 @@ class Plant:
         self._physics.loads.push(force, point)
 
     @property
-    def fingers(self) -> FingerState | None:
-        """The fingers as the last cycle that is computed left them; None without a tool that has some."""
-        hand = self._physics.hand
-        return None if hand is None else hand.state
+    def fingers(self) -> list[FingerState]:
+        """The fingers of each tool as the last cycle that is computed left them."""
+        return [hand.state for hand in self._physics.hands]
 
-    def drive_fingers(self, command: FingerCommand | None) -> None:
-        """Set what the fingers do from the next cycle on; None: they hold."""
-        self._finger_command = command
+    def drive_fingers(self, commands: Sequence[FingerCommand | None]) -> None:
+        """Set what the fingers of each tool do from the next cycle on; None: they hold."""
+        self._finger_commands = commands
 
     # --- the cycle ---
 
@@ -284,7 +283,7 @@ class Plant:
         self._finish()
         self._state = None
         self.cycle += 1
-        self._command = ArmCommand(self.cycle, target, mode, torque, self._finger_command)
+        self._command = ArmCommand(self.cycle, target, mode, torque, self._finger_commands)
         if not self._arm.moves_later:
             self._finish()
 

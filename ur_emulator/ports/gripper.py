@@ -1,13 +1,14 @@
 """Port 63352: the variables of a Robotiq gripper, as the software of the maker offers them.
 
 Answers come at once, from the present state; what a SET writes the gripper has after its next exchange. All
-clients, and programs at 127.0.0.1, talk to the same gripper; only its number (SID) belongs to the connection.
+clients, and programs at 127.0.0.1, talk to the same grippers; which of them (SID) belongs to the connection.
 """
 
 from collections import deque
+from collections.abc import Mapping, Sequence
 
 from protocol import robotiq
-from ur_emulator.controller.gripper import TwoFingerGripper
+from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
@@ -22,11 +23,11 @@ _CONSTANTS = {"DST": 4, "PCO": 0}
 
 
 class GripperPort:
-    """Answers requests for the variables of a gripper."""
+    """Answers requests for the variables of grippers."""
 
-    def __init__(self, box: ServedBox, gripper: TwoFingerGripper) -> None:
+    def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper]) -> None:
         self._box = box
-        self._gripper = gripper
+        self._grippers = {gripper.unit: gripper for gripper in grippers}
         self._sessions: dict[Connection, _GripperSession] = {}
 
     @property
@@ -36,7 +37,7 @@ class GripperPort:
 
     def opened(self, connection: Connection) -> None:
         """The client speaks first."""
-        self._sessions[connection] = _GripperSession(connection, self._box, self._gripper)
+        self._sessions[connection] = _GripperSession(connection, self._box, self._grippers)
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Answer requests in order."""
@@ -50,9 +51,11 @@ class GripperPort:
 class _GripperSession(Session):
     """A client."""
 
-    def __init__(self, connection: Connection, box: ServedBox, gripper: TwoFingerGripper) -> None:
+    def __init__(
+        self, connection: Connection, box: ServedBox, grippers: Mapping[int, RobotiqGripper]
+    ) -> None:
         super().__init__(connection, box)
-        self._gripper = gripper
+        self._grippers = grippers
         self._parser = robotiq.GripperConnection()
         self._requests: deque[robotiq.Request] = deque()
         self._sid = robotiq.DEFAULT_SID
@@ -74,9 +77,9 @@ class _GripperSession(Session):
                 self._sid = sid
                 return robotiq.ACK
             case robotiq.Set(values=values):
-                if self._sid == robotiq.DEFAULT_SID:
+                if (gripper := self._grippers.get(self._sid)) is not None:
                     for name, value in values:
-                        self._gripper.set(name, value)
+                        gripper.set(name, value)
                 return robotiq.ACK
             case robotiq.Get(name=name):
                 return robotiq.encode_value(request, self._value(name))
@@ -84,10 +87,10 @@ class _GripperSession(Session):
                 return robotiq.NAK if is_set else f"{robotiq.NOT_KNOWN}\n".encode()
 
     def _value(self, name: str) -> int | str:
-        gripper = self._gripper
         if name == robotiq.SID:
-            return f"[{robotiq.DEFAULT_SID}]" if gripper.has_power else "[]"
-        if self._sid != robotiq.DEFAULT_SID or not gripper.has_power:
+            return str([unit for unit, gripper in self._grippers.items() if gripper.has_power])
+        gripper = self._grippers.get(self._sid)
+        if gripper is None or not gripper.has_power:
             return robotiq.NOT_KNOWN
         value = _TEXTS.get(name, _CONSTANTS.get(name, gripper.get(name)))
         return robotiq.NOT_KNOWN if value is None else value

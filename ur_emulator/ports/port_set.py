@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.loop.event_loop import EventLoop
 from ur_emulator.loop.listener import ClientLimits, ClientLines, Listener, Port, SpareDescriptor
@@ -168,10 +169,11 @@ def answering_ports(
         ports["dashboard"] = DashboardPort(box, DashboardAnswers(box, player, reports, shut_down))
     if software.has_interpreter:
         ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
-    if (gripper := box.controller.state.gripper) is not None:
-        ports[GRIPPER] = software_of_gripper = GripperPort(box, gripper)
+    grippers = box.controller.state.grippers
+    if robotiq := [gripper for gripper in grippers if isinstance(gripper, RobotiqGripper)]:
+        ports[GRIPPER] = software_of_gripper = GripperPort(box, robotiq)
         if software.has_tool_line:
-            ports[TOOL_LINE] = ToolLinePort(box, gripper, software_of_gripper)
+            ports[TOOL_LINE] = ToolLinePort(box, robotiq, software_of_gripper)
     if software.robot_api:
         # A box without HTTP does not load it.
         from ur_emulator.ports.http import HttpPort

@@ -9,12 +9,12 @@ A gripper takes its time: an answer comes `_PACE` after its request. Otherwise a
 pause would ask thousands of times a second.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from protocol import modbus, modbus_rtu
 from ur_emulator.controller.command import BoxParts, Result
-from ur_emulator.controller.gripper import TwoFingerGripper
-from ur_emulator.controller.io.lines import ToolLine
+from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
@@ -22,18 +22,16 @@ from ur_emulator.ports.gripper import GripperPort
 from ur_emulator.ports.session import Session
 
 _REQUEST_COST = 4
-_UNIT = 9
 _PACE = 0.004  # s
-_SETTINGS = ToolLine(is_enabled=True)
 
 
 class ToolLinePort:
-    """Passes requests of Modbus RTU on to a gripper."""
+    """Passes requests of Modbus RTU on to grippers."""
 
-    def __init__(self, box: ServedBox, gripper: TwoFingerGripper, software: GripperPort) -> None:
+    def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper], software: GripperPort) -> None:
         """`software` is the other user of the line."""
         self._box = box
-        self._gripper = gripper
+        self._grippers = {gripper.unit: gripper for gripper in grippers}
         self._software = software
         self._sessions: dict[Connection, _LineSession] = {}
 
@@ -49,29 +47,28 @@ class ToolLinePort:
         """Forget the client."""
         self._sessions.pop(connection, None)
 
-    def has_line(self, connection: Connection) -> bool:
-        """Whether bytes of a client reach the gripper."""
+    def gripper(self, connection: Connection, unit: int) -> RobotiqGripper | None:
+        """The gripper that requests of a client reach; None: nothing answers."""
         line = self._box.controller.state.io.tool_line
-        return (
-            self._gripper.has_power
-            and line[:4] == _SETTINGS[:4]
-            and not self._software.has_clients
-            and next(iter(self._sessions)) is connection
-        )
+        gripper = self._grippers.get(unit)
+        if gripper is None or not gripper.has_power or line[:4] != gripper.line[:4]:
+            return None
+        has_line = not self._software.has_clients and next(iter(self._sessions)) is connection
+        return gripper if has_line else None
 
 
 @dataclass(frozen=True, slots=True)
 class _Exchange:
     """A request on the line; None: a cycle in which it is on its way."""
 
+    gripper: RobotiqGripper
     pdu: bytes | None
 
     def apply(self, box: BoxParts) -> Result:
-        gripper = box.state.gripper
-        return None if gripper is None or self.pdu is None else {"pdu": _answer(gripper, self.pdu)}
+        return None if self.pdu is None else {"pdu": _answer(self.gripper, self.pdu)}
 
 
-def _answer(gripper: TwoFingerGripper, pdu: bytes) -> bytes:
+def _answer(gripper: RobotiqGripper, pdu: bytes) -> bytes:
     """Return the answer of the gripper to a request."""
     try:
         if pdu[0] == modbus.ModbusFunction.READ_WRITE_REGISTERS:
@@ -101,20 +98,20 @@ class _LineSession(Session):
         self._inbox = bytearray()
 
     def _take(self, data: bytes) -> None:
-        if self._port.has_line(self.connection):
-            self._inbox += data
-            del self._inbox[: -modbus_rtu.MOST_WAITING]
+        self._inbox += data
+        del self._inbox[: -modbus_rtu.MOST_WAITING]
 
     def _answer_next(self) -> Steps[int]:
         frame = modbus_rtu.take_request(self._inbox)
         if frame is None:
             return 0
-        if frame.unit != _UNIT:
+        gripper = self._port.gripper(self.connection, frame.unit)
+        if gripper is None:
             return _REQUEST_COST
         for _ in range(1, round(_PACE / self._box.controller.period_s)):
-            yield from self._box.apply(_Exchange(None))
-        result = yield from self._box.apply(_Exchange(frame.pdu))
-        if self._port.has_line(self.connection):
+            yield from self._box.apply(_Exchange(gripper, None))
+        result = yield from self._box.apply(_Exchange(gripper, frame.pdu))
+        if self._port.gripper(self.connection, frame.unit) is not None:
             answer = modbus_rtu.encode_rtu(frame.unit, result["pdu"])
             if not self.connection.send(answer):
                 self.connection.close()

@@ -21,15 +21,22 @@ after the activation is chosen.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from protocol.robotiq import INPUTS, OUTPUTS, Fault, Objects, Status, decode_request, encode_status
-from ur_emulator.models.tools import ToolModel
+from protocol.robotiq import (
+    DEFAULT_SID,
+    INPUTS,
+    OUTPUTS,
+    Fault,
+    Objects,
+    Status,
+    decode_request,
+    encode_status,
+)
+from ur_emulator.controller.io.lines import InputOutput, ToolLine
 from ur_emulator.plant.hand import FingerCommand, FingerState
+from ur_hil.tools import ToolModel
 
 EXCHANGE = 0.016
 """Time between two exchanges over the serial line [s]. Source: PYR (16 ms), a measured mean of 32 ms."""
-
-SUPPLY = 24
-"""Voltage at the tool connector that a gripper needs [V]."""
 
 _RELEASE_SPEED = 0.02
 """Of the automatic release [m/s]: the slowest; assumed."""
@@ -72,15 +79,20 @@ class Settings:
     LGN: int = 0
 
 
-class TwoFingerGripper:
+class RobotiqGripper:
     """The gripper's own controller; `step` is its cycle.
 
     Attributes:
+        unit: its address on the serial line, which is its SID.
+        line: settings of the serial line with which it is reached.
         has_power: the tool connector supplies it.
     """
 
-    def __init__(self, tool: ToolModel, period: float) -> None:
+    line = ToolLine(is_enabled=True)
+
+    def __init__(self, tool: ToolModel, period: float, unit: int = DEFAULT_SID) -> None:
         """Begin without power; `period` is the cycle [s]."""
+        self.unit = unit
         self._tool = tool
         self._period = period
         self._every = max(1, round(EXCHANGE / period))
@@ -141,6 +153,7 @@ class TwoFingerGripper:
     def summary(self) -> dict[str, float]:
         """What people want to know of it: the width between its pads [m], and its state."""
         return {
+            "SID": self.unit,
             "width": self._fingers.width,
             "STA": int(self._status),
             "OBJ": int(self._objects),
@@ -195,11 +208,12 @@ class TwoFingerGripper:
 
     # --- the cycle
 
-    def step(self, fingers: FingerState, has_power: bool) -> FingerCommand | None:
+    def step(self, fingers: FingerState, has_power: bool, io: InputOutput) -> FingerCommand | None:
         """Advance by a cycle.
 
         Args:
             fingers: after the last cycle.
+            io: not used; other grippers are driven by it.
             has_power: the connector has 24 V, and no stop has cut them.
 
         Returns:
