@@ -63,7 +63,7 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"arm_in_space", "clock", "gripper", "interpreter_queue", "pendant", "robot_mode"},
+    {"arm_in_space", "clock", "grippers", "interpreter_queue", "pendant", "robot_mode"},
     {"io"},
     {"safety"},
     {"settings"},
