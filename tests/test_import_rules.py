@@ -63,9 +63,9 @@ BOX_ORDER = (
 )
 CONTROLLER_ORDER = (
     {"events"},
-    {"arm_in_space", "clock", "grippers", "interpreter_queue", "pendant", "robot_mode"},
+    {"arm_in_space", "clock", "interpreter_queue", "pendant", "robot_mode"},
     {"io"},
-    {"safety"},
+    {"grippers", "safety"},
     {"settings"},
     {"arm_dynamics", "client_inputs", "world_model"},
     {"snapshot"},
