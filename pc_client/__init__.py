@@ -28,35 +28,35 @@ if TYPE_CHECKING:
     from pc_client.errors import ClientError as ClientError
     from pc_client.errors import PlanningError as PlanningError
     from pc_client.errors import RobotStoppedError as RobotStoppedError
-    from pc_client.kinematics.cell import Cell as Cell
-    from pc_client.kinematics.cell import Solid as Solid
-    from pc_client.kinematics.cell import Tool as Tool
-    from pc_client.kinematics.cell import Wall as Wall
     from pc_client.movements.movement import Movement as Movement
     from pc_client.movements.samples import JointTrajectory as JointTrajectory
     from pc_client.planning.plan import Plan as Plan
     from pc_client.studies.drawing.drawing import drawing as drawing
+    from ur_hil.cell import Cell as Cell
+    from ur_hil.cell import Solid as Solid
+    from ur_hil.cell import Tool as Tool
+    from ur_hil.cell import Wall as Wall
 
 check_packages()
 
 _HOMES = {
-    "Arm": "arm",
-    "Cell": "kinematics.cell",
-    "ClientError": "errors",
-    "Controller": "control.controller",
-    "JointTrajectory": "movements.samples",
-    "Movement": "movements.movement",
-    "Plan": "planning.plan",
-    "PlanningError": "errors",
-    "RobotStoppedError": "errors",
-    "Run": "analysis.run",
-    "Signals": "analysis.run",
-    "Solid": "kinematics.cell",
-    "Tool": "kinematics.cell",
-    "Wall": "kinematics.cell",
-    "connect": "arm",
-    "drawing": "studies.drawing.drawing",
-    "plan": "arm",
+    "Arm": "pc_client.arm",
+    "Cell": "ur_hil.cell",
+    "ClientError": "pc_client.errors",
+    "Controller": "pc_client.control.controller",
+    "JointTrajectory": "pc_client.movements.samples",
+    "Movement": "pc_client.movements.movement",
+    "Plan": "pc_client.planning.plan",
+    "PlanningError": "pc_client.errors",
+    "RobotStoppedError": "pc_client.errors",
+    "Run": "pc_client.analysis.run",
+    "Signals": "pc_client.analysis.run",
+    "Solid": "ur_hil.cell",
+    "Tool": "ur_hil.cell",
+    "Wall": "ur_hil.cell",
+    "connect": "pc_client.arm",
+    "drawing": "pc_client.studies.drawing.drawing",
+    "plan": "pc_client.arm",
 }
 __all__ = sorted(_HOMES)
 
@@ -64,7 +64,7 @@ __all__ = sorted(_HOMES)
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

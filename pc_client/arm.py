@@ -31,13 +31,14 @@ from pc_client.experiment.experiment import Experiment, check_folder, experiment
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
 from pc_client.experiment.preflight import model_of, preflight, require
 from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, Observer, run_approach
-from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.model import RobotModel, nearest_posture, robot_model, tcp_pose
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.plan import Motion, Plan, make_plan
 from protocol.pose import T_to_pose, pose_to_T
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
+from ur_hil.cell import NO_CELL, Cell, load_cell
 from ur_hil.records import checked
 
 Confirm = Callable[[str], bool]
@@ -111,7 +112,7 @@ def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell | str | Path | None 
 
 
 def _cell_of(cell: Cell | str | Path | None) -> Cell:
-    return load_cell(cell) if isinstance(cell, str | Path) else cell or NO_CELL
+    return load_cell(cell, FILE_KINDS["cell"]) if isinstance(cell, str | Path) else cell or NO_CELL
 
 
 class Arm:

@@ -30,6 +30,7 @@ from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.outgoing.addresses import close_to_scripts, give_back
 from ur_emulator.outgoing.loop_network import LoopNetwork
+from ur_emulator.plant.scene import load_scene
 from ur_emulator.polyscope.player import ProgramPlayer, start_up
 from ur_emulator.polyscope.report_writer import ReportWriter
 from ur_emulator.ports.port_set import CONTROL, GRIPPER, TOOL_LINE, PortSet, SendingPorts, answering_ports
@@ -37,6 +38,7 @@ from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.scripting.network import Network
 from ur_emulator.scripting.robot_host import robot_hosts
+from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel, tools_by_name
 
 
@@ -51,6 +53,7 @@ class _Choice:
     closed: Collection[str]
     identity: BoxIdentity
     tools: tuple[ToolModel, ...]
+    scene: Cell | Path | None
 
     @classmethod
     def of(cls, options: BoxOptions) -> _Choice:
@@ -78,7 +81,8 @@ class _Choice:
             masterboard=LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
         )
         tools = tools_by_name(str(options.tool), ModelError)
-        return cls(model, version, fidelity, pace, closed, identity, tools)
+        scene = None if options.scene is None else load_scene(Path(options.scene))
+        return cls(model, version, fidelity, pace, closed, identity, tools, scene)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -102,6 +106,8 @@ class _Choice:
             tools=self.tools,
         )
         controller.state.pendant.set_remote_control(options.remote_control)
+        if self.scene is not None:
+            controller.plant.furnish(self.scene)
         return controller
 
     def served_at(self, options: BoxOptions, ports: Collection[str]) -> ServedAt:

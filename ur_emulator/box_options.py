@@ -51,6 +51,7 @@ class BoxOptions:
     services: Collection[str] = ()
     generation: RobotGeneration | None = None
     tool: str | PathLike[str] = "none"
+    scene: str | PathLike[str] | None = None
 
     def check(self) -> None:
         """Check the arguments that need no table; EmulatorError for one that is not allowed."""

@@ -88,6 +88,10 @@ def serve(
     tool: Annotated[
         str, typer.Option(help="On the flange: none, robotiq-2f85 and others, or FILE.toml.")
     ] = "none",
+    scene: Annotated[
+        Path | None,
+        typer.Option(help="Around the arm, with things to grip: a cell file (.toml), or MJCF (.xml)."),
+    ] = None,
     programs: Annotated[
         Path | None,
         typer.Option(
@@ -153,6 +157,7 @@ def serve(
         first = BoxOptions(
             robot=robot,
             tool=tool,
+            scene=scene,
             version=software,
             host=host,
             pace=pace,

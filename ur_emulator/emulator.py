@@ -221,6 +221,7 @@ class ControlBox(_Running, BoxControl):
         remote_control: clients may command the box; False: it starts in local control (e-Series).
         services: of a PolyScope X box, closed until they are enabled: "primary" and "rtde".
         tool: on the flange, such as "robotiq-2f85", or a file (docs/grippers.md).
+        scene: what stands around the arm, and things to grip: a cell file (TOML) or a fragment of MJCF.
         in_process: run in a thread of this process. A client that holds Python's lock while it waits for the
             box then waits for ever.
 
@@ -245,6 +246,7 @@ class ControlBox(_Running, BoxControl):
         remote_control: bool = True,
         services: Collection[str] = (),
         tool: str | PathLike[str] = "none",
+        scene: str | PathLike[str] | None = None,
         *,
         in_process: bool = False,
         generation: RobotGeneration | None = None,
@@ -267,6 +269,7 @@ class ControlBox(_Running, BoxControl):
             services,
             generation,
             tool,
+            scene,
         )
         super().__init__(make_rack([options], in_process=in_process))
 

@@ -44,6 +44,7 @@ OPTIONS = (
     "remote_control",
     "services",
     "tool",
+    "scene",
     "control_port",
     "control_token",
     "in_process",

@@ -19,12 +19,13 @@ from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column, movement_sheet
 from pc_client.analysis.table import FLOOR, LAG, MOVEMENT, Table, build_table
 from pc_client.errors import CellError, RecordingError, one_line
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
-from pc_client.kinematics.cell import NO_CELL, parse_cell
 from pc_client.recording.recording import load_recording
 from pc_client.results.pages import picture, render, require_report_libraries, write_files, zoomable
 from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
+from ur_hil.cell import NO_CELL, parse_cell
 
 TABLE_JSON, TABLE_MARKDOWN, REPORT_HTML = "table1.json", "table1.md", "report.html"
 _TEMPLATE = "analysis/report.html.j2"
@@ -200,7 +201,7 @@ def provenance_facts(runs: Sequence[MeasuredRun]) -> dict[str, str]:
 def _cell_summary(text: str) -> str:
     """What stood around the arm and what it carried, in words."""
     try:
-        return (parse_cell(text, "recording") if text else NO_CELL).summary
+        return (parse_cell(text, "recording", FILE_KINDS["cell"]) if text else NO_CELL).summary
     except CellError as error:
         return f"cannot be read ({one_line(error)})"
 

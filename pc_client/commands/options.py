@@ -15,9 +15,10 @@ from rich.console import Console
 
 from pc_client.control.controller import DEFAULT, Controller, load_controller
 from pc_client.errors import ClientError, ControllerError, printable
-from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
+from pc_client.files import FILE_KINDS
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
+from ur_hil.cell import NO_CELL, Cell, load_cell
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
@@ -138,7 +139,7 @@ def check_workers(workers: int | None, dask: str | None) -> None:
 
 def cell_of(path: Path | None) -> Cell:
     """What stands around the arm and what it carries, by a file; without one nothing is known."""
-    return NO_CELL if path is None else load_cell(path)
+    return NO_CELL if path is None else load_cell(path, FILE_KINDS["cell"])
 
 
 def ports_of(port_base: int) -> Ports:

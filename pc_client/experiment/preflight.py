@@ -14,9 +14,9 @@ from pc_client.driver.report import UNKNOWN, RobotReport
 from pc_client.driver.watchdog import Condition
 from pc_client.errors import DriverError
 from pc_client.kinematics.arms import ROBOTS
-from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.model import ROTATION_TOLERANCE, RobotModel, flange_difference, robot_model
 from protocol.ur_types import JOINT_NAMES
+from ur_hil.cell import NO_CELL, Cell
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)
 """How far from the flange the TCP may be [m, rad]: what a pendant rounds."""

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from pc_client.arrays import Array
 from pc_client.kinematics.arms import DhArm, RobotDescription, find_robot_file, find_share_folder
-from pc_client.kinematics.cell import Solid, Three
 from pc_client.kinematics.model import RobotModel, load_pinocchio_model
+from ur_hil.cell import Solid, Three
 
 # The joint that carries a body, as Pinocchio counts: 0 nothing, 3 the forearm's, 4 to 6 the wrists'.
 _FIXED, _WRIST_3 = 0, 6

@@ -32,8 +32,8 @@ from numpy.typing import ArrayLike, NDArray
 from pc_client.arrays import Array
 from pc_client.errors import DriverError, PlanningError
 from pc_client.kinematics.arms import ROBOTS, JointLimits, RobotDescription
-from pc_client.kinematics.cell import NO_CELL, Cell
 from protocol.pose import T_to_pose, pose_inv, pose_trans
+from ur_hil.cell import NO_CELL, Cell
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,13 @@ import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.kinematics.arms import JointLimits
-from pc_client.kinematics.cell import Cell
 from pc_client.kinematics.clearance import Distances, Nearest, clearance_model
 from pc_client.kinematics.model import RobotModel, tcp_positions
 from pc_client.planning.joint_path import JointPath
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits
 from protocol.ur_types import JOINT_NAMES
+from ur_hil.cell import Cell
 
 
 class Extreme(NamedTuple):

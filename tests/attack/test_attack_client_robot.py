@@ -30,13 +30,13 @@ from pc_client.driver.session import UrDriver
 from pc_client.errors import DriverError, one_line
 from pc_client.experiment.identification import identify
 from pc_client.experiment.preflight import model_of, preflight, refusal
-from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.model import robot_model
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.messages import TextMessage, encode_message
 from protocol.realtime.layout import layout_for_version
 from protocol.ur_types import Ports, ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
+from ur_hil.cell import NO_CELL
 
 VERSION = SoftwareVersion(3, 15, 8)
 LAYOUT = layout_for_version(VERSION)

@@ -16,7 +16,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import fuzz_mutations as mutations
@@ -27,7 +27,7 @@ from urp_samples import SAMPLES as NODES
 from pc_client.analysis.run import analyse_run
 from pc_client.control.controller import Controller
 from pc_client.errors import ClientError, one_line
-from pc_client.kinematics.cell import load_cell
+from pc_client.files import FILE_KINDS
 from pc_client.movements.library_sets import LIBRARY_FOLDER
 from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
@@ -42,6 +42,7 @@ from ur_emulator.program_files.compiling import load_and_compile
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
 from ur_emulator.scripting.rpc_builtins import RpcBuiltins
+from ur_hil.cell import load_cell
 from urscript.errors import ScriptRuntimeError
 
 # --- cases
@@ -203,7 +204,7 @@ CLIENT_FILES = {
     "cell": Target(
         lambda: _texts(ROOT / "examples" / "cell.toml"),
         mutations.mutate_toml,
-        _file(".toml", load_cell),
+        _file(".toml", partial(load_cell, kind=FILE_KINDS["cell"])),
         (ClientError,),
     ),
     "controller": Target(

@@ -7,9 +7,9 @@ from math import pi
 import numpy as np
 
 from pc_client.experiment.experiment import Experiment
-from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.model import robot_model
 from pc_client.planning.plan import make_plan
+from ur_hil.cell import NO_CELL
 
 
 def min_jerk(u):

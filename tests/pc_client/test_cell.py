@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from planning_paths import INSIDE_THE_BOX, StraightStrokes, prepare_experiment
 
 from pc_client.errors import CellError, PlanningError
-from pc_client.kinematics.cell import MOST_BODIES, NO_CELL, Cell, Solid, Tool, Wall, load_cell, parse_cell
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import load_movement
 from pc_client.movements.movement_file import toml_value
 from pc_client.planning.approach import approach_text, plan_approach, plan_text
 from pc_client.planning.plan import plan_movement
+from ur_hil.cell import MOST_BODIES, NO_CELL, Cell, Solid, Tool, Wall, load_cell, parse_cell
 
 SIZES = {"boxes": 3, "cylinders": 2, "spheres": 1, "capsules": 2}
 EXAMPLE = Path(__file__).parents[2] / "examples" / "cell.toml"
@@ -30,7 +31,7 @@ BOX = '[[boxes]]\nname = "press"\ncentre = [1, 0, 0]\nsize = [0.1, 0.2, 0.3]\n'
 
 def refused(text: str) -> str:
     with pytest.raises(CellError) as caught:
-        parse_cell(text, "cell.toml")
+        parse_cell(text, "cell.toml", FILE_KINDS["cell"])
     message = str(caught.value)
     assert message.startswith("cell.toml: ")
     assert "\n" not in message
@@ -38,7 +39,7 @@ def refused(text: str) -> str:
 
 
 def test_the_example_is_read_as_it_says():
-    cell = load_cell(EXAMPLE)
+    cell = load_cell(EXAMPLE, FILE_KINDS["cell"])
     assert cell.text == EXAMPLE.read_text()
     assert cell.name == "bench by the window"
     assert cell.walls[0] == Wall("window", (0.0, -1.0, 0.0), -0.6)
@@ -56,7 +57,7 @@ def test_the_example_is_read_as_it_says():
 
 
 def test_a_file_with_a_name_alone_is_a_bare_arm_on_a_plane():
-    cell = parse_cell(HEAD, "cell.toml")
+    cell = parse_cell(HEAD, "cell.toml", FILE_KINDS["cell"])
     assert (cell.floor_z, cell.walls, cell.solids, cell.tool) == (0.0, (), (), NO_CELL.tool)
     assert NO_CELL.summary == "no cell file: bare arm on a plane z = 0"
 
@@ -71,7 +72,7 @@ def test_a_file_with_a_name_alone_is_a_bare_arm_on_a_plane():
     ],
 )
 def test_a_side_says_where_the_arm_stays(side, normal, offset):
-    (wall,) = parse_cell(f'{HEAD}[[walls]]\nname = "w"\n{side}\n', "cell.toml").walls
+    (wall,) = parse_cell(f'{HEAD}[[walls]]\nname = "w"\n{side}\n', "cell.toml", FILE_KINDS["cell"]).walls
     assert wall == Wall("w", normal, offset)
 
 
@@ -123,10 +124,10 @@ def test_too_many_bodies_are_refused():
 
 def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path):
     with pytest.raises(CellError, match=r"cell.toml: cannot be read"):
-        load_cell(tmp_path / "cell.toml")
+        load_cell(tmp_path / "cell.toml", FILE_KINDS["cell"])
     (tmp_path / "cell.toml").write_bytes(b"name = '\xff'")
     with pytest.raises(CellError, match="not UTF-8"):
-        load_cell(tmp_path / "cell.toml")
+        load_cell(tmp_path / "cell.toml", FILE_KINDS["cell"])
 
 
 _VALUES = st.one_of(
@@ -142,7 +143,7 @@ _VALUES = st.one_of(
 @given(st.text(max_size=200))
 def test_any_text_is_read_or_refused_in_one_line(text):
     try:
-        parse_cell(text, "cell.toml")
+        parse_cell(text, "cell.toml", FILE_KINDS["cell"])
     except CellError as error:
         assert "\n" not in str(error)  # noqa: PT017 - one of two allowed outcomes
 
@@ -155,7 +156,7 @@ def test_any_text_is_read_or_refused_in_one_line(text):
 def test_any_solid_is_read_or_refused_in_one_line(kind, fields, where):
     lines = [f"{key} = {_toml(value)}" for key, value in fields.items() if value is not None]
     try:
-        cell = parse_cell("\n".join([HEAD, f"[[{where}{kind}]]", *lines]), "cell.toml")
+        cell = parse_cell("\n".join([HEAD, f"[[{where}{kind}]]", *lines]), "cell.toml", FILE_KINDS["cell"])
     except CellError as error:
         assert str(error).startswith("cell.toml: ")  # noqa: PT017 - one of two allowed outcomes
         return

@@ -26,16 +26,17 @@ from pc_client.driver.watchdog import (
 from pc_client.errors import CellError
 from pc_client.experiment.experiment import experiment_text, load_movements
 from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
-from pc_client.kinematics.cell import load_cell, parse_cell
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.model import robot_model
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.limits import limits_of
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from ur_hil.cell import load_cell, parse_cell
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "real-arm.md").read_text(encoding="utf-8")
 START = (ROOT / "docs" / "start" / "real-ur3.md").read_text(encoding="utf-8")
-CELL = load_cell(ROOT / "examples" / "cell.toml")
+CELL = load_cell(ROOT / "examples" / "cell.toml", FILE_KINDS["cell"])
 MESSAGES = [
     message
     for row in PAGE.partition("## What can go wrong")[2].partition("## When the client dies")[0].splitlines()
@@ -95,7 +96,11 @@ def conditions():
 
 def cell_error():
     with pytest.raises(CellError) as caught:
-        parse_cell(CELL.text.replace("size = [0.2, 0.45, 0.4]", "size = [0.2, 0, 0.4]"), "cell.toml")
+        parse_cell(
+            CELL.text.replace("size = [0.2, 0.45, 0.4]", "size = [0.2, 0, 0.4]"),
+            "cell.toml",
+            FILE_KINDS["cell"],
+        )
     return str(caught.value)
 
 
@@ -159,7 +164,7 @@ def test_the_start_page_is_for_the_arms_and_the_software_that_the_client_takes()
 
 def test_the_cell_of_the_page_is_one():
     text = PAGE.partition("```toml\n")[2].partition("```")[0]
-    cell = parse_cell(text, "docs/real-arm.md")
+    cell = parse_cell(text, "docs/real-arm.md", FILE_KINDS["cell"])
     assert cell.tool.mass == CELL.tool.mass
     assert cell.solids == CELL.solids[:1]
 

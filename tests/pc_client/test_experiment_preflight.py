@@ -16,12 +16,12 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.watchdog import conditions_text
 from pc_client.errors import DriverError
 from pc_client.experiment.preflight import model_of, preflight, refusal, require
-from pc_client.kinematics.cell import NO_CELL
 from pc_client.kinematics.model import robot_model
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.primary.messages import encode_message, version_message
 from protocol.primary.packages import encode_state
 from protocol.ur_types import Ports, RobotType, SoftwareVersion
+from ur_hil.cell import NO_CELL
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
 UR3 = robot_model("ur3")

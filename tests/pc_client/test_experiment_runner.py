@@ -33,7 +33,6 @@ from pc_client.experiment.experiment import (
 )
 from pc_client.experiment.identification import identify
 from pc_client.experiment.runner import ExperimentRunner, run_approach
-from pc_client.kinematics.cell import Cell, Wall
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import Movement
 from pc_client.planning.approach import Approach
@@ -41,6 +40,7 @@ from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
 from pc_client.recording.rows import Phase
 from protocol.velocity_stream import VelocityMode
+from ur_hil.cell import Cell, Wall
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
 

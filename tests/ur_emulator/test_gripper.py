@@ -1,6 +1,7 @@
 """A gripper on the arm: its registers, its fingers, what they hold, and who reaches it."""
 
 import socket
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from ur_emulator.models.things import Thing
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.plant import Plant
+from ur_emulator.plant.scene import load_scene
 from ur_hil.tools import TOOLS, tools_by_name
 
 PERIOD = 0.008
@@ -228,13 +230,13 @@ def test_things_come_and_go_and_the_arm_stays():
     q = bench.plant.q_true.copy()
     with pytest.raises(RefusedError, match="the arm is where it should be"):
         bench.scene.put(Thing("anvil", "sphere", (0.2,), 5.0, 0.5, bench.place))
-    assert [thing.name for thing in bench.scene.things] == ["block"]
+    assert bench.scene.names == ("block",)
     bench.scene.put(Thing("ball", "sphere", (0.03,), 0.1, 0.5, (0.5, 0.5, 0.2, 0.0, 0.0, 0.0)))
     bench.run(1.0, 0.085)
     assert bench.scene.state("ball").pose[2] == pytest.approx(0.01, abs=0.002)  # on the table
     np.testing.assert_allclose(bench.plant.q_true, q, atol=2e-4)
     bench.scene.remove("block")
-    assert [thing.name for thing in bench.scene.things] == ["ball"]
+    assert bench.scene.names == ("ball",)
 
 
 # --- tools
@@ -451,3 +453,75 @@ def test_two_grippers_on_a_flange_are_reached_by_their_numbers():
             pass
         assert ask(first, "GET STA\n") == "STA 0\n"
         assert [gripper["SID"] for gripper in box.state.grippers] == [9, 2]
+
+
+# --- a scene
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "scene.toml"
+MJCF = """<mujoco>
+  <worldbody>
+    <geom name="shelf" type="box" size="0.1 0.1 0.05" pos="0.5 0.3 0.03"/>
+    <body name="mug" pos="0.5 0.3 0.2"><freejoint/><geom type="cylinder" size="0.03 0.05" mass="0.2"/></body>
+    <body name="door" pos="0 0.8 0.3"><joint type="hinge" axis="0 0 1"/><geom type="box" size="0.2 0.01 0.2"/></body>
+  </worldbody>
+</mujoco>"""
+
+
+def furnished(scene):
+    robot = robot_by_name("ur5e")
+    plant = Plant(robot, robot.generation.fidelity("typical"), 7)
+    plant.furnish(scene)
+    home = JointTarget(robot.home_q, (0.0,) * 6, (0.0,) * 6)
+    for _ in range(500):
+        plant.step(home)
+        plant.sense()
+    return plant
+
+
+def test_a_cell_file_is_the_scene_of_a_box_and_the_surroundings_of_a_plan():
+    plant = furnished(load_scene(EXAMPLE))
+    assert plant.scene.names == ("block", "can")
+    assert plant.scene.state("block").pose[2] == pytest.approx(0.0, abs=1e-3)  # on the floor
+    assert plant.scene.state("can").pose[2] == pytest.approx(0.13, abs=1e-3)  # on the shelf
+    cell = load_scene(EXAMPLE)
+    assert [solid.name for solid in cell.solids] == ["shelf"]
+
+
+def test_a_fragment_of_mjcf_is_a_scene(tmp_path):
+    path = tmp_path / "kitchen.xml"
+    path.write_text(MJCF)
+    plant = furnished(load_scene(path))
+    assert plant.scene.names == ("mug",)
+    assert plant.scene.state("mug").pose[2] == pytest.approx(0.13, abs=1e-3)
+    plant.scene.remove("mug")
+    plant.scene.put(Thing("mug", "sphere", (0.03,), 0.1, 0.5, (0.5, -0.3, 0.2, 0.0, 0.0, 0.0)))
+    assert plant.scene.names == ("mug",)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>", "a.xml: .*; give a file of MJCF"),
+        ("a.xml", MJCF.replace('pos="0.5 0.3 0.03"', 'pos="0 -0.3 0.4" size="1 1 1"'), "give a file of MJCF"),
+        (
+            "a.xml",
+            MJCF.replace("</mujoco>", '<actuator><motor joint="hinge"/></actuator></mujoco>'),
+            "a.xml: a scene has no actuators",
+        ),
+        ("b.xml", MJCF.replace("box", "file"), "b.xml: .*; give a file of MJCF"),
+        ("a.json", "{}", "a.json: give a cell file"),
+        ("a.toml", "format = 2", "a.toml: format: 2; give 1"),
+    ],
+)
+def test_a_scene_that_makes_no_sense_is_one_line(tmp_path, name, text, said):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(ModelError, match=said):
+        furnished(load_scene(path))
+
+
+def test_nothing_stands_where_the_arm_is(tmp_path):
+    path = tmp_path / "full.xml"
+    path.write_text('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>')
+    with pytest.raises(RefusedError, match="the arm is where something should stand"):
+        furnished(path)

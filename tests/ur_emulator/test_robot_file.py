@@ -11,7 +11,6 @@ import pytest
 from pc_client.driver.report import read_report
 from pc_client.driver.transport import TcpNetwork
 from pc_client.experiment.preflight import model_of, preflight, refusal
-from pc_client.kinematics.cell import NO_CELL
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError, ModelError, RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
@@ -19,6 +18,7 @@ from ur_emulator.models.generations import CB3, POLYSCOPE_X
 from ur_emulator.models.robots import ROBOTS, robot_by_name
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.plant import Plant
+from ur_hil.cell import NO_CELL
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "arms" / "long_ur5e.toml"
 UR5E = ROBOTS["ur5e"]

@@ -226,7 +226,7 @@ class RemoveThing(CommandOperation):
 
 
 def _known_thing(box: BoxParts, name: str) -> None:
-    known = [thing.name for thing in box.plant.scene.things]
+    known = box.plant.scene.names
     if name not in known:
         there = f"are {', '.join(known)}" if known else "is none"
         raise RefusedError(f"there is no thing {name!r}: there {there}")

@@ -174,7 +174,7 @@ def take_state(controller: Controller) -> BoxState:
 
 def _things(controller: Controller) -> tuple[ThingNow, ...]:
     scene = controller.plant.scene
-    states = ((thing.name, scene.state(thing.name)) for thing in scene.things)
+    states = ((name, scene.state(name)) for name in scene.names)
     return tuple(ThingNow(name, now.pose, now.twist, now.touches_tool) for name, now in states)
 
 

@@ -6,6 +6,7 @@ the declared payload, no push, no contact, no hand. The accelerometer reads grav
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import mujoco
 
@@ -19,6 +20,7 @@ from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.drives import TARGET_MAX
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.plant import Plant, PlantState
+from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
 
 
@@ -100,6 +102,10 @@ class ExactPlant(Plant):
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Raise RefusedError: no load acts on this arm."""
         raise _refusal("payload")
+
+    def furnish(self, surroundings: Cell | Path) -> None:
+        """Refuse, as `put_thing`."""
+        raise _refusal("scene")
 
     def put_thing(self, thing: Thing) -> None:
         """Refuse: this arm would pass through it; RefusedError always."""

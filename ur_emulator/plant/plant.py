@@ -15,6 +15,7 @@ Part of the work need not wait for the next target: `run_ahead` does it while a 
 
 from collections.abc import Sequence
 from math import exp
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.scene import Scene
+from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
 
 
@@ -157,6 +159,10 @@ class Plant:
         """Things around the arm that can be moved."""
         self._be_current()
         return self._physics.scene
+
+    def furnish(self, surroundings: Cell | Path) -> None:
+        """Put a scene around the arm, see `Scene.furnish`."""
+        self.scene.furnish(surroundings)
 
     def put_thing(self, thing: Thing) -> None:
         """Add a thing at rest, see `Scene.put`."""

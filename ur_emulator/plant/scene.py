@@ -1,25 +1,33 @@
-"""The things around an arm that can be moved: bodies with mass and friction, which it grips and pushes.
+"""The surroundings of an arm: things that can be moved, which it grips and pushes, and a scene of a file.
 
 A model of MuJoCo has a fixed size, so it is compiled anew when a thing is added or removed; the state of
-everything else stays. Things that stand still for ever are obstacles (`obstacles.py`).
+everything else stays. What stands still and comes and goes are obstacles (`obstacles.py`); what stands still
+in a scene stays.
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from ur_emulator.errors import RefusedError
+from protocol.pose import rpy_to_rotvec
+from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.models.things import Thing, ThingState
 from ur_emulator.plant.obstacles import quaternion
+from ur_hil.cell import Cell, load_cell
+from ur_hil.input_files import MIB, FileKind
 
 MOST_THINGS = 32
 PREFIX = "thing_"
 
+_SCENE = "scene"
+
 _GEOMS: dict[str, tuple[mujoco.mjtGeom, Callable[..., tuple[float, float, float]]]] = {
     "box": (mujoco.mjtGeom.mjGEOM_BOX, lambda x, y, z: (x / 2, y / 2, z / 2)),
     "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, lambda r, length: (r, length / 2, 0.0)),
+    "capsule": (mujoco.mjtGeom.mjGEOM_CAPSULE, lambda r, length: (r, length / 2, 0.0)),
     "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0)),
 }
 
@@ -33,16 +41,61 @@ class Scene:
     def __init__(self, spec: mujoco.MjSpec, recompile: Callable[[], None]) -> None:
         self._spec = spec
         self._recompile = recompile
-        self._things: dict[str, Thing] = {}
+        # None: a body of a scene in MJCF.
+        self._things: dict[str, Thing | None] = {}
 
     def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Look at this model and its state from now on."""
         self._model, self._data = model, data
 
     @property
-    def things(self) -> tuple[Thing, ...]:
-        """All of them, as they were put, in the order in which they were added."""
-        return tuple(self._things.values())
+    def names(self) -> tuple[str, ...]:
+        """Names of the things, in the order in which they were added."""
+        return tuple(self._things)
+
+    def furnish(self, surroundings: Cell | Path) -> None:
+        """Put what a cell describes, or a fragment of MJCF, around the arm for good; things can be moved.
+
+        Raises:
+            RefusedError: the arm is where something should stand, or there are too many things.
+            ModelError: the fragment makes no sense.
+        """
+        body = self._spec.worldbody.add_body(name=_SCENE)
+        if isinstance(surroundings, Path):
+            self._attach(surroundings, body)
+            self._recompile()
+        else:
+            self._model.geom("table").pos[2] = surroundings.floor_z
+            _add_cell(body, surroundings)
+            self._recompile()
+            for solid in surroundings.things:
+                pose = six([*solid.centre, *rpy_to_rotvec(solid.rpy)])
+                self.put(Thing(solid.name, solid.shape, solid.sizes, solid.mass, solid.friction, pose))
+        self._collide()
+        standing = self._model.body(_SCENE).id
+        if self._arm_touches(lambda geom: self._model.geom_bodyid[geom] == standing):
+            raise RefusedError("scene: the arm is where something should stand, move one of them")
+
+    def _attach(self, path: Path, body: mujoco.MjsBody) -> None:
+        """Add the bodies of a fragment of MJCF; those with a free joint are things."""
+        try:
+            fixed, moving = mujoco.MjSpec.from_file(str(path)), mujoco.MjSpec.from_file(str(path))
+            if any((moving.actuators, moving.sensors, moving.keys, moving.plugins)):
+                raise ValueError("a scene has no actuators, sensors, keys and plugins, remove them")
+            fixed.compile()
+        except ValueError as error:
+            raise ModelError(f"{path}: {' '.join(str(error).split())[:200]}; give a file of MJCF") from error
+        for own in list(fixed.worldbody.bodies):
+            fixed.delete(own)
+        self._spec.attach(fixed, frame=body.add_frame(), prefix=f"{_SCENE}_")
+        for i, own in enumerate(moving.worldbody.bodies):
+            name = own.name or f"body {i + 1}"
+            free = [joint for joint in own.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
+            own.name = name
+            for joint in free:
+                joint.name = name
+                self._things[name] = None
+            self._spec.worldbody.add_frame().attach_body(own, PREFIX, "")
 
     def put(self, thing: Thing) -> None:
         """Add a thing at rest; one of the same name is replaced.
@@ -51,28 +104,23 @@ class Scene:
             RefusedError: there are too many, or it would overlap the arm; nothing changes then.
         """
         before = self._things.get(thing.name)
+        if before is None and thing.name in self._things:
+            raise RefusedError(f"thing {thing.name}: it is one of the scene's file, remove it first")
         if before is None and len(self._things) >= MOST_THINGS:
             raise RefusedError(f"thing {thing.name}: there are {MOST_THINGS} already, remove one first")
         if before is not None:
             self.remove(thing.name)
-        kind, to_mujoco = _GEOMS[thing.shape]
         body = self._spec.worldbody.add_body(
             name=PREFIX + thing.name, pos=thing.pose[:3], quat=quaternion(thing.pose[3:])
         )
         body.add_freejoint(name=PREFIX + thing.name)
-        body.add_geom(
-            name=PREFIX + thing.name,
-            type=kind,
-            size=to_mujoco(*thing.size),
-            mass=thing.mass,
-            friction=[thing.friction, 0.005, 0.0001],
-            solref=_SOLREF,
-            solimp=_SOLIMP,
-            condim=4,
-        )
+        geom = _add_shape(body, thing.shape, thing.size, thing.friction)
+        geom.mass = thing.mass
+        geom.solref, geom.solimp, geom.condim = _SOLREF, _SOLIMP, 4
         self._recompile()
         self._things[thing.name] = thing
-        if self._overlaps_arm(thing.name):
+        self._collide()
+        if self._touches(thing.name):
             self.remove(thing.name)
             if before is not None:
                 self.put(before)
@@ -80,7 +128,8 @@ class Scene:
 
     def remove(self, name: str) -> None:
         """Take a thing away, if it exists."""
-        if self._things.pop(name, None) is not None:
+        if name in self._things:
+            del self._things[name]
             self._spec.delete(self._spec.body(PREFIX + name))
             self._recompile()
 
@@ -106,20 +155,54 @@ class Scene:
             self._touches(name),
         )
 
-    def _touches(self, name: str) -> bool:
-        """Whether it touches the arm or its tool."""
-        model, data = self._model, self._data
-        geom, arm = model.geom(PREFIX + name).id, model.body("link_1").id
-        for i in range(data.ncon):
-            pair = data.contact[i].geom.tolist()
-            if geom in pair:
-                other = pair[1 - pair.index(geom)]
-                if model.body_rootid[model.geom_bodyid[other]] == arm:
-                    return True
-        return False
-
-    def _overlaps_arm(self, name: str) -> bool:
+    def _collide(self) -> None:
+        """Find the contacts of the present pose."""
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_collision(self._model, self._data)
-        return self._touches(name)
+
+    def _touches(self, name: str) -> bool:
+        """Whether a thing touches the arm or its tool."""
+        model = self._model
+        thing = model.body(PREFIX + name).id
+        return self._arm_touches(lambda geom: model.body_rootid[model.geom_bodyid[geom]] == thing)
+
+    def _arm_touches(self, is_it: Callable[[int], bool]) -> bool:
+        model, data = self._model, self._data
+        arm = model.body("link_1").id
+        for i in range(data.ncon):
+            one, other = data.contact[i].geom.tolist()
+            for geom, against in ((one, other), (other, one)):
+                if model.body_rootid[model.geom_bodyid[geom]] == arm and is_it(against):
+                    return True
+        return False
+
+
+def load_scene(path: Path) -> Cell | Path:
+    """Read a scene: a cell file in TOML; a file of MJCF (.xml) is read when it is put around an arm.
+
+    Raises:
+        ModelError: the file cannot be read or makes no sense.
+    """
+    if path.suffix == ".toml":
+        return load_cell(path, FileKind(MIB, ModelError, "100 bodies have less than 0.1 MiB"))
+    if path.suffix == ".xml":
+        return path
+    raise ModelError(f"{path}: give a cell file (.toml, as examples/scene.toml) or a fragment of MJCF (.xml)")
+
+
+def _add_cell(body: mujoco.MjsBody, cell: Cell) -> None:
+    """Add walls and solids of a cell."""
+    for wall in cell.walls:
+        wide = body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=np.multiply(wall.normal, wall.offset)
+        )
+        mujoco.mju_quatZ2Vec(wide.quat, np.array(wall.normal))
+    for solid in cell.solids:
+        geom = _add_shape(body, solid.shape, solid.sizes, solid.friction)
+        geom.pos, geom.quat = solid.centre, quaternion(rpy_to_rotvec(solid.rpy))
+
+
+def _add_shape(body: mujoco.MjsBody, shape: str, size: tuple[float, ...], friction: float) -> mujoco.MjsGeom:
+    kind, to_mujoco = _GEOMS[shape]
+    return body.add_geom(type=kind, size=to_mujoco(*size), friction=[friction, 0.005, 0.0001])

@@ -13,10 +13,10 @@ from typing import Any, Literal
 from pc_client.analysis.measures import PARTS
 from pc_client.analysis.run import budget_column
 from pc_client.control.controller import FIELDS, Controller
-from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.recording.provenance import Origin, origin_of
 from pc_client.results.tables import Column
 from ur_hil import tool_version
+from ur_hil.cell import NO_CELL, Cell
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,6 @@ from pc_client.errors import ClientError, GainMarginError, SweepError, full_mess
 from pc_client.experiment.experiment import Experiment
 from pc_client.experiment.identification import Identification
 from pc_client.experiment.runner import ExperimentRunner
-from pc_client.kinematics.cell import NO_CELL, Cell
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.library_sets import library_name_of
 from pc_client.movements.movement import load_movement
@@ -54,6 +53,7 @@ from pc_client.studies.sweep.case import (
 from pc_client.studies.sweep.guard import ENDED_FILE
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
+from ur_hil.cell import NO_CELL, Cell
 
 if TYPE_CHECKING:
     from pc_client.studies.sweep.settings import SweepConfig

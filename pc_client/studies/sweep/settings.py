@@ -27,11 +27,11 @@ from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controlle
 from pc_client.errors import ControllerError, MovementError, SweepError
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
-from pc_client.kinematics.cell import NO_CELL, Cell, load_cell
 from pc_client.movements.library_sets import library_names, library_path
 from pc_client.movements.movement import load_movement
 from pc_client.results.tables import Column
 from pc_client.studies.sweep.case import FACTORS, MovementFile, SimulatedArm
+from ur_hil.cell import NO_CELL, Cell, load_cell
 from ur_hil.records import Finite, Flag, Items, checked, nearest, record, text, whole, word
 
 if TYPE_CHECKING:
@@ -213,7 +213,7 @@ def read_config(path: Path) -> SweepConfig:
         file,
         tuple(_movement(name, path) for name in file.movements),
         tuple(SimulatedArm(*arm) for arm in arms),
-        NO_CELL if file.cell is None else load_cell(path.parent / file.cell),
+        NO_CELL if file.cell is None else load_cell(path.parent / file.cell, FILE_KINDS["cell"]),
         axes,
     )
     if problem := _repeated([movement.name for movement in config.movements]):

@@ -1,5 +1,7 @@
 """The bodies around the arm and its tool: the geometry of a cell, in metres and radians, and its file.
 
+The client plans around them; the emulated box puts them around its arm.
+
 The TCP stays at the flange: the tool is a shape that must not touch anything, and a load, not a new TCP.
 
 A cell file is TOML, read strictly; `examples/cell.toml` shows every field, `docs/real-arm.md` explains them.
@@ -10,8 +12,7 @@ from math import hypot, pi
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pc_client.errors import CellError
-from pc_client.files import FILE_KINDS
+from ur_hil.input_files import FileKind
 from ur_hil.records import Finite, Items, checked, number, record
 from ur_hil.records import text as text_field
 
@@ -32,6 +33,8 @@ class Solid:
         sizes: x, y, z of a box; the radius, and the length of a cylinder or capsule [m].
         centre: in `base`, or in the flange's frame for a part of a tool [m].
         rpy: roll, pitch, yaw: turns about the fixed x, y and z axis, in this order [rad].
+        mass: of a thing that can be gripped and pushed [kg]; 0: it stands still.
+        friction: coefficient of its surface.
     """
 
     name: str
@@ -39,11 +42,18 @@ class Solid:
     sizes: tuple[float, ...]
     centre: Three
     rpy: Three = (0.0, 0.0, 0.0)
+    mass: float = 0.0
+    friction: float = 0.5
+
+    @property
+    def shape(self) -> str:
+        """What it is, e.g. `box`."""
+        return _NOUNS[self.kind]
 
     @property
     def title(self) -> str:
         """What it is and how it is called, e.g. `box 'press'`."""
-        return f"{_NOUNS[self.kind]} '{self.name}'"
+        return f"{self.shape} '{self.name}'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +92,8 @@ class Cell:
     Attributes:
         name: for messages; empty: nothing is known, the bare arm stands on a plane.
         floor_z: height of the surface under the arm in `base`; forearm, wrists and tool stay above it [m].
-        solids: bodies, in `base`.
+        solids: bodies that stand still, in `base`.
+        things: bodies that can be gripped and pushed, in `base`; a plan may touch them.
         text: the file that it was read from.
     """
 
@@ -92,6 +103,7 @@ class Cell:
     solids: tuple[Solid, ...] = ()
     tool: Tool = Tool()
     text: str = ""
+    things: tuple[Solid, ...] = ()
 
     @property
     def summary(self) -> str:
@@ -177,6 +189,8 @@ class _Body:
     name: Name
     centre: Point
     rpy: tuple[_Angle, _Angle, _Angle] = (0.0, 0.0, 0.0)
+    mass: Annotated[float, number(0.001, 100.0, "kg")] = 0.0
+    friction: Annotated[float, number(0.0, 2.0)] = 0.5
 
 
 @record
@@ -211,8 +225,8 @@ class _Solids:
 
 
 def _solid(kind: str, body: _Body) -> Solid:
-    name, centre, rpy, *sizes = astuple(body)
-    return Solid(name, kind, sizes[0] if kind == "boxes" else tuple(sizes), centre, rpy)
+    name, centre, rpy, mass, friction, *sizes = astuple(body)
+    return Solid(name, kind, sizes[0] if kind == "boxes" else tuple(sizes), centre, rpy, mass, friction)
 
 
 @record
@@ -230,6 +244,8 @@ class _Cell(_Solids):
     tool: _Tool = _Tool()
 
     def __post_init__(self) -> None:
+        if heavy := next((solid for solid in self.tool.solids if solid.mass), None):
+            raise ValueError("tool", f"{heavy.title} has a mass; give that of the whole tool")
         names = [wall.name for wall in self.walls]
         names += [solid.name for solid in (*self.solids, *self.tool.solids)]
         if len(names) > MOST_BODIES:
@@ -238,13 +254,24 @@ class _Cell(_Solids):
             raise ValueError(f"two bodies are called {twice!r}; give each a name of its own")
 
 
-def load_cell(path: str | Path) -> Cell:
-    """Read a cell file; CellError, naming file and field, if it is out of reach or makes no sense."""
-    return parse_cell(FILE_KINDS["cell"].read_text(Path(path)), str(path))
+def load_cell(path: str | Path, kind: FileKind) -> Cell:
+    """Read a cell file.
+
+    Raises:
+        Exception: the error of its kind, naming file and field: it is out of reach or makes no sense.
+    """
+    return parse_cell(kind.read_text(Path(path)), str(path), kind)
 
 
-def parse_cell(text: str, source: str) -> Cell:
-    """Make a cell of the text (TOML) of its file; CellError, naming file and field, if it makes no sense."""
-    file = checked(_Cell, FILE_KINDS["cell"].parse_toml(text, source), source, CellError)
-    tool = Tool(file.tool.solids, file.tool.mass, file.tool.centre_of_gravity)
-    return Cell(file.name, file.floor.z, tuple(wall.wall() for wall in file.walls), file.solids, tool, text)
+def parse_cell(text: str, source: str, kind: FileKind) -> Cell:
+    """Make a cell of the text (TOML) of its file; errors as `load_cell`."""
+    file = checked(_Cell, kind.parse_toml(text, source), source, kind.error)
+    return Cell(
+        file.name,
+        file.floor.z,
+        tuple(wall.wall() for wall in file.walls),
+        tuple(solid for solid in file.solids if not solid.mass),
+        Tool(file.tool.solids, file.tool.mass, file.tool.centre_of_gravity),
+        text,
+        tuple(solid for solid in file.solids if solid.mass),
+    )
