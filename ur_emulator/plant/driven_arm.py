@@ -194,7 +194,7 @@ class DrivenArm:
 
     def run_ahead(self) -> None:
         """Compute the next cycle, if no target that is still unknown acts in it; `advance` completes it."""
-        if not self.drives.target_acts_later or self._is_braked or self._is_ahead:
+        if not self.drives.target_acts_later or self._is_braked or self._is_ahead or self.physics.hands:
             return
         if self._mode not in _FREE and not self.physics.loads.is_unexpected:
             self.physics.store_state()

@@ -185,6 +185,7 @@ class Hand:
         self._speed: NDArray[np.float64] = data.ctrl[drive : drive + 1]
         self._force: NDArray[np.float64] = data.actuator_force[drive : drive + 1]
         self._limit: NDArray[np.float64] = model.actuator_forcerange[drive]
+        self._most = float(self._limit[1])
 
     def open_half(self) -> None:
         """Put the fingers in the middle of their stroke, as they are found after power on."""
@@ -193,24 +194,29 @@ class Hand:
     @property
     def state(self) -> FingerState:
         """The fingers now."""
-        (first, second), (first_speed, second_speed) = self._q.tolist(), self._qd.tolist()
-        share = abs(float(self._force[0])) / float(self._limit[1])
-        return FingerState(first + second, first_speed + second_speed, share)
+        first, second = self._q.tolist()
+        first_speed, second_speed = self._qd.tolist()
+        (force,) = self._force.tolist()
+        return FingerState(first + second, first_speed + second_speed, abs(force) / self._most)
 
     def drive(self, command: FingerCommand | None, period: float) -> None:
         """Set what the drive does in the next cycle [s]; None: it holds, with the force that it has."""
         if command is None:
-            if abs(float(self._force[0])) < 0.9 * float(self._limit[1]):
+            if abs(float(self._force[0])) < 0.9 * self._most:
                 self._speed[0] = self._raised = 0.0
             return
         first, second = self._q.tolist()
+        first_speed, second_speed = self._qd.tolist()
         fastest, ahead = 0.5 * command.speed, 0.5 * (command.width - first - second) / _APPROACH
         wanted = min(fastest, max(-fastest, ahead))
-        most = 2.0 * command.force / _SERVO
-        error = wanted - 0.5 * float(self._qd.sum())
+        limit = 2.0 * command.force
+        most = limit / _SERVO
+        error = wanted - 0.5 * (first_speed + second_speed)
         self._raised = min(most, max(-most, self._raised + _SERVO_RATE * period * error))
         self._speed[0] = wanted + self._raised
-        self._limit[:] = -2.0 * command.force, 2.0 * command.force
+        if limit != self._most:
+            self._limit[:] = -limit, limit
+            self._most = limit
 
     def place(self, command: FingerCommand | None, period: float) -> None:
         """Let the fingers be where the command leads them within a cycle [s]: nothing is in their way."""

@@ -62,7 +62,7 @@ class Loads:
         # What hangs on the flange; empty: what is declared does.
         self._true: tuple[tuple[float, Vector3], ...] = self._tools
         self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
-        self.is_unexpected = bool(self._true)
+        self._attached = False
         self._weigh()
 
     def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -89,9 +89,9 @@ class Loads:
         """Set the true payload, which the controller does not know; errors as in `check_payload`."""
         check_payload(mass, cog)
         self._true = (*self._tools, (mass, cog))
+        self._attached = True
         self._weigh()
         set_payload_body(self._model, mass, cog)
-        self.is_unexpected = True
 
     def push(self, force: Sequence[float], point: Sequence[float] | None) -> None:
         """Push from now on; see `Plant.push`."""
@@ -104,7 +104,7 @@ class Loads:
         self._push = force_base if force_base.any() else None
         self._push_point = at
         self._data.xfrc_applied[self._flange_link] = 0.0
-        self.is_unexpected = self._push is not None or bool(self._true)
+        self._weigh()
 
     def apply(self) -> None:
         """Apply the push to its body in MuJoCo, for the pose at the start of this cycle."""
@@ -122,14 +122,14 @@ class Loads:
         """Wrench (6,) that the controller does not expect, at the flange in base axes [N, Nm]."""
         wrench = np.zeros(6) if self._push is None else self._push_wrench.copy()
         if self._true:
-            x, y, _ = (self._flange_rotation @ self._excess_moment).tolist()
-            wrench[2] -= GRAVITY * self._excess_mass
-            wrench[3] -= GRAVITY * y
-            wrench[4] += GRAVITY * x
+            x, y, _ = self._flange_rotation.dot(self._excess_weight).tolist()
+            wrench[2:5] += (-self._excess_force, -y, x)
         return wrench
 
     def _weigh(self) -> None:
-        """Compute what hangs on the flange beyond what is declared."""
+        """Compute what hangs on the flange beyond what is declared, and whether something is unexpected."""
         loads = [*self._true, (-self._declared[0], self._declared[1])]
-        self._excess_mass = sum(mass for mass, _ in loads)
-        self._excess_moment = sum((mass * np.array(cog) for mass, cog in loads), np.zeros(3))
+        self._excess_force = GRAVITY * sum(mass for mass, _ in loads)
+        self._excess_weight = sum((GRAVITY * mass * np.array(cog) for mass, cog in loads), np.zeros(3))
+        differs = bool(self._true) and (self._excess_force != 0.0 or self._excess_weight.any())
+        self.is_unexpected = self._push is not None or self._attached or bool(differs)
