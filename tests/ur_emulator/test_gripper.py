@@ -329,6 +329,9 @@ def p():
   socket_send_string(255, "g")
   socket_send_line(" GTO 1", "g")
   socket_read_byte_list(3, "g")
+  still = get_tool_current()
+  sleep(0.3)
+  textmsg("mA ", floor(1000 * (get_tool_current() - still) + 0.5))
   sleep(1.0)
   socket_send_string("GET PRE", "g")
   textmsg("pre ", socket_read_byte_list(3, "g"))
@@ -346,9 +349,10 @@ def test_a_program_reaches_it_at_its_usual_port(box):
     said = len(box.log)
     box.run_program(PROGRAM, wait=True)
     texts = [entry.text for entry in box.log[said:] if entry.source == "Program"]
-    assert [text for text in texts if text[:3] in ("sid", "ack", "pre", "pos")] == [
+    assert [text for text in texts if text[:3] in ("sid", "ack", "mA ", "pre", "pos")] == [
         "sid [3,91,57,93,-1,-1]",
         "ack [3,97,99,107]",
+        "mA 100",
         "pre [3,50,53,53]",
         "pos 230",
         "sid [2,91,93]",
@@ -374,6 +378,10 @@ def test_people_put_move_and_remove_things(box):
     assert (ball.name, ball.touches_tool) == ("ball", False)
     box.move_thing("ball", (0.5, 0.4, 0.01, 0.0, 0.0, 0.0))
     assert box.state.things[0].pose[:2] == pytest.approx((0.5, 0.4), abs=1e-3)
+    box.run_program("def p():\n  sleep(1.0)\nend", wait=True)
+    (contact,) = box.state.contacts
+    assert {contact.first, contact.second} == {"table", "ball"}
+    assert contact.force[2] == pytest.approx(0.1 * 9.81, rel=0.05)
     with pytest.raises(RefusedError, match="there is no thing 'cube': there are ball"):
         box.move_thing("cube", (0.5, 0.4, 0.1, 0.0, 0.0, 0.0))
     with pytest.raises(ArgumentError, match="a cylinder needs 2 numbers"):

@@ -106,6 +106,7 @@ def make_snapshot(state: ControllerState, programs: ProgramRunner, sensed: Plant
         analog_values=analog.values,
         analog_domains=analog.domains,
         tool_output_voltage=io.tool_voltage,
+        gripper_current=sum(g.supply_current for g in state.grippers) if state.grippers else 0.0,
         tool_output_modes=io.tool_output_modes,
         tool_line=io.tool_line,
         euromap_inputs=euromap.inputs,

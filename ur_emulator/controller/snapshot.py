@@ -156,6 +156,7 @@ class _Fields(NamedTuple):
     analog_values: tuple[float, ...]
     analog_domains: tuple[int, ...]
     tool_output_voltage: int
+    gripper_current: float
     tool_output_modes: tuple[int, int, int]
     tool_line: ToolLine
     euromap_inputs: int
@@ -286,7 +287,8 @@ class Snapshot(_Fields):
         if not self.tool_output_voltage:
             return 0.0
         switched = (self.actual_digital_output_bits & TOOL.mask).bit_count()
-        return self.tool_output_voltage / TOOL_RESISTANCE + OUTPUT_CURRENT * switched
+        resting = self.tool_output_voltage / TOOL_RESISTANCE + OUTPUT_CURRENT * switched
+        return resting + self.gripper_current
 
     @property
     def tool_temperature(self) -> float:

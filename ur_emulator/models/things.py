@@ -1,8 +1,8 @@
-"""Things around an arm that can be moved, as people put them there and as they are now."""
+"""Things around an arm that can be moved, as people put them there and as they are now, and contacts."""
 
 from dataclasses import dataclass
 
-from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.robot_model import Vector3, Vector6
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,3 +32,20 @@ class ThingState:
     pose: Vector6
     twist: Vector6
     touches_tool: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A point in which two bodies press on each other.
+
+    Attributes:
+        first: name of a body: of a link, a tool, an obstacle, a thing, "table", "base" or "scene".
+        second: likewise.
+        position: in the base frame [m].
+        force: on the second body, in the base frame [N].
+    """
+
+    first: str
+    second: str
+    position: Vector3
+    force: Vector3

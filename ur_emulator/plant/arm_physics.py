@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.models.robot_model import DhRow, RobotModel
+from ur_emulator.models.things import Contact
 from ur_emulator.plant.drives import Drives, ServoGains
 from ur_emulator.plant.friction import Presliding
 from ur_emulator.plant.hand import add_tool, make_hand
 from ur_emulator.plant.loads import Loads
-from ur_emulator.plant.obstacles import Obstacles, add_slots
-from ur_emulator.plant.scene import Scene
+from ur_emulator.plant.obstacles import OBSTACLES, Obstacles, add_slots
+from ur_emulator.plant.scene import PREFIX, Scene
 from ur_emulator.plant.sensors import REC_Q, REC_QD
 from ur_hil.tools import ToolModel
 
@@ -155,21 +156,44 @@ class ArmPhysics:
         """
         model, data = self.model, self.data
         wrench = np.zeros(6)
-        in_contact_frame = np.zeros(6)
         for i in range(data.ncon):
             contact = data.contact[i]
             first, second = (bool(self._is_arm[model.geom_bodyid[geom]]) for geom in contact.geom)
             if first == second:
                 continue
-            mujoco.mj_contactForce(model, data, i, in_contact_frame)
-            # MuJoCo gives the force on the second body, in the contact's axes (rows of `frame`).
-            force = contact.frame.reshape(3, 3).T @ in_contact_frame[:3]
-            if first:
-                force = -force
-            fx, fy, fz = force.tolist()
+            force = self._contact_force(i)
+            fx, fy, fz = (-force if first else force).tolist()
             rx, ry, rz = (contact.pos - self.flange_position).tolist()
             wrench += (fx, fy, fz, ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx)
         return wrench
+
+    def _contact_force(self, contact: int) -> NDArray[np.float64]:
+        """The force of a contact on its second body (3,) in the base frame [N]."""
+        in_contact_frame = np.zeros(6)
+        mujoco.mj_contactForce(self.model, self.data, contact, in_contact_frame)
+        # The rows of `frame` are the axes of the contact.
+        axes: NDArray[np.float64] = self.data.contact[contact].frame.reshape(3, 3)
+        return axes.T @ in_contact_frame[:3]
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """All contact points with a force."""
+        contacts = []
+        for i in range(self.data.ncon):
+            first, second = (self._name_of(geom) for geom in self.data.contact[i].geom.tolist())
+            force = self._contact_force(i)
+            if force.any():
+                position = tuple(self.data.contact[i].pos.tolist())
+                contacts.append(Contact(first, second, position, tuple(force.tolist())))
+        return tuple(contacts)
+
+    def _name_of(self, geom: int) -> str:
+        """What people call the body of a shape: a link, a tool, an obstacle, a thing, the table."""
+        model = self.model
+        body: str = model.body(model.geom_bodyid[geom]).name
+        if body == OBSTACLES:
+            return self.obstacles.name_of(geom)
+        return model.geom(geom).name or "base" if body == "world" else body.removeprefix(PREFIX)
 
     def set_free(self, free: bool) -> None:
         """Free the joints, or return them to servo control.

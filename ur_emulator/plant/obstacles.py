@@ -86,6 +86,10 @@ class Obstacles:
         """Their names, in the order in which they were added."""
         return tuple(self._slots)
 
+    def name_of(self, geom: int) -> str:
+        """The obstacle that a shape of the model is."""
+        return next(name for name, slot in self._slots.items() if slot == geom - self._first)
+
     def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
         """Add an obstacle, one of SHAPES with sizes as it wants them [m]; one of the same name is replaced.
 

@@ -116,6 +116,11 @@ class RobotiqGripper:
             self._is_moving or self._status is Status.ACTIVATING or self._held != self._wanted
         )
 
+    @property
+    def supply_current(self) -> float:
+        """What it takes from the tool connector [A]: what COU reports."""
+        return 0.01 * self._current if self.has_power else 0.0
+
     # --- clients
 
     def set(self, name: str, value: int) -> None:

@@ -24,6 +24,7 @@ class VacuumGripper:
         self._per_cycle = period / BUILD_UP
         self._vacuum = 0.0
         self.is_busy = False
+        self.supply_current = 0.0  # its valve is a load of the output
 
     def summary(self) -> dict[str, float]:
         """The vacuum as a share of the full one."""
