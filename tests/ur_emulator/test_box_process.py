@@ -128,11 +128,15 @@ def test_an_attached_box_is_used_like_a_box_of_ones_own(served, attached):
         served.ports,
         served.serial_number,
     )
+    attached.add_thing("ball", "sphere", (0.03,), 0.1, (0.3, 0.3, 0.01, 0.0, 0.0, 0.0))
     attached.run_program('def p():\n  popup("look")\n  movej([0.5, -1.5, -1.8, 0, 1.2, 1.5])\nend\n')
     state = attached.wait_until(program_state="STOPPED", steady=True)
     state = attached.wait_until(time=state.time + 1.0)
     assert state == served.state == attached.state
     assert state.popups == ("look",)
+    assert state.things[0].touches_tool is False
+    assert {state.contacts[0].first, state.contacts[0].second} == {"ball", "table"}
+    attached.remove_thing("ball")
     assert attached.close_popups() == served.state.tick
     assert attached.log == served.log
     assert attached.identity == served.identity

@@ -14,10 +14,11 @@ from protocol.ur_types import Ports
 from ur_emulator.box_log import LogEntry
 from ur_emulator.box_options import ServedAt
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.control_api.box_state import BoxState, Question
+from ur_emulator.control_api.box_state import BoxState, Question, ThingNow
 from ur_emulator.control_api.operations import OPERATIONS, make
 from ur_emulator.control_api.step_operations import ReadState, WaitUntil
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTimeoutError
+from ur_emulator.models.things import Contact
 
 if TYPE_CHECKING:
     from ur_emulator.controller.command import Command, Done
@@ -148,9 +149,15 @@ class AttachedBox:
         return False, None
 
 
+# Fields of the state that are tuples of records.
+_RECORDS: dict[str, Callable[..., Any]] = {"things": ThingNow, "contacts": Contact, "questions": Question}
+
+
 def _state_of(result: Mapping[str, Any]) -> BoxState:
-    questions = tuple(Question(**question) for question in result["questions"])
-    return BoxState(**{**{name: _frozen(value) for name, value in result.items()}, "questions": questions})
+    state = _frozen(result)
+    for name, record in _RECORDS.items():
+        state[name] = tuple(record(**fields) for fields in state[name])
+    return BoxState(**state)
 
 
 def _frozen(value: Any) -> Any:
