@@ -37,10 +37,8 @@ ROWS: tuple[MapRow, ...] = (
     MapRow(
         "interpreter", "an answer for each line", "on request", "statements of URScript", "interpreter.md"
     ),
-    MapRow("gripper", "an answer for each line", "on request", "variables of a gripper", "../grippers.md"),
-    MapRow(
-        "tool_line", "answers of a gripper", "on request", "Modbus RTU, e-Series arms only", "../grippers.md"
-    ),
+    MapRow("gripper", "an answer for each line", "on request", "variables of a gripper", "gripper.md"),
+    MapRow("tool_line", "answers of a gripper", "on request", "Modbus RTU, e-Series arms only", "gripper.md"),
     MapRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
 )
 """One row a port of `Ports`."""
