@@ -72,6 +72,8 @@ def test_spectrum_ends_at_the_cutoff() -> None:
     shaken = speed + 0.3 * np.sin(2 * math.pi * 40.0 * T) * speed
     assert sparc(shaken, RATE) == pytest.approx(sparc(speed, RATE), abs=0.01)
     assert sparc(shaken, RATE, cutoff=60.0) < sparc(speed, RATE) - 0.1
+    slower = speed + 0.3 * np.sin(2 * math.pi * 10.0 * T) * speed
+    assert sparc(slower, RATE) < sparc(slower, RATE, cutoff=9.0) - 0.05
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])

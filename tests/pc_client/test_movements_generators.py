@@ -408,6 +408,11 @@ def test_any_seed_stays_in_the_box_at_the_top_speed(seed: int, n: int) -> None:
         TOP_SPEED, rel=5e-3
     )
     assert movement.provenance["seed"] == seed
+    scale, stretch = (float(movement.provenance[fact]) for fact in ("scale", "time_stretch"))
+    legs = np.linalg.norm(np.diff(movement.target_points, axis=0), axis=1) / scale
+    # A hand's stroke of 37.5 mm lasts .1 s, others by the power .3 of their length, each up to 8 % off.
+    factors = movement.stroke_durations / stretch / (0.1 * (legs / 0.0375) ** 0.3)
+    assert np.all((factors > 0.9) & (factors < 1.1))
 
 
 def test_durations_must_go_with_the_points() -> None:
