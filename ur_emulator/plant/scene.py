@@ -72,8 +72,8 @@ class Scene:
                 pose = six([*solid.centre, *rpy_to_rotvec(solid.rpy)])
                 self.put(Thing(solid.name, solid.shape, solid.sizes, solid.mass, solid.friction, pose))
         self._collide()
-        standing = self._model.body(_SCENE).id
-        if self._arm_touches(lambda geom: self._model.geom_bodyid[geom] == standing):
+        standing = (0, self._model.body(_SCENE).id)  # the table is of the world
+        if self._arm_touches(lambda geom: self._model.geom_bodyid[geom] in standing):
             raise RefusedError("scene: the arm is where something should stand, move one of them")
 
     def _attach(self, path: Path, body: mujoco.MjsBody) -> None:
