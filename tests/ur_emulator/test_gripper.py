@@ -533,7 +533,7 @@ def test_a_scene_that_makes_no_sense_is_one_line(tmp_path, name, text, said):
     [
         ("full.xml", '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'),
         ("high.toml", 'format = 1\nname = "high"\n[floor]\nz = 0.5'),
-        ("wall.toml", 'format = 1\nname = "wall"\n[[walls]]\nname = "near"\nx_min = -0.1'),
+        ("wall.toml", 'format = 1\nname = "wall"\n[[walls]]\nname = "near"\nx_max = 0.1'),
     ],
 )
 def test_nothing_stands_where_the_arm_is(tmp_path, name, text):
