@@ -305,10 +305,10 @@ class Controller:
     def _step_grippers(self) -> None:
         """Let the grippers see their fingers, and drive them in the next cycle."""
         state, plant = self.state, self.plant
-        has_power = state.io.tool_voltage == SUPPLY and state.mode.mode >= RobotMode.POWER_ON
+        is_on, has_supply = state.mode.mode >= RobotMode.POWER_ON, state.io.tool_voltage == SUPPLY
         plant.drive_fingers(
             [
-                gripper.step(fingers, has_power, state.io)
+                gripper.step(fingers, is_on and (has_supply or gripper.has_cable), state.io)
                 for gripper, fingers in zip(state.grippers, plant.fingers, strict=True)
             ]
         )

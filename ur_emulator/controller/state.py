@@ -6,6 +6,7 @@ The record itself is frozen. Scripts, commands and ports get the parts that they
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from protocol.ur_types import SoftwareVersion
 from ur_emulator.controller.arm_dynamics import ArmDynamics
 from ur_emulator.controller.client_inputs import ClientInputs
 from ur_emulator.controller.clock import Clock
@@ -121,6 +122,7 @@ def make_state(
     past, tool = PastCycles(clock.generation), ToolSettings()
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)
+    has_tool_line = bool(tools) and robot.generation.software(SoftwareVersion(*version)).has_tool_line
     if tools:
         # As the installations of their makers do.
         io.set_tool_voltage(SUPPLY)
@@ -158,5 +160,5 @@ def make_state(
         requests=ProgramRequests(),
         past=past,
         events=EventQueue(),
-        grippers=make_grippers(tools, clock.period_s),
+        grippers=make_grippers(tools, clock.period_s, has_tool_line),
     )

@@ -55,7 +55,8 @@ class FingerState(NamedTuple):
     Attributes:
         width: between the pads [m].
         speed: of the width [m/s]; negative while they close.
-        share: force of the drive as a share of its limit; of a cup 1 while it is on something, else 0.
+        share: force of the drive as a share of its limit, negative while it closes; of a cup 1 while it is on
+            something, else 0.
     """
 
     width: float
@@ -197,7 +198,7 @@ class Hand:
         first, second = self._q.tolist()
         first_speed, second_speed = self._qd.tolist()
         (force,) = self._force.tolist()
-        return FingerState(first + second, first_speed + second_speed, abs(force) / self._most)
+        return FingerState(first + second, first_speed + second_speed, force / self._most)
 
     def drive(self, command: FingerCommand | None, period: float) -> None:
         """Set what the drive does in the next cycle [s]; None: it holds, with the force that it has."""
@@ -212,6 +213,8 @@ class Hand:
         limit = 2.0 * command.force
         most = limit / _SERVO
         error = wanted - 0.5 * (first_speed + second_speed)
+        if wanted * self._raised < 0.0:
+            self._raised = 0.0  # lets go at once of what it has held
         self._raised = min(most, max(-most, self._raised + _SERVO_RATE * period * error))
         self._speed[0] = wanted + self._raised
         if limit != self._most:

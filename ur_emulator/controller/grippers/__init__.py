@@ -15,10 +15,18 @@ _UNITS = (9, 2, 3, 4)
 """Addresses of the grippers 1 to 4 of programs. Source: reference `grippers.md` 1.1 (O)."""
 
 
-def make_grippers(tools: Sequence[ToolModel], period: float) -> tuple[Gripper, ...]:
-    """Return the controllers of tools, in their order; `period` is the cycle [s]."""
+def make_grippers(tools: Sequence[ToolModel], period: float, has_tool_line: bool) -> tuple[Gripper, ...]:
+    """Return the controllers of tools, in their order.
+
+    Args:
+        period: of the control cycle [s].
+        has_tool_line: the tool connector has a serial line; where it has none, a cable leads from the control
+            box to the grippers that need one.
+    """
     units = iter(_UNITS)
     return tuple(
-        VacuumGripper(tool, period) if tool.kind == "vacuum" else RobotiqGripper(tool, period, next(units))
+        VacuumGripper(tool, period)
+        if tool.kind == "vacuum"
+        else RobotiqGripper(tool, period, next(units), has_cable=not has_tool_line)
         for tool in tools
     )

@@ -85,14 +85,18 @@ class RobotiqGripper:
     Attributes:
         unit: its address on the serial line, which is its SID.
         line: settings of the serial line with which it is reached.
-        has_power: the tool connector supplies it.
+        has_cable: its supply comes from the control box, not from the tool connector.
+        has_power: it has its supply.
     """
 
     line = ToolLine(is_enabled=True)
 
-    def __init__(self, tool: ToolModel, period: float, unit: int = DEFAULT_SID) -> None:
+    def __init__(
+        self, tool: ToolModel, period: float, unit: int = DEFAULT_SID, *, has_cable: bool = False
+    ) -> None:
         """Begin without power; `period` is the cycle [s]."""
         self.unit = unit
+        self.has_cable = has_cable
         self._tool = tool
         self._period = period
         self._every = max(1, round(EXCHANGE / period))
@@ -219,7 +223,7 @@ class RobotiqGripper:
         Args:
             fingers: after the last cycle.
             io: not used; other grippers are driven by it.
-            has_power: the connector has 24 V, and no stop has cut them.
+            has_power: the connector or the cable has 24 V, and no stop has cut them.
 
         Returns:
             What the drive does; None: it holds where it is, as its screw does without power.
@@ -301,11 +305,16 @@ class RobotiqGripper:
         if self._is_moving:
             if reached and stands:
                 self._arrive(Objects.AT_TARGET)
-            elif stands and fingers.share > 0.95:
+            elif stands and self._presses(command.width):
                 closing = command.width < fingers.width
                 self._arrive(Objects.CONTACT_CLOSING if closing else Objects.CONTACT_OPENING)
         elif not stands and self._objects is not Objects.AT_TARGET:
             self._objects = Objects.AT_TARGET  # the object is lost
+
+    def _presses(self, width: float) -> bool:
+        """Whether the drive presses towards a width with its limit; after a grip it may still press back."""
+        share = self._fingers.share
+        return (share if width > self._fingers.width else -share) > 0.95
 
     def _arrive(self, objects: Objects) -> None:
         self._is_moving, self._objects = False, objects
@@ -322,7 +331,7 @@ class RobotiqGripper:
             return
         end = self._route[0]
         self._command = FingerCommand(end, tool.speed_of(255), tool.force_of(0))
-        there = abs(fingers.width - end) <= _REACHED or fingers.share > 0.95
+        there = abs(fingers.width - end) <= _REACHED or self._presses(end)
         if not (there and abs(fingers.speed) < _RESTS and self._time_in_phase >= _PAUSE):
             return
         del self._route[0]

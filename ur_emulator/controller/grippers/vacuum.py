@@ -18,6 +18,8 @@ _REACHED = 0.8
 class VacuumGripper:
     """The valve and the pressure switch."""
 
+    has_cable = False
+
     def __init__(self, tool: ToolModel, period: float) -> None:
         """Begin without vacuum; `period` is the cycle [s]."""
         self._tool = tool
