@@ -17,12 +17,17 @@ unexport PYTHONDONTWRITEBYTECODE
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
+# A client for the tests, without the fourteen packages that it asks for: its gripper imports one, which is
+# among the `clients` of pyproject.toml.
+BARE := airo-robots==2026.10.1
+
 # pip would compile with one core, and also what few or none of our commands load.
 NOT_LOADED := /(tests|OpenGL|dask|debugpy|distributed|fontTools|mypyc?|pip|setuptools|sqlalchemy)/
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -qq --upgrade pip
 	$(BIN)/python -m pip install -qq --no-compile --editable '.[dev]'
+	$(BIN)/python -m pip install -qq --no-compile --no-deps $(BARE)
 	-$(BIN)/python -m compileall -qq -j 0 -x '$(NOT_LOADED)' $(VENV)/lib
 	@touch $@
 

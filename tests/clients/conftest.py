@@ -16,8 +16,9 @@ def box(tmp_path_factory, request):
 
 @pytest.fixture(scope="module")
 def old_box(tmp_path_factory):
-    """A CB3 with software 3.4."""
-    with served_box(tmp_path_factory.mktemp("old_box"), "--software", "3.4.0") as served:
+    """A CB3 with software 3.4 and a gripper."""
+    options = ("--software", "3.4.0", "--tool", "robotiq-2f85")
+    with served_box(tmp_path_factory.mktemp("old_box"), *options) as served:
         yield served
 
 

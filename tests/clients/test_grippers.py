@@ -2,8 +2,13 @@
 
 import asyncio
 import json
+import os
+import select
+import socket
 import subprocess
 import sys
+import threading
+import tty
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -151,3 +156,142 @@ def test_ur_rtde_is_told_that_there_is_no_power(box):
     box.wait_until(robot_mode="RUNNING")
     results, _ = ur_rtde(box, ("getVar", "STA"), ("getVar", "FLT"))
     assert results == [0, 0]
+
+
+# --- the serial line
+
+
+def test_pyrobotiqgripper(box, line, capsys):
+    client = pytest.importorskip("pyrobotiqgripper")
+    host, port = line
+    gripper = client.RobotiqGripper(
+        connection_type=client.GRIPPER_MODE_RTU_VIA_TCP, tcp_host=host, tcp_port=port
+    )
+    gripper.reset()
+    assert not gripper.isActivated()
+    with pytest.raises(client.GripperFaultError) as fault:
+        gripper.start()
+    assert fault.value.code == 7
+    gripper.activate(start=False)
+    assert gripper.isActivated()
+    assert not gripper.isStarted()
+    gripper.start()
+    assert gripper.isStarted()
+    gripper.close()
+    assert gripper.objectDetection() == 3
+    gripper.open()
+    assert gripper.position() == 3
+    gripper.move(100, speed=200, force=10)
+    assert (gripper.position(), gripper.positionCommand(), gripper.speed(), gripper.force()) == (
+        100,
+        100,
+        200,
+        10,
+    )
+    assert gripper.lastMoveDirection() == 1
+    gripper.move(200, speed=None, force=None, readStatus=False, wait=False)
+    gripper.stop()
+    assert not gripper.isStarted()
+    gripper.move(60, start=True)
+    assert gripper.position() == 60
+    gripper.move(200, wait=False)
+    gripper.moveToCurrentPosition()
+    assert gripper.isStarted()
+    gripper.calibrate_bit()
+    gripper.calibrate_mm(closemm=0, openmm=85)
+    gripper.calibrate_speed(minSpeedClosingTime=4.25, maxSpeedClosingTime=0.57)
+    assert (gripper.open_mm(), gripper.close_mm()) == (85, 0)
+    assert gripper.positioningResolution() == pytest.approx(85 / 227)
+    assert gripper.minSpeedMmSecond() == pytest.approx(20.0)
+    assert gripper.maxSpeedMmSecond() == pytest.approx(149.1, abs=0.1)
+    gripper.move_mm(60)
+    assert gripper.position_mm() == pytest.approx(60, abs=0.4)
+    gripper.realTimePositionMove(0.9)
+    gripper.realTimeSpeedMove(-0.5)
+    gripper.open()
+    with block_between_pads(box):
+        gripper.close(force=100)
+        gripper.printObjectDetection()
+        assert gripper.objectDetection() == 2
+        assert gripper.position_mm() == pytest.approx(1e3 * BLOCK, abs=1.0)
+        gripper.open()
+    status = gripper.status()
+    del status["time"]
+    assert list(status) == ["gOBJ", "gSTA", "gGTO", "gACT", "kFLT", "gFLT", "gPR", "gPO", "gCU"]
+    assert list(status.values()) == [3, 3, 1, 1, 0, 0, 0, 3, 0]
+    gripper.printStatus()
+    assert "stopped due to a contact while closing" in (said := capsys.readouterr().out)
+    assert "Activation is completed" in said
+    assert (
+        gripper.historyNumpy().shape[1]
+        == len(client.COMMAND_HISTORY_COLUMNS_ID_2_NAME) + len(client.STATUS_HISTORY_COLUMNS_ID_2_NAME) - 1
+    )
+    gripper.disconnect()
+
+
+@contextmanager
+def serial_port(address):
+    """A serial port that leads to a TCP port, as socat makes it; gives its name and all bytes that have passed."""
+    passed = bytearray()
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    wake, woken = os.pipe()
+
+    def pass_on(peer):
+        while True:
+            ready, _, _ = select.select([ours, peer, wake], [], [])
+            if wake in ready:
+                return
+            for source in ready:
+                data = os.read(ours, 256) if source is ours else peer.recv(256)
+                passed.extend(data)
+                os.write(ours, data) if source is peer else peer.sendall(data)
+
+    with socket.create_connection(address, timeout=TIMEOUT) as peer:
+        thread = threading.Thread(target=pass_on, args=(peer,), daemon=True)
+        thread.start()
+        try:
+            yield os.ttyname(theirs), passed
+        finally:
+            os.write(woken, b"x")
+            thread.join(TIMEOUT)
+            for descriptor in (ours, theirs, wake, woken):
+                os.close(descriptor)
+
+
+def test_minimalmodbus(line):
+    client = pytest.importorskip("minimalmodbus")
+    with serial_port(line) as (port, passed):
+        gripper = client.Instrument(port, 9)
+        gripper.serial.baudrate, gripper.serial.timeout = 115200, TIMEOUT
+
+        def passes(frames, call, *arguments, **options):
+            """Return what a call returns, which exchanges these frames of the maker's manual."""
+            passed.clear()
+            result = call(*arguments, **options)
+            assert bytes(passed) == bytes.fromhex(frames)
+            return result
+
+        reset = "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30  09 10 03 E8 00 03 01 30"
+        passes(reset, gripper.write_registers, 0x03E8, [0, 0, 0])
+        activate = "09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1  09 10 03 E8 00 03 01 30"
+        passes(activate, gripper.write_registers, 0x03E8, [0x0100, 0, 0])
+        activating = "09 03 07 D0 00 01 85 CF  09 03 02 11 00 55 D5"
+        assert passes(activating, gripper.read_register, 0x07D0) == 0x1100
+        while gripper.read_register(0x07D0, functioncode=4) != 0x3100:
+            pass
+        passes("09 04 07 D0 00 01 30 0F  09 04 02 31 00 4D 61", gripper.read_register, 0x07D0, functioncode=4)
+        close = "09 10 03 E8 00 03 06 09 00 00 FF FF FF 42 29  09 10 03 E8 00 03 01 30"
+        passes(close, gripper.write_registers, 0x03E8, [0x0900, 0x00FF, 0xFFFF])
+        assert gripper.read_registers(0x07D0, 2) == [0x3900, 0x00FF]
+        while gripper.read_registers(0x07D0, 3, functioncode=4) != [0xF900, 0x00FF, 0xE600]:
+            pass
+        gripper.write_register(0x03E9, 100)
+        gripper.write_register(0x03EA, 0x4020, functioncode=6)
+        assert gripper.read_registers(0x03E8, 3) == [0x0900, 100, 0x4020]
+        gripper.write_long(0x03E9, 0x0000FFFF)
+        assert gripper.read_long(0x03E9) == 0x0000FFFF
+        gripper.serial.timeout = 1.0  # it waits for as many bytes as it wants
+        with pytest.raises(client.SlaveReportedException, match="illegal data address"):
+            gripper.read_register(0)
+        gripper.serial.close()

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from clients_support import TIMEOUT, wait_until
+from clients_support import TIMEOUT, connect, wait_until
 
 urx = pytest.importorskip("urx")
 
@@ -163,3 +163,20 @@ def test_the_realtime_monitor_sees_what_the_secondary_port_reports(robot):
     cycles = np.diff(stamps) / 0.008
     assert np.allclose(cycles, np.round(cycles), atol=1e-3)
     at_rest(robot)
+
+
+def test_a_gripper_follows_scripts(robot, old_box):
+    """Each takes the voltage off the tool connector, activates the gripper and reads no answers."""
+    from urx.robotiq_two_finger_gripper import Robotiq_Two_Finger_Gripper
+
+    gripper = Robotiq_Two_Finger_Gripper(robot)
+    with connect(old_box, "gripper") as watcher:
+
+        def is_at(position):
+            watcher.sendall(b"GET STA\nGET OBJ\nGET POS\n")
+            return watcher.recv(100).decode() == f"STA 3\nOBJ 3\nPOS {position}\n"
+
+        gripper.close_gripper()
+        wait_until(lambda: is_at(230), "closed fingers")
+        gripper.open_gripper()
+        wait_until(lambda: is_at(3), "open fingers")
