@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pc_client.arm import connect as connect
     from pc_client.arm import plan as plan
     from pc_client.control.controller import Controller as Controller
+    from pc_client.driver.gripper import Gripper as Gripper
     from pc_client.errors import ClientError as ClientError
     from pc_client.errors import PlanningError as PlanningError
     from pc_client.errors import RobotStoppedError as RobotStoppedError
@@ -44,6 +45,7 @@ _HOMES = {
     "Cell": "ur_hil.cell",
     "ClientError": "pc_client.errors",
     "Controller": "pc_client.control.controller",
+    "Gripper": "pc_client.driver.gripper",
     "JointTrajectory": "pc_client.movements.samples",
     "Movement": "pc_client.movements.movement",
     "Plan": "pc_client.planning.plan",

@@ -22,6 +22,7 @@ from pc_client.analysis.run import Run, Signals
 from pc_client.arrays import Array
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
 from pc_client.control.tracker import ControlLaw
+from pc_client.driver.gripper import Gripper
 from pc_client.driver.report import RobotInfo, RobotReport, read_report
 from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
@@ -31,15 +32,16 @@ from pc_client.experiment.experiment import Experiment, check_folder, experiment
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
 from pc_client.experiment.preflight import model_of, preflight, require
 from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, Observer, run_approach
-from pc_client.files import FILE_KINDS
 from pc_client.kinematics.model import RobotModel, nearest_posture, robot_model, tcp_pose
+from pc_client.kinematics.tool import gripper_model, surroundings
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.plan import Motion, Plan, make_plan
 from protocol.pose import T_to_pose, pose_to_T
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
-from ur_hil.cell import NO_CELL, Cell, load_cell
+from ur_hil.cell import Cell, Three
 from ur_hil.records import checked
+from ur_hil.tools import ToolModel
 
 Confirm = Callable[[str], bool]
 """Gets the text that describes the motion; returns whether the arm may move."""
@@ -67,6 +69,7 @@ def connect(
     ports: Ports | None = None,
     *,
     cell: Cell | str | Path | None = None,
+    tool: str | None = None,
     reverse_port: int | None = None,
     confirm: Confirm = _ask_at_terminal,
 ) -> Arm:
@@ -76,20 +79,22 @@ def connect(
         host: name or address of the robot.
         ports: its ports; the standard ones by default.
         cell: surroundings and tool of the arm: a record or a file (docs/real-arm.md).
+        tool: a gripper on the flange, by its name or its file (docs/grippers.md): it gives the arm its TCP,
+            its payload, its shape, and `gripper`.
         reverse_port: port of this computer to which the robot's program connects; 31000 by default.
         confirm: called before a motion of an arm that is not known to be simulated.
 
     Raises:
         ClientError: the robot does not answer, does not report its type, or does not meet a condition.
     """
-    surroundings = _cell_of(cell)
+    around, hand = surroundings(cell, tool), None if tool is None else gripper_model(tool)
     numbers = ports or Ports.standard()
     report = read_report(TcpNetwork(), host, numbers)
-    model = model_of(report, surroundings)
+    model = model_of(report, around)
     require(preflight(report, model))
     if model is None:
         raise ClientError(f"{host} does not report which arm it is: there is no plan for it")
-    return Arm(host, numbers, report, model, reverse_port, confirm)
+    return Arm(host, numbers, report, model, reverse_port, confirm, hand)
 
 
 def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell | str | Path | None = None) -> Plan:
@@ -105,14 +110,10 @@ def plan(motion: Motion, arm: Arm | str = "ur3", cell: Cell | str | Path | None 
         ClientError: a cell for an arm that has its own, or its file makes no sense.
     """
     if isinstance(arm, str):
-        return make_plan(motion, robot_model(arm, _cell_of(cell)))
+        return make_plan(motion, robot_model(arm, surroundings(cell)))
     if cell is not None:
         raise ClientError(f"cell: {arm!r} has its own; give it to connect, or plan for {arm.model.name!r}")
     return make_plan(motion, arm.model)
-
-
-def _cell_of(cell: Cell | str | Path | None) -> Cell:
-    return load_cell(cell, FILE_KINDS["cell"]) if isinstance(cell, str | Path) else cell or NO_CELL
 
 
 class Arm:
@@ -131,6 +132,7 @@ class Arm:
         model: RobotModel,
         reverse_port: int | None,
         confirm: Confirm,
+        tool: ToolModel | None,
     ) -> None:
         self._host = host
         self._ports = ports
@@ -138,6 +140,7 @@ class Arm:
         self.model = model
         self._reverse_port = reverse_port
         self._confirm = confirm
+        self._gripper = None if tool is None else Gripper(tool, host, ports.gripper, self._ask_for_fingers)
 
     def __repr__(self) -> str:
         return f"<Arm {self.report.info} at {self._host}>"
@@ -154,6 +157,31 @@ class Arm:
     def simulated(self) -> bool | None:
         """True, False, or None if the robot does not report it; held against every motion's report."""
         return self.report.info.simulated
+
+    @property
+    def gripper(self) -> Gripper:
+        """The gripper that was given to `connect` as `tool`; ClientError without one."""
+        if self._gripper is None:
+            raise ClientError(f"{self!r} has no gripper: give connect its tool, such as 'robotiq-2f85'")
+        return self._gripper
+
+    def set_payload(self, mass: float, centre_of_gravity: Three) -> None:
+        """Set what the flange carries, on the robot and in the plans that follow: the tool and what it holds.
+
+        The robot feels an undeclared load as a force, and the payload is compared before each motion.
+
+        Args:
+            mass: [kg].
+            centre_of_gravity: in the flange frame [m].
+
+        Raises:
+            ClientError: the robot does not take it, or the answer was no.
+        """
+        self._ask(lambda: f"the payload of the arm at {self._host} becomes {mass:g} kg")
+        with self._session() as driver:
+            driver.set_payload(mass, centre_of_gravity)
+        tool = replace(self.model.cell.tool, mass=mass, centre_of_gravity=centre_of_gravity)
+        self.model = replace(self.model, cell=replace(self.model.cell, tool=tool))
 
     def frame(self) -> RealtimeFrame:
         """The robot's state now: `actual_q`, `actual_TCP_pose` and so on, by RTDE name in lower case.
@@ -363,6 +391,10 @@ class Arm:
         now.check_same(then.model, then.serial)
         if now.simulated is not then.simulated:
             raise DriverError(f"the robot at {self._host} is {now}; at connect it was {then}: connect again")
+
+    def _ask_for_fingers(self, text: str) -> None:
+        self._report_now()  # it is the robot of `connect`
+        self._ask(lambda: text)
 
     def _ask(self, text: Callable[[], str]) -> None:
         """Ask whether an arm may move, unless it reports itself as simulated."""

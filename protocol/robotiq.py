@@ -20,6 +20,8 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final, NamedTuple
 
+from protocol.errors import RemoteProtocolError
+
 __all__ = [
     "ACK",
     "DEFAULT_SID",
@@ -40,8 +42,10 @@ __all__ = [
     "Status",
     "Variable",
     "decode_request",
+    "encode_request",
     "encode_status",
     "encode_value",
+    "take_answer",
 ]
 
 ACK: Final = b"ack"
@@ -206,6 +210,38 @@ def encode_value(request: Get, value: int | str) -> bytes:
     if isinstance(value, str):
         return value.encode()
     return f"{value:0{VARIABLES[request.name].width}d}".encode()
+
+
+def encode_request(request: Get | Set) -> bytes:
+    """Return what a client sends."""
+    if isinstance(request, Get):
+        return f"GET {request.name}".encode() + (b"" if request.bare else b"\n")
+    return f"SET {' '.join(f'{name} {value}' for name, value in request.values)}\n".encode()
+
+
+def take_answer(inbox: bytearray, request: Get | Set) -> int | str | None:
+    """Take the answer to a SET, or to the GET of a number with a newline, off what has come to a client.
+
+    Returns:
+        The number or NOT_KNOWN; of a SET "ack"; None: more bytes must come.
+
+    Raises:
+        RemoteProtocolError: it is no answer to this request.
+    """
+    end = len(ACK) if isinstance(request, Set) else inbox.find(b"\n") + 1 or MAX_LINE
+    if len(inbox) < end:
+        return None
+    answer = inbox[:end].decode("ascii", "replace").strip()
+    del inbox[:end]
+    name, _, value = answer.partition(" ")
+    match request:
+        case Set() if answer == ACK.decode():
+            return answer
+        case Get() if name == request.name and value == NOT_KNOWN:
+            return value
+        case Get() if name == request.name and (number := _number(value)) is not None:
+            return number
+    raise RemoteProtocolError(f"{answer[:60]!r} is no answer to {encode_request(request)!r}")
 
 
 def _parse(text: str) -> Request:

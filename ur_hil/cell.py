@@ -2,7 +2,7 @@
 
 The client plans around them; the emulated box puts them around its arm.
 
-The TCP stays at the flange: the tool is a shape that must not touch anything, and a load, not a new TCP.
+The tool is a shape that must not touch anything, and a load. The TCP is the flange, or `length` before it.
 
 A cell file is TOML, read strictly; `examples/cell.toml` shows every field, `docs/real-arm.md` explains them.
 """
@@ -78,11 +78,18 @@ class Tool:
         solids: its shape, in the flange's frame.
         mass: [kg]; the payload that must be set in PolyScope.
         centre_of_gravity: in the flange's frame [m].
+        length: from the flange to the TCP, along the flange's z axis [m].
     """
 
     solids: tuple[Solid, ...] = ()
     mass: float = 0.0
     centre_of_gravity: Three = (0.0, 0.0, 0.0)
+    length: float = 0.0
+
+    @property
+    def tcp_text(self) -> str:
+        """Where the TCP is, for people."""
+        return f"TCP {1e3 * self.length:g} mm before the flange" if self.length else "TCP at the flange"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +122,7 @@ class Cell:
         return (
             f"'{self.name}': floor at z = {self.floor_z:g} m, {', '.join(around) or 'nothing else around'};"
             f" tool of {self.tool.mass:g} kg, {tool or 'without a shape'}"
+            + (f", {self.tool.tcp_text}" if self.tool.length else "")
         )
 
 
@@ -233,6 +241,7 @@ def _solid(kind: str, body: _Body) -> Solid:
 class _Tool(_Solids):
     mass: Annotated[float, number(0.0, 100.0, "kg")] = 0.0
     centre_of_gravity: Point = (0.0, 0.0, 0.0)
+    length: Annotated[float, number(0.0, 2.0, "m")] = 0.0
 
 
 @record
@@ -271,7 +280,7 @@ def parse_cell(text: str, source: str, kind: FileKind) -> Cell:
         file.floor.z,
         tuple(wall.wall() for wall in file.walls),
         tuple(solid for solid in file.solids if not solid.mass),
-        Tool(file.tool.solids, file.tool.mass, file.tool.centre_of_gravity),
+        Tool(file.tool.solids, file.tool.mass, file.tool.centre_of_gravity, file.tool.length),
         text,
         tuple(solid for solid in file.solids if solid.mass),
     )

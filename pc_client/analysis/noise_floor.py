@@ -17,6 +17,7 @@ drops out there: of a movement with long slow tails this figure is better than t
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 
 import numpy as np
@@ -25,8 +26,11 @@ from pc_client.analysis.measures import decibels, rest_samples, speed, speed_noi
 from pc_client.analysis.run import MeasuredRun
 from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
+from pc_client.errors import CellError
+from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel, robot_model, tcp_jacobian
+from ur_hil.cell import NO_CELL, parse_cell
 
 LEAST_STEPS = 30
 """Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
@@ -68,10 +72,10 @@ def _floor_power(run: MeasuredRun, covariance: Array, model: RobotModel) -> floa
 
 def floor_db(run: MeasuredRun, covariance: Array | None) -> float | None:
     """Return the SNR [dB] at which noise alone would leave a run; None for an unknown arm or without rest."""
-    name = run.provenance.robot_model.lower()
-    if covariance is None or name not in ROBOTS:
+    model = _nominal(run)
+    if covariance is None or model is None:
         return None
-    power = _floor_power(run, covariance, robot_model(name))
+    power = _floor_power(run, covariance, model)
     signal = run.budget.signal_power
     return decibels(signal, power) if power > 0.0 < signal else None
 
@@ -95,10 +99,10 @@ def unrepeatable_power(runs: Sequence[MeasuredRun]) -> float | None:
 
 def _as_driven_like(first: MeasuredRun, second: MeasuredRun) -> Array | None:
     """Return the positions (n, 3) [m] of the second run as they would be with the commands of the first."""
-    loop, name = _loop_of(first), first.provenance.robot_model.lower()
-    if loop is None or name not in ROBOTS or len(first.track.t) != len(second.track.t):
+    loop, model = _loop_of(first), _nominal(first)
+    if loop is None or model is None or len(first.track.t) != len(second.track.t):
         return None
-    model, period = robot_model(name), float(np.median(np.diff(first.track.t)))
+    period = float(np.median(np.diff(first.track.t)))
     commands = [run.recording.column("cmd_qd")[run.track.rows] for run in (first, second)]
     response = velocity_response(loop, period)
     more = commands[1] - commands[0]
@@ -110,6 +114,15 @@ def _as_driven_like(first: MeasuredRun, second: MeasuredRun) -> Array | None:
     moved = np.einsum("nij,nj->ni", jacobians, further * period)
     positions: Array = second.track.p_actual - moved
     return positions
+
+
+def _nominal(run: MeasuredRun) -> RobotModel | None:
+    """The nominal arm of a run, with its TCP; None for an unknown arm."""
+    name, text = run.provenance.robot_model.lower(), run.provenance.cell_text
+    cell = NO_CELL
+    with suppress(CellError):  # the report says what is wrong with it
+        cell = parse_cell(text, "recording", FILE_KINDS["cell"]) if text else NO_CELL
+    return robot_model(name, cell) if name in ROBOTS else None
 
 
 def _loop_of(run: MeasuredRun) -> LoopModel | None:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pc_client.commands.options import CellOption, PortBaseOption, RobotOption, cell_of, ports_of, say
+from pc_client.commands.options import CellOption, PortBaseOption, RobotOption, ToolOption, ports_of, say
+from pc_client.kinematics.tool import surroundings
 from ur_hil.command_line import ExitCode
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 def doctor(
     robot: RobotOption,
     cell: CellOption = None,
+    tool: ToolOption = None,
     port_base: PortBaseOption = 0,
     seconds: Annotated[
         float, typer.Option("--seconds", min=0.1, max=600.0, help="How long to listen.")
@@ -27,7 +29,7 @@ def doctor(
     from pc_client.driver.watchdog import conditions_text
     from pc_client.experiment.preflight import model_of, preflight, refusal
 
-    surroundings = cell_of(cell)
+    around = surroundings(cell, tool)
     found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)
     for name, number, state in found.ports:
         say(f"port {number:5}  {name:13} {state}")
@@ -39,7 +41,7 @@ def doctor(
     if found.report is not None:
         if found.report.calibration is not None:
             say(f"calibration {found.report.calibration}")
-        conditions = preflight(found.report, model_of(found.report, surroundings))
+        conditions = preflight(found.report, model_of(found.report, around))
         say(conditions_text(conditions))
         obstacle = refusal(conditions) or obstacle
         unreported = [condition.name for condition in conditions if condition.holds is None]

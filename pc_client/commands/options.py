@@ -15,10 +15,10 @@ from rich.console import Console
 
 from pc_client.control.controller import DEFAULT, Controller, load_controller
 from pc_client.errors import ClientError, ControllerError, printable
-from pc_client.files import FILE_KINDS
+from pc_client.kinematics.tool import surroundings
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
-from ur_hil.cell import NO_CELL, Cell, load_cell
+from ur_hil.cell import Cell
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
@@ -87,6 +87,14 @@ CellOption = Annotated[
         help="What stands around the arm and what it carries, .toml; without: the bare arm on a plane z = 0.",
     ),
 ]
+ToolOption = Annotated[
+    str | None,
+    typer.Option(
+        "--tool",
+        metavar="NAME|FILE.toml",
+        help="Gripper on the flange, such as robotiq-2f85: its TCP, payload and shape; without: the flange.",
+    ),
+]
 _ReversePortOption = Annotated[
     int | None,
     typer.Option(
@@ -137,11 +145,6 @@ def check_workers(workers: int | None, dask: str | None) -> None:
         raise typer.BadParameter("--workers is for this machine, --dask for a cluster: give only one")
 
 
-def cell_of(path: Path | None) -> Cell:
-    """What stands around the arm and what it carries, by a file; without one nothing is known."""
-    return NO_CELL if path is None else load_cell(path, FILE_KINDS["cell"])
-
-
 def ports_of(port_base: int) -> Ports:
     """The robot's ports; typer.BadParameter if the offset leaves the TCP ports."""
     try:
@@ -177,6 +180,7 @@ def _read_settings(
     gain_i: _GainIOption = None,
     acceleration: _AccelerationOption = None,
     cell: CellOption = None,
+    tool: ToolOption = None,
     port_base: PortBaseOption = 0,
     reverse_port: _ReversePortOption = None,
     overwrite: _OverwriteOption = False,
@@ -191,7 +195,8 @@ def _read_settings(
         config = base.changed(numbers, _OPTIONS.__getitem__)
     except ControllerError as error:
         raise typer.BadParameter(str(error)) from error
-    return RunSettings(config, cell_of(cell), ports_of(port_base), reverse_port, overwrite, yes, dry_run)
+    around, ports = surroundings(cell, tool), ports_of(port_base)
+    return RunSettings(config, around, ports, reverse_port, overwrite, yes, dry_run)
 
 
 def takes_run_settings(command: Callable[..., None]) -> Callable[..., None]:

@@ -124,7 +124,7 @@ class ToolGuard:
     by the angle a have matrices that differ by 2 sqrt(2) sin(a / 2).
 
     Args:
-        model: the nominal arm; the tool is its flange.
+        model: the nominal arm; the tool is its TCP.
         path_tolerance: largest distance of the tool from its path [m].
         angle_tolerance: largest angle of the tool to its orientation there [rad].
     """

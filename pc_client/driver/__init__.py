@@ -9,4 +9,5 @@ report           which robot answers, and what it reports of itself before it mo
 receiver         the program that runs on the robot, and the port where it dials back
 velocity_stream  the control loop: one frame in, one command out
 session          a session with one robot: connect, stream, always stop
+gripper          the fingers of a Robotiq gripper, and waiting for them
 """

@@ -32,6 +32,7 @@ _CONNECT_TIMEOUT = 2.0
 _SERIAL, _MODEL = "get serial number", "get robot model"
 _REMOTE, _MODE = "is in remote control", "get operational mode"
 _ANSWERS = {"true": True, "false": False}
+_ASKED = ("actual_q", "actual_TCP_pose", "payload", "payload_cog")
 _OPERATIONAL_MODES = ("NONE", "MANUAL", "AUTOMATIC")
 _MODEL_NAME = re.compile(r"UR[0-9]{1,3}[a-zA-Z]{0,10}")
 
@@ -118,6 +119,12 @@ class RobotReport:
         """Mass [kg]. Only RTDE reports it on a CB3: frames of port 30003 have it from 5.10 on."""
         value = None if self.rtde is None else self.rtde.values.get("payload")
         return value if isinstance(value, float) else None
+
+    @property
+    def payload_cog(self) -> tuple[float, ...] | None:
+        """Its centre of gravity in the flange frame [m]; likewise."""
+        value = None if self.rtde is None else self.rtde.values.get("payload_cog")
+        return value if isinstance(value, tuple) and len(value) == 3 else None
 
 
 class StatePorts:
@@ -225,9 +232,7 @@ class StatePorts:
             frame=frame,
             slider=self.slider,
             tcp_offset=None if cartesian is None else cartesian.tcp_offset,
-            rtde=ask_rtde(
-                self.network, self.host, self.ports.rtde, ("actual_q", "actual_TCP_pose", "payload")
-            ),
+            rtde=ask_rtde(self.network, self.host, self.ports.rtde, _ASKED),
             calibration=None if kinematics is None else kinematics.calibration,
             remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
             operational_mode=mode if mode in _OPERATIONAL_MODES else None,

@@ -23,6 +23,7 @@ from protocol.primary.messages import ErrorCodeMessage, TextMessage
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
 from protocol.velocity_stream import VelocityMode, encode_velocity
+from ur_hil.patience import Patience
 
 _CONNECT_TIMEOUT = 5.0  # s
 
@@ -139,6 +140,15 @@ class UrDriver:
                 "the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves"
             )
         self._in_motion = False
+
+    def set_payload(self, mass: float, centre_of_gravity: tuple[float, float, float]) -> None:
+        """Set what the flange carries [kg, m]; DriverError if the robot reports another mass afterwards."""
+        robot, waited = self._robot, Patience()
+        setting = f"  set_payload({mass}, {list(centre_of_gravity)})"
+        robot.scripts.send_program(f"sec ur_client_payload():\n{setting}\nend\n")
+        while (reported := self.report().payload) is not None and abs(reported - mass) > 1e-3:
+            if waited.spent(robot.network.now()) > _START_TIMEOUT:
+                raise DriverError(f"the robot's payload is {reported:.2f} kg after {setting}: see its log")
 
     def check_ready(self) -> RealtimeFrame:
         """Refuse a robot that may not move now; returns its state.

@@ -180,7 +180,7 @@ def experiment_text(experiment: Experiment) -> str:
     return "\n".join(
         (
             f"{_count(len(reports), 'movement')}, {_count(experiment.repeat, 'run')} of each, "
-            f"on a {experiment.model.title}, TCP at the flange",
+            f"on a {experiment.model.title}, {experiment.model.cell.tool.tcp_text}",
             f"  box of motion   {axes} m, robot base frame",
             f"  duration        {moving:.0f} s of movement, plus a slow approach before each",
             f"  top TCP speed   {reports[fastest].tcp_speed.value:.3f} m/s ({fastest})",

@@ -19,13 +19,16 @@ from protocol.ur_types import JOINT_NAMES
 from ur_hil.cell import NO_CELL, Cell
 
 _OFFSET_TOLERANCE = (1e-4, 1e-3)
-"""How far from the flange the TCP may be [m, rad]: what a pendant rounds."""
+"""How far the TCP may be from where plans have it [m, rad]: what a pendant rounds."""
 
 _RTDE_TOLERANCE = (0.02, 0.05)
 """How far port 30004 may see the arm from where port 30003 does [m, rad]: a moment lies between the two."""
 
 _PAYLOAD_TOLERANCE = 0.05
 """Of the mass [kg]. Its weight is 0.5 N, a sixth of the noise of the controller's own force estimate."""
+
+_CENTRE_TOLERANCE = 0.02
+"""Of its centre of gravity [m]: as good as the pendant's own estimation is. A choice: docs/fidelity.md."""
 
 Check = Callable[[RobotReport, RobotModel | None], Condition]
 """Holds one thing that a robot reports against what is needed."""
@@ -77,14 +80,17 @@ def _arm_type(report: RobotReport, model: RobotModel | None) -> Condition:
 
 
 def tcp_offset(report: RobotReport, model: RobotModel | None) -> Condition:
-    """The TCP is the flange, as in plans."""
+    """The TCP is that of plans: the flange, or that of the tool."""
     offset, reported, holds = report.tcp_offset, "", None
+    must, remedy = "0 (the flange)", "set the TCP of the installation to zero in all six values"
+    wanted = (0.0,) * 6 if model is None else model.tcp_offset
+    if any(wanted):
+        must, remedy = _pose_text(wanted), f"set it in the installation, or by set_tcp(p{list(wanted)})"
     if offset is not None:
-        distance, angle = np.linalg.norm(offset[:3]), np.linalg.norm(offset[3:])
+        distance, angle = np.linalg.norm(np.subtract(offset, wanted)[:3]), np.linalg.norm(offset[3:])
         most_distance, most_angle = _OFFSET_TOLERANCE
         reported, holds = _pose_text(offset), bool(distance <= most_distance and angle <= most_angle)
-    remedy = "set the TCP of the installation to zero in all six values"
-    return Condition("TCP offset", reported, "0 (the flange)", remedy, holds)
+    return Condition("TCP offset", reported, must, remedy, holds)
 
 
 def _forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -93,7 +99,7 @@ def _forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condit
     if model is None:
         return Condition("flange pose", "", "that of the model", "plan for the arm that answers", None)
     q, pose = frame.actual_q.tolist(), frame.actual_tcp_pose.tolist()
-    distance, angle = flange_difference(model, q, pose, report.tcp_offset or (0.0,) * 6)
+    distance, angle = flange_difference(model, q, pose, report.tcp_offset)
     most = model.description.position_tolerance
     return Condition(
         "flange pose",
@@ -105,15 +111,22 @@ def _forward_kinematics(report: RobotReport, model: RobotModel | None) -> Condit
 
 
 def payload(report: RobotReport, model: RobotModel | None) -> Condition:
-    """The controller is set to the mass that the arm carries."""
-    mass, carried = report.payload, (NO_CELL if model is None else model.cell).tool.mass
-    return Condition(
-        "payload",
-        "" if mass is None else f"{mass:.2f} kg",
-        f"{carried:.2f} kg within {_PAYLOAD_TOLERANCE:g} kg",
-        "set the payload on the pendant to the tool's mass, or the mass in the cell file to the tool's",
-        None if mass is None else abs(mass - carried) <= _PAYLOAD_TOLERANCE,
+    """The controller is set to the mass that the arm carries; with a TCP of its own, also to its centre."""
+    tool = (NO_CELL if model is None else model.cell).tool
+    mass, cog, centre = report.payload, report.payload_cog, tool.centre_of_gravity
+    reported, must = "" if mass is None else f"{mass:.2f} kg", f"{tool.mass:.2f} kg"
+    within, holds = (
+        f"{_PAYLOAD_TOLERANCE:g} kg",
+        None if mass is None else abs(mass - tool.mass) <= _PAYLOAD_TOLERANCE,
     )
+    remedy = "set the payload on the pendant to the tool's mass, or the mass in the cell file to the tool's"
+    if tool.length:
+        must, within = f"{must} at ({_mm(centre)}) mm", f"{within}, {1e3 * _CENTRE_TOLERANCE:g} mm"
+        remedy = f"set it in the installation, or by set_payload({tool.mass:.4g}, {list(centre)})"
+        if mass is not None and cog is not None:
+            reported += f" at ({_mm(cog)}) mm"
+            holds = holds and bool(np.linalg.norm(np.subtract(cog, centre)) <= _CENTRE_TOLERANCE)
+    return Condition("payload", reported, f"{must} within {within}", remedy, holds)
 
 
 def _rtde(report: RobotReport, model: RobotModel | None) -> Condition:
@@ -193,6 +206,9 @@ CONDITIONS: tuple[Check, ...] = (
 
 
 def _pose_text(pose: Sequence[float]) -> str:
-    position = ", ".join(f"{1e3 * value:.1f}" for value in pose[:3])
     rotation = ", ".join(f"{1e3 * value:.0f}" for value in pose[3:])
-    return f"({position}) mm, ({rotation}) mrad"
+    return f"({_mm(pose[:3])}) mm, ({rotation}) mrad"
+
+
+def _mm(position: Sequence[float]) -> str:
+    return ", ".join(f"{1e3 * value:.1f}" for value in position)

@@ -184,7 +184,7 @@ def _geometry(solid: Solid, carrier: RobotModel | None) -> Any:
     placement = pin.SE3(pin.rpy.rpyToMatrix(*solid.rpy), np.array(solid.centre))
     joint = _FIXED
     if carrier is not None:
-        flange = carrier.pin_model.frames[carrier.tcp_frame]
+        flange = carrier.pin_model.frames[carrier.flange_frame]
         joint, placement = flange.parentJoint, flange.placement * placement
     shape = _COAL_SHAPES[solid.kind](*solid.sizes)
     return pin.GeometryObject(solid.name, joint, 0, placement, shape)

@@ -2,7 +2,7 @@
 
 Everything is expressed in UR's `base` frame, the frame of the DH table and of the TCP poses that a control
 box reports. (The URDF's own root, `base_link`, is turned by pi about z against it.) The TCP is the flange,
-`tool0`.
+`tool0`, or lies before it on its z axis, by the length of the tool.
 
 `solve_ik` is the iterative Jacobian inverse kinematics that the paper used: a damped Newton
 (Levenberg-Marquardt) iteration on the pose error log6(T_tcp_goal). Near a solution the damping is zero and
@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from pc_client.arrays import Array
 from pc_client.errors import DriverError, PlanningError
 from pc_client.kinematics.arms import ROBOTS, JointLimits, RobotDescription
-from protocol.pose import T_to_pose, pose_inv, pose_trans
+from protocol.pose import Pose, T_to_pose, pose_inv, pose_trans
 from ur_hil.cell import NO_CELL, Cell
 
 
@@ -44,13 +44,15 @@ class RobotModel:
 
     Attributes:
         pin_model: Pinocchio model whose world frame is UR's `base`.
-        tcp_frame: index of the frame `tool0`.
+        flange_frame: index of the frame `tool0`.
+        tcp_frame: index of the frame of the TCP; without a tool the same.
     """
 
     description: RobotDescription
     cell: Cell = field(repr=False)
     pin_model: Any = field(repr=False)
     pin_data: Any = field(repr=False)
+    flange_frame: int
     tcp_frame: int
 
     @property
@@ -68,6 +70,16 @@ class RobotModel:
         """Joint limits of the client's own table."""
         return self.description.limits
 
+    @property
+    def reach(self) -> float:
+        """Distance from the base axis to the TCP of the stretched arm [m]."""
+        return self.description.reach + self.cell.tool.length
+
+    @property
+    def tcp_offset(self) -> Pose:
+        """Pose of the TCP in the flange frame [m, rad]."""
+        return 0.0, 0.0, self.cell.tool.length, 0.0, 0.0, 0.0
+
 
 def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
     """Return a fresh nominal model of an arm, by its key in `ROBOTS`, in its cell.
@@ -79,7 +91,13 @@ def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
     if description is None:
         raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(ROBOTS)}")
     model = load_pinocchio_model(description)
-    return RobotModel(description, cell, model, model.createData(), int(model.getFrameId("tool0")))
+    tcp = index = int(model.getFrameId("tool0"))
+    if length := cell.tool.length:
+        model, flange = model.copy(), model.frames[index]
+        placement = flange.placement * pin.SE3(np.eye(3), np.array((0.0, 0.0, length)))
+        frame = pin.Frame("tcp", flange.parentJoint, index, placement, pin.FrameType.OP_FRAME)
+        tcp = int(model.addFrame(frame))
+    return RobotModel(description, cell, model, model.createData(), index, tcp)
 
 
 @lru_cache(maxsize=len(ROBOTS))
@@ -268,7 +286,7 @@ def nearest_posture(model: RobotModel, T_base_tcp: ArrayLike, q_near: ArrayLike)
     x, y, z = goal[:3, 3].tolist()
     raise PlanningError(
         f"no posture of a {model.title} brings the TCP to ({x:.3f}, {y:.3f}, {z:.3f}) m in this orientation; "
-        f"its reach is {model.description.reach:g} m from the base axis"
+        f"its reach is {model.reach:g} m from the base axis"
     )
 
 
@@ -347,32 +365,30 @@ That of the position stands in the arm's row. A choice: docs/fidelity.md."""
 _FARTHEST = 1e3
 """No angle [rad] and no coordinate [m, rad] of a pose is larger."""
 
-_NO_OFFSET = (0.0,) * 6
-
 
 def flange_difference(
-    model: RobotModel, q: Sequence[float], pose: Sequence[float], tcp_offset: Sequence[float] = _NO_OFFSET
+    model: RobotModel, q: Sequence[float], pose: Sequence[float], tcp_offset: Sequence[float] | None = None
 ) -> tuple[float, float]:
     """How far the reported flange is from the model's [m, rad]; endless where a value is no number.
 
     Args:
         q: (6,) reported joint angles [rad].
         pose: (6,) reported pose of the TCP in the base frame [m, rad].
-        tcp_offset: (6,) pose of the TCP in the flange frame [m, rad].
+        tcp_offset: (6,) pose of the TCP in the flange frame [m, rad]; the model's by default.
     """
-    if not all(-_FARTHEST < value < _FARTHEST for value in (*q, *pose, *tcp_offset)):  # NaN is not
+    offset = model.tcp_offset if tcp_offset is None else tcp_offset
+    if not all(-_FARTHEST < value < _FARTHEST for value in (*q, *pose, *offset)):  # NaN is not
         return inf, inf
     x, y, z, rx, ry, rz = pose
-    computed = T_to_pose(tcp_pose(model, q))
-    flange = pose_trans((x, y, z, rx, ry, rz), pose_inv(tuple(tcp_offset)))
+    tcp_pose(model, q)
+    computed = T_to_pose(np.array(model.pin_data.oMf[model.flange_frame].homogeneous))
+    flange = pose_trans((x, y, z, rx, ry, rz), pose_inv(tuple(offset)))
     difference = pose_trans(pose_inv(computed), flange)
     return float(np.linalg.norm(difference[:3])), float(np.linalg.norm(difference[3:]))
 
 
 def check_flange(model: RobotModel, q: Sequence[float], pose: Sequence[float]) -> None:
     """Refuse a robot whose angles q (6,) [rad] and TCP pose (6,) [m, rad] in `base` do not belong together.
-
-    The TCP is the flange.
 
     Raises:
         DriverError: they are further apart than the tolerances.

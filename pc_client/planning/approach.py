@@ -81,7 +81,7 @@ def _largest_joint_distance(begin: Array, end: Array) -> float:
 
 
 _CHECK_STEP = 0.01
-"""Largest distance of the stretched arm's flange between checked postures [m]."""
+"""Largest distance of the stretched arm's TCP between checked postures [m]."""
 
 _TURN = 2.0 * pi
 _FOLDING_JOINTS = (1, 2)
@@ -208,7 +208,7 @@ def _check_route(
     name: str, hulls: ClearanceModel, limits: PlanLimits, postures: tuple[Array, ...]
 ) -> tuple[float, float, float] | PlanningError:
     """Return the least clearances on straight joint lines, or the first bad posture's error."""
-    step = _CHECK_STEP / hulls.robot.description.reach
+    step = _CHECK_STEP / hulls.robot.reach
     lines = []
     for begin, end in pairwise(postures):
         n = max(2, int(np.ceil(np.abs(end - begin).max() / step)) + 1)
@@ -246,7 +246,7 @@ turning the base while folding down, while rising, or in between."""
 
 def plan_text(plan: JointPlan) -> str:
     """Return the plan as a few lines: box of motion, top speeds, duration, margins, start posture."""
-    title = f"{plan.name} on a {plan.report.robot} (nominal kinematics, TCP at the flange)"
+    title = f"{plan.name} on a {plan.report.robot} (nominal kinematics, {plan.report.cell.tool.tcp_text})"
     return "\n".join(
         (title, *(f"  {line}" for line in plan.report.lines()), f"  start posture   {_degrees(plan.start_q)}")
     )

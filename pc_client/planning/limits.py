@@ -57,7 +57,7 @@ class PlanLimits:
         return self.floor_clearance_min, self.own_clearance_min, self.cell_clearance_min
 
 
-# Speed [m/s] and acceleration [m/s²] of the flange when the leading joint moves the stretched arm: UR's
+# Speed [m/s] and acceleration [m/s²] of the TCP when the leading joint moves the stretched arm: UR's
 # recovery mode allows 250 mm/s.
 _APPROACH_SPEED = 0.25
 _APPROACH_ACCELERATION = 0.4
@@ -86,8 +86,8 @@ def limits_of(arm: RobotModel) -> PlanLimits:
         floor_clearance_min=0.03,
         own_clearance_min=0.01,
         cell_clearance_min=0.02,
-        approach_speed=_APPROACH_SPEED / description.reach,
-        approach_acceleration=_APPROACH_ACCELERATION / description.reach,
+        approach_speed=_APPROACH_SPEED / arm.reach,
+        approach_acceleration=_APPROACH_ACCELERATION / arm.reach,
     )
 
 

@@ -116,6 +116,7 @@ class FakeRobot:
         self.slider, self.scaling = 1.0, 1.0
         self.tcp_offset = (0.0,) * 6
         self.payload = 0.0  # None: no RTDE port
+        self.payload_cog = (0.0, 0.0, 0.0)
         self.state = None  # instead of the state that script ports send: bytes
         self.program = None  # None, "receiver", "stop"
         self.programs = []

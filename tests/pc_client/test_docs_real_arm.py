@@ -76,7 +76,7 @@ def conditions():
     )
     protective = SimpleNamespace(safety_mode=float(SafetyMode.PROTECTIVE_STOP))
     report = SimpleNamespace(
-        tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0, operational_mode="MANUAL"
+        tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0, payload_cog=None, operational_mode="MANUAL"
     )
     model = robot_model("ur3", CELL)
     return [

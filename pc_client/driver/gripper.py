@@ -1,0 +1,163 @@
+"""A Robotiq gripper, reached by port 63352 of its robot: moves the fingers and waits for them.
+
+A motion has begun when PRE is its target: OBJ is 0 no later, and until then that of the motion before. A
+connection lasts for one call, so that others reach the gripper. Source: reference `grippers.md` 1.3 and 1.5.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from pc_client.driver.transport import TcpNetwork, TcpTransport
+from pc_client.errors import ClientError, DriverError
+from protocol.errors import RemoteProtocolError
+from protocol.robotiq import NOT_KNOWN, Fault, Get, Objects, Set, Status, encode_request, take_answer
+from ur_hil.patience import LONGEST_STEP, Patience
+from ur_hil.records import checked, number
+from ur_hil.tools import ToolModel
+
+_TIMEOUT = 2.0
+"""For connections, answers and what the gripper takes over [s]; programs of the maker wait so long."""
+
+_ACTIVATION_TIMEOUT = 10.0  # s
+_POLL = 0.01  # s between two questions; the gripper is read every 16 ms
+_HELD = (Objects.CONTACT_OPENING, Objects.CONTACT_CLOSING)
+
+
+class Gripper:
+    """The gripper of an `Arm`. Its first motion activates it: the fingers open and close fully.
+
+    A person is asked before each motion of an arm that is not known to be simulated. What reaches the gripper
+    raises a `ClientError` if it does not answer, has no power, reports a fault, or is late.
+    """
+
+    def __init__(self, model: ToolModel, host: str, port: int, ask: Callable[[str], None]) -> None:
+        self._model = model
+        self._host, self._port = host, port
+        self._ask = ask
+        self._force, self._speed = 0, 255
+
+    @property
+    def width(self) -> float:
+        """Distance between the pads by the table of tools [m]."""
+        with self._connected() as port:
+            return self._model.width_of(port.get("POS"))
+
+    @property
+    def is_holding(self) -> bool:
+        """The fingers press on an object."""
+        with self._connected() as port:
+            return port.get("GTO") == 1 and port.get("OBJ") in _HELD
+
+    @property
+    def speed(self) -> float:
+        """Of the width in the motions that follow [m/s]; the fastest until it is set."""
+        return self._model.speed_of(self._speed)
+
+    @speed.setter
+    def speed(self, value: float) -> None:
+        self._speed = _share("speed", value, self._model.speed, "m/s")
+
+    def force(self, newton: float) -> None:
+        """Set with which force [N] a pad presses in the motions that follow; the least until it is set."""
+        self._force = _share("force", newton, self._model.force, "N")
+
+    def open(self) -> None:
+        """Open fully."""
+        self._move(0, "open")
+
+    def close(self) -> None:
+        """Close until something is held or nothing is left to close."""
+        self._move(255, "close")
+
+    def move(self, width: float) -> None:
+        """Move until the pads are so far apart [m], or something is in their way; `is_holding` says which."""
+        value = checked(number(0.0, self._model.stroke, "m"), width, "width", ClientError)
+        self._move(self._model.count_of(value), f"move to {1e3 * value:.1f} mm")
+
+    def _move(self, position: int, how: str) -> None:
+        model = self._model
+        force, slowest = model.force_of(self._force), model.stroke / model.speed[0]
+        self._ask(
+            f"the fingers of the {model.title} at {self._host} {how}, pressing with up to {force:.0f} N"
+        )
+        with self._connected() as port:
+            if port.get("STA") != Status.ACTIVE or port.get("FLT") > Fault.NOT_ACTIVATED:
+                port.set(ACT=0, ATR=0, GTO=0)
+                port.wait("reset", lambda: port.get("ACT") == port.get("STA") == 0)
+                port.set(ACT=1)
+                port.wait("activation", lambda: port.get("STA") == Status.ACTIVE, _ACTIVATION_TIMEOUT)
+            port.set(POS=position, SPE=self._speed, FOR=self._force, GTO=1)
+            port.wait("start", lambda: port.get("PRE") == position and port.get("GTO") == 1)
+            port.wait("motion", lambda: port.get("OBJ") != Objects.MOVING, slowest + _TIMEOUT)
+            port.check()
+
+    @contextmanager
+    def _connected(self) -> Iterator["_Port"]:
+        if not self._port:
+            raise DriverError(f"no gripper: its port at {self._host} is 0; give its number in `ports`")
+        try:
+            transport = TcpNetwork().connect(self._host, self._port, _TIMEOUT)
+        except DriverError as error:
+            raise DriverError(f"no gripper: {error} (is its software installed there?)") from error
+        try:
+            yield _Port(transport, self._model.title)
+        except RemoteProtocolError as error:
+            raise DriverError(f"{self._host}:{self._port} is not the port of a gripper: {error}") from error
+        finally:
+            transport.close()
+
+
+class _Port:
+    """A connection to the software of a gripper."""
+
+    def __init__(self, transport: TcpTransport, title: str) -> None:
+        self._transport = transport
+        self._title = title
+        self._inbox = bytearray()
+
+    def get(self, name: str) -> int:
+        """The number of a variable; DriverError without power."""
+        answer = self._exchange(Get(name, bare=False))
+        if answer == NOT_KNOWN:
+            raise DriverError(f"the {self._title} has no power: 24 V at the tool, and no emergency stop?")
+        return int(answer)
+
+    def set(self, **values: int) -> None:
+        """Write variables together."""
+        self._exchange(Set(tuple(values.items())))
+
+    def wait(self, what: str, is_done: Callable[[], bool], seconds: float = _TIMEOUT) -> None:
+        """Ask until it is done; DriverError for a fault, or if it takes longer."""
+        waited = Patience()
+        while not is_done():
+            if waited.spent(time.monotonic()) > seconds:
+                self.check()
+                raise DriverError(f"the {self._title} is late: its {what} takes more than {seconds:.3g} s")
+            time.sleep(_POLL)
+
+    def check(self) -> None:
+        """Raise DriverError if the gripper reports a fault."""
+        if (fault := self.get("FLT")) > Fault.NOT_ACTIVATED:
+            name = Fault(fault).name if fault in list(Fault) else "not known"
+            raise DriverError(
+                f"the {self._title} reports fault {fault} ({name}): the next motion activates it"
+            )
+
+    def _exchange(self, request: Get | Set) -> int | str:
+        self._transport.send(encode_request(request))
+        waited = Patience()
+        while (answer := take_answer(self._inbox, request)) is None:
+            data = self._transport.receive(LONGEST_STEP)
+            if data == b"" or waited.spent(time.monotonic()) > _TIMEOUT:
+                raise DriverError(f"the software of the {self._title} does not answer: restart it")
+            self._inbox += data or b""
+        return answer
+
+
+def _share(name: str, value: float, ends: tuple[float, float], unit: str) -> int:
+    """0 to 255 for a value between the ends of a table."""
+    least, most = ends
+    return round(
+        255 * (checked(number(least, most, unit), value, name, ClientError) - least) / (most - least)
+    )
