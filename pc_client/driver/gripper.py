@@ -16,9 +16,7 @@ from ur_hil.patience import LONGEST_STEP, Patience
 from ur_hil.records import checked, number
 from ur_hil.tools import ToolModel
 
-_TIMEOUT = 2.0
-"""For connections, answers and what the gripper takes over [s]; programs of the maker wait so long."""
-
+_TIMEOUT = 2.0  # s, for connections, answers and what it takes over; programs of the maker wait so long
 _ACTIVATION_TIMEOUT = 10.0  # s
 _POLL = 0.01  # s between two questions; the gripper is read every 16 ms
 _HELD = (Objects.CONTACT_OPENING, Objects.CONTACT_CLOSING)

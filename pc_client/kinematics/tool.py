@@ -23,10 +23,9 @@ def gripper_model(name: str) -> ToolModel:
 
 
 def surroundings(cell: Cell | str | Path | None, tool: str | None = None) -> Cell:
-    """What stands around an arm and what it carries: a cell or its file, and a gripper by name or file.
+    """What stands around an arm and what it carries, of a cell or its file and a gripper's name or file.
 
-    Raises:
-        CellError: a file or a name is wrong, or both have a tool.
+    CellError if one of them is wrong, or both have a tool.
     """
     known = load_cell(cell, FILE_KINDS["cell"]) if isinstance(cell, str | Path) else cell or NO_CELL
     return known if tool is None else _carrying(known, gripper_model(tool))

@@ -28,6 +28,7 @@ from pc_client.experiment.experiment import experiment_text, load_movements
 from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.model import robot_model
+from pc_client.kinematics.tool import surroundings
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.limits import limits_of
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
@@ -78,7 +79,8 @@ def conditions():
     report = SimpleNamespace(
         tcp_offset=(0.0, 0.0, 0.15, 0.0, 0.0, 0.0), payload=0.0, payload_cog=None, operational_mode="MANUAL"
     )
-    model = robot_model("ur3", CELL)
+    model, gripper = robot_model("ur3", CELL), robot_model("ur3", surroundings(None, "robotiq-2f85"))
+    flange = SimpleNamespace(tcp_offset=(0.0,) * 6, payload=0.0, payload_cog=None)
     return [
         software(SoftwareVersion(10, 11, 0)),
         safety_mode(frame),
@@ -91,6 +93,8 @@ def conditions():
         speed_scaling(frame),
         tcp_offset(report, model),
         payload(report, model),
+        tcp_offset(flange, gripper),
+        payload(flange, gripper),
     ]
 
 

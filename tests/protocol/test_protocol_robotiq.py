@@ -1,12 +1,23 @@
 """The socket of a Robotiq gripper and its registers: bytes of the maker's programs and of public clients."""
 
+from contextlib import suppress
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol import modbus, robotiq
+from protocol.errors import RemoteProtocolError
 from protocol.modbus_rtu import crc16, decode_read_write, encode_rtu, take_request
-from protocol.robotiq import Get, GripperConnection, Malformed, Set, encode_value
+from protocol.robotiq import (
+    Get,
+    GripperConnection,
+    Malformed,
+    Set,
+    encode_request,
+    encode_value,
+    take_answer,
+)
 
 STREAM = (
     (b"SET POS 100 SPE 255 FOR 10 GTO 1\n", Set((("POS", 100), ("SPE", 255), ("FOR", 10), ("GTO", 1)))),
@@ -69,6 +80,37 @@ def test_no_bytes_are_kept_without_end(segments):
 )
 def test_answers_have_the_widths_that_programs_read(request_, value, answer):
     assert encode_value(request_, value) == answer
+
+
+ASKED = (
+    (Set((("POS", 100), ("GTO", 1))), b"SET POS 100 GTO 1\n", b"ack", "ack"),
+    (Get("PRE", bare=False), b"GET PRE\n", b"PRE 77\n", 77),
+    (Get("FLT", bare=False), b"GET FLT\n", b"FLT 05\n", 5),
+    (Get("POS", bare=False), b"GET POS\n", b"POS ?\n", "?"),
+)
+
+
+@pytest.mark.parametrize(("request_", "line", "answer", "value"), ASKED)
+def test_a_client_asks_and_takes_the_answer_whole_bytewise_and_before_others(request_, line, answer, value):
+    assert encode_request(request_) == line
+    assert GripperConnection().receive(line) == [request_]
+    for others in (b"", b"ack", b"STA 3\n"):
+        inbox = bytearray(answer + others)
+        assert (take_answer(inbox, request_), inbox) == (value, others)
+    inbox = bytearray()
+    for byte in answer[:-1]:
+        inbox.append(byte)
+        assert take_answer(inbox, request_) is None
+    inbox.append(answer[-1])
+    assert take_answer(inbox, request_) == value
+
+
+@given(st.binary(max_size=3000), st.sampled_from([request for request, *_ in ASKED]))
+def test_a_client_takes_nothing_else_for_an_answer(data, request_):
+    inbox = bytearray(data)
+    with suppress(RemoteProtocolError):
+        take_answer(inbox, request_)
+    assert len(inbox) < robotiq.MAX_LINE or len(inbox) < len(data)
 
 
 # The maker's manual and public drivers; reference grippers.md, section 2.
