@@ -176,3 +176,20 @@ def pc_with_script(*programs, keep_open=False):
             stop.set()
             server.close()
             thread.join()
+
+
+def gripper_node(kind, nodes="", **data):
+    """A node of Robotiq's grippers; `nodes` are inside of it."""
+    rows = "".join(f'<data key="{key}" value="{value}"/>' for key, value in data.items())
+    return (
+        f'<Contributed strategyProgramNodeType="{kind}" strategyURCapName="Robotiq_Grippers" '
+        f'strategyURCapDeveloper="Robotiq Inc."><dataModel>{rows}</dataModel><children>{nodes}</children></Contributed>'
+    )
+
+
+def gripper_move(position, speed=100, force=20, **data):
+    """A node that moves a gripper [%]."""
+    values = {"position": position, "speed": speed, "force": force}
+    doubles = {f"{key}InDouble": value for key, value in values.items()}
+    whole = {key: int(value) for key, value in values.items()}
+    return gripper_node("Gripper", **whole | doubles | data)

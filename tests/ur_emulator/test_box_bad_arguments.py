@@ -27,6 +27,7 @@ USUAL = {
     ParamType.INT: "1.0",
     ParamType.NUMBER: "1.0",
     ParamType.STRING: '"a"',
+    ParamType.STRING_OR_INT: "1.0",
     ParamType.POSE: POSE,
     ParamType.JOINTS: JOINTS,
     ParamType.POSE_OR_JOINTS: JOINTS,

@@ -77,10 +77,11 @@ class _GripperSession(Session):
     def _answer(self, request: robotiq.Request) -> bytes:
         match request:
             case robotiq.Set(values=((robotiq.SID, sid),)):
+                # The maker's programs take each gripper that is acknowledged for connected, and wait for it.
                 self._sid = sid
-                return robotiq.ACK
+                return robotiq.ACK if self._chosen is not None else robotiq.NAK
             case robotiq.Set(values=values):
-                if (gripper := self._grippers.get(self._sid)) is not None:
+                if (gripper := self._chosen) is not None:
                     for name, value in values:
                         gripper.set(name, value)
                 return robotiq.ACK
@@ -89,11 +90,17 @@ class _GripperSession(Session):
             case robotiq.Malformed(is_set=is_set):
                 return robotiq.NAK if is_set else f"{robotiq.NOT_KNOWN}\n".encode()
 
+    @property
+    def _chosen(self) -> RobotiqGripper | None:
+        """The gripper of this connection; None if there is none with its number, or it has no power."""
+        gripper = self._grippers.get(self._sid)
+        return gripper if gripper is not None and gripper.has_power else None
+
     def _value(self, name: str) -> int | str:
         if name == robotiq.SID:
             return str([unit for unit, gripper in self._grippers.items() if gripper.has_power])
-        gripper = self._grippers.get(self._sid)
-        if gripper is None or not gripper.has_power:
+        gripper = self._chosen
+        if gripper is None:
             return robotiq.NOT_KNOWN
         value = _TEXTS.get(name, _CONSTANTS.get(name, gripper.get(name)))
         return robotiq.NOT_KNOWN if value is None else value

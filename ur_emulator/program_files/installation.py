@@ -93,6 +93,29 @@ class DeclaredSignal:
 
 
 @dataclass(frozen=True, slots=True)
+class GripperCalibration:
+    """Two positions of a gripper of Robotiq [%] and their widths [mm]; the defaults hold without it."""
+
+    closed_position: float = 100.0
+    open_position: float = 0.0
+    closed_width: float = 0.0
+    open_width: float = 50.0
+
+    def width(self, position: float) -> float:
+        """Return the width at a position, within the two widths."""
+        share = (position - self.closed_position) / (self.open_position - self.closed_position)
+        return self.closed_width + min(max(share, 0.0), 1.0) * (self.open_width - self.closed_width)
+
+
+@dataclass(frozen=True, slots=True)
+class GripperSetup:
+    """What an installation gives for grippers of Robotiq; calibrations by number of the gripper, from 1."""
+
+    is_current_limited: bool
+    calibrations: Mapping[int, GripperCalibration]
+
+
+@dataclass(frozen=True, slots=True)
 class StartUp:
     """What the box does when it is switched on.
 
@@ -128,6 +151,7 @@ class Installation:
         modbus: signals of other units.
         safe_home: joint angles [rad].
         start_up: what the box does when it is switched on.
+        grippers: None without the software of Robotiq's grippers.
     """
 
     wire_path: str
@@ -150,6 +174,7 @@ class Installation:
     safe_home: Vector6 = NEW_HOME
     safety: SafetySettings = NO_SETTINGS
     start_up: StartUp = StartUp()
+    grippers: GripperSetup | None = None
 
     @property
     def tcp_offset(self) -> Vector6:

@@ -79,8 +79,9 @@ def _read(reader: ProgramReader, name: str) -> Installation:
     return replace(found, variables=variables_file.read_variables(reader, reader.folder.find(variables)))
 
 
-# Contributor of a part of an installation. Source: the source text of the URCap.
+# Contributors of parts of an installation. Sources: the source text of the URCap; installations.
 _EXTERNAL_CONTROL = "com.fzi.externalcontrol"
+_ROBOTIQ = "com.robotiq.urcap.gripper"
 # Element with the names of lines -> their own name, the index of the first.
 _LINE_NAMES = {
     "DigitalInputNames": ("digital_in", 0),
@@ -156,6 +157,7 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
         if "SafetySettings" in reader.first
         else Installation(wire_path).safety,
         reader.start_up(),
+        reader.grippers(),
     )
     entries = len(tcps) + len(found.features) + len(found.lines) + len(found.modbus)
     if entries > BUDGETS.installation_entries:
@@ -230,12 +232,41 @@ class _Values:
 class _Reader(_Values):
     """Looks up the parts of one file but its features."""
 
+    def _contributed(self, owner: str) -> dict[str, str]:
+        """Return what a URCap has kept, by key."""
+        parts = [part for part in self.tree.root.iter("Contributed") if part.get("ownerId") == owner]
+        return {item.get("key", ""): item.get("value", "") for part in parts for item in part.iter("data")}
+
     def external_control(self) -> tuple[installation.ExternalControlPc, str]:
-        data: dict[str, str] = {}
-        for part in self.tree.root.iter("Contributed"):
-            if part.get("ownerId") == _EXTERNAL_CONTROL:
-                data |= {item.get("key", ""): item.get("value", "") for item in part.iter("data")}
+        data = self._contributed(_EXTERNAL_CONTROL)
         return pc_from(data, self.tree.name), data.get("name", "")
+
+    def grippers(self) -> installation.GripperSetup | None:
+        data = self._contributed(_ROBOTIQ)
+        if not data:
+            return None
+        calibrations: dict[int, installation.GripperCalibration] = {}
+        for gripper in range(1, 5):
+            prefix = f"_models.Gripper{gripper}."
+            if data.get(f"{prefix}_isCalibrationDefined") != "true":
+                continue
+            calibration = installation.GripperCalibration(
+                *(
+                    self.number(data.get(prefix + key), f"{key} of gripper {gripper}")
+                    for key in (
+                        "_closedValueInPercent",
+                        "_openValueInPercent",
+                        "_closedValueInMillimeters",
+                        "_openValueInMillimeters",
+                    )
+                )
+            )
+            if calibration.closed_position == calibration.open_position:
+                raise ProgramFileError(
+                    f"{self.tree.name}: gripper {gripper} is open and closed in one position"
+                )
+            calibrations[gripper] = calibration
+        return installation.GripperSetup(data.get("gripper_current_limit_enabled") == "true", calibrations)
 
     def tcps(self) -> tuple[dict[str, Vector6], str]:
         settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
@@ -275,6 +306,8 @@ class _Reader(_Values):
         return (level * math.cos(base), -level * math.sin(base), g * math.cos(tilt))
 
     def tool_voltage(self) -> int:
+        if self._contributed(_ROBOTIQ):
+            return 24  # its software controls the connector
         given = self.attribute("ToolCommSettings", "toolOutputVoltage")
         return _VOLTAGES.get(given or self.tree.root.get("toolOutputVoltage", ""), 0)
 

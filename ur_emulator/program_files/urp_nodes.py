@@ -69,6 +69,11 @@ class Node:
         """Return the text of an element inside, without blanks around; "" if it is missing."""
         return (self.element.findtext(tag) or "").strip()
 
+    @property
+    def data(self) -> dict[str, str]:
+        """What the URCap of a `<Contributed>` node has kept in it, by key."""
+        return {item.get("key", ""): item.get("value", "") for item in self.element.findall("dataModel/data")}
+
     def find(self, tag: str) -> Element | None:
         """Return the first element inside of that tag, with its reference followed."""
         found = self.element.find(tag)

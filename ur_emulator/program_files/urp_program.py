@@ -24,6 +24,7 @@ from ur_emulator.program_files.script_writer import Header, Part, ScriptWriter, 
 from ur_emulator.program_files.urp_expressions import expression_of, variable_name
 from ur_emulator.program_files.urp_maker import Around, NodeWriter, UrpMaker
 from ur_emulator.program_files.urp_nodes import Node, read_nodes
+from ur_emulator.program_files.urp_robotiq import declare_functions
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -45,7 +46,8 @@ _ROWS = (
     NodeKind("CircleMove", urp_moves.write_circle,
         "`movec` through the first to the second waypoint, `mode=1` for a fixed orientation"),
     NodeKind("Comment", urp_statements.write_comment, "a comment"),
-    NodeKind("Contributed", urp_statements.write_contributed, "External Control: what a PC sends, see below"),
+    NodeKind("Contributed", urp_statements.write_contributed,
+        "External Control: what a PC sends, see below; the nodes of Robotiq_Grippers"),
     NodeKind("Folder", urp_flow.write_folder, "its nodes"),
     NodeKind("Force", urp_moves.write_force, "`force_mode` around its nodes; only the type Frame"),
     NodeKind("Halt", urp_statements.write_halt, "`halt`"),
@@ -91,7 +93,7 @@ TOP_KINDS: Mapping[str, str] = MappingProxyType(
 
 NOT_KNOWN: tuple[str, ...] = (
     "pallets and conveyor tracking",
-    "wizards and nodes of URCaps other than External Control",
+    "wizards and nodes of URCaps other than External Control and Robotiq_Grippers",
     "`Set` of analogue outputs, expressions and payloads",
     "`Until` of an expression or a line, or with another end than a stop",
     "moves with OptiMove",
@@ -158,6 +160,9 @@ def make_script(
             for sub_program in program.sub_programs:
                 with writer.block(f"def {sub_program.name}():"):
                     _write_section(maker, sub_program.node, sub_program.name, mark="noBreak")
+        written = (*writer.parts, *functions, *before, *others, *body)
+        if installation.grippers and any("rq_" in part for part in written if isinstance(part, str)):
+            declare_functions(maker)
         for timer in maker.timers:
             if f"first value of {timer}" not in maker.declarations:
                 writer.add(f"global {timer}=0")

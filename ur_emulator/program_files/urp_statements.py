@@ -16,6 +16,7 @@ from ur_emulator.program_files.urp_expressions import Line, expression_of, line_
 from ur_emulator.program_files.urp_maker import Around, UrpMaker
 from ur_emulator.program_files.urp_moves import set_tcp
 from ur_emulator.program_files.urp_nodes import Node
+from ur_emulator.program_files.urp_robotiq import ROBOTIQ, write_gripper_node
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -183,20 +184,26 @@ def write_timer(maker: UrpMaker, node: Node, around: Around) -> None:
 
 
 def write_contributed(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write the node of a URCap: only External Control is known."""
+    """Write the node of a URCap: External Control, or Robotiq's grippers."""
     name = contributor(node.element)
-    if name != EXTERNAL_CONTROL:
+    write = {EXTERNAL_CONTROL: _write_external_control, ROBOTIQ: write_gripper_node}.get(name)
+    if write is None:
         raise node.source.unknown(f"a node of the URCap {name!r}")
     writer = maker.writer
-    data = {item.get("key", ""): item.get("value", "") for item in node.element.iter("data")}
-    pc = pc_from(data, node.source.tree.name)
-    title = one_line(node.get("strategyProgramNodeType") or EXTERNAL_CONTROL)
     writer.add("# begin: URCap Program Node")
-    writer.add(f"#   Source: {EXTERNAL_CONTROL}, {one_line(node.get('strategyURCapDeveloper'))}".rstrip(", "))
-    writer.add(f"#   Type: {title}")
-    writer.label(node.number, f"Control by {maker.installation.pc_name or pc.host or title}", around.mark)
-    writer.gap(pc)
+    writer.add(f"#   Source: {name}, {one_line(node.get('strategyURCapDeveloper'))}".rstrip(", "))
+    writer.add(f"#   Type: {one_line(node.get('strategyProgramNodeType') or name)}")
+    write(maker, node, around)
     writer.add("# end: URCap Program Node")
+
+
+def _write_external_control(maker: UrpMaker, node: Node, around: Around) -> None:
+    pc = pc_from(node.data, node.source.tree.name)
+    title = one_line(node.get("strategyProgramNodeType") or EXTERNAL_CONTROL)
+    maker.writer.label(
+        node.number, f"Control by {maker.installation.pc_name or pc.host or title}", around.mark
+    )
+    maker.writer.gap(pc)
 
 
 def contributor(element: Element) -> str:

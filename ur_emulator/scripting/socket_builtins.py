@@ -85,6 +85,8 @@ class TextSearch:
 OPEN_TIMEOUT = 2.0
 # Longest text that a string read returns [bytes]. Source: later edition of the manual, socket_read_string.
 MAX_STRING = 1024
+# Name of a socket in a program; a number is its text.
+_Name = str | int
 
 
 class SocketBuiltins(BuiltinGroup):
@@ -107,7 +109,8 @@ class SocketBuiltins(BuiltinGroup):
     # --- opening, closing, sending
 
     @builtin("socket_open")
-    def _open(self, thread: object, address: str, port: int, name: str) -> Generator[Wait, None, bool]:
+    def _open(self, thread: object, address: str, port: int, name: _Name) -> Generator[Wait, None, bool]:
+        name = log_form(name)
         if len(name) > LONGEST_NAME:
             raise ScriptRuntimeError(
                 f"socket_open: a socket name of {len(name)} characters; allowed: up to {LONGEST_NAME}"
@@ -136,35 +139,38 @@ class SocketBuiltins(BuiltinGroup):
         return True
 
     @builtin("socket_close")
-    def _close(self, thread: object, name: str) -> None:
-        reader = self._sockets.pop(name, None)
+    def _close(self, thread: object, name: _Name) -> None:
+        reader = self._sockets.pop(log_form(name), None)
         if reader is not None:
             reader.socket.close()
 
-    def _send(self, name: str, data: bytes) -> bool:
-        reader = self._sockets.get(name)
+    def _reader(self, name: _Name) -> SocketReader | None:
+        return self._sockets.get(log_form(name))
+
+    def _send(self, name: _Name, data: bytes) -> bool:
+        reader = self._reader(name)
         return reader is not None and reader.socket.send(data)
 
     @builtin("socket_send_byte")
-    def _send_byte(self, thread: object, value: int, name: str) -> bool:
+    def _send_byte(self, thread: object, value: int, name: _Name) -> bool:
         return self._send(name, bytes([int(value) & 0xFF]))
 
     @builtin("socket_send_int")
-    def _send_int(self, thread: object, value: float, name: str) -> bool:
+    def _send_int(self, thread: object, value: float, name: _Name) -> bool:
         if not (math.isfinite(value) and -(2**31) <= value < 2**31):
             raise ScriptRuntimeError(f"socket_send_int: {value:g} does not fit into 32 bits")
         return self._send(name, struct.pack(">i", int(value)))
 
     @builtin("socket_send_string")
-    def _send_string(self, thread: object, text: Any, name: str) -> bool:
+    def _send_string(self, thread: object, text: Any, name: _Name) -> bool:
         return self._send(name, log_form(text).encode("latin-1", "replace"))
 
     @builtin("socket_send_line")
-    def _send_line(self, thread: object, text: Any, name: str) -> bool:
+    def _send_line(self, thread: object, text: Any, name: _Name) -> bool:
         return self._send(name, log_form(text).encode("latin-1", "replace") + b"\n")
 
     @builtin("socket_set_var")
-    def _set_var(self, thread: object, variable: str, value: int, name: str) -> None:
+    def _set_var(self, thread: object, variable: str, value: int, name: _Name) -> None:
         self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
 
     # --- reading
@@ -177,9 +183,9 @@ class SocketBuiltins(BuiltinGroup):
         end = clock.program_tick + math.ceil(timeout / clock.period_s)
         return lambda: clock.program_tick >= end
 
-    def _take(self, name: str, timeout: float, search: TextSearch) -> Generator[Wait, None, bytes | None]:
+    def _take(self, name: _Name, timeout: float, search: TextSearch) -> Generator[Wait, None, bytes | None]:
         """Wait until a text is complete in the inbox and take it; None on failure."""
-        reader = self._sockets.get(name)
+        reader = self._reader(name)
         if reader is None:
             return None
         socket = reader.socket
@@ -223,14 +229,14 @@ class SocketBuiltins(BuiltinGroup):
         return size
 
     def _read_numbers(
-        self, name: str, timeout: float, number: int, code: str, width: int
+        self, name: _Name, timeout: float, number: int, code: str, width: int
     ) -> Generator[Blocked, None, list[int]]:
         """Wait for big-endian numbers; a stream of commands passes here every cycle.
 
         A time-out [s] that is not above 0 is none; `code` is that of a number for `struct`, `width` its
         bytes.
         """
-        reader, clock, size = self._sockets.get(name), self._clock, width * number
+        reader, clock, size = self._reader(name), self._clock, width * number
         failed = [0] + [-1] * number
         if reader is None:
             return failed
@@ -261,19 +267,19 @@ class SocketBuiltins(BuiltinGroup):
 
     @builtin("socket_read_binary_integer")
     def _read_binary_integer(
-        self, thread: object, number: float, name: str, timeout: float
+        self, thread: object, number: float, name: _Name, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
         return self._read_numbers(name, timeout, int(number), "i", 4)
 
     @builtin("socket_read_byte_list")
     def _read_byte_list(
-        self, thread: object, number: float, name: str, timeout: float
+        self, thread: object, number: float, name: _Name, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
         return self._read_numbers(name, timeout, int(number), "B", 1)
 
     @builtin("socket_read_ascii_float")
     def _read_ascii_float(
-        self, thread: object, number: float, name: str, timeout: float
+        self, thread: object, number: float, name: _Name, timeout: float
     ) -> Generator[Wait, None, list[float]]:
         number = int(number)
         data = yield from self._take(name, timeout, TextSearch(b"", b")"))
@@ -288,14 +294,14 @@ class SocketBuiltins(BuiltinGroup):
         return [number, *values] if len(values) == number else failed
 
     @builtin("socket_read_line")
-    def _read_line(self, thread: object, name: str, timeout: float) -> Generator[Wait, None, str]:
+    def _read_line(self, thread: object, name: _Name, timeout: float) -> Generator[Wait, None, str]:
         data = yield from self._take(name, timeout, TextSearch(b"", b"\n"))
         line = b"" if data is None else data.removesuffix(b"\n").removesuffix(b"\r")
         return line[:LONGEST_STRING].decode("latin-1")
 
     @builtin("socket_read_string")
     def _read_string(
-        self, thread: object, name: str, prefix: str, suffix: str, interpret_escape: bool, timeout: float
+        self, thread: object, name: _Name, prefix: str, suffix: str, interpret_escape: bool, timeout: float
     ) -> Generator[Wait, None, str]:
         start, end = (_delimiter(text, interpret_escape) for text in (prefix, suffix))
         data = yield from self._take(name, timeout, TextSearch(start, end, MAX_STRING))
@@ -305,7 +311,7 @@ class SocketBuiltins(BuiltinGroup):
         return (text.removesuffix(end) if end else text)[:MAX_STRING].decode("latin-1")
 
     @builtin("socket_get_var")
-    def _get_var(self, thread: object, variable: str, name: str) -> Generator[Wait, None, int]:
+    def _get_var(self, thread: object, variable: str, name: _Name) -> Generator[Wait, None, int]:
         self._send(name, f"GET {variable}\n".encode("latin-1", "replace"))
         data = yield from self._take(name, OPEN_TIMEOUT, TextSearch(b"", b"\n"))
         words = b"" if data is None or len(data) > MAX_STRING else data

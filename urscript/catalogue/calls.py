@@ -138,6 +138,7 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.INT: _is_int,
     ParamType.NUMBER: is_number,
     ParamType.STRING: lambda value: isinstance(value, str),
+    ParamType.STRING_OR_INT: lambda value: isinstance(value, str) or _is_int(value),
     ParamType.POSE: _is_pose,
     ParamType.JOINTS: _is_six,
     ParamType.POSE_OR_JOINTS: lambda value: type(value) is Pose or _is_numbers(value, 6),

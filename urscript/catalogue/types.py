@@ -139,6 +139,7 @@ class ParamType(Enum):
     INT = "an integer"
     NUMBER = "a number"
     STRING = "a string"
+    STRING_OR_INT = "a string or an integer"
     POSE = "a Pose on the form p[x,y,z,a,b,c]"
     JOINTS = "a list of 6 numbers"
     POSE_OR_JOINTS = "a Pose on the form p[x,y,z,a,b,c] or a list of 6 joint positions"

@@ -1,0 +1,222 @@
+"""Nodes of Robotiq's grippers in program files: the script they become, and what it does with and without a gripper."""
+
+import pytest
+from dashboard_support import gripper_move, gripper_node, script_line, urp
+from installation_support import installation
+from urp_support import NEW_BOX, lines_of, script_of
+
+from ur_emulator import ControlBox
+from ur_emulator.errors import ProgramFileError, UnknownNodeError
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation import GripperCalibration, GripperSetup, Installation
+from ur_emulator.program_files.installation_reader import load_installation
+from urscript import compile_program
+from urscript.catalogue import catalogue_for
+
+CALIBRATION = GripperCalibration(90.2, 1.18, 0.0, 85.0)
+CALIBRATED = Installation("/programs/cell.installation", grippers=GripperSetup(True, {1: CALIBRATION}))
+
+
+def check(*, detects=True, **data):
+    branches = gripper_node("If", script_line('textmsg("held")')) + gripper_node(
+        "Else", script_line('textmsg("nothing")')
+    )
+    return gripper_node("Grip Check", branches, ObjectDetectedKey=str(detects).lower(), **data)
+
+
+def test_a_motion_is_guarded_and_waits(tmp_path):
+    assert lines_of(tmp_path, gripper_move(50, speed=10, force=1)) == [
+        "# begin: URCap Program Node",
+        "#   Source: Robotiq_Grippers, Robotiq Inc.",
+        "#   Type: Gripper",
+        '$ 2 "Gripper Move50% (1)"',
+        "if (not gripper_connected[0]):",
+        'popup("Gripper 1 does not answer.", "No connection", False, True, blocking=True)',
+        'elif (not rq_is_gripper_activated("1")):',
+        'popup("Gripper 1 must be activated first.", "Not activated", False, True, blocking=True)',
+        "else:",
+        'rq_set_pos_spd_for(128, 26, 3, "1")',
+        'rq_wait_pos_spe_for_request(128, 26, 3, "1")',
+        'rq_go_to("1")',
+        'rq_wait("1")',
+        "end",
+        "# end: URCap Program Node",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("node", "installed", "label"),
+    [
+        (gripper_move(0), NEW_BOX, "Gripper Open (1)"),
+        (gripper_move(100), CALIBRATED, "Gripper Close (1)"),
+        (gripper_move(40, slaveIds="[2]"), CALIBRATED, "Gripper Move40% (2)"),
+        (gripper_move(60, slaveIds="[9]"), CALIBRATED, "Gripper Move29mm (1)"),
+        (gripper_move(99), CALIBRATED, "Gripper Move0mm (1)"),
+        (gripper_node("Gripper Activate"), NEW_BOX, "Gripper Activate"),
+        (gripper_node("Gripper Activate", ResetAndActivateKey="true"), NEW_BOX, "Gripper Reset and Activate"),
+    ],
+)
+def test_labels(tmp_path, node, installed, label):
+    assert lines_of(tmp_path, node, installed)[3] == f'$ 2 "{label}"'
+
+
+def test_a_motion_that_does_not_block_is_not_waited_for(tmp_path):
+    lines = lines_of(tmp_path, gripper_move(0, blocking="false", slaveIds="[3]"))
+    assert lines[-3:-1] == ['rq_go_to("3")', "end"]
+
+
+@pytest.mark.parametrize(
+    ("node", "label", "condition"),
+    [
+        (check(), "If object detected", 'rq_is_object_detected("1")'),
+        (check(detects=False), "If object not detected", 'not rq_is_object_detected("1")'),
+        (
+            check(GripperIdKey="2", DimensionValidationKey="true", DimensionKey="50", DimensionNegativeGapKey="10",
+                  DimensionDimensionPositiveGapKey="5"),
+            "If grip validated",
+            'rq_is_object_detected("2") and rq_current_pos("2") >= 102.0 and rq_current_pos("2") <= 140.25',
+        ),
+    ],
+)  # fmt: skip
+def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
+    assert lines_of(tmp_path, node)[3:-1] == [
+        '$ 2 "Grip Check"',
+        f'$ 3 "{label}          " "noBreak"',
+        f"if ({condition}):",
+        "$ 4 \"textmsg('held')\"",
+        'textmsg("held")',
+        "else:",
+        '$ 5 "Else" "noBreak"',
+        "$ 6 \"textmsg('nothing')\"",
+        'textmsg("nothing")',
+        "end",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("node", "error", "problem"),
+    [
+        (gripper_node("Vacuum"), UnknownNodeError, "a node 'Vacuum' of the URCap 'Robotiq_Grippers' cannot"),
+        (gripper_move(0, slaveIds="[9, 2]"), UnknownNodeError, "a node of the grippers '9, 2' cannot"),
+        (gripper_move(101), ProgramFileError, "position is 101 %: use 0 to 100"),
+        (gripper_node("Gripper"), ProgramFileError, "position of a Gripper node is None, a number"),
+        (gripper_node("Grip Check"), ProgramFileError, "a Grip Check node has no If"),
+    ],
+)
+def test_nodes_that_cannot_be_used(tmp_path, node, error, problem):
+    with pytest.raises(error, match=problem.replace("[", r"\[")):
+        lines_of(tmp_path, node)
+
+
+@pytest.mark.parametrize("software", ["3.15", "5.11"])
+def test_functions_stand_once_in_front_of_programs_that_need_them(tmp_path, software):
+    text = script_of(tmp_path, urp(gripper_move(0) + gripper_move(100)), CALIBRATED)
+    assert text.count("def rq_wait(") == 1
+    assert "rq_max_current = 600\n" in text
+    assert "gripper_open_mm = [85.0, 50.0, 50.0, 50.0]\n" in text
+    compile_program(text, catalogue=catalogue_for(software))
+    call = urp(script_line("rq_close_and_wait()"))
+    compile_program(script_of(tmp_path, call, CALIBRATED), catalogue=catalogue_for(software))
+    assert "def rq_" not in script_of(tmp_path, call)
+    assert "def rq_" not in script_of(tmp_path, urp(script_line("sync()")), CALIBRATED)
+
+
+def contribution(**values):
+    data = "".join(f'<data key="{key}" value="{value}"/>' for key, value in values.items())
+    return f'<Contributed ownerId="com.robotiq.urcap.gripper" title="Gripper"><dataModel>{data}</dataModel></Contributed>'
+
+
+def test_the_installation_gives_calibrations_and_the_voltage(tmp_path):
+    values = {
+        "gripper_current_limit_enabled": "true",
+        "_models.Gripper1._isCalibrationDefined": "true",
+        "_models.Gripper1._openValueInMillimeters": "85.0",
+        "_models.Gripper1._closedValueInMillimeters": "0.0",
+        "_models.Gripper1._openValueInPercent": "1.18",
+        "_models.Gripper1._closedValueInPercent": "90.2",
+        "_models.Gripper2._isCalibrationDefined": "false",
+    }
+    path = tmp_path / "cell.installation"
+    path.write_bytes(installation(contribution(**values)))
+    cell = load_installation(ProgramFolder(tmp_path), path.name)
+    assert (cell.grippers, cell.tool_voltage) == (CALIBRATED.grippers, 24)
+    path.write_bytes(installation(contribution(**values | {"_models.Gripper1._openValueInPercent": "90.2"})))
+    with pytest.raises(ProgramFileError, match="gripper 1 is open and closed in one position"):
+        load_installation(ProgramFolder(tmp_path), path.name)
+
+
+# --- what the script does
+
+
+GRIP = (
+    gripper_node("Gripper Activate", ResetAndActivateKey="true")
+    + gripper_move(0)
+    + script_line('textmsg("open ", rq_current_pos_norm())')
+    + gripper_move(100)
+    + check()
+    + script_line('textmsg("wide ", rq_current_pos_mm())')
+    + gripper_move(0)
+)
+REACH = """
+def reach():
+  set_tcp(p[0, 0, 0.15, 0, 0, 0])
+  set_payload(0.9, [0, 0, 0.058])
+  movej(get_inverse_kin(p[0.5, 0.2, 0.1, 3.14159, 0, 0]), a=1.2, v=1.0)
+  movel(p[0.5, 0.2, 0, 3.14159, 0, 0], a=0.5, v=0.15)
+end
+"""
+
+
+@pytest.fixture
+def programs(tmp_path):
+    values = {
+        "_models.Gripper1._isCalibrationDefined": "true",
+        "_models.Gripper1._openValueInMillimeters": "85",
+    }
+    values |= {
+        "_models.Gripper1._closedValueInMillimeters": "0",
+        "_models.Gripper1._openValueInPercent": "1.18",
+    }
+    values |= {"_models.Gripper1._closedValueInPercent": "90.2"}
+    (tmp_path / "cell.installation").write_bytes(installation(contribution(**values)))
+    (tmp_path / "grip.urp").write_bytes(urp(GRIP, name="grip", installation="cell"))
+    (tmp_path / "move.urp").write_bytes(urp(gripper_move(0), name="move", installation="cell"))
+    return tmp_path
+
+
+def said(box, run):
+    """Do something; return what programs have written meanwhile."""
+    before = len(box.log)
+    run()
+    return [
+        entry.text for entry in box.log[before:] if entry.text.startswith(("open", "held", "nothing", "wide"))
+    ]
+
+
+def test_a_program_sees_what_it_has_gripped(programs):
+    with ControlBox(
+        "ur5e",
+        in_process=True,
+        pace="lockstep",
+        port_base=None,
+        seed=7,
+        tool="robotiq-2f85",
+        programs=programs,
+    ) as box:
+        box.run_program(file="move.urp", wait=False)
+        assert box.wait_until(popup=True).popups == ("Gripper 1 must be activated first.",)
+        box.close_popups()
+        lines = said(box, lambda: box.run_program(file="grip.urp", wait=True))
+        assert lines[:2] == ["open 1", "nothing"]
+        assert float(lines[2].removeprefix("wide ")) == pytest.approx(0.0, abs=0.3)
+        box.add_thing("block", "box", (0.04, 0.04, 0.04), 0.1, (0.5, 0.2, 0.0, 0, 0, 0))
+        box.run_program(REACH, wait=True)
+        lines = said(box, lambda: box.run_program(file="grip.urp", wait=True))
+        assert lines[:2] == ["open 1", "held"]
+        assert float(lines[2].removeprefix("wide ")) == pytest.approx(40.0, abs=0.5)
+
+
+def test_without_a_gripper_a_program_shows_that_there_is_no_connection(programs):
+    with ControlBox("ur5e", in_process=True, pace="lockstep", port_base=None, programs=programs) as box:
+        box.run_program(file="grip.urp", wait=False)
+        assert box.wait_until(popup=True).popups == ("Gripper 1 does not answer.",)
