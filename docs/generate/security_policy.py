@@ -47,6 +47,11 @@ _PORTS = (
     _PortRow(("interpreter",), "add any URScript to a program that is in interpreter mode", _NOTHING),
     _PortRow(("rtde",), "read all variables, set outputs, registers and the speed slider", _NOTHING),
     _PortRow(("modbus",), "read and set outputs and registers", _NOTHING),
+    _PortRow(
+        ("gripper", "tool_line"),
+        "activate grippers, move their fingers, let go of what they hold; open only with a tool (`--tool`)",
+        _NOTHING,
+    ),
     _PortRow(("primary_ro", "secondary_ro", "realtime_ro"), "read states, frames and messages", _NOTHING),
     _PortRow(
         _CONTROL,

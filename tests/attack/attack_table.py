@@ -4,10 +4,11 @@ from attacks_bytes import BYTES
 from attacks_clients import CLIENTS
 from attacks_compiling import COMPILING
 from attacks_failures import FAILURES
+from attacks_grippers import GRIPPERS
 from attacks_places import PLACES
 from attacks_scripts import SCRIPTS
 
-SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES)
+SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS)
 
 
 def described() -> list[dict[str, object]]:

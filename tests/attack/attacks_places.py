@@ -162,11 +162,14 @@ def requests_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
 
 
 @PLACES.attack(
-    "A web page posts a program and words to the ports of scripts and to the dashboard", "it is closed"
+    "A web page posts a program and words to the ports of scripts, of grippers and to the dashboard",
+    "it is closed",
 )
 def scripts_of_web_pages(box: BoxUnderAttack, seconds: float) -> None:
     body = b'def page():\n  textmsg("from a page")\nend\npower off\n'
-    for port in {"primary", "secondary", "realtime", "dashboard"} & set(box.open_ports):
+    for port in {"primary", "secondary", "realtime", "dashboard", "gripper", "tool_line"} & set(
+        box.open_ports
+    ):
         for path in ("/", "/" + 700 * "a"):
             with box.connect(port) as sock, suppress(OSError):
                 sock.sendall(f"POST {path} HTTP/1.1\r\nHost: {box.host}\r\n\r\n".encode() + body)
