@@ -107,6 +107,16 @@ def test_a_target_shows_together_with_the_motion_towards_it(fingers):
     assert 3 < stopped < 230
 
 
+def test_a_target_without_go_waits_and_is_not_reached(fingers):
+    fingers.activate()
+    fingers.set(POS=100)
+    fingers.run(0.1)
+    assert fingers.get("PRE", "OBJ", "POS") == (100, Objects.MOVING, 3)
+    fingers.set(GTO=1)
+    fingers.run(1.0)
+    assert fingers.get("OBJ", "POS") == (Objects.AT_TARGET, 100)
+
+
 def test_what_is_in_the_way_is_gripped_and_its_loss_is_seen(fingers):
     fingers.activate()
     fingers.block = 0.04

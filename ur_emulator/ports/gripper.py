@@ -20,8 +20,9 @@ _REQUEST_COST = 2
 _TOGETHER = BUDGETS.client_work // _REQUEST_COST
 """Answers that leave in one segment: whoever asks for many variables in one reads once. Source: RT C++."""
 
-_TEXTS = {"NCY": "0", "SNU": "C-00000", "FWV": "GC3-1.6.16", "VER": "1.8.0"}
-"""Answers that are texts. The serial number is one that no real gripper has."""
+_TEXTS = {"NCY": "1", "SNU": "C-00000", "FWV": "GC3-1.6.16", "VER": "1.8.0"}
+"""Answers that are texts. The serial number is one that no real gripper has; a number of 0 cycles
+is to the maker's programs one that they could not read."""
 
 _CONSTANTS = {"DST": 4, "PCO": 0}
 

@@ -8,6 +8,7 @@ what it reports is that of the same moment: a target that is accepted and the mo
 | power comes | reset: it must be activated |
 | ACT 0 -> 1 | STA 1; the fingers open, close and open; STA 3 |
 | ACT 0 | STA 0, no fault |
+| a target with GTO 0 | it waits for GTO 1; OBJ 0 |
 | a target with GTO 1 | while it is activated FLT 5, afterwards it moves; before the activation FLT 7 |
 | the force is reached before the target | OBJ 2 closing, 1 opening; it goes on squeezing |
 | the object is lost | OBJ 3; the fingers go on to the target |
@@ -272,6 +273,8 @@ class RobotiqGripper:
             if before.GTO:
                 self._command = None
                 self._is_moving = False
+            if held.POS != before.POS:
+                self._objects = Objects.MOVING  # whoever then sets GTO and waits must not find the end before
             return
         changed = is_new or (held.SPE, held.FOR) != (before.SPE, before.FOR)
         if changed or self._command is None:
