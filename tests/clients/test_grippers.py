@@ -9,11 +9,11 @@ import subprocess
 import sys
 import threading
 import tty
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
-from clients_support import TIMEOUT
+from clients_support import TIMEOUT, wait_until
 
 from ur_emulator import ControlBox
 from ur_hil.tools import TOOLS
@@ -35,14 +35,17 @@ def box():
 
 @pytest.fixture
 def line(box):
-    """Address of the serial line, which the software of port 63352 has given back."""
-    peers = {}
-    for words in (entry.text.split() for entry in box.log if " gripper port " in entry.text):
-        peers[words[0]] = words[1]
-    for peer, last in peers.items():
-        if last == "connected":
-            box.wait_until(log=f"{peer} disconnected from gripper port")
-    return box.host, box.ports.tool_line
+    """Address of the serial line, when the software of port 63352 has given it back."""
+    address = box.host, box.ports.tool_line
+
+    def answers():
+        with socket.create_connection(address, timeout=0.5) as client, suppress(TimeoutError):
+            client.sendall(bytes.fromhex("09 04 07 D0 00 01 30 0F"))
+            return bool(client.recv(100))
+        return False
+
+    wait_until(answers, "an answer on the serial line")
+    return address
 
 
 @contextmanager

@@ -430,6 +430,13 @@ def test_a_power_cut_leaves_the_grip_and_needs_a_new_activation(box, client):
     box.remove_thing("block")
 
 
+def leave(box, client):
+    """Disconnect, and wait until the box knows it."""
+    peer = "{}:{}".format(*client.getsockname())
+    client.close()
+    box.wait_until(log=f"{peer} disconnected")
+
+
 def test_the_serial_line_has_one_user_at_a_time(box, client):
     one, three = bytes.fromhex("09 04 07 D0 00 01 30 0F"), bytes.fromhex("09 04 07 D0 00 03 B1 CE")
     with (
@@ -439,13 +446,11 @@ def test_the_serial_line_has_one_user_at_a_time(box, client):
         # What is lost is never answered: the first answer is that to what is asked later.
         first.sendall(one)
         assert ask(client, "GET PCO\n") == "PCO 0\n"
-        client.close()
-        box.wait_until(log="disconnected from gripper port")
+        leave(box, client)
         second.sendall(one)
         first.sendall(three)
         assert first.recv(100)[:3] == bytes.fromhex("09 04 06")
-        first.close()
-        box.wait_until(log="disconnected from tool_line port")
+        leave(box, first)
         second.sendall(three)
         assert second.recv(100)[:3] == bytes.fromhex("09 04 06")
 
