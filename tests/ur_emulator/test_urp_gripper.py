@@ -30,16 +30,16 @@ def test_a_motion_is_guarded_and_waits(tmp_path):
         "#   Source: Robotiq_Grippers, Robotiq Inc.",
         "#   Type: Gripper",
         '$ 2 "Gripper Move50% (1)"',
-        "if (not gripper_connected[0]):",
-        'popup("Gripper 1 does not answer.", "No connection", False, True, blocking=True)',
-        'elif (not rq_is_gripper_activated("1")):',
-        'popup("Gripper 1 must be activated first.", "Not activated", False, True, blocking=True)',
-        "else:",
+        "if not(gripper_connected[0]):",
+        'popup("Gripper 1 does not answer.", "No connection", False, True, True)',
+        "end",
+        'if not(rq_is_gripper_activated("1")):',
+        'popup("Gripper 1 must be activated first.", "Not activated", False, True, True)',
+        "end",
         'rq_set_pos_spd_for(128, 26, 3, "1")',
         'rq_wait_pos_spe_for_request(128, 26, 3, "1")',
         'rq_go_to("1")',
         'rq_wait("1")',
-        "end",
         "# end: URCap Program Node",
     ]
 
@@ -62,7 +62,7 @@ def test_labels(tmp_path, node, installed, label):
 
 def test_a_motion_that_does_not_block_is_not_waited_for(tmp_path):
     lines = lines_of(tmp_path, gripper_move(0, blocking="false", slaveIds="[3]"))
-    assert lines[-3:-1] == ['rq_go_to("3")', "end"]
+    assert lines[-2:] == ['rq_go_to("3")', "# end: URCap Program Node"]
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_nodes_that_cannot_be_used(tmp_path, node, error, problem):
 def test_functions_stand_once_in_front_of_programs_that_need_them(tmp_path, software):
     text = script_of(tmp_path, urp(gripper_move(0) + gripper_move(100)), CALIBRATED)
     assert text.count("def rq_wait(") == 1
-    assert "rq_max_current = 600\n" in text
+    assert "rq_current_limit_enabled = True\n" in text
     assert "gripper_open_mm = [85.0, 50.0, 50.0, 50.0]\n" in text
     compile_program(text, catalogue=catalogue_for(software))
     call = urp(script_line("rq_close_and_wait()"))

@@ -18,8 +18,6 @@ ROBOTIQ = "Robotiq_Grippers"
 
 # Number of a gripper in programs <- its number on the serial line, and the number itself.
 _NUMBERS = {"9": 1, "1": 1, "2": 2, "3": 3, "4": 4}
-_CURRENT_LIMIT = 600
-"""Greatest current where the installation limits it [mA]; 450 also occurs, which is when is not known."""
 
 
 def declare_functions(maker: UrpMaker) -> None:
@@ -29,7 +27,7 @@ def declare_functions(maker: UrpMaker) -> None:
     rows = [known.get(number, GripperCalibration()) for number in range(1, 5)]
     maker.declare(
         ROBOTIQ,
-        f"rq_max_current = {_CURRENT_LIMIT if setup is not None and setup.is_current_limited else 0}",
+        f"rq_current_limit_enabled = {setup is not None and setup.is_current_limited}",
         f"gripper_closed_norm = {[row.closed_position for row in rows]}",
         f"gripper_open_norm = {[row.open_position for row in rows]}",
         f"gripper_closed_mm = {[row.closed_width for row in rows]}",
@@ -63,17 +61,14 @@ def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
     position, speed, force = (_percent(node, f"{key}InDouble", key) for key in ("position", "speed", "force"))
     writer.label(node.number, f"Gripper {_motion(maker, n, position)} ({n})", around.mark)
     request = f'{_counts(position)}, {_counts(speed)}, {_counts(force)}, "{n}"'
-    with writer.branch(f"if (not gripper_connected[{n - 1}]):"):
-        writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, blocking=True)')
-    with writer.branch(f'elif (not rq_is_gripper_activated("{n}")):'):
-        writer.add(
-            f'popup("Gripper {n} must be activated first.", "Not activated", False, True, blocking=True)'
-        )
-    with writer.block("else:"):
-        writer.add(f"rq_set_pos_spd_for({request})", f"rq_wait_pos_spe_for_request({request})")
-        writer.add(f'rq_go_to("{n}")')
-        if node.data.get("blocking", "true") == "true":
-            writer.add(f'rq_wait("{n}")')
+    with writer.block(f"if not(gripper_connected[{n - 1}]):"):
+        writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, True)')
+    with writer.block(f'if not(rq_is_gripper_activated("{n}")):'):
+        writer.add(f'popup("Gripper {n} must be activated first.", "Not activated", False, True, True)')
+    writer.add(f"rq_set_pos_spd_for({request})", f"rq_wait_pos_spe_for_request({request})")
+    writer.add(f'rq_go_to("{n}")')
+    if node.data.get("blocking", "true") == "true":
+        writer.add(f'rq_wait("{n}")')
 
 
 def _motion(maker: UrpMaker, n: int, position: float) -> str:
