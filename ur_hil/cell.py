@@ -2,7 +2,7 @@
 
 The client plans around them; the emulated box puts them around its arm.
 
-The tool is a shape that must not touch anything, and a load. The TCP is the flange, or `length` before it.
+The tool is a shape that must not touch anything, and a load. The TCP is the flange, or `length` beyond it.
 
 A cell file is TOML, read strictly; `examples/cell.toml` shows every field, `docs/real-arm.md` explains them.
 """
@@ -89,7 +89,7 @@ class Tool:
     @property
     def tcp_text(self) -> str:
         """Where the TCP is, for people."""
-        return f"TCP {1e3 * self.length:g} mm before the flange" if self.length else "TCP at the flange"
+        return f"TCP {1e3 * self.length:g} mm beyond the flange" if self.length else "TCP at the flange"
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ _HERE = {
     "OBJ": "exact",
     "FLT": "exact for 0, 5, 7, 11, 13, 15; no others occur",
     "COU": "approximate: 100 mA while the fingers move, else 0",
-    "NCY": "declared: 0",
+    "NCY": "declared: 1",
     "SNU": "declared: a number that no real gripper has",
     "FWV": "declared",
     "VER": "declared",
