@@ -86,7 +86,7 @@ def test_the_text_of_a_cell_has_the_tool():
     text = 'format = 1\nname = "bench"\n[[walls]]\nname = "window"\ny_max = 0.6'
     for cell in (surroundings(parse_cell(text, "f", FILE_KINDS["cell"]), HAND.name), MODEL.cell):
         assert parse_cell(cell.text, "f", FILE_KINDS["cell"]) == cell
-        assert cell.summary.endswith("tool of 0.9 kg, cylinder 'Robotiq 2F-85', TCP 150 mm before the flange")
+        assert cell.summary.endswith("tool of 0.9 kg, cylinder 'Robotiq 2F-85', TCP 150 mm beyond the flange")
     made = surroundings(Cell("bench", walls=(wall,)), HAND.name)
     assert (made.walls, made.tool, made.text) == ((wall,), MODEL.cell.tool, "")
 
