@@ -10,6 +10,7 @@ import pytest
 from box_support import (
     TIMEOUT,
     Bench,
+    FakeNetwork,
     FrameReader,
     MessageReader,
     connect,
@@ -45,6 +46,32 @@ def box():
 
 def log_lines(box, words):
     return [entry.text for entry in box.log if words in entry.text]
+
+
+class OwnPorts(FakeNetwork):
+    """Every connection leads to the box itself."""
+
+    def open(self, host, port):
+        sock = super().open(host, port)
+        sock.is_own = True
+        return sock
+
+
+@pytest.mark.parametrize(
+    "read", ['socket_read_byte_list(6, "g", 0.1)', 'socket_read_string("g", timeout=0.1)']
+)
+def test_time_waits_for_an_own_port_only_behind_a_question(read):
+    bench = Bench(network=OwnPorts())
+    opened, ask = 'socket_open("127.0.0.1", 63352, "g")', 'socket_send_line("GET STA", "g")'
+    bench.start(program(opened, f'textmsg("first ", {read})', ask, f'textmsg("then ", {read})'))
+    bench.tick()
+    assert not bench.controller.waits_outside
+    while not bench.texts:
+        bench.tick()
+    assert bench.controller.waits_outside
+    bench.network.sockets[0].inbox += b"STA 3\n"
+    bench.tick(2)
+    assert bench.texts[1].startswith("then ")
 
 
 # --- how many

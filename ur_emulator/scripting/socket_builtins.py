@@ -28,6 +28,17 @@ class SocketReader:
     def __init__(self, socket: ScriptSocket) -> None:
         self.socket = socket
         self.n_taken = 0
+        self._has_asked = False
+
+    @property
+    def waits_outside(self) -> bool:
+        """Bytes can come that time must wait for: from outside, or the answer of a port of the box itself."""
+        return self._has_asked or not self.socket.is_own
+
+    def send(self, data: bytes) -> bool:
+        """Send; the peer may answer."""
+        self._has_asked = True
+        return self.socket.send(data)
 
     def take(self, size: int) -> bytes:
         """Take bytes out of the inbox."""
@@ -35,6 +46,7 @@ class SocketReader:
         data = bytes(inbox[:size])
         del inbox[:size]
         self.n_taken += len(data)
+        self._has_asked = self._has_asked and bool(inbox)
         return data
 
 
@@ -149,7 +161,7 @@ class SocketBuiltins(BuiltinGroup):
 
     def _send(self, name: _Name, data: bytes) -> bool:
         reader = self._reader(name)
-        return reader is not None and reader.socket.send(data)
+        return reader is not None and reader.send(data)
 
     @builtin("socket_send_byte")
     def _send_byte(self, thread: object, value: int, name: _Name) -> bool:
@@ -205,7 +217,7 @@ class SocketBuiltins(BuiltinGroup):
                 yield NEXT_CYCLE
             if is_over():
                 break
-            yield Blocked(lambda: not self._may_search() or is_over(), outside=True)
+            yield Blocked(lambda: not self._may_search() or is_over(), outside=reader.waits_outside)
             has_waited = True
         if not has_waited:
             yield CHECKPOINT
@@ -250,7 +262,8 @@ class SocketBuiltins(BuiltinGroup):
             def has_come(n_bytes: int) -> bool:
                 return len(inbox) >= n_bytes or not socket.is_open or clock.program_tick >= end
 
-            if socket.is_own:  # the box's own answer comes whole: what it lacks will not come
+            if socket.is_own and reader.waits_outside:
+                # The box's own answer comes whole: what it lacks will not come.
                 yield Blocked(lambda: has_come(1), outside=True)
             yield Blocked(lambda: has_come(enough), outside=not socket.is_own)
         else:
