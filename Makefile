@@ -12,7 +12,7 @@ PAGES := README.md SECURITY.md CONTRIBUTING.md CHANGELOG.md docs examples
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: ablation attack pictures help setup demo draw explore soak test check check-static bench format docs clean
+.PHONY: ablation attack pictures help setup demo draw explore pick soak test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -41,6 +41,9 @@ ablation: $(STAMP) ## what each piece of the controller brings, into out/ablatio
 
 draw: $(STAMP) ## drawings on the emulated arm: extracted, executed, compared, into out/draw
 	$(BIN)/python examples/draw.py
+
+pick: $(STAMP) ## a block picked up like a hand and like a robot, page and film, into out/pick
+	$(BIN)/python examples/08_pick_like_a_hand.py
 
 test: $(STAMP) ## all tests, in one process more than there are cores, at most four
 	$(PYTEST)

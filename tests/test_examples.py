@@ -101,6 +101,21 @@ def test_demo_and_plot(run, tmp_path):
 
 
 @pytest.mark.slow
+def test_pick(run, tmp_path):
+    """One style and a film of few pictures; the fingers end on the block, and it ends where it should."""
+    said = run("08_pick_like_a_hand.py", "--out", tmp_path, STYLES={"human": "lognormal strokes"}, FPS=1)
+    reach, carry, withdraw, top, width, missed = map(float, re.search(r"human +(.+)", said)[1].split())
+    assert min(reach, carry, withdraw) > 25.0
+    assert top > 500.0
+    assert width == pytest.approx(40.0, abs=1.0)
+    assert missed < 3.0  # the calibration of the arm
+    assert (tmp_path / "pick.gif").read_bytes().startswith(b"GIF89a")
+    page = (tmp_path / "index.html").read_text()
+    assert f"{missed:.1f} mm" in page
+    assert "data:image/gif;base64," in page
+
+
+@pytest.mark.slow
 def test_ablation(run, tmp_path):
     said = run("ablation.py", "--quick", "--out", tmp_path)
     assert len(said.splitlines()) == 1
