@@ -14,7 +14,7 @@ from urscript import compile_program
 from urscript.catalogue import catalogue_for
 
 CALIBRATION = GripperCalibration(90.2, 1.18, 0.0, 85.0)
-CALIBRATED = Installation("/programs/cell.installation", grippers=GripperSetup(True, {1: CALIBRATION}))
+CALIBRATED = Installation("/programs/cell.installation", grippers=GripperSetup(True, True, {1: CALIBRATION}))
 
 
 def check(*, detects=True, **data):
@@ -74,7 +74,7 @@ def test_a_motion_that_does_not_block_is_not_waited_for(tmp_path):
             check(GripperIdKey="2", DimensionValidationKey="true", DimensionKey="50", DimensionNegativeGapKey="10",
                   DimensionDimensionPositiveGapKey="5"),
             "If grip validated",
-            'rq_is_object_detected("2") and rq_current_pos("2") >= 102.0 and rq_current_pos("2") <= 140.25',
+            'rq_is_object_detected("2") and rq_current_pos("2") >= 102.00 and rq_current_pos("2") <= 140.25',
         ),
     ],
 )  # fmt: skip
@@ -100,7 +100,7 @@ def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
         (gripper_move(0, slaveIds="[9, 2]"), UnknownNodeError, "a node of the grippers '9, 2' cannot"),
         (gripper_move(101), ProgramFileError, "position is 101 %: use 0 to 100"),
         (gripper_node("Gripper"), ProgramFileError, "position of a Gripper node is None, a number"),
-        (gripper_node("Grip Check"), ProgramFileError, "a Grip Check node has no If"),
+        (gripper_node("Grip Check"), ProgramFileError, "a Grip Check node needs an If and an Else"),
     ],
 )
 def test_nodes_that_cannot_be_used(tmp_path, node, error, problem):
@@ -140,9 +140,10 @@ def test_the_installation_gives_calibrations_and_the_voltage(tmp_path):
     path.write_bytes(installation(contribution(**values)))
     cell = load_installation(ProgramFolder(tmp_path), path.name)
     assert (cell.grippers, cell.tool_voltage) == (CALIBRATED.grippers, 24)
-    path.write_bytes(installation(contribution(**values | {"_models.Gripper1._openValueInPercent": "90.2"})))
-    with pytest.raises(ProgramFileError, match="gripper 1 is open and closed in one position"):
-        load_installation(ProgramFolder(tmp_path), path.name)
+    for key, value in (("_openValueInPercent", "90.2"), ("_openValueInMillimeters", "1e308")):
+        path.write_bytes(installation(contribution(**values | {f"_models.Gripper1.{key}": value})))
+        with pytest.raises(ProgramFileError, match="use two positions, widths below 1 m"):
+            load_installation(ProgramFolder(tmp_path), path.name)
 
 
 # --- what the script does

@@ -96,23 +96,24 @@ class DeclaredSignal:
 class GripperCalibration:
     """Two positions of a gripper of Robotiq [%] and their widths [mm]; the defaults hold without it."""
 
-    closed_position: float = 100.0
-    open_position: float = 0.0
-    closed_width: float = 0.0
-    open_width: float = 50.0
+    closed_norm: float = 100.0
+    open_norm: float = 0.0
+    closed_mm: float = 0.0
+    open_mm: float = 50.0
 
     def width(self, position: float) -> float:
         """Return the width at a position, within the two widths."""
-        share = (position - self.closed_position) / (self.open_position - self.closed_position)
-        return self.closed_width + min(max(share, 0.0), 1.0) * (self.open_width - self.closed_width)
+        share = (position - self.closed_norm) / (self.open_norm - self.closed_norm)
+        return self.closed_mm + min(max(share, 0.0), 1.0) * (self.open_mm - self.closed_mm)
 
 
 @dataclass(frozen=True, slots=True)
 class GripperSetup:
-    """What an installation gives for grippers of Robotiq; calibrations by number of the gripper, from 1."""
+    """The part of Robotiq's grippers; calibrations by number of the gripper, from 1."""
 
-    is_current_limited: bool
-    calibrations: Mapping[int, GripperCalibration]
+    is_there: bool = False
+    is_current_limited: bool = False
+    calibrations: Mapping[int, GripperCalibration] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +152,6 @@ class Installation:
         modbus: signals of other units.
         safe_home: joint angles [rad].
         start_up: what the box does when it is switched on.
-        grippers: None without the software of Robotiq's grippers.
     """
 
     wire_path: str
@@ -174,7 +174,7 @@ class Installation:
     safe_home: Vector6 = NEW_HOME
     safety: SafetySettings = NO_SETTINGS
     start_up: StartUp = StartUp()
-    grippers: GripperSetup | None = None
+    grippers: GripperSetup = GripperSetup()
 
     @property
     def tcp_offset(self) -> Vector6:

@@ -82,6 +82,7 @@ def _read(reader: ProgramReader, name: str) -> Installation:
 # Contributors of parts of an installation. Sources: the source text of the URCap; installations.
 _EXTERNAL_CONTROL = "com.fzi.externalcontrol"
 _ROBOTIQ = "com.robotiq.urcap.gripper"
+_CALIBRATION = [f"_{end}ValueIn{unit}" for unit in ("Percent", "Millimeters") for end in ("closed", "open")]
 # Element with the names of lines -> their own name, the index of the first.
 _LINE_NAMES = {
     "DigitalInputNames": ("digital_in", 0),
@@ -241,32 +242,19 @@ class _Reader(_Values):
         data = self._contributed(_EXTERNAL_CONTROL)
         return pc_from(data, self.tree.name), data.get("name", "")
 
-    def grippers(self) -> installation.GripperSetup | None:
+    def grippers(self) -> installation.GripperSetup:
         data = self._contributed(_ROBOTIQ)
-        if not data:
-            return None
-        calibrations: dict[int, installation.GripperCalibration] = {}
-        for gripper in range(1, 5):
-            prefix = f"_models.Gripper{gripper}."
-            if data.get(f"{prefix}_isCalibrationDefined") != "true":
-                continue
-            calibration = installation.GripperCalibration(
-                *(
-                    self.number(data.get(prefix + key), f"{key} of gripper {gripper}")
-                    for key in (
-                        "_closedValueInPercent",
-                        "_openValueInPercent",
-                        "_closedValueInMillimeters",
-                        "_openValueInMillimeters",
-                    )
-                )
-            )
-            if calibration.closed_position == calibration.open_position:
-                raise ProgramFileError(
-                    f"{self.tree.name}: gripper {gripper} is open and closed in one position"
-                )
-            calibrations[gripper] = calibration
-        return installation.GripperSetup(data.get("gripper_current_limit_enabled") == "true", calibrations)
+        calibrations = {}
+        for n in range(1, 5):
+            prefix = f"_models.Gripper{n}."
+            if data.get(prefix + "_isCalibrationDefined") == "true":
+                values = [self.number(data.get(prefix + key), f"{key} of a gripper") for key in _CALIBRATION]
+                if values[0] == values[1] or max(map(abs, values)) > 1000.0:
+                    problem = f"gripper {n} is calibrated at {values}: use two positions, widths below 1 m"
+                    raise ProgramFileError(f"{self.tree.name}: {problem}")
+                calibrations[n] = installation.GripperCalibration(*values)
+        is_limited = data.get("gripper_current_limit_enabled") == "true"
+        return installation.GripperSetup(bool(data), is_limited, calibrations)
 
     def tcps(self) -> tuple[dict[str, Vector6], str]:
         settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))

@@ -161,7 +161,7 @@ def make_script(
                 with writer.block(f"def {sub_program.name}():"):
                     _write_section(maker, sub_program.node, sub_program.name, mark="noBreak")
         written = (*writer.parts, *functions, *before, *others, *body)
-        if installation.grippers and any("rq_" in part for part in written if isinstance(part, str)):
+        if installation.grippers.is_there and any("rq_" in part for part in written if isinstance(part, str)):
             declare_functions(maker)
         for timer in maker.timers:
             if f"first value of {timer}" not in maker.declarations:

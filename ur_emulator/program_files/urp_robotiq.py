@@ -1,8 +1,7 @@
 """Nodes of Robotiq's grippers in program files: Gripper, Gripper Activate and Grip Check.
 
-They become calls of functions whose names begin with `rq_`. Those are in `robotiq.script` beside this module
-and stand before all nodes of a program that calls one of them. Source: program files and the scripts that
-PolyScope saved beside them (reference `grippers.md` 5). Titles of popups are the maker's.
+They become calls of the functions in `robotiq.script`, which stand before all nodes of such a program.
+Source: program files and the scripts saved beside them (reference `grippers.md` 5), as are popups' titles.
 """
 
 import math
@@ -23,15 +22,14 @@ _NUMBERS = {"9": 1, "1": 1, "2": 2, "3": 3, "4": 4}
 def declare_functions(maker: UrpMaker) -> None:
     """Put the functions before all nodes, and what the installation gives for them."""
     setup = maker.installation.grippers
-    known = {} if setup is None else setup.calibrations
-    rows = [known.get(number, GripperCalibration()) for number in range(1, 5)]
+    rows = [setup.calibrations.get(n, GripperCalibration()) for n in range(1, 5)]
     maker.declare(
         ROBOTIQ,
-        f"rq_current_limit_enabled = {setup is not None and setup.is_current_limited}",
-        f"gripper_closed_norm = {[row.closed_position for row in rows]}",
-        f"gripper_open_norm = {[row.open_position for row in rows]}",
-        f"gripper_closed_mm = {[row.closed_width for row in rows]}",
-        f"gripper_open_mm = {[row.open_width for row in rows]}",
+        f"rq_current_limit_enabled = {setup.is_current_limited}",
+        *(
+            f"gripper_{name} = {[getattr(row, name) for row in rows]}"
+            for name in GripperCalibration.__slots__
+        ),
         resources.files(__package__).joinpath("robotiq.script").read_text("utf-8"),
         "rq_init()",
     )
@@ -39,28 +37,33 @@ def declare_functions(maker: UrpMaker) -> None:
 
 def write_gripper_node(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a node by its type."""
-    kind = node.get("strategyProgramNodeType")
     declare_functions(maker)
-    match kind:
+    match node.get("strategyProgramNodeType"):
         case "Gripper":
             _write_motion(maker, node, around)
         case "Gripper Activate":
             reset = node.data.get("ResetAndActivateKey") == "true"
-            maker.writer.label(
-                node.number, "Gripper Reset and Activate" if reset else "Gripper Activate", around.mark
-            )
+            label = f"Gripper {'Reset and ' if reset else ''}Activate"
+            maker.writer.label(node.number, label, around.mark)
             maker.writer.add("rq_init()", f"rq_activate_all_grippers({reset})")
         case "Grip Check":
             _write_check(maker, node, around)
-        case _:
+        case kind:
             raise node.source.unknown(f"a node {kind!r} of the URCap {ROBOTIQ!r}")
 
 
 def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
     writer, n = maker.writer, _gripper(node, "slaveIds")
-    position, speed, force = (_percent(node, f"{key}InDouble", key) for key in ("position", "speed", "force"))
-    writer.label(node.number, f"Gripper {_motion(maker, n, position)} ({n})", around.mark)
-    request = f'{_counts(position)}, {_counts(speed)}, {_counts(force)}, "{n}"'
+    percents = [_percent(node, f"{key}InDouble", key) for key in ("position", "speed", "force")]
+    request = ", ".join(f"{_rounded(percent * 255.0 / 100.0)}" for percent in percents) + f', "{n}"'
+    calibration = maker.installation.grippers.calibrations.get(n)
+    if percents[0] in (0.0, 100.0):
+        motion = "Close" if percents[0] else "Open"
+    elif calibration is None:
+        motion = f"Move{_rounded(percents[0])}%"
+    else:
+        motion = f"Move{_rounded(calibration.width(percents[0]))}mm"
+    writer.label(node.number, f"Gripper {motion} ({n})", around.mark)
     with writer.block(f"if not(gripper_connected[{n - 1}]):"):
         writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, True)')
     with writer.block(f'if not(rq_is_gripper_activated("{n}")):'):
@@ -71,43 +74,26 @@ def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
         writer.add(f'rq_wait("{n}")')
 
 
-def _motion(maker: UrpMaker, n: int, position: float) -> str:
-    """Return what a label says of a motion to a position [%]."""
-    if position in (0.0, 100.0):
-        return "Close" if position else "Open"
-    setup = maker.installation.grippers
-    calibration = None if setup is None else setup.calibrations.get(n)
-    if calibration is None:
-        return f"Move{_rounded(position)}%"
-    return f"Move{_rounded(calibration.width(position))}mm"
-
-
 def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
     writer, data, n = maker.writer, node.data, _gripper(node, "GripperIdKey")
     branches = {child.get("strategyProgramNodeType"): child for child in node.children}
-    if "If" not in branches:
-        raise node.source.error("a Grip Check node has no If")
+    if branches.keys() != {"If", "Else"}:
+        raise node.source.error("a Grip Check node needs an If and an Else")
     detects = data.get("ObjectDetectedKey", "true") == "true"
-    condition = f'{"" if detects else "not "}rq_is_object_detected("{n}")'
     label = "If object detected" if detects else "If object not detected"
+    condition = f'{"" if detects else "not "}rq_is_object_detected("{n}")'
     if data.get("DimensionValidationKey") == "true":
-        middle, more, less = (
-            _percent(node, key)
-            for key in ("DimensionKey", "DimensionDimensionPositiveGapKey", "DimensionNegativeGapKey")
-        )
-        low, high = round((middle - less) * 2.55, 2), round((middle + more) * 2.55, 2)
-        position = f'rq_current_pos("{n}")'
-        condition += f" and {position} >= {low} and {position} <= {high}"
-        label = "If grip validated"
+        keys = ("DimensionKey", "DimensionDimensionPositiveGapKey", "DimensionNegativeGapKey")
+        middle, more, less = (_percent(node, key) * 2.55 for key in keys)
+        label, position = "If grip validated", f'rq_current_pos("{n}")'
+        condition += f" and {position} >= {middle - less:.2f} and {position} <= {middle + more:.2f}"
     writer.label(node.number, "Grip Check", around.mark)
     writer.label(branches["If"].number, label + " " * 10, "noBreak")
     with writer.branch(f"if ({condition}):"):
         maker.write_children(branches["If"], around)
-    if "Else" in branches:
-        with writer.branch("else:"):
-            writer.label(branches["Else"].number, "Else", "noBreak")
-            maker.write_children(branches["Else"], around)
-    writer.add("end")
+    with writer.block("else:"):
+        writer.label(branches["Else"].number, "Else", "noBreak")
+        maker.write_children(branches["Else"], around)
 
 
 def _gripper(node: Node, key: str) -> int:
@@ -125,10 +111,6 @@ def _percent(node: Node, *keys: str) -> float:
     if not 0.0 <= value <= 100.0:
         raise node.source.error(f"{keys[-1]} is {value:g} %: use 0 to 100")
     return value
-
-
-def _counts(percent: float) -> int:
-    return _rounded(percent * 255.0 / 100.0)
 
 
 def _rounded(value: float) -> int:

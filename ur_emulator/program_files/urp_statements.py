@@ -200,9 +200,8 @@ def write_contributed(maker: UrpMaker, node: Node, around: Around) -> None:
 def _write_external_control(maker: UrpMaker, node: Node, around: Around) -> None:
     pc = pc_from(node.data, node.source.tree.name)
     title = one_line(node.get("strategyProgramNodeType") or EXTERNAL_CONTROL)
-    maker.writer.label(
-        node.number, f"Control by {maker.installation.pc_name or pc.host or title}", around.mark
-    )
+    name = maker.installation.pc_name or pc.host or title
+    maker.writer.label(node.number, f"Control by {name}", around.mark)
     maker.writer.gap(pc)
 
 

@@ -23,22 +23,17 @@ from urscript.values import log_form
 
 
 class SocketReader:
-    """A socket that a program has opened."""
+    """A socket that a program has opened; it `has_asked` if an answer to what it sent may come."""
 
     def __init__(self, socket: ScriptSocket) -> None:
         self.socket = socket
         self.n_taken = 0
-        self._has_asked = False
+        self.has_asked = False
 
     @property
     def waits_outside(self) -> bool:
         """Bytes can come that time must wait for: from outside, or the answer of a port of the box itself."""
-        return self._has_asked or not self.socket.is_own
-
-    def send(self, data: bytes) -> bool:
-        """Send; the peer may answer."""
-        self._has_asked = True
-        return self.socket.send(data)
+        return self.has_asked or not self.socket.is_own
 
     def take(self, size: int) -> bytes:
         """Take bytes out of the inbox."""
@@ -46,7 +41,7 @@ class SocketReader:
         data = bytes(inbox[:size])
         del inbox[:size]
         self.n_taken += len(data)
-        self._has_asked = self._has_asked and bool(inbox)
+        self.has_asked = self.has_asked and bool(inbox)
         return data
 
 
@@ -161,7 +156,10 @@ class SocketBuiltins(BuiltinGroup):
 
     def _send(self, name: _Name, data: bytes) -> bool:
         reader = self._reader(name)
-        return reader is not None and reader.send(data)
+        if reader is None:
+            return False
+        reader.has_asked = True
+        return reader.socket.send(data)
 
     @builtin("socket_send_byte")
     def _send_byte(self, thread: object, value: int, name: _Name) -> bool:
