@@ -53,6 +53,21 @@ def test_an_arm_has_the_gripper_that_it_was_given(box):
         arm.gripper.open()
 
 
+def test_a_person_is_asked_before_fingers_of_an_arm_that_may_be_real(box, monkeypatch):
+    asked = []
+    box.run_program(SETTINGS, wait=True)
+    arm = ur.connect(box.host, box.ports, tool="robotiq-2f85", confirm=asked.append)  # the answer is None: no
+    monkeypatch.setattr(ur.Arm, "simulated", None)
+    for motion in (arm.gripper.close, lambda: arm.set_payload(2.0, (0.0, 0.0, 0.1))):
+        with pytest.raises(ClientError, match="the arm was not moved: the answer was no"):
+            motion()
+    assert [text.split(" at ")[0] for text in asked] == [
+        "the fingers of the Robotiq 2F-85",
+        "the payload of the arm",
+    ]
+    assert (box.state.grippers[0]["STA"], box.state.payload) == (0, 0.9)
+
+
 def test_an_arm_without_a_gripper_says_so(ur_box_factory):
     box = ur_box_factory(robot="ur5e")
     with pytest.raises(ClientError, match="has no gripper: give connect its tool"):
