@@ -208,6 +208,7 @@ class Ports:
         interpreter: takes statements for a program in interpreter mode; not on CB3. Source: script manual.
         tool_line: the serial line at the tool (docs/grippers.md).
         gripper: variables of a Robotiq gripper (docs/grippers.md).
+        onrobot: methods of OnRobot grippers (docs/grippers.md).
     """
 
     robot_api: int = 80
@@ -223,6 +224,7 @@ class Ports:
     interpreter: int = 30020
     tool_line: int = 54321
     gripper: int = 63352
+    onrobot: int = 41414
 
     @classmethod
     def of(cls, numbers: Mapping[str, int]) -> Ports:
@@ -233,7 +235,7 @@ class Ports:
     def standard(cls, offset: int = 0) -> Ports:
         """The vendor's ports, all moved by `offset` for machines where they are taken.
 
-        Those of Modbus and of the Robot API, far below the others, and that of the gripper, far above them,
+        Those of Modbus and of the Robot API, far below the others, and those of grippers, far above them,
         are 0 (none) where they would leave the TCP ports. LocalProtocolError if another one would leave
         1..65535.
         """

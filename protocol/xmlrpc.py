@@ -1,4 +1,4 @@
-"""XML-RPC: calls as bytes, and answers read piece by piece.
+"""XML-RPC: calls as bytes, and calls and answers read piece by piece.
 
     call:    <methodCall> <methodName> <params> <param> <value> ...
     answer:  <methodResponse> <params> <param> <value> ... or <methodResponse> <fault> <value> <struct> ...
@@ -11,7 +11,7 @@
 | string, no type at all | str                          |
 | array                  | list                         |
 | struct                 | dict                         |
-| nil                    | None, in answers only        |
+| nil                    | None, only read              |
 
 dateTime.iso8601 and base64 are refused: no value of a robot's program is one. The standard library's
 `xmlrpc.client` takes these and document types, bounds neither the depth nor the number of values, and imports
@@ -26,7 +26,7 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 
-__all__ = ["AnswerReader", "RemoteFaultError", "encode_call"]
+__all__ = ["AnswerReader", "CallReader", "RemoteFaultError", "encode_call"]
 
 DEEPEST: Final = 32
 """Elements inside each other; an array of arrays has eleven."""
@@ -76,7 +76,7 @@ def _text(text: str) -> str:
     return text.translate(_ESCAPED)
 
 
-# --- answers
+# --- reading
 
 
 def _boolean(text: str) -> bool:
@@ -99,7 +99,7 @@ _SCALARS: Final[Mapping[str, Callable[[str], Any]]] = {
     "nil": _none,
 }
 _CONTENT: Final[Mapping[str, frozenset[str]]] = {
-    "": frozenset({"methodResponse"}),
+    "methodCall": frozenset({"methodName", "params"}),
     "methodResponse": frozenset({"params", "fault"}),
     "params": frozenset({"param"}),
     "param": frozenset({"value"}),
@@ -125,13 +125,15 @@ class _Element:
 
 
 class _Name(str):
-    """Text of a <name>, which is not a value."""
+    """Text of a <name> or <methodName>, which is not a value."""
 
     __slots__ = ()
 
 
 class AnswerReader:
     """Reads an answer as it comes; it may have `most_values` values, arrays and structs included."""
+
+    _what, _root = "the answer", "methodResponse"
 
     def __init__(self, most_values: int) -> None:
         self._values_left = most_values
@@ -165,21 +167,21 @@ class AnswerReader:
         try:
             self._parser.Parse(data, is_end)
         except (ExpatError, LookupError, ValueError, TypeError) as error:  # the latter: of its encoding
-            raise RemoteProtocolError(f"the answer is not XML: {error}") from None
+            raise RemoteProtocolError(f"{self._what} is not XML: {error}") from None
 
     def _doctype(self, *_: object) -> NoReturn:
-        raise RemoteProtocolError("the answer has a document type, which XML-RPC does not know")
+        raise RemoteProtocolError(f"{self._what} has a document type, which XML-RPC does not know")
 
     def _start(self, name: str, attributes: Mapping[str, str]) -> None:
         inside = self._open[-1].name
-        if name not in _CONTENT.get(inside, ()):
-            raise RemoteProtocolError(f"the answer has <{name[:40]}> inside <{inside or 'nothing'}>")
+        if name not in (_CONTENT.get(inside, ()) if inside else (self._root,)):
+            raise RemoteProtocolError(f"{self._what} has <{name[:40]}> inside <{inside or 'nothing'}>")
         if len(self._open) > DEEPEST:
-            raise RemoteProtocolError(f"the answer has more than {DEEPEST} elements inside each other")
+            raise RemoteProtocolError(f"{self._what} has more than {DEEPEST} elements inside each other")
         if name == "value":
             self._values_left -= 1
             if self._values_left < 0:
-                raise RemoteProtocolError("the answer has too many values")
+                raise RemoteProtocolError(f"{self._what} has too many values")
         self._open.append(_Element(name))
 
     def _data(self, text: str) -> None:
@@ -192,8 +194,14 @@ class AnswerReader:
             value = _value_of(element)
         except ValueError:
             text = "".join(element.text)[:40]
-            raise RemoteProtocolError(f"the answer has a <{name}> that is not valid: {text!r}") from None
+            raise RemoteProtocolError(f"{self._what} has a <{name}> that is not valid: {text!r}") from None
         self._open[-1].values.append(value)
+
+
+class CallReader(AnswerReader):
+    """Reads a call in the same way; `result` returns the method and its arguments."""
+
+    _what, _root = "the call", "methodCall"
 
 
 def _value_of(element: _Element) -> Any:
@@ -201,11 +209,11 @@ def _value_of(element: _Element) -> Any:
     name, values = element.name, element.values
     if name in _SCALARS:
         return _SCALARS[name]("".join(element.text).strip())
-    if name == "name":
+    if name in ("name", "methodName"):
         return _Name("".join(element.text))
     if name == "string" or (name == "value" and not values):
         return "".join(element.text)
-    if name == "data":
+    if name in ("data", "params"):
         return values
     if name == "member":
         key, value = _exactly(2, values)
@@ -214,9 +222,14 @@ def _value_of(element: _Element) -> Any:
         return str(key), value
     if name == "struct":
         return dict(values)
-    if name == "params":
-        return _exactly(1, values)[0] if values else None
+    if name == "methodCall":
+        method, arguments = values if len(values) > 1 else (*values, [])
+        if type(method) is not _Name or type(arguments) is not list:
+            raise ValueError
+        return str(method), arguments
     value = _exactly(1, values)[0]
+    if name == "methodResponse":
+        return _exactly(1, value)[0] if value else None
     if name == "fault":
         text = value.get("faultString") if isinstance(value, dict) else None
         raise RemoteFaultError(text if type(text) is str else "a fault without a text")

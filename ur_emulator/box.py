@@ -33,7 +33,7 @@ from ur_emulator.outgoing.loop_network import LoopNetwork
 from ur_emulator.plant.scene import load_scene
 from ur_emulator.polyscope.player import ProgramPlayer, start_up
 from ur_emulator.polyscope.report_writer import ReportWriter
-from ur_emulator.ports.port_set import CONTROL, GRIPPER, TOOL_LINE, PortSet, SendingPorts, answering_ports
+from ur_emulator.ports.port_set import CONTROL, SOFTWARE_OF, TOOL_LINE, PortSet, SendingPorts, answering_ports
 from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.scripting.network import Network
@@ -244,7 +244,7 @@ class Box:
             raise
         if control_port := numbers.pop(CONTROL, 0):
             close_to_scripts(self, control_port)
-        for name in (GRIPPER, TOOL_LINE):
+        for name in (TOOL_LINE, *SOFTWARE_OF.values()):
             if name in numbers:
                 self._network.own_ports[getattr(Ports(), name)] = (self._options.host, numbers[name])
         self.served_at = dataclasses.replace(
@@ -263,8 +263,9 @@ class Box:
         """Numbers of the ports to open by name; 0 takes a free one."""
         ports = dataclasses.asdict(self.served_at.ports)
         numbers = {name: number for name, number in ports.items() if number}
-        if any(tool.kind == "robotiq" for tool in self._choice.tools) and GRIPPER not in numbers:
-            numbers[GRIPPER] = 0  # moved beyond the ports of TCP
+        for kind, name in SOFTWARE_OF.items():
+            if any(tool.kind == kind for tool in self._choice.tools):
+                numbers.setdefault(name, 0)  # moved beyond the ports of TCP
         if self._options.port_base is None:
             numbers = dict.fromkeys(numbers, 0)
         if self._options.control_port is not None:

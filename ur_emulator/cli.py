@@ -41,6 +41,7 @@ _SHOWN_PORTS = (
     "interpreter",
     "modbus",
     "gripper",
+    "onrobot",
     "tool_line",
 )
 

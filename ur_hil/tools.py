@@ -7,9 +7,9 @@ of the flange: z away from the arm, fingers along x.
 """
 
 from dataclasses import dataclass, fields, replace
-from math import cos, pi, sin
+from math import cos, pi, radians, sin
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import checked, number, record, text, whole, word
@@ -17,7 +17,22 @@ from ur_hil.records import checked, number, record, text, whole, word
 Vector3 = tuple[float, float, float]
 
 
-ToolKind = Literal["robotiq", "vacuum"]
+ToolKind = Literal["robotiq", "onrobot", "vacuum"]
+
+
+class Linkage(NamedTuple):
+    """The arms of an OnRobot gripper, which turn; its metal tips are `root + 2 arm sin(angle)` apart.
+
+    Lengths and the thickness of a fingertip on the metal [m], the angle of the least voltage [rad], the unit
+    of the force in words by tool outputs [N], and the product code.
+    """
+
+    arm: float
+    root: float
+    tip: float
+    least_angle: float
+    force_step: float
+    product: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +59,7 @@ class ToolModel:
         input: bit of the digital input that reports its vacuum.
         tilt: angle of the tool's z axis from that of the flange, about the tool's x axis [rad].
         turn: of the tilted tool about the z axis of the flange [rad].
+        linkage: of OnRobot.
     """
 
     name: str
@@ -64,6 +80,7 @@ class ToolModel:
     input: int = 16
     tilt: float = 0.0
     turn: float = 0.0
+    linkage: Linkage | None = None
 
     @property
     def quaternion(self) -> tuple[float, float, float, float]:
@@ -147,6 +164,34 @@ TOOLS: dict[str, ToolModel] = {
             friction=0.3,  # D: silicone on oiled steel
             pad=(0.011, 0.0125),
             body=0.0375,
+        ),
+        ToolModel(
+            name="onrobot-rg2",
+            title="OnRobot RG2",
+            kind="onrobot",
+            mass=0.78,  # D
+            cog=(0.0, 0.0, 0.069),  # O
+            inertia=(1.9e-3, 1.7e-3, 6e-4),  # I: a bar of this mass and length
+            length=0.218,  # S1
+            stroke=0.110 - 2 * 0.00445,  # D between the metal tips, less the fingertips
+            speed=(0.020, 0.129),  # I: 67.35 degrees/s (D) of an arm
+            force=(3.0, 40.0),  # C, D
+            friction=0.4,  # D: silicone
+            linkage=Linkage(0.055, 0.005, 0.00445, radians(5.0), 2.0, 0x20),  # D, O
+        ),
+        ToolModel(
+            name="onrobot-rg6",
+            title="OnRobot RG6",
+            kind="onrobot",
+            mass=1.25,  # D
+            cog=(0.0, 0.0, 0.085),  # ?
+            inertia=(4.2e-3, 3.9e-3, 1.2e-3),  # I
+            length=0.258,  # O
+            stroke=0.160 - 2 * 0.005,  # D
+            speed=(0.020, 0.136),  # I: 48.65 degrees/s (D)
+            force=(25.0, 120.0),  # O
+            friction=0.4,
+            linkage=Linkage(0.080, 0.0084, 0.005, radians(5.4), 5.0, 0x21),  # D, O
         ),
         ToolModel(
             name="vacuum",

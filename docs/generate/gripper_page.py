@@ -1,14 +1,17 @@
-"""The page docs/protocol/gripper.md, made from the variables of Robotiq's port."""
+"""The page docs/protocol/gripper.md, made from the tables of Robotiq's port and of OnRobot's."""
 
 from __future__ import annotations
 
 from protocol.robotiq import INPUTS, OUTPUTS, VARIABLES, Variable
+from ur_emulator.controller.grippers.onrobot import STATUS
+from ur_emulator.ports.onrobot import METHODS
 
 _INTRODUCTION = """\
 # Grippers: what is answered, and how well
 
-Made from `protocol/robotiq.py` by `make docs`. [Grippers](../grippers.md) explains how they are used,
-[fidelity.md](../fidelity.md) what was chosen. *Exact*: as sources describe a real one. *Approximate*:
+Made from `protocol/robotiq.py` and `ur_emulator/ports/onrobot.py` by `make docs`.
+[Grippers](../grippers.md) explains how they are used, [fidelity.md](../fidelity.md) what was chosen.
+*Exact*: as sources describe a real one. *Approximate*:
 the same kind of answer, from a simpler model. *Declared*: kept and read back, or constant.
 
 ## Robotiq: variables of port 63352
@@ -65,11 +68,67 @@ back, {OUTPUTS:04X} to {OUTPUTS + 15:04X} are read; others are refused with exce
 | {OUTPUTS + 3:04X} - {OUTPUTS + 15:04X} | 0 | 0 | declared |
 """
 
+_METHODS = """
+## OnRobot: methods of port 41414
+
+The first number of a method is the place of the device: 0, or 1 and 2 of two. Other types are fault
+-501, other names -506, what is no call -503.
+
+| method | arguments | result | meaning | here |
+|---|---|---|---|---|
+"""
+
+_METHODS_HERE = {
+    "get_discovery": "approximate: serial number and messages are empty",
+    "cb_report_robot_type": "declared: 0",
+    "cb_reset_tool_power": "approximate: 1 s without supply",
+    "rg_grip": "exact; speed and force approximate",
+    "rg_calibration": "declared: 0, calibrates nothing",
+    "rg_get_all_variables": "approximate: the names are chosen",
+    "rg_get_busy": "approximate: until the motion ends",
+    "rg_get_speed": "approximate: the unit is chosen",
+    "rg_get_angle_speed": "approximate: the unit is chosen",
+    "rg_get_relative_depth": "approximate: since the last command",
+    **{f"rg_get_{name}": "declared: false" for name in STATUS[2:6]},
+    "rg_get_safety_failed": "declared: true without power",
+}
+
+_ONROBOT_REGISTERS = """\
+
+## OnRobot: registers of unit 65
+
+Of two grippers units 66 and 67. Functions 3, 4, 6, 16 and 23: exact. All other registers from 0100 to
+011F are read as 0; others are refused with exception 2.
+
+| register | access | meaning | here |
+|---|---|---|---|
+| 0000 | w | force, 0.1 N | exact; beyond its range the nearest |
+| 0001 | w | width, 0.1 mm | exact; beyond its range the nearest |
+| 0002 | w | 1 grip (between the metal tips), 8 stop, 16 grip (between the fingertips) | exact |
+| 0407 | w | thickness of a fingertip, 0.1 mm | exact |
+| 0102 | r | thickness of a fingertip, signed | exact |
+| 0107 | r | depth, 0.1 mm | exact |
+| 0108 | r | relative depth | approximate: since the last command |
+| 010B | r | width between the metal tips | exact |
+| 010C | r | status: busy, grip, S1, S2, safety | as the methods |
+| 0113 | r | width between the fingertips | exact |
+| 0000 of unit 63 | w | 2: supply off and on | approximate: 1 s; port 502 only |
+
+Registers of a 2FG and a VG10 are not there.
+"""
+
 
 def render() -> str:
     """Return the page."""
     rows = (_line(name, variable, _HERE[name]) for name, variable in VARIABLES.items())
-    return _INTRODUCTION + "\n".join(rows) + "\n" + _REGISTERS
+    methods = (_method_line(name, *METHODS[name]) for name in METHODS)
+    variables = _INTRODUCTION + "\n".join(rows) + "\n" + _REGISTERS
+    return variables + _METHODS + "\n".join(methods) + "\n" + _ONROBOT_REGISTERS
+
+
+def _method_line(name: str, result: str, arguments: str, meaning: str) -> str:
+    here = "exact: not there" if name.startswith(("twofg", "vg10")) else _METHODS_HERE.get(name, "exact")
+    return f"| {name} | {arguments.replace(' ', ', ')} | {result} | {meaning} | {here} |"
 
 
 def _line(name: str, variable: Variable, here: str) -> str:

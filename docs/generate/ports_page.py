@@ -38,6 +38,7 @@ ROWS: tuple[MapRow, ...] = (
         "interpreter", "an answer for each line", "on request", "statements of URScript", "interpreter.md"
     ),
     MapRow("gripper", "an answer for each line", "on request", "variables of a gripper", "gripper.md"),
+    MapRow("onrobot", "an answer for each call", "on request", "XML-RPC calls to a gripper", "gripper.md"),
     MapRow("tool_line", "answers of a gripper", "on request", "Modbus RTU, e-Series arms only", "gripper.md"),
     MapRow("modbus", "answers", "on request", "Modbus functions 1-6, 15, 16", "modbus.md"),
 )

@@ -86,7 +86,7 @@ _PROMISES = """\
 | The use of resources by clients and programs is bounded (below); the newest request beyond a limit is refused. The memory of the box and its worker processes is measured as one total, which stays below 300 MB, on Linux; a box in the process of its user (`in_process=True`) is not measured | `tests/attack` |
 | A client that is not part of an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also lists the attacks that exceed them | `make attack` |
 | Nothing is read or written outside the folder `--programs`, by no name and through no link; without this option the box writes into a temporary folder, which it removes. No answer contains a path of this machine | `tests/attack` |
-| A web page in a browser on this machine cannot use the box: the control port checks `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close connections that begin with an HTTP request | `tests/attack` |
+| A web page in a browser on this machine cannot use the box: the control port, the Robot API and port 41414 check `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close connections that begin with an HTTP request | `tests/attack` |
 | The client ends a session with a hostile or broken robot in one line, with the arm at rest, and refuses files that are too large or damaged | `tests/attack` |
 
 ## What is not promised

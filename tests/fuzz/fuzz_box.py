@@ -52,7 +52,7 @@ from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS
 from urscript import compile_program
 
 # Kinds of boxes, as options.
-CB3 = {"robot": "ur3", "version": "3.15.8"}
+CB3 = {"robot": "ur3", "version": "3.15.8", "tool": "onrobot-rg2"}
 E_SERIES = {"robot": "ur5e", "version": "5.25.1", "tool": "robotiq-2f85"}
 POLYSCOPE_X = {"robot": "ur5e", "version": "10.14.0", "services": ("primary", "rtde")}
 # Hostile clients of one port at a time.

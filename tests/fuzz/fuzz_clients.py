@@ -310,6 +310,7 @@ class HttpReader:
 
 READERS = {
     "gripper": GripperReader,
+    "onrobot": HttpReader,
     "tool_line": ToolLineReader,
     "realtime": RealtimeReader,
     "realtime_ro": RealtimeReader,

@@ -2,6 +2,7 @@
 
 import json
 import struct
+import xmlrpc.client
 
 from protocol import robotiq
 from protocol.dashboard.commands import COMMANDS
@@ -25,6 +26,7 @@ from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.script_channel import CONTROLLER_WORDS
 from ur_emulator.commands.operation import Kind
 from ur_emulator.control_api.operations import OPERATIONS
+from ur_emulator.ports.onrobot import METHODS
 
 # Words and operations by which something else than a program may move the arm.
 MOVING_WORDS = {"set robotmode freedrive"}
@@ -260,6 +262,24 @@ def gripper_message(rng, lively):
     return f"SET {pairs}\n".encode()
 
 
+def onrobot_message(rng, lively):
+    """A call of a method, often with wrong types; the fingers move only in a lively box."""
+    names = [name for name in METHODS if lively or name != "rg_grip"]
+    values = [
+        rng.choice([0, 1, 2**31 - 1, 20.0, -1e308, float("nan"), True, "rg_grip", [1], {"a": 2}])
+        for _ in range(3)
+    ]
+    body = xmlrpc.client.dumps(
+        tuple(values[: rng.randrange(4)]), rng.choice([*names, "rg_fly", "<"])
+    ).encode()
+    if rng.random() < 0.2:
+        body = rng.choice(
+            (b"", b"<methodCall>", b"<!DOCTYPE a>", b"<a>" * 900, b"\xff" * 40, b"<methodResponse/>")
+        )
+    head = f"{rng.choice(('POST', 'POST', 'POST', 'GET'))} {rng.choice(('/', '/RPC2'))} HTTP/1.1"
+    return f"{head}\r\nHost: 127.0.0.1\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body
+
+
 def tool_line_message(rng, lively):
     """A request of Modbus RTU to the gripper; nothing activates it."""
     address = rng.choice([robotiq.OUTPUTS, robotiq.INPUTS + 1, robotiq.INPUTS + 2, rng.randrange(1 << 16)])
@@ -275,6 +295,7 @@ def tool_line_message(rng, lively):
 
 MESSAGES = {
     "gripper": gripper_message,
+    "onrobot": onrobot_message,
     "tool_line": tool_line_message,
     "realtime": script_message,
     "realtime_ro": script_message,

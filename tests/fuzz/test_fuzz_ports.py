@@ -20,8 +20,8 @@ KINDS = {"cb3": CB3, "e-series": E_SERIES, "polyscope-x": POLYSCOPE_X}
 TOOL = {"gripper", "tool_line"}
 NOT_THERE = {
     "cb3": {"interpreter", "robot_api"} | TOOL,
-    "e-series": {"robot_api"},
-    "polyscope-x": {"dashboard"} | TOOL,
+    "e-series": {"robot_api", "onrobot"},
+    "polyscope-x": {"dashboard", "onrobot"} | TOOL,
 }
 PORTS = sorted(MESSAGES.keys() - NOT_THERE["cb3"])
 

@@ -86,8 +86,8 @@ class BoxState:
         obstacles: names of those that were added.
         things: what can be moved around the arm.
         contacts: points in which bodies press on each other, also two things or the pads of a tool.
-        grippers: of each tool: width between the pads [m] and SID, STA, OBJ and FLT of a Robotiq gripper; the
-            vacuum of a cup as a share of the full one.
+        grippers: of each tool: width between the pads [m]; SID, STA, OBJ and FLT of a Robotiq gripper, unit
+            and status of one of OnRobot; the vacuum of a cup as a share of the full one.
         popups: texts of the popups on the screen.
         questions: of programs, which wait for an answer.
     """

@@ -17,7 +17,7 @@ from ur_emulator.controller.grippers import SUPPLY, Gripper, make_grippers
 from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.controller.io.configuration import IoConfiguration
 from ur_emulator.controller.io.encoders import Encoders
-from ur_emulator.controller.io.lines import InputOutput, ToolLine
+from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.controller.io.registers import MapMemory, Registers
 from ur_emulator.controller.io.watchdogs import Watchdogs
@@ -123,10 +123,11 @@ def make_state(
     modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
     io_configuration = IoConfiguration(io, registers, modbus)
     has_tool_line = bool(tools) and robot.generation.software(SoftwareVersion(*version)).has_tool_line
-    if tools:
+    grippers = make_grippers(tools, clock.period_s, has_tool_line)
+    if grippers:
         # As the installations of their makers do.
         io.set_tool_voltage(SUPPLY)
-        io.set_tool_line(ToolLine(is_enabled=True))
+        io.set_tool_line(grippers[0].line)
     return ControllerState(
         robot=robot,
         arm=arm,
@@ -160,5 +161,5 @@ def make_state(
         requests=ProgramRequests(),
         past=past,
         events=EventQueue(),
-        grippers=make_grippers(tools, clock.period_s, has_tool_line),
+        grippers=grippers,
     )

@@ -21,7 +21,7 @@ from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
 from ur_emulator.polyscope.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
-from ur_emulator.ports.session import Session
+from ur_emulator.ports.session import Session, SessionPort
 
 # Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
 # library expects them.
@@ -222,33 +222,24 @@ def _path_of(thing: object) -> str:
 _LINE_COST, _BYTES_PER_UNIT = 2, 1024
 
 
-class DashboardPort:
+class DashboardPort(SessionPort["_DashboardSession"]):
     """Answers dashboard lines."""
 
     def __init__(self, box: ServedBox, answers: DashboardAnswers) -> None:
         """Serve a box."""
-        self._box = box
+        super().__init__(box)
         self._answers = answers
-        self._sessions: dict[Connection, _DashboardSession] = {}
 
-    def opened(self, connection: Connection) -> None:
-        """Send the greeting line; a client that has closed its sending side still gets its answers."""
+    def _begin(self, connection: Connection) -> "_DashboardSession":
+        # A client that has closed its sending side still gets its answers.
         connection.allow_half_close(self.ended)
         session = _DashboardSession(connection, self._box, self._answers)
-        self._sessions[connection] = session
         connection.send(session.lines.greet())
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Take lines and answer what can be answered now; a client whose line has no end is disconnected."""
-        self._sessions[connection].receive(data)
+        return session
 
     def ended(self, connection: Connection) -> None:
         """A client sends nothing more: close it when all its lines are answered."""
         self._sessions[connection].answer_requests()
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client; what it has begun goes on."""
-        self._sessions.pop(connection, None)
 
 
 class _DashboardSession(Session):

@@ -13,7 +13,7 @@ from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
-from ur_emulator.ports.session import Session
+from ur_emulator.ports.session import Session, SessionPort
 
 _REQUEST_COST = 2
 
@@ -27,30 +27,20 @@ is to the maker's programs one that they could not read."""
 _CONSTANTS = {"DST": 4, "PCO": 0}
 
 
-class GripperPort:
+class GripperPort(SessionPort["_GripperSession"]):
     """Answers requests for the variables of grippers."""
 
     def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper]) -> None:
-        self._box = box
+        super().__init__(box)
         self._grippers = {gripper.unit: gripper for gripper in grippers}
-        self._sessions: dict[Connection, _GripperSession] = {}
 
     @property
     def has_clients(self) -> bool:
         """Somebody uses the software of the gripper."""
         return bool(self._sessions)
 
-    def opened(self, connection: Connection) -> None:
-        """The client speaks first."""
-        self._sessions[connection] = _GripperSession(connection, self._box, self._grippers)
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Answer requests in order."""
-        self._sessions[connection].receive(data)
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client."""
-        self._sessions.pop(connection, None)
+    def _begin(self, connection: Connection) -> "_GripperSession":
+        return _GripperSession(connection, self._box, self._grippers)
 
 
 class _GripperSession(Session):

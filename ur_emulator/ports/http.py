@@ -23,7 +23,7 @@ from ur_emulator.errors import NotRunningError
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
-from ur_emulator.ports.session import Session
+from ur_emulator.ports.session import Session, SessionPort
 
 MAX_HEADER = 16 * 1024
 JSON = "application/json"
@@ -145,7 +145,7 @@ def _is_own(host: str, own_host: str) -> bool:
         return False
     name = match[1].strip("[]").lower()
     try:
-        if name in ("localhost", own_host):
+        if name in ("localhost", "127.0.0.1", own_host):
             return True
         # Bound to all addresses: any address will do, but no name: it could resolve to any of them.
         return ip_address(own_host).is_unspecified and bool(ip_address(name))
@@ -169,37 +169,24 @@ class Answers(Protocol):
         ...
 
 
-class HttpPort:
+class HttpPort(SessionPort["_HttpSession"]):
     """Answers HTTP requests."""
 
     def __init__(self, box: ServedBox, answers: Answers, most_bytes: int = BUDGETS.body_bytes) -> None:
-        self._box = box
+        super().__init__(box)  # the session that has been silent longest is the first
         self._answers = answers
         self._most_bytes = most_bytes
-        # The one that has been silent longest first.
-        self._sessions: dict[Connection, _HttpSession] = {}
 
-    def opened(self, connection: Connection) -> None:
-        """Take in a client; if there are too many, the one that has been silent longest is closed."""
+    def _begin(self, connection: Connection) -> _HttpSession:
         if len(self._sessions) >= BUDGETS.control_clients:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
-        self._sessions[connection] = _HttpSession(
-            connection, self._box, self._answers, self._most_bytes, self._is_not_silent
-        )
         connection.allow_half_close(self.ended)
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Take bytes and answer what can be answered now."""
-        self._sessions[connection].receive(data)
+        return _HttpSession(connection, self._box, self._answers, self._most_bytes, self._is_not_silent)
 
     def ended(self, connection: Connection) -> None:
         """A client sends nothing more; its requests are still answered."""
         self._sessions[connection].receive(b"")
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client; what it has begun takes its course."""
-        self._sessions.pop(connection, None)
 
     def _is_not_silent(self, connection: Connection) -> None:
         """A client has sent a whole request."""

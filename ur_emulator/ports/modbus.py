@@ -2,42 +2,33 @@
 
 Reads are answered at once, from the state at the end of the last cycle. Writes are commands, answered after
 the cycle in which they act; the next request of that client follows then, so that it reads what it has
-written. The unit number is not used. A request with an address that does not exist, or a write to one that
-can only be read, is refused as a whole with exception 2.
+written. A request with an address that does not exist, or a write to one that can only be read, is refused as
+a whole with exception 2. The unit number is not used, except for those of OnRobot grippers at the tool.
 Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus application protocol.
 """
 
 from protocol import modbus
 from protocol.errors import RemoteProtocolError
 from ur_emulator.commands.client_writes import WriteModbus
+from ur_emulator.controller.grippers.onrobot import OnRobotGripper
 from ur_emulator.controller.modbus_map import MapAddressError, can_write, read_coil, read_register
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
-from ur_emulator.ports.session import Session
+from ur_emulator.ports.session import Session, SessionPort
+from ur_emulator.ports.tool_line import answer_registers
 
+# 2 in its register 0 turns the supply of grippers off and on. Source: reference `grippers.md` 3.2 (S1).
+_CYCLE_POWER = {(63, modbus.encode_write(modbus.ModbusFunction(function), 0, [2])) for function in (6, 16)}
 # Units of work for a request, and how many values cost another one.
 _REQUEST_COST, _VALUES_PER_UNIT = 4, 4
 
 
-class ModbusPort:
+class ModbusPort(SessionPort["_ModbusSession"]):
     """Answers Modbus requests."""
 
-    def __init__(self, box: ServedBox) -> None:
-        self._box = box
-        self._sessions: dict[Connection, _ModbusSession] = {}
-
-    def opened(self, connection: Connection) -> None:
-        """The client speaks first."""
-        self._sessions[connection] = _ModbusSession(connection, self._box)
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Answer requests in order."""
-        self._sessions[connection].receive(data)
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client."""
-        self._sessions.pop(connection, None)
+    def _begin(self, connection: Connection) -> "_ModbusSession":
+        return _ModbusSession(connection, self._box)
 
 
 class _ModbusSession(Session):
@@ -58,7 +49,15 @@ class _ModbusSession(Session):
             return 0
         if frame is None:
             return 0
-        pdu = yield from self._answer(frame.pdu)
+        grippers = [g for g in self._box.controller.state.grippers if isinstance(g, OnRobotGripper)]
+        if grippers and (frame.unit, frame.pdu) in _CYCLE_POWER:
+            for gripper in grippers:
+                gripper.cycle_power()
+            pdu = frame.pdu[:5]
+        elif addressed := [gripper for gripper in grippers if gripper.unit == frame.unit]:
+            pdu = answer_registers(addressed[0], frame.pdu)
+        else:
+            pdu = yield from self._answer(frame.pdu)
         if not self.connection.send(modbus.encode_frame(frame.transaction, frame.unit, pdu)):
             self.connection.close()  # without its answer, a client takes the next one for it
         return _REQUEST_COST + len(pdu) // (2 * _VALUES_PER_UNIT)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.controller.grippers.onrobot import OnRobotGripper
 from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.loop.event_loop import EventLoop
@@ -25,12 +26,13 @@ from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.ports.tool_line import ToolLinePort
 
 CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
-# Ports of the software of a tool.
-GRIPPER, TOOL_LINE = "gripper", "tool_line"
+TOOL_LINE = "tool_line"
+# Kinds of tools, and the port of their maker's software.
+SOFTWARE_OF = {"robotiq": "gripper", "onrobot": "onrobot"}
 # Ports whose numbers need privileges, and what the box lacks without them.
 _PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
 # Ports of web servers.
-_WEB = frozenset({CONTROL, ROBOT_API})
+_WEB = frozenset({CONTROL, ROBOT_API, SOFTWARE_OF["onrobot"]})
 
 
 class PortSet:
@@ -170,13 +172,21 @@ def answering_ports(
     if software.has_interpreter:
         ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
     grippers = box.controller.state.grippers
-    if robotiq := [gripper for gripper in grippers if isinstance(gripper, RobotiqGripper)]:
-        ports[GRIPPER] = software_of_gripper = GripperPort(box, robotiq)
-        if software.has_tool_line:
-            ports[TOOL_LINE] = ToolLinePort(box, robotiq, software_of_gripper)
-    if software.robot_api:
+    robotiq = [gripper for gripper in grippers if isinstance(gripper, RobotiqGripper)]
+    onrobot = [gripper for gripper in grippers if isinstance(gripper, OnRobotGripper)]
+    software_of_robotiq = GripperPort(box, robotiq)
+    if robotiq:
+        ports[SOFTWARE_OF["robotiq"]] = software_of_robotiq
+    if software.has_tool_line and (robotiq or onrobot):
+        ports[TOOL_LINE] = ToolLinePort(box, [*robotiq, *onrobot], software_of_robotiq)
+    if onrobot or software.robot_api:
         # A box without HTTP does not load it.
         from ur_emulator.ports.http import HttpPort
+    if onrobot:
+        from ur_emulator.ports.onrobot import MOST_BYTES, OnRobotAnswers
+
+        ports[SOFTWARE_OF["onrobot"]] = HttpPort(box, OnRobotAnswers(onrobot, host), MOST_BYTES)
+    if software.robot_api:
         from ur_emulator.ports.robot_api import RobotApiAnswers
 
         answers = RobotApiAnswers(box, player, reports, shut_down, host)

@@ -18,7 +18,7 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
-from ur_emulator.ports.session import Session
+from ur_emulator.ports.session import Session, SessionPort
 
 # Sender of text messages.
 SOURCE = "RTDE"
@@ -28,26 +28,20 @@ _SCRIPT_LINE = "script_control_line"
 _INPUT_COST, _REQUEST_COST, _RECIPE_COST = 2, 8, 64
 
 
-class RtdePort:
+class RtdePort(SessionPort["_RtdeSession"]):
     """Streams data packages and takes inputs."""
 
     def __init__(self, box: ServedBox) -> None:
-        self._box = box
-        self._sessions: dict[Connection, _RtdeSession] = {}
+        super().__init__(box)
         self._streams: tuple[_RtdeSession, ...] = ()
         self._owners: dict[str, Connection] = {}
 
-    def opened(self, connection: Connection) -> None:
-        """The client speaks first."""
-        self._sessions[connection] = _RtdeSession(connection, self._box, self._answer)
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Answer requests in order, pass inputs on; bytes that are not RTDE end the connection."""
-        self._sessions[connection].receive(data)
+    def _begin(self, connection: Connection) -> _RtdeSession:
+        return _RtdeSession(connection, self._box, self._answer)
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; its input variables are free at once."""
-        self._sessions.pop(connection, None)
+        super().closed(connection)
         self._owners = {name: owner for name, owner in self._owners.items() if owner is not connection}
         self._find_streams()
 

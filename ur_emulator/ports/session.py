@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from functools import partial
+from typing import Generic, TypeVar
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import NotRunningError
@@ -82,3 +83,31 @@ class Session(ABC):
             self.connection.close_when_sent()
         else:
             self.connection.set_reading(True)
+
+
+_S = TypeVar("_S", bound=Session)
+
+
+class SessionPort(ABC, Generic[_S]):
+    """A port whose clients speak first; each has a session, which answers its requests in order."""
+
+    def __init__(self, box: ServedBox) -> None:
+        """Serve a box."""
+        self._box = box
+        self._sessions: dict[Connection, _S] = {}
+
+    @abstractmethod
+    def _begin(self, connection: Connection) -> _S:
+        """Return the session of a new client."""
+
+    def opened(self, connection: Connection) -> None:
+        """Take in a client."""
+        self._sessions[connection] = self._begin(connection)
+
+    def received(self, connection: Connection, data: bytes) -> None:
+        """Take bytes and answer what can be answered now."""
+        self._sessions[connection].receive(data)
+
+    def closed(self, connection: Connection) -> None:
+        """Forget the client; what it has begun goes on."""
+        self._sessions.pop(connection, None)

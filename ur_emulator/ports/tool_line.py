@@ -14,40 +14,33 @@ from dataclasses import dataclass
 
 from protocol import modbus, modbus_rtu
 from ur_emulator.controller.command import BoxParts, Result
+from ur_emulator.controller.grippers.onrobot import OnRobotGripper
 from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
 from ur_emulator.ports.gripper import GripperPort
-from ur_emulator.ports.session import Session
+from ur_emulator.ports.session import Session, SessionPort
 
 _REQUEST_COST = 4
 _PACE = 0.004  # s
 
+_Gripper = RobotiqGripper | OnRobotGripper
 
-class ToolLinePort:
+
+class ToolLinePort(SessionPort["_LineSession"]):
     """Passes requests of Modbus RTU on to grippers."""
 
-    def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper], software: GripperPort) -> None:
+    def __init__(self, box: ServedBox, grippers: Sequence[_Gripper], software: GripperPort) -> None:
         """`software` is the other user of the line."""
-        self._box = box
+        super().__init__(box)
         self._grippers = {gripper.unit: gripper for gripper in grippers}
         self._software = software
-        self._sessions: dict[Connection, _LineSession] = {}
 
-    def opened(self, connection: Connection) -> None:
-        """The client speaks first."""
-        self._sessions[connection] = _LineSession(connection, self._box, self)
+    def _begin(self, connection: Connection) -> "_LineSession":
+        return _LineSession(connection, self._box, self)
 
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Pass on what the client that has the line sends; what others send is lost."""
-        self._sessions[connection].receive(data)
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client."""
-        self._sessions.pop(connection, None)
-
-    def gripper(self, connection: Connection, unit: int) -> RobotiqGripper | None:
+    def gripper(self, connection: Connection, unit: int) -> _Gripper | None:
         """The gripper that requests of a client reach; None: nothing answers."""
         line = self._box.controller.state.io.tool_line
         gripper = self._grippers.get(unit)
@@ -61,14 +54,14 @@ class ToolLinePort:
 class _Exchange:
     """A request on the line; None: a cycle in which it is on its way."""
 
-    gripper: RobotiqGripper
+    gripper: _Gripper
     pdu: bytes | None
 
     def apply(self, box: BoxParts) -> Result:
-        return None if self.pdu is None else {"pdu": _answer(self.gripper, self.pdu)}
+        return None if self.pdu is None else {"pdu": answer_registers(self.gripper, self.pdu)}
 
 
-def _answer(gripper: RobotiqGripper, pdu: bytes) -> bytes:
+def answer_registers(gripper: _Gripper, pdu: bytes) -> bytes:
     """Return the answer of the gripper to a request."""
     try:
         if pdu[0] == modbus.ModbusFunction.READ_WRITE_REGISTERS:
@@ -86,7 +79,9 @@ def _answer(gripper: RobotiqGripper, pdu: bytes) -> bytes:
     except modbus.ModbusRequestError as error:
         return modbus.encode_exception(pdu[0], error.code)
     except LookupError:
-        return modbus.encode_exception(pdu[0], modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
+        code = modbus.ExceptionCode
+        wrong = code.ILLEGAL_DATA_ADDRESS if gripper.has_power else code.SLAVE_DEVICE_FAILURE
+        return modbus.encode_exception(pdu[0], wrong)
 
 
 class _LineSession(Session):

@@ -1,7 +1,9 @@
 """What drives the tools on the flange: a controller of its own for each kind, advanced once a cycle."""
 
 from collections.abc import Sequence
+from itertools import count
 
+from ur_emulator.controller.grippers.onrobot import FIRST_UNIT, OnRobotGripper
 from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.controller.grippers.vacuum import VacuumGripper
 from ur_hil.tools import ToolModel
@@ -9,7 +11,7 @@ from ur_hil.tools import ToolModel
 SUPPLY = 24
 """Voltage at the tool connector that grippers need [V]."""
 
-Gripper = RobotiqGripper | VacuumGripper
+Gripper = RobotiqGripper | OnRobotGripper | VacuumGripper
 
 _UNITS = (9, 2, 3, 4)
 """Addresses of the grippers 1 to 4 of programs. Source: reference `grippers.md` 1.1 (O)."""
@@ -24,9 +26,13 @@ def make_grippers(tools: Sequence[ToolModel], period: float, has_tool_line: bool
             box to the grippers that need one.
     """
     units = iter(_UNITS)
+    # One alone is the first; several are counted from the next one on.
+    onrobot_units = count(FIRST_UNIT + (sum(tool.kind == "onrobot" for tool in tools) > 1))
     return tuple(
         VacuumGripper(tool, period)
         if tool.kind == "vacuum"
+        else OnRobotGripper(tool, period, next(onrobot_units))
+        if tool.kind == "onrobot"
         else RobotiqGripper(tool, period, next(units), has_cable=not has_tool_line)
         for tool in tools
     )

@@ -4,7 +4,7 @@ The vacuum builds up while the cup is on something, within `BUILD_UP`, and ends 
 when the output goes off. The cup holds in proportion to it.
 """
 
-from ur_emulator.controller.io.lines import InputOutput
+from ur_emulator.controller.io.lines import InputOutput, ToolLine
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_hil.tools import ToolModel
 
@@ -18,7 +18,7 @@ _REACHED = 0.8
 class VacuumGripper:
     """The valve and the pressure switch."""
 
-    has_cable = False
+    line, has_cable = ToolLine(is_enabled=True), False
 
     def __init__(self, tool: ToolModel, period: float) -> None:
         """Begin without vacuum; `period` is the cycle [s]."""
