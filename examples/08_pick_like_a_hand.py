@@ -45,9 +45,9 @@ GRIP, PLACE, UP = np.array((0.5, 0.2, 0.035)), np.array((0.5, -0.2, 0.036)), np.
 START = np.array((0.42, -0.05, 0.3))
 # Points, and durations of the strokes between them [s].
 WAYS = {
-    "reach": ((START, GRIP + UP, GRIP), (2.0, 1.4)),
-    "carry": ((GRIP, GRIP + UP, PLACE + UP, PLACE), (1.4, 2.4, 1.4)),
-    "withdraw": ((PLACE, PLACE + UP), (1.4,)),
+    "reach": ((START, GRIP + UP, GRIP), (1.6, 1.1)),
+    "carry": ((GRIP, GRIP + UP, PLACE + UP, PLACE), (1.1, 2.0, 1.4)),
+    "withdraw": ((PLACE, PLACE + UP), (1.1,)),
 }
 HALF_BLOCK, BLOCK_MASS = np.array((0.02, 0.02, 0.04)), 0.2
 FORCE = 80.0  # N
