@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.xmlrpc import DEEPEST, AnswerReader, RemoteFaultError, encode_call
+from protocol.xmlrpc import DEEPEST, AnswerReader, CallReader, RemoteFaultError, encode_call
 
 TEXTS = st.text(
     st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff")
@@ -58,6 +58,17 @@ def test_answers_of_the_standard_library(value, size):
 @given(st.lists(VALUES, max_size=4))
 def test_calls_that_the_standard_library_reads(arguments):
     assert xmlrpc.client.loads(encode_call("work", arguments)) == (tuple(arguments), "work")
+
+
+@given(st.lists(VALUES, max_size=4), st.integers(1, 50))
+def test_calls_are_read_whole_and_in_pieces_and_not_with_others_behind_them(arguments, size):
+    for data in (encode_call("work", arguments), xmlrpc.client.dumps(tuple(arguments), "work").encode()):
+        reader = CallReader(10_000)
+        for i in range(0, len(data), size):
+            reader.feed(data[i : i + size])
+        assert reader.result() == ("work", arguments)
+        with pytest.raises(RemoteProtocolError, match="the call is not XML"):
+            CallReader(10_000).feed(data + data)
 
 
 @pytest.mark.parametrize("text", ["a\0", "\x1b[2J", "\ud800", "\uffff"])
