@@ -20,8 +20,12 @@ FIRST_UNIT = 65  # of Modbus, of a gripper that is alone; two are the next ones
 # Bits of the status, from the lowest.
 STATUS = ("busy", "grip_detected", "s1_pushed", "s1_triggered", "s2_pushed", "s2_triggered", "safety_failed")
 
-_REACHED, _RESTS, _CLOSED = 0.0003, 0.002, 5.0  # m, m/s, mm
-_LEAST_BUSY, _OFF, _PAUSE = 0.1, 1.0, 0.1  # s: programs look within 20 cycles; without supply; ends a word
+_REACHED = 0.0003  # m; a width this near is reached
+_RESTS = 0.002  # m/s; slower than this the fingers stand
+_CLOSED = 5.0  # mm; jaws that have closed to less read as a grip
+_LEAST_BUSY = 0.1  # s; programs look for it within 20 cycles
+_OFF = 1.0  # s without supply, of a power cycle
+_PAUSE = 0.1  # s; a longer one between two bits ends a word
 _CURRENT = 0.2  # A while it moves; the screw holds by itself
 _GRIP, _STOP, _GRIP_OFFSET = 1, 8, 16
 
@@ -66,9 +70,8 @@ class OnRobotGripper:
     @property
     def _angle(self) -> float:
         metal = self._fingers.width + 2e-3 * self._tip
-        return asin(
-            min(0.99, (metal - self.linkage.root) / (2.0 * self.linkage.arm))
-        )  # a file's stroke is free
+        # A file may have a stroke that is longer than its arms.
+        return asin(min(0.99, (metal - self.linkage.root) / (2.0 * self.linkage.arm)))
 
     def values(self) -> dict[str, float]:
         """What `rg_get_...` answers while it has power, by name."""
