@@ -130,7 +130,7 @@ def test_the_ready_file_says_what_answers(tmp_path):
         assert numbers == {
             name: number
             for name, number in dataclasses.asdict(Ports.standard(box.base)).items()
-            if name not in ("interpreter", "robot_api", "gripper", "tool_line")
+            if name not in ("interpreter", "robot_api", "gripper", "onrobot", "tool_line")
         }
         for name in numbers:
             connect(box, name).close()
