@@ -40,14 +40,16 @@ class ToolLinePort(SessionPort["_LineSession"]):
     def _begin(self, connection: Connection) -> "_LineSession":
         return _LineSession(connection, self._box, self)
 
-    def gripper(self, connection: Connection, unit: int) -> _Gripper | None:
-        """The gripper that requests of a client reach; None: nothing answers."""
+    def has_line(self, connection: Connection) -> bool:
+        """Whether a client has the line; what others send is lost."""
+        return not self._software.has_clients and next(iter(self._sessions)) is connection
+
+    def gripper(self, unit: int) -> _Gripper | None:
+        """The gripper that answers to a unit; None: nothing answers."""
         line = self._box.controller.state.io.tool_line
         gripper = self._grippers.get(unit)
-        if gripper is None or not gripper.has_power or line[:4] != gripper.line[:4]:
-            return None
-        has_line = not self._software.has_clients and next(iter(self._sessions)) is connection
-        return gripper if has_line else None
+        is_reached = gripper is not None and gripper.has_power and line[:4] == gripper.line[:4]
+        return gripper if is_reached else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,20 +95,21 @@ class _LineSession(Session):
         self._inbox = bytearray()
 
     def _take(self, data: bytes) -> None:
-        self._inbox += data
-        del self._inbox[: -modbus_rtu.MOST_WAITING]
+        if self._port.has_line(self.connection):
+            self._inbox += data
+            del self._inbox[: -modbus_rtu.MOST_WAITING]
 
     def _answer_next(self) -> Steps[int]:
         frame = modbus_rtu.take_request(self._inbox)
         if frame is None:
             return 0
-        gripper = self._port.gripper(self.connection, frame.unit)
+        gripper = self._port.gripper(frame.unit)
         if gripper is None:
             return _REQUEST_COST
         for _ in range(1, round(_PACE / self._box.controller.period_s)):
             yield from self._box.apply(_Exchange(gripper, None))
         result = yield from self._box.apply(_Exchange(gripper, frame.pdu))
-        if self._port.gripper(self.connection, frame.unit) is not None:
+        if self._port.has_line(self.connection) and self._port.gripper(frame.unit) is not None:
             answer = modbus_rtu.encode_rtu(frame.unit, result["pdu"])
             if not self.connection.send(answer):
                 self.connection.close()

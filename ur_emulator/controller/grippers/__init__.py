@@ -26,13 +26,16 @@ def make_grippers(tools: Sequence[ToolModel], period: float, has_tool_line: bool
             box to the grippers that need one.
     """
     units = iter(_UNITS)
-    # One alone is the first; several are counted from the next one on.
-    onrobot_units = count(FIRST_UNIT + (sum(tool.kind == "onrobot" for tool in tools) > 1))
-    return tuple(
-        VacuumGripper(tool, period)
-        if tool.kind == "vacuum"
-        else OnRobotGripper(tool, period, next(onrobot_units))
-        if tool.kind == "onrobot"
-        else RobotiqGripper(tool, period, next(units), has_cable=not has_tool_line)
-        for tool in tools
-    )
+    # One of OnRobot that is alone is the first; several are counted from the next one on.
+    several = sum(tool.kind == "onrobot" for tool in tools) > 1
+    onrobot_units = count(FIRST_UNIT + several)
+    grippers: list[Gripper] = []
+    for tool in tools:
+        match tool.kind:
+            case "robotiq":
+                grippers.append(RobotiqGripper(tool, period, next(units), has_cable=not has_tool_line))
+            case "onrobot":
+                grippers.append(OnRobotGripper(tool, period, next(onrobot_units)))
+            case "vacuum":
+                grippers.append(VacuumGripper(tool, period))
+    return tuple(grippers)

@@ -33,19 +33,29 @@ _GRIP, _STOP, _GRIP_OFFSET = 1, 8, 16
 class OnRobotGripper:
     """The gripper's own controller; widths in mm. Attributes and `step` as of `RobotiqGripper`."""
 
-    line, has_cable = ToolLine(is_enabled=True, parity=2), False
+    line = ToolLine(is_enabled=True, parity=2)
+    has_cable = False
 
     def __init__(self, tool: ToolModel, period: float, unit: int = FIRST_UNIT) -> None:
         """Begin without power; `period` is the cycle [s]."""
         assert tool.linkage is not None
-        self.unit, self.tool, self.linkage, self._period = unit, tool, tool.linkage, period
+        self.unit = unit
+        self.tool = tool
+        self.linkage = tool.linkage
+        self._period = period
         self._offset = self._tip = 1e3 * tool.linkage.tip
         self._fingers = FingerState(tool.stroke, 0.0, 0.0)
         self._command: FingerCommand | None = None
-        self.has_power = self.is_busy = self._closes = self._has_grip = self._was_high = False
+        self.has_power = self.is_busy = False
+        self.supply_current = 0.0
+        # The last command, and the time since it.
+        self._closes = self._has_grip = False
+        self._since = self._first_depth = 0.0
+        # Registers 0 to 2; bits of a word that have come, and the time since the last of them.
+        self._targets = [0, 0, 0]
+        self._bits, self._was_high, self._pause = "", False, 0.0
         self._has_inputs = unit != FIRST_UNIT + 2
-        self._since = self._pause = self._off = self._first_depth = self.supply_current = 0.0
-        self._targets, self._bits = [0, 0, 0], ""
+        self._off = 0.0  # time that is left without supply
 
     def grip(self, width: float, force: float, offset: float | None = None) -> None:
         """Go to a width between the fingertips, or between the metal tips with an `offset` of 0."""
@@ -161,7 +171,8 @@ class OnRobotGripper:
     def _look(self, target: float) -> None:
         """Look at where the fingers are."""
         self._since += self._period
-        stands, reached = abs(self._fingers.speed) < _RESTS, abs(self._fingers.width - target) <= _REACHED
+        stands = abs(self._fingers.speed) < _RESTS
+        reached = abs(self._fingers.width - target) <= _REACHED
         presses = abs(self._fingers.share) > 0.95 and not reached
         if stands and (reached or presses) and self._since >= _LEAST_BUSY:
             self.is_busy = False
