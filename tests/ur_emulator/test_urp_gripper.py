@@ -65,6 +65,23 @@ def test_a_motion_that_does_not_block_is_not_waited_for(tmp_path):
     assert lines[-2:] == ['rq_go_to("3")', "# end: URCap Program Node"]
 
 
+def test_several_grippers_have_their_targets_before_the_first_one_moves(tmp_path):
+    lines = lines_of(tmp_path, gripper_move(100, slaveIds="[9, 2]"))
+    assert lines[3] == '$ 2 "Gripper Close (1, 2)"'
+    calls = [line for line in lines if line.startswith("rq_")]
+    assert [(call.partition("(")[0], call[-3:-1]) for call in calls] == [
+        ("rq_set_pos_spd_for", '1"'),
+        ("rq_wait_pos_spe_for_request", '1"'),
+        ("rq_set_pos_spd_for", '2"'),
+        ("rq_wait_pos_spe_for_request", '2"'),
+        ("rq_go_to", '1"'),
+        ("rq_go_to", '2"'),
+        ("rq_wait", '1"'),
+        ("rq_wait", '2"'),
+    ]
+    assert lines.count("if not(gripper_connected[1]):") == 1
+
+
 @pytest.mark.parametrize(
     ("node", "label", "condition"),
     [
@@ -97,10 +114,11 @@ def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
     ("node", "error", "problem"),
     [
         (gripper_node("Vacuum"), UnknownNodeError, "a node 'Vacuum' of the URCap 'Robotiq_Grippers' cannot"),
-        (gripper_move(0, slaveIds="[9, 2]"), UnknownNodeError, "a node of the grippers '9, 2' cannot"),
+        (gripper_move(0, slaveIds="[9, 5]"), UnknownNodeError, "a node of the grippers '9, 5' cannot"),
+        (gripper_move(0, slaveIds="[9, 1]"), UnknownNodeError, "a node of the grippers '9, 1' cannot"),
         (gripper_move(101), ProgramFileError, "position is 101 %: use 0 to 100"),
         (gripper_node("Gripper"), ProgramFileError, "position of a Gripper node is None, a number"),
-        (gripper_node("Grip Check"), ProgramFileError, "a Grip Check node needs an If and an Else"),
+        (gripper_node("Grip Check"), ProgramFileError, "a Grip Check node needs one gripper, an If and an Else"),
     ],
 )
 def test_nodes_that_cannot_be_used(tmp_path, node, error, problem):

@@ -15,7 +15,7 @@ from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.polyscope.player import ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
 from ur_emulator.ports.dashboard import DashboardAnswers, DashboardPort
-from ur_emulator.ports.gripper import GripperPort
+from ur_emulator.ports.robotiq import RobotiqPort
 from ur_emulator.ports.interpreter import InterpreterIntake, InterpreterPort
 from ur_emulator.ports.modbus import ModbusPort
 from ur_emulator.ports.primary.port import PrimaryPort
@@ -174,7 +174,7 @@ def answering_ports(
     grippers = box.controller.state.grippers
     robotiq = [gripper for gripper in grippers if isinstance(gripper, RobotiqGripper)]
     onrobot = [gripper for gripper in grippers if isinstance(gripper, OnRobotGripper)]
-    software_of_robotiq = GripperPort(box, robotiq)
+    software_of_robotiq = RobotiqPort(box, robotiq)
     if robotiq:
         ports[SOFTWARE_OF["robotiq"]] = software_of_robotiq
     if software.has_tool_line and (robotiq or onrobot):

@@ -19,7 +19,7 @@ from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.loop.steps import Steps
-from ur_emulator.ports.gripper import GripperPort
+from ur_emulator.ports.robotiq import RobotiqPort
 from ur_emulator.ports.session import Session, SessionPort
 
 _REQUEST_COST = 4
@@ -31,7 +31,7 @@ _Gripper = RobotiqGripper | OnRobotGripper
 class ToolLinePort(SessionPort["_LineSession"]):
     """Passes requests of Modbus RTU on to grippers."""
 
-    def __init__(self, box: ServedBox, grippers: Sequence[_Gripper], software: GripperPort) -> None:
+    def __init__(self, box: ServedBox, grippers: Sequence[_Gripper], software: RobotiqPort) -> None:
         """`software` is the other user of the line."""
         super().__init__(box)
         self._grippers = {gripper.unit: gripper for gripper in grippers}

@@ -53,32 +53,35 @@ def write_gripper_node(maker: UrpMaker, node: Node, around: Around) -> None:
 
 
 def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
-    writer, n = maker.writer, _gripper(node, "slaveIds")
+    """Write the motion of one or more grippers: each has its target before the first of them moves."""
+    writer, grippers = maker.writer, _grippers(node, "slaveIds")
     percents = [_percent(node, f"{key}InDouble", key) for key in ("position", "speed", "force")]
-    request = ", ".join(f"{_rounded(percent * 255.0 / 100.0)}" for percent in percents) + f', "{n}"'
-    calibration = maker.installation.grippers.calibrations.get(n)
+    request = ", ".join(f"{_rounded(percent * 255.0 / 100.0)}" for percent in percents)
+    calibration = maker.installation.grippers.calibrations.get(grippers[0])
     if percents[0] in (0.0, 100.0):
         motion = "Close" if percents[0] else "Open"
     elif calibration is None:
         motion = f"Move{_rounded(percents[0])}%"
     else:
         motion = f"Move{_rounded(calibration.width(percents[0]))}mm"
-    writer.label(node.number, f"Gripper {motion} ({n})", around.mark)
-    with writer.block(f"if not(gripper_connected[{n - 1}]):"):
-        writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, True)')
-    with writer.block(f'if not(rq_is_gripper_activated("{n}")):'):
-        writer.add(f'popup("Gripper {n} must be activated first.", "Not activated", False, True, True)')
-    writer.add(f"rq_set_pos_spd_for({request})", f"rq_wait_pos_spe_for_request({request})")
-    writer.add(f'rq_go_to("{n}")')
+    writer.label(node.number, f"Gripper {motion} ({', '.join(map(str, grippers))})", around.mark)
+    for n in grippers:
+        with writer.block(f"if not(gripper_connected[{n - 1}]):"):
+            writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, True)')
+        with writer.block(f'if not(rq_is_gripper_activated("{n}")):'):
+            writer.add(f'popup("Gripper {n} must be activated first.", "Not activated", False, True, True)')
+        for function in ("rq_set_pos_spd_for", "rq_wait_pos_spe_for_request"):
+            writer.add(f'{function}({request}, "{n}")')
+    writer.add(*(f'rq_go_to("{n}")' for n in grippers))
     if node.data.get("blocking", "true") == "true":
-        writer.add(f'rq_wait("{n}")')
+        writer.add(*(f'rq_wait("{n}")' for n in grippers))
 
 
 def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
-    writer, data, n = maker.writer, node.data, _gripper(node, "GripperIdKey")
+    writer, data, (n, *others) = maker.writer, node.data, _grippers(node, "GripperIdKey")
     branches = {child.get("strategyProgramNodeType"): child for child in node.children}
-    if branches.keys() != {"If", "Else"}:
-        raise node.source.error("a Grip Check node needs an If and an Else")
+    if branches.keys() != {"If", "Else"} or others:
+        raise node.source.error("a Grip Check node needs one gripper, an If and an Else")
     detects = data.get("ObjectDetectedKey", "true") == "true"
     label = "If object detected" if detects else "If object not detected"
     condition = f'{"" if detects else "not "}rq_is_object_detected("{n}")'
@@ -96,12 +99,13 @@ def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
         maker.write_children(branches["Else"], around)
 
 
-def _gripper(node: Node, key: str) -> int:
-    """Return the number of the gripper that a node names, 1 if it names none."""
-    name = node.data.get(key, "").strip("[] ") or "9"
-    if name not in _NUMBERS:
-        raise node.source.unknown(f"a node of the grippers {name[:100]!r}")
-    return _NUMBERS[name]
+def _grippers(node: Node, key: str) -> list[int]:
+    """Return the numbers of the grippers that a node names, in its order; gripper 1 if it names none."""
+    names = (node.data.get(key, "").strip("[] ") or "9").split(",")
+    numbers = [_NUMBERS.get(name.strip()) for name in names]
+    if None in numbers or len({*numbers}) < len(numbers):
+        raise node.source.unknown(f"a node of the grippers {','.join(names)[:100]!r}")
+    return [number for number in numbers if number is not None]
 
 
 def _percent(node: Node, *keys: str) -> float:

@@ -27,7 +27,7 @@ is to the maker's programs one that they could not read."""
 _CONSTANTS = {"DST": 4, "PCO": 0}
 
 
-class GripperPort(SessionPort["_GripperSession"]):
+class RobotiqPort(SessionPort["_RobotiqSession"]):
     """Answers requests for the variables of grippers."""
 
     def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper]) -> None:
@@ -39,11 +39,11 @@ class GripperPort(SessionPort["_GripperSession"]):
         """Somebody uses the software of the gripper."""
         return bool(self._sessions)
 
-    def _begin(self, connection: Connection) -> "_GripperSession":
-        return _GripperSession(connection, self._box, self._grippers)
+    def _begin(self, connection: Connection) -> "_RobotiqSession":
+        return _RobotiqSession(connection, self._box, self._grippers)
 
 
-class _GripperSession(Session):
+class _RobotiqSession(Session):
     """A client."""
 
     def __init__(
