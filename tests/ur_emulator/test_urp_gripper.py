@@ -118,7 +118,11 @@ def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
         (gripper_move(0, slaveIds="[9, 1]"), UnknownNodeError, "a node of the grippers '9, 1' cannot"),
         (gripper_move(101), ProgramFileError, "position is 101 %: use 0 to 100"),
         (gripper_node("Gripper"), ProgramFileError, "position of a Gripper node is None, a number"),
-        (gripper_node("Grip Check"), ProgramFileError, "a Grip Check node needs one gripper, an If and an Else"),
+        (
+            gripper_node("Grip Check"),
+            ProgramFileError,
+            "a Grip Check node needs one gripper, an If and an Else",
+        ),
     ],
 )
 def test_nodes_that_cannot_be_used(tmp_path, node, error, problem):

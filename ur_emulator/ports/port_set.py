@@ -15,12 +15,12 @@ from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.polyscope.player import ProgramPlayer
 from ur_emulator.polyscope.report_writer import ReportWriter
 from ur_emulator.ports.dashboard import DashboardAnswers, DashboardPort
-from ur_emulator.ports.robotiq import RobotiqPort
 from ur_emulator.ports.interpreter import InterpreterIntake, InterpreterPort
 from ur_emulator.ports.modbus import ModbusPort
 from ur_emulator.ports.primary.port import PrimaryPort
 from ur_emulator.ports.primary.robot_state import StateEncoder
 from ur_emulator.ports.realtime import RealtimePort
+from ur_emulator.ports.robotiq import RobotiqPort
 from ur_emulator.ports.rtde import RtdePort
 from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.ports.tool_line import ToolLinePort
