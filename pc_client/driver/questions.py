@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pc_client.driver.rtde import RtdeStream
 from pc_client.driver.transport import Network, Transport
 from pc_client.errors import DriverError
-from protocol.errors import RemoteProtocolError
-from protocol.rtde import codec
-from protocol.rtde.client_connection import ClientEvent, DataReceived, RtdeClientConnection
-from protocol.rtde.types import REFUSALS, RtdeValue
+from protocol.rtde.types import RtdeValue
 from protocol.ur_types import SoftwareVersion
 from ur_hil.patience import LONGEST_STEP, Patience
 
@@ -95,12 +93,6 @@ class _Lines:
         return line.decode("latin-1").strip()
 
 
-_PACKAGE_TIMEOUT = 1.0
-"""Longest wait for one package [s]. Source: UR's RTDE client in Python."""
-
-_MOST_PACKAGES = 100
-"""Packages that are read before the first one with data."""
-
 _RATE = 125.0
 """Packages a second: as many as every generation sends, the first one is enough."""
 
@@ -123,64 +115,7 @@ def ask_rtde(network: Network, host: str, port: int, names: tuple[str, ...]) -> 
     Variables that the software does not know are left out.
     """
     try:
-        connection = network.connect(host, port, _CONNECT_TIMEOUT)
+        with RtdeStream(network, host, port, names, _RATE) as stream:
+            return RtdeAnswer(stream.version, stream.receive())
     except DriverError:
         return None
-    try:
-        return _answer(_Events(connection, network), names)
-    except (DriverError, RemoteProtocolError):
-        return None
-    finally:
-        connection.close()
-
-
-def _answer(events: _Events, names: tuple[str, ...]) -> RtdeAnswer | None:
-    if events.reply(codec.RequestProtocolVersion(2)) != codec.RequestProtocolVersionReply(True):
-        return None
-    version = events.reply(codec.GetControllerVersion())
-    types = events.reply(codec.SetupOutputs(names, _RATE))
-    if not isinstance(version, codec.GetControllerVersionReply):
-        return None
-    if not isinstance(types, codec.SetupOutputsReply):
-        return None
-    known = tuple(name for name, word in zip(names, types.types, strict=True) if word not in REFUSALS)
-    if known != names:  # one refused variable refuses the recipe
-        events.reply(codec.SetupOutputs(known, _RATE))
-    if events.reply(codec.Start()) == codec.StartReply(True):
-        for _ in range(_MOST_PACKAGES):
-            if isinstance(event := events.next(), DataReceived):
-                return RtdeAnswer(version.version, dict(zip(event.names, event.values, strict=True)))
-    return None
-
-
-class _Events:
-    """What the robot says on one connection."""
-
-    def __init__(self, connection: Transport, network: Network) -> None:
-        self._connection = connection
-        self._network = network
-        self._rtde = RtdeClientConnection()
-
-    def reply(self, request: codec.Request) -> ClientEvent:
-        """Ask, and wait for the answer."""
-        self._connection.send(self._rtde.send(request))
-        return self.next()
-
-    def next(self) -> ClientEvent:
-        """The next package; texts for the log are passed over.
-
-        Raises:
-            DriverError: none comes in time, or the connection ended.
-            RemoteProtocolError: this is no RTDE.
-        """
-        deadline = self._network.now() + _PACKAGE_TIMEOUT
-        while self._network.now() <= deadline:
-            event = self._rtde.next_event()
-            if event is not None and not isinstance(event, codec.RtdeTextMessage):
-                return event
-            if event is None:
-                data = self._connection.receive(_PACKAGE_TIMEOUT)
-                if not data:
-                    break
-                self._rtde.receive_data(data)
-        raise DriverError("the RTDE port sends no usable answer")

@@ -1,13 +1,15 @@
 """The PC's side of RTDE, port 30004, without I/O; `rtde.server_connection` shows the packages.
 
-`send` a request and wait for its reply, then for `DataReceived` events. Send the bytes that a method returns.
-After a LocalProtocolError nothing has changed; after a RemoteProtocolError close the connection.
+`send` a request and wait for its reply, then for `DataReceived` events; `send_data` writes inputs. Send the
+bytes that a method returns. After a LocalProtocolError nothing has changed; after a RemoteProtocolError close
+the connection.
 """
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from protocol.errors import RemoteProtocolError
+from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import codec
 from protocol.rtde.recipe import Recipe
 from protocol.rtde.types import REFUSALS, RtdeState, RtdeType, RtdeValue
@@ -36,6 +38,7 @@ class RtdeClientConnection:
         self._buffer = bytearray()
         self._unanswered: deque[codec.Request] = deque()
         self._outputs: dict[int | None, Recipe] = {}
+        self._inputs: dict[int, Recipe] = {}
         self._was_started = False
         self.protocol_version = codec.VERSIONS[0]
         self.state = RtdeState.PAUSED
@@ -49,6 +52,13 @@ class RtdeClientConnection:
         data = codec.encode_message(request, codec.Role.PC, self.protocol_version)
         self._unanswered.append(request)
         return data
+
+    def send_data(self, recipe_id: int, values: Iterable[RtdeValue]) -> bytes:
+        """Write the inputs of a recipe that the robot has accepted; LocalProtocolError if it is another."""
+        if recipe_id not in self._inputs:
+            raise LocalProtocolError(f"recipe {recipe_id} given: accepted are {[*self._inputs]}")
+        package = codec.DataPackage(self._inputs[recipe_id].encode(values), recipe_id)
+        return codec.encode_message(package, codec.Role.PC, self.protocol_version)
 
     def next_event(self) -> ClientEvent | None:
         """The next package as an event, or None when more bytes are needed.
@@ -94,6 +104,10 @@ class RtdeClientConnection:
                 recipe = _recipe_of(names, types)
                 if recipe is not None:
                     self._outputs[recipe_id] = recipe
+            case codec.SetupInputs(names), codec.SetupInputsReply(types, recipe_id):
+                recipe = _recipe_of(names, types)
+                if recipe is not None:
+                    self._inputs[recipe_id] = recipe
             case codec.Start(), codec.StartReply(True):
                 self.state = RtdeState.STARTED
                 self._was_started = True

@@ -7,6 +7,7 @@ call of `struct.pack` over all numbers of the package. Nothing here knows ids, f
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -41,6 +42,14 @@ class Recipe:
                 f"this one {len(data)}"
             )
         return self._group(self._struct.unpack(data))
+
+    def encode(self, values: Iterable[RtdeValue]) -> bytes:
+        """Bytes of one value for each variable; LocalProtocolError if they do not fit its types."""
+        flat = chain.from_iterable(value if isinstance(value, tuple) else (value,) for value in values)
+        try:
+            return self._struct.pack(*flat)
+        except struct.error as problem:
+            raise LocalProtocolError(f"the values do not fit {self}: {problem}") from None
 
     def decode_leading(self, data: bytes) -> tuple[RtdeValue, ...]:
         """The complete values: all of them from surplus bytes, the first ones from too few.

@@ -79,8 +79,10 @@ def test_a_session_with_both_ends(version):
         DataReceived(("timestamp", "actual_q"), (1.5, SNAPSHOT.actual_q))
     ]
     values = (-5, (0.0, 1.0, 2.0, 3.0, 4.0, 5.0))
-    data = M.DataPackage(struct.pack(">i6d", -5, *values[1]), 1)
-    assert pair.to_robot(encode_message(data, M.Role.PC, version)) == InputReceived(inputs.names, values)
+    assert pair.to_robot(pair.pc.send_data(1, values)) == InputReceived(inputs.names, values)
+    for recipe_id, wrong in ((2, values), (1, (-5,)), (1, ("-5", values[1]))):
+        with pytest.raises(LocalProtocolError):
+            pair.pc.send_data(recipe_id, wrong)
     assert pair.ask(M.Pause()) == M.PauseReply(True)
     assert pair.robot.encoder is None
     assert pair.ask(M.Start()) == M.StartReply(True)
