@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-OURS = {"ur_hil", "protocol", "urscript", "ur_emulator", "pc_client"}
+OURS = {"ur_hil", "protocol", "urscript", "ur_emulator", "pc_client", "ur_pendant"}
 MAY_IMPORT = {
     "ur_hil": {"pydantic", "pydantic_core", "typer"},
     "protocol": {"numpy"},
@@ -17,6 +17,9 @@ MAY_IMPORT = {
     "ur_emulator": {"ur_hil", "urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
     "pc_client": {
         "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "markupsafe", "plotly", "polars", "distributed", "optuna",
+    },
+    "ur_pendant": {
+        "ur_hil", "protocol", "ur_emulator", "pc_client", "numpy", "pinocchio", "typer", "rich", "viser", "websockets",
     },
 }  # fmt: skip
 # Modules of the standard library that a layer must not touch, and the folders in which it may.
@@ -36,6 +39,7 @@ MAY_HAVE_EFFECTS = {
         "cli.py",
         "recording/recorder.py",
     },
+    "ur_pendant": {"robot.py", "hands.py", "server.py", "panel.py", "recordings.py", "__main__.py"},
 }
 # Inside a package: each part imports those before it, also for types only; those on one line import each other.
 BOX_ORDER = (

@@ -16,7 +16,7 @@ from zipfile import ZipFile
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client", "ur_hil")
+PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client", "ur_pendant", "ur_hil")
 BARE = ("--no-deps", "--no-index", "--no-compile")
 PROGRAM = """
 import pathlib, sys

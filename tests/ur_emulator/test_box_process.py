@@ -135,6 +135,9 @@ def test_an_attached_box_is_used_like_a_box_of_ones_own(served, attached):
     assert state == served.state == attached.state
     assert state.popups == ("look",)
     assert state.things[0].touches_tool is False
+    (shape,) = (shape for shape in state.shapes if shape.name == "ball")
+    assert (shape.shape, shape.size, shape.is_carried) == ("sphere", (0.03,), False)
+    assert shape.pose == state.things[0].pose
     assert {state.contacts[0].first, state.contacts[0].second} == {"ball", "table"}
     attached.remove_thing("ball")
     assert attached.close_popups() == served.state.tick

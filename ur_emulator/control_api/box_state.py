@@ -9,7 +9,7 @@ from protocol.primary.messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.controller.io.lines import DIGITAL_GROUPS
 from ur_emulator.models.robot_model import Vector3, Vector6
-from ur_emulator.models.things import Contact
+from ur_emulator.models.things import BodyShape, Contact
 
 if TYPE_CHECKING:
     from ur_emulator.controller.controller import Controller
@@ -85,6 +85,7 @@ class BoxState:
         tool_voltage: supply of the tool [V].
         obstacles: names of those that were added.
         things: what can be moved around the arm.
+        shapes: of all that stands around the arm and hangs on its flange, for those who draw it.
         contacts: points in which bodies press on each other, also two things or the pads of a tool.
         grippers: of each tool: width between the pads [m]; SID, STA, OBJ and FLT of a Robotiq gripper, unit
             and status of one of OnRobot; the vacuum of a cup as a share of the full one.
@@ -120,6 +121,7 @@ class BoxState:
     tool_voltage: int
     obstacles: tuple[str, ...]
     things: tuple[ThingNow, ...]
+    shapes: tuple[BodyShape, ...]
     contacts: tuple[Contact, ...]
     grippers: tuple[dict[str, float], ...]
     popups: tuple[str, ...]
@@ -165,6 +167,7 @@ def take_state(controller: Controller) -> BoxState:
         tool_voltage=now.tool_output_voltage,
         obstacles=controller.plant.obstacles.names,
         things=_things(controller),
+        shapes=controller.plant.shapes,
         contacts=controller.plant.contacts,
         grippers=tuple(gripper.summary() for gripper in controller.state.grippers),
         popups=(*pendant.shown, *popups),

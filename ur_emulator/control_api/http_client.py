@@ -18,7 +18,7 @@ from ur_emulator.control_api.box_state import BoxState, Question, ThingNow
 from ur_emulator.control_api.operations import OPERATIONS, make
 from ur_emulator.control_api.step_operations import ReadState, WaitUntil
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTimeoutError
-from ur_emulator.models.things import Contact
+from ur_emulator.models.things import BodyShape, Contact
 
 if TYPE_CHECKING:
     from ur_emulator.controller.command import Command, Done
@@ -150,7 +150,12 @@ class AttachedBox:
 
 
 # Fields of the state that are tuples of records.
-_RECORDS: dict[str, Callable[..., Any]] = {"things": ThingNow, "contacts": Contact, "questions": Question}
+_RECORDS: dict[str, Callable[..., Any]] = {
+    "things": ThingNow,
+    "shapes": BodyShape,
+    "contacts": Contact,
+    "questions": Question,
+}
 
 
 def _state_of(result: Mapping[str, Any]) -> BoxState:

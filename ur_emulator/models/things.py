@@ -1,4 +1,4 @@
-"""Things around an arm that can be moved, as people put them there and as they are now, and contacts."""
+"""Things around an arm that can be moved, as people put them there and as they are now; shapes; contacts."""
 
 from dataclasses import dataclass
 
@@ -32,6 +32,25 @@ class ThingState:
     pose: Vector6
     twist: Vector6
     touches_tool: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BodyShape:
+    """A shape around the arm, or on its flange, for those who draw it; the links of the arm are none.
+
+    Attributes:
+        name: of the body that it is a part of: a tool, an obstacle, a thing, "table" or "scene".
+        is_carried: it hangs on the flange.
+        shape: "box", "cylinder" or "capsule" (along z), "sphere" or "plane" (z points away from it).
+        size: three edges; radius and length, of a capsule without its ends; radius [m].
+        pose: of its middle in the base frame, of one that is carried in the flange frame [m, rad].
+    """
+
+    name: str
+    is_carried: bool
+    shape: str
+    size: tuple[float, ...]
+    pose: Vector6
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ of the gears. The law of the joint servos is that of MuJoCo's actuators, force =
 so that it acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -13,9 +13,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from protocol.pose import rotvec_from_flat
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
-from ur_emulator.models.robot_model import DhRow, RobotModel
-from ur_emulator.models.things import Contact
+from ur_emulator.models.robot_model import DhRow, RobotModel, six
+from ur_emulator.models.things import BodyShape, Contact
 from ur_emulator.plant.drives import Drives, ServoGains
 from ur_emulator.plant.friction import Presliding
 from ur_emulator.plant.hand import add_tool, make_hand
@@ -43,6 +44,15 @@ _CONTACT_SOLREF = (0.010, 1.0)
 _CONTACT_SOLIMP = (0.3, 0.95, 0.0005, 0.5, 2.0)
 # Sliding friction of what touches; assumed: a tool of metal or plastic on a table.
 _SLIDING_FRICTION = 0.3
+
+# Shapes by MuJoCo's types, and MuJoCo's sizes as those of `BodyShape`.
+_SHAPES: dict[int, tuple[str, Callable[..., tuple[float, ...]]]] = {
+    int(mujoco.mjtGeom.mjGEOM_BOX): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", lambda r, half, _: (r, 2 * half)),
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", lambda r, half, _: (r, 2 * half)),
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", lambda r, *_: (r,)),
+    int(mujoco.mjtGeom.mjGEOM_PLANE): ("plane", lambda *_: ()),
+}
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 
@@ -186,6 +196,28 @@ class ArmPhysics:
                 position = tuple(self.data.contact[i].pos.tolist())
                 contacts.append(Contact(first, second, position, tuple(force.tolist())))
         return tuple(contacts)
+
+    @property
+    def shapes(self) -> tuple[BodyShape, ...]:
+        """Shapes around the arm and on its flange, at the start of the last sub-step."""
+        model, data = self.model, self.data
+        shapes = []
+        for geom in range(model.ngeom):
+            body = model.geom_bodyid[geom]
+            row = _SHAPES.get(model.geom_type[geom])
+            is_used = model.geom_contype[geom] | model.geom_conaffinity[geom]
+            name = self._name_of(geom) if is_used else ""
+            if row is None or not is_used or name == "base" or model.body(body).name in LINKS:
+                continue
+            position, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+            is_carried = bool(self._is_arm[body])
+            if is_carried:
+                to_flange = self.flange_rotation.T
+                position, rotation = to_flange @ (position - self.flange_position), to_flange @ rotation
+            pose = six([*position.tolist(), *rotvec_from_flat(*rotation.ravel().tolist())])
+            shape, size = row
+            shapes.append(BodyShape(name, is_carried, shape, size(*model.geom_size[geom].tolist()), pose))
+        return tuple(shapes)
 
     def _name_of(self, geom: int) -> str:
         """What people call the body of a shape: a link, a tool, an obstacle, a thing, the table."""

@@ -27,7 +27,7 @@ from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.fidelity import Fidelity
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
-from ur_emulator.models.things import Contact, Thing
+from ur_emulator.models.things import BodyShape, Contact, Thing
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
 from ur_emulator.plant.hand import FingerCommand, FingerState
@@ -165,6 +165,12 @@ class Plant:
         """Where bodies touch."""
         self._be_current()
         return self._physics.contacts
+
+    @property
+    def shapes(self) -> tuple[BodyShape, ...]:
+        """Shapes around the arm and on its flange."""
+        self._be_current()
+        return self._physics.shapes
 
     def furnish(self, surroundings: Cell | Path) -> None:
         """Put a scene around the arm, see `Scene.furnish`."""

@@ -1,0 +1,242 @@
+"""What people do to a box through a window: what a pendant can, and what only an emulated box has.
+
+A pendant's keys are lines for the dashboard server, or the operation of the control API that does the same
+where there is no dashboard (PolyScope X); the arm is moved by a program that is sent to port 30002. All else
+is operations of the control API. Every way begins with `_check`: a robot that does not say that it is
+simulated takes nothing.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from importlib import resources
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pc_client.arrays import Array
+from pc_client.driver.questions import ask_dashboard
+from pc_client.driver.rtde import RtdeStream
+from pc_client.driver.transport import TcpNetwork
+from pc_client.errors import ClientError
+from protocol.rtde.types import RtdeValue
+from protocol.ur_types import ProgramState, RobotMode, SoftwareVersion
+from ur_emulator.control_api.http_client import ControlClient
+from ur_emulator.errors import EmulatorError
+from ur_pendant.robot import Robot
+
+
+class HandError(Exception):
+    """What was asked for was not done; one line for people."""
+
+
+class Key(NamedTuple):
+    """A key of a pendant: the line for the dashboard server, and the operation that does the same."""
+
+    label: str
+    line: str
+    operation: str
+
+
+KEYS = (
+    Key("Power on", "power on", "power_on"),
+    Key("Release brakes", "brake release", "release_brakes"),
+    Key("Power off", "power off", "power_off"),
+    Key("Play", "play", "resume_program"),
+    Key("Pause", "pause", "pause_program"),
+    Key("Stop", "stop", "stop_program"),
+    Key("Unlock protective stop", "unlock protective stop", "unlock_protective_stop"),
+    Key("Restart safety", "restart safety", "restart_safety"),
+    Key("Close popup", "close popup", "close_popups"),
+)
+"""Of a real pendant; replies of the dashboard are shown as they come."""
+
+_REFUSALS = ("could not", "cannot", "failed", "not allowed", "unable", "no such", "error", "not found")
+"""What a reply of the dashboard has when the command was not carried out."""
+
+SPEED, ACCELERATION = 0.6, 1.5
+"""Of a joint that follows [rad/s, rad/s²]: a third of what a UR3 may, so that TCP limits hold, too."""
+
+_SILENCE = 0.3
+"""The arm stops when no target comes for so long [s]."""
+
+_REST = 3.0
+"""A program that nobody moves ends after so long [s]: others may want the arm."""
+
+_START = 2.0
+"""A program that has not begun after so long [s] does not run: in local control, for example."""
+
+_RATE = 30.0
+_UPPER_SINCE = (SoftwareVersion(3, 9), SoftwareVersion(5, 3))
+"""First software with registers from 24 on, which fieldbuses leave alone."""
+
+
+class Hands:
+    """All that is done to one robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._follower: Follower | None = None
+        self._lock = threading.Lock()
+
+    # --- keys of a pendant
+
+    def press(self, key: Key) -> str:
+        """Press a key; return what the robot says. HandError if it was not done."""
+        if not self._robot.address.ports.dashboard:
+            self.operate(key.operation)
+            return ""
+        return self.tell_dashboard(key.line)
+
+    def tell_dashboard(self, line: str) -> str:
+        """Have a command of the dashboard server done; return its reply. HandError if it was refused."""
+        self._check()
+        address = self._robot.address
+        try:
+            answers = ask_dashboard(TcpNetwork(), address.host, address.ports.dashboard, (line,))
+        except ClientError as error:
+            raise HandError(str(error)) from None
+        reply = answers.get(line)
+        if reply is None:
+            raise HandError(f"the dashboard server does not answer to {line!r}")
+        if any(word in reply.lower() for word in _REFUSALS):
+            raise HandError(reply)
+        return reply
+
+    def run(self, program: str) -> None:
+        """Send a program. HandError if it was not sent; what becomes of it the log says."""
+        self._check()
+        address = self._robot.address
+        try:
+            connection = TcpNetwork().connect(address.host, address.ports.secondary, 2.0)
+            connection.send(program.encode("latin-1", "replace") + b"\n")
+            connection.close()
+        except ClientError as error:
+            raise HandError(str(error)) from None
+
+    # --- an emulated box
+
+    @property
+    def has_control_api(self) -> bool:
+        """Whether `operate` works."""
+        return bool(self._robot.address.control_port)
+
+    def operate(self, operation: str, **arguments: Any) -> dict[str, Any]:
+        """Have an operation of the control API done. HandError if it was not, with what the box says."""
+        self._check()
+        address = self._robot.address
+        if not address.control_port:
+            raise HandError("only the control API of a box can do this: serve it with --control-port")
+        client = ControlClient(address.host, address.control_port, address.token)
+        try:
+            return client.perform(operation, arguments)
+        except EmulatorError as error:
+            raise HandError(str(error)) from None
+
+    # --- moving the arm
+
+    def follow(self, q: Sequence[float] | Array) -> None:
+        """Let the arm go to a posture (6,) [rad] from where it is, until `let_go` or a loss.
+
+        HandError if no program may run now.
+        """
+        self._check()
+        with self._lock:
+            if self._follower is None or not self._follower.is_alive:
+                self._follower = Follower(self._robot, self.run)
+            self._follower.goal = tuple(map(float, q))
+
+    @property
+    def goal(self) -> Array | None:
+        """Where the arm goes (6,) [rad]; None while it follows nobody."""
+        follower = self._follower
+        return np.array(follower.goal) if follower is not None and follower.is_alive else None
+
+    def let_go(self) -> None:
+        """End following: the arm stops with a ramp."""
+        with self._lock:
+            if self._follower is not None:
+                self._follower.end()
+
+    def _check(self) -> None:
+        """Raise HandError for a robot that is only shown."""
+        if not self._robot.is_held:
+            raise HandError(
+                "this window only shows the robot: it does not say that it is simulated"
+                if not self._robot.view_only
+                else "this window only shows the robot"
+            )
+
+
+class Follower:
+    """A program in the box that goes to `goal`, and the stream of its targets.
+
+    It ends by `end`, when nothing has changed for `_REST`, and when its program has ended, as by a stop.
+    """
+
+    def __init__(self, robot: Robot, run: Callable[[str], None]) -> None:
+        """Begin where the arm is. HandError if no program may run now."""
+        values = robot.values
+        if values.get("robot_mode") != RobotMode.RUNNING:
+            raise HandError("the arm has no power or its brakes are closed: power it on, release the brakes")
+        if values.get("runtime_state") != ProgramState.STOPPED:
+            raise HandError("a program runs: stop it before you move the arm")
+        self.goal = _six(values["target_q"])
+        assert robot.info is not None
+        address, version = robot.address, robot.info.version
+        first = 24 if version >= _UPPER_SINCE[version.major >= 5] else 0
+        inputs = [f"input_int_register_{first}", *(f"input_double_register_{first + k}" for k in range(6))]
+        outputs = ("runtime_state",)
+        try:
+            self._stream = RtdeStream(TcpNetwork(), address.host, address.ports.rtde, outputs, _RATE, inputs)
+            # The program must find where the arm is, not the targets of the last time.
+            for counter in (1, 2):
+                self._stream.send((counter, *self.goal))
+                self._stream.receive()
+            run(_program(first))
+        except ClientError as error:
+            raise HandError(str(error)) from None
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._feed, daemon=True)
+        self._thread.start()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the program still follows."""
+        return self._thread.is_alive()
+
+    def end(self) -> None:
+        """Let the arm stop with a ramp."""
+        self._ending.set()
+        self._thread.join()
+
+    def _feed(self) -> None:
+        counter, resting, has_run, last = 2, 0.0, False, self.goal
+        try:
+            while not self._ending.is_set() and resting < _REST:
+                values = self._stream.receive()  # 30 times a second
+                runs = values["runtime_state"] == ProgramState.PLAYING
+                resting = 0.0 if self.goal != last else resting + 1.0 / _RATE
+                if not runs and (has_run or resting > _START):
+                    return
+                has_run, last, counter = has_run or runs, self.goal, counter + 1
+                self._stream.send((counter, *last))
+            self._stream.send((0, *last))
+        except ClientError:
+            pass  # the program ends by itself
+        finally:
+            self._stream.close()
+
+
+def _program(register: int) -> str:
+    """The program with its numbers."""
+    text = resources.files(__package__).joinpath("follow.script").read_text("utf-8")
+    numbers = {"REGISTER": register, "SPEED": SPEED, "ACCELERATION": ACCELERATION, "SILENCE": _SILENCE}
+    for name, number in numbers.items():
+        text = text.replace(name, str(number))
+    return text
+
+
+def _six(value: RtdeValue) -> tuple[float, ...]:
+    return tuple(map(float, value)) if isinstance(value, tuple) else ()
