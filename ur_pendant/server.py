@@ -40,7 +40,7 @@ class WindowError(Exception):
     """The window cannot be opened; one line for people."""
 
 
-class PageServer(viser.ViserServer):
+class PageServer(viser.ViserServer):  # type: ignore[misc]  # viser has no types that mypy can use
     """viser's server that nobody can ask to publish the page."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
