@@ -20,6 +20,9 @@ help: ## list the targets
 # A client for the tests, without the fourteen packages that it asks for: its gripper imports one, which is
 # among the `clients` of pyproject.toml.
 BARE := airo-robots==2026.10.1
+# A client for Node.js, without serial ports; where npm is missing or does not get it, its tests are skipped.
+FOR_NODE := modbus-serial@8.0.25
+NPM := npm install --loglevel error --no-audit --no-fund --ignore-scripts --omit optional --fetch-retries 0 --fetch-timeout 30000
 
 # pip would compile with one core, and also what few or none of our commands load.
 NOT_LOADED := /(tests|OpenGL|dask|debugpy|distributed|fontTools|mypyc?|pip|setuptools|sqlalchemy)/
@@ -28,6 +31,7 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install -qq --upgrade pip
 	$(BIN)/python -m pip install -qq --no-compile --editable '.[dev]'
 	$(BIN)/python -m pip install -qq --no-compile --no-deps $(BARE)
+	-if command -v npm >/dev/null; then $(NPM) --prefix $(VENV)/node $(FOR_NODE) >/dev/null; fi
 	-$(BIN)/python -m compileall -qq -j 0 -x '$(NOT_LOADED)' $(VENV)/lib
 	@touch $@
 

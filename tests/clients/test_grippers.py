@@ -14,22 +14,18 @@ from pathlib import Path
 
 import pytest
 from clients_support import TIMEOUT, wait_until
+from gripper_support import BLOCK, block_between_pads, move_to_place
 
 from ur_emulator import ControlBox
 from ur_hil.tools import TOOLS
 
 HAND = TOOLS["robotiq-2f85"]
-BLOCK = 0.04  # m
-PLACE = (0.5, 0.2, 0.0)  # m; a block that stands on the table is there
-TO_PLACE = (
-    f"movej(get_inverse_kin(p[{PLACE[0]}, {PLACE[1]}, {PLACE[2] + HAND.length}, 3.14159, 0, 0]), a=8, v=2)\n"
-)
 
 
 @pytest.fixture(scope="module")
 def box():
     with ControlBox("ur5e", pace="lockstep", port_base=None, seed=7, tool=HAND.name) as box:
-        box.run_program(TO_PLACE, wait=True)
+        move_to_place(box, HAND)
         yield box
 
 
@@ -46,14 +42,6 @@ def line(box):
 
     wait_until(answers, "an answer on the serial line")
     return address
-
-
-@contextmanager
-def block_between_pads(box):
-    """Put a block on the table where the pads are; they must be open."""
-    box.add_thing("block", "box", (BLOCK, BLOCK, BLOCK), 0.1, (*PLACE, 0, 0, 0))
-    yield
-    box.remove_thing("block")
 
 
 # --- port 63352
