@@ -31,6 +31,9 @@ __all__ = ["AnswerReader", "CallReader", "RemoteFaultError", "encode_call"]
 DEEPEST: Final = 32
 """Elements inside each other; an array of arrays has eleven."""
 
+_ENCODINGS: Final = ("utf-8", "us-ascii", "iso-8859-1", "utf-16")
+"""Those of the parser itself; it looks for others in Python, which keeps the names that it has not found."""
+
 _ESCAPED: Final = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -143,6 +146,7 @@ class AnswerReader:
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
         self._parser.CharacterDataHandler = self._data
+        self._parser.XmlDeclHandler = self._declaration
         self._parser.StartDoctypeDeclHandler = self._doctype
 
     def feed(self, data: bytes) -> None:
@@ -166,8 +170,12 @@ class AnswerReader:
     def _parse(self, data: bytes, is_end: bool) -> None:
         try:
             self._parser.Parse(data, is_end)
-        except (ExpatError, LookupError, ValueError, TypeError) as error:  # the latter: of its encoding
+        except ExpatError as error:
             raise RemoteProtocolError(f"{self._what} is not XML: {error}") from None
+
+    def _declaration(self, _version: str, encoding: str | None, _standalone: int) -> None:
+        if encoding is not None and encoding.lower() not in _ENCODINGS:
+            raise RemoteProtocolError(f"{self._what} has encoding {encoding[:40]}: use {_ENCODINGS[0]}")
 
     def _doctype(self, *_: object) -> NoReturn:
         raise RemoteProtocolError(f"{self._what} has a document type, which XML-RPC does not know")

@@ -15,7 +15,7 @@ LEAST_RATE, LONGEST_GAP = 0.99, 20.0  # robot time per real time; ms
 _HEADS = ("attack", "rate", "gap (timer)", "lost", "memory", "end")
 _BOXES = {
     "CB3": "UR3, software 3.15.8",
-    "e-Series": "UR5e, software 5.25.1, with a gripper",
+    "e-Series": "UR5e, software 5.25.1, with two grippers",
     "PolyScope X": "UR5e, software 10.14.0, with the services primary and rtde",
     "oldest": "UR3, software 3.0.0, the oldest",
     "rack": "three UR3 in one process; one is attacked, the client reads from another",

@@ -1,6 +1,7 @@
 """All attacks, in the order of docs/security.md."""
 
 from attacks_bytes import BYTES
+from attacks_calls import CALLS
 from attacks_clients import CLIENTS
 from attacks_compiling import COMPILING
 from attacks_failures import FAILURES
@@ -8,7 +9,7 @@ from attacks_grippers import GRIPPERS
 from attacks_places import PLACES
 from attacks_scripts import SCRIPTS
 
-SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS)
+SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS, CALLS)
 
 
 def described() -> list[dict[str, object]]:

@@ -18,6 +18,7 @@ from ur_emulator.budgets import BUDGETS
 
 RESET = struct.pack("ii", 1, 0)
 _TURN = 1 << 16
+_STILL = 0.01  # rad; the arm sways by less when fingers stop
 
 
 def flood(
@@ -125,6 +126,38 @@ def until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) 
 def plays(box: BoxUnderAttack) -> bool:
     """Return whether a program runs."""
     return box.state()["program_state"] == "PLAYING"
+
+
+@contextmanager
+def arm_at_rest(box: BoxUnderAttack) -> Iterator[None]:
+    """The arm stands where it stood when the block ends."""
+    before = request(box, "GET", "state")[1]["q"]
+    yield
+    after = request(box, "GET", "state")[1]["q"]
+    moved = max(abs(a - b) for a, b in zip(after, before, strict=True))
+    assert moved < _STILL, f"the arm has moved by {moved:.3f} rad"
+
+
+@contextmanager
+def in_background(run: object, *arguments: object, **options: object) -> Iterator[threading.Thread]:
+    """Run an attack in a thread; it has ended when the block ends."""
+    thread = threading.Thread(target=run, args=arguments, kwargs=options, daemon=True)
+    thread.start()
+    try:
+        yield thread
+    finally:
+        thread.join()
+
+
+def asked_while(thread: threading.Thread, ask: Callable[[], None]) -> str:
+    """Ask, as a client that is not part of an attack, as long as that lasts; return a remark."""
+    n, longest = 0, 0.0
+    while thread.is_alive() or not n:
+        began = time.monotonic()
+        ask()
+        n, longest = n + 1, max(longest, time.monotonic() - began)
+        time.sleep(0.005)
+    return f"another client was answered within {1e3 * longest:.0f} ms"
 
 
 def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[list[dict], int]:

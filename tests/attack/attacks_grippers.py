@@ -11,14 +11,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from attack_record import Section
-from attackers import crowd, flood, request, until
+from attackers import arm_at_rest, asked_while, crowd, flood, in_background, until
 from box_under_attack import WITH_GRIPPER, BoxUnderAttack
 
 from protocol.modbus_rtu import encode_rtu
 
 GRIPPERS = Section("Ports of a gripper")
 
-_STILL = 0.01  # rad; the arm sways by less when the fingers stop
 _UNIT = 9
 _STATUS = encode_rtu(_UNIT, struct.pack(">BHH", 4, 0x07D0, 3))
 _CLOSE = encode_rtu(_UNIT, struct.pack(">BHHB3H", 16, 0x03E8, 3, 6, 0x0900, 0x00FF, 0xFFFF))
@@ -59,34 +58,19 @@ def _asked(box: BoxUnderAttack, text: str) -> str:
 @contextmanager
 def _arm_at_rest(box: BoxUnderAttack) -> Iterator[None]:
     """The arm stands where it stood, and the gripper answers, when the block ends."""
-    before = request(box, "GET", "state")[1]["q"]
-    yield
-    until(lambda: _asked(box, "GET SID") == "[9]", "the gripper answers")
-    after = request(box, "GET", "state")[1]["q"]
-    moved = max(abs(a - b) for a, b in zip(after, before, strict=True))
-    assert moved < _STILL, f"the arm has moved by {moved:.3f} rad"
-
-
-@contextmanager
-def _in_background(run: object, *arguments: object, **options: object) -> Iterator[threading.Thread]:
-    thread = threading.Thread(target=run, args=arguments, kwargs=options, daemon=True)
-    thread.start()
-    try:
-        yield thread
-    finally:
-        thread.join()
+    with arm_at_rest(box):
+        yield
+        until(lambda: _asked(box, "GET SID") == "[9]", "the gripper answers")
 
 
 def _answers_while(client: socket.socket, thread: threading.Thread) -> str:
     """Ask as long as others attack; return a remark."""
-    n, longest = 0, 0.0
-    while thread.is_alive() or not n:
-        began = time.monotonic()
+
+    def ask() -> None:
         answer = _told(client, "GET OBJ\n")
         assert answer.startswith("OBJ "), answer
-        n, longest = n + 1, max(longest, time.monotonic() - began)
-        time.sleep(0.005)
-    return f"another client was answered within {1e3 * longest:.0f} ms"
+
+    return asked_while(thread, ask)
 
 
 @GRIPPERS.attack(
@@ -99,7 +83,7 @@ def unread_answers_of_a_gripper(box: BoxUnderAttack, seconds: float) -> str:
     with (
         _arm_at_rest(box),
         box.connect("gripper") as client,
-        _in_background(flood, box, "gripper", block, seconds, clients=40, reads=False) as attack,
+        in_background(flood, box, "gripper", block, seconds, clients=40, reads=False) as attack,
     ):
         return _answers_while(client, attack)
 
@@ -114,7 +98,7 @@ def endless_lines_of_a_gripper(box: BoxUnderAttack, seconds: float) -> str:
         assert len(halves) == 40, f"{len(halves)} of 40 were served"
         with (
             box.connect("gripper") as client,
-            _in_background(
+            in_background(
                 flood, box, "gripper", b"SET POS " + (1 << 20) * b"9", seconds, clients=20
             ) as attack,
         ):
@@ -189,7 +173,7 @@ def _until_line_answers(box: BoxUnderAttack) -> None:
 def many_masters_of_a_line(box: BoxUnderAttack, seconds: float) -> None:
     block = 30 * (_STATUS + _CLOSE + encode_rtu(_UNIT, struct.pack(">BHH", 6, 0x03EA, 0xFFFF)))
     with _arm_at_rest(box):
-        with _in_background(flood, box, "tool_line", block, seconds, clients=15, reads=False):
+        with in_background(flood, box, "tool_line", block, seconds, clients=15, reads=False):
             flood(box, "tool_line", block, seconds, clients=15)
         _until_line_answers(box)
 
@@ -261,7 +245,7 @@ def _activate(client: socket.socket) -> None:
 def activations_while_it_moves(box: BoxUnderAttack, seconds: float) -> None:
     block = b"SET ACT 1\nSET POS 255 SPE 255 FOR 255 GTO 1\nSET ATR 1\nSET ARD 1\nSET POS 0\nSET ACT 0 ATR 0\nSET GTO 0\n"
     with _arm_at_rest(box):
-        with _in_background(flood, box, "gripper", block, seconds, clients=10):
+        with in_background(flood, box, "gripper", block, seconds, clients=10):
             flood(box, "tool_line", 20 * (_CLOSE + _STATUS), seconds, clients=1)
         with box.connect("gripper") as client:
             _activate(client)

@@ -70,13 +70,13 @@ KINDS = {
     kind.name: kind
     for kind in (
         Kind("CB3", "ur3"),
-        Kind("e-Series", "ur5e", "5.25.1", ("--tool", "robotiq-2f85")),
+        Kind("e-Series", "ur5e", "5.25.1", ("--tool", "robotiq-2f85,onrobot-rg2")),
         Kind("PolyScope X", "ur5e", "10.14.0", ("--services", "primary,rtde")),
         Kind("oldest", "ur3", "3.0.0"),
         Kind("rack", "ur3", "", ("--boxes", "3")),
     )
 }
-# Those with a dashboard; those of the e-Series; that with a gripper; the first, for what is the same in all of them.
+# Those with a dashboard; those of the e-Series; that with grippers; the first, for what is the same in all of them.
 WITH_DASHBOARD = ("CB3", "e-Series", "oldest", "rack")
 WITH_E_SERIES = ("e-Series", "PolyScope X")
 WITH_GRIPPER = ("e-Series",)
@@ -129,6 +129,7 @@ class BoxUnderAttack:
             "robot_api",
             "tool_line",
             "gripper",
+            "onrobot",
         )
         return (*(name for name in names if getattr(self.ports, name)), "control")
 

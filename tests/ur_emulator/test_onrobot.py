@@ -266,6 +266,8 @@ def test_it_says_what_it_is_and_can(server):
     [
         ("rg_grip", (0, 20, 40.0), -501),
         ("rg_grip", (0, 20.0), -501),
+        ("rg_grip", (0, float("nan"), 40.0), -501),
+        ("rg_set_fingertip_offset", (0, float("inf")), -501),
         ("rg_stop", (True,), -501),
         ("rg_stop", ({},), -501),
         ("rg_fly", (0,), -506),

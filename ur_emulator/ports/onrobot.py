@@ -6,6 +6,7 @@ values that cannot be. Source: reference `grippers.md` 3.1; codes of faults: of 
 
 import json
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any, Final
 from xmlrpc.client import Fault, dumps
 
@@ -92,6 +93,8 @@ class OnRobotAnswers:
         given = " ".join(_TYPES.get(type(argument), "other") for argument in arguments)
         if given != expected:
             raise Fault(-501, f"{name} takes ({expected}), not ({given})")
+        if not all(isfinite(argument) for argument in arguments if type(argument) is float):
+            raise Fault(-501, f"{name} takes finite numbers, not {arguments}"[:200])
         if result == "int" and name.startswith("cb_"):
             for supplied in self._grippers.values() if name == "cb_reset_tool_power" else ():
                 supplied.cycle_power()
