@@ -54,8 +54,8 @@ _PORTS = (
     ),
     _PortRow(
         ("onrobot",),
-        "move the fingers of grippers, let go of what they hold, turn their supply off and on; open only with "
-        "such a tool",
+        "move the fingers of grippers, let go of what they hold, turn their supply off and on; open only "
+        "with such a tool",
         "pages of other sites are refused",
     ),
     _PortRow(("primary_ro", "secondary_ro", "realtime_ro"), "read states, frames and messages", _NOTHING),
