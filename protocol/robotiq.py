@@ -97,6 +97,8 @@ VARIABLES: Final[Mapping[str, Variable]] = {
     "LBL": Variable("lamp, blue", Access.BOTH, 1, 1),
     "LGN": Variable("lamp, green", Access.BOTH, 1, 1),
     "SCN_BLOCK": Variable("1 stops the search for grippers", Access.WRITE, 1, 1),
+    "MUTE": Variable("1 stops the scan of the gripper", Access.WRITE, 1, 1),
+    "TOOL": Variable("1 enables the tool connector", Access.WRITE, 1, 1),
     "PRE": Variable("the target as the gripper has it", Access.READ, 255, 3),
     "STA": Variable("0 reset, 1 activating, 3 active", Access.READ, 3, 1),
     "OBJ": Variable("0 moving, 1 or 2 contact while opening or closing, 3 at the target", Access.READ, 3, 1),

@@ -33,7 +33,7 @@ from ur_emulator.outgoing.loop_network import LoopNetwork
 from ur_emulator.plant.scene import load_scene
 from ur_emulator.polyscope.player import ProgramPlayer, start_up
 from ur_emulator.polyscope.report_writer import ReportWriter
-from ur_emulator.ports.port_set import CONTROL, SOFTWARE_OF, TOOL_LINE, PortSet, SendingPorts, answering_ports
+from ur_emulator.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, SendingPorts, answering_ports
 from ur_emulator.ports.script_intake import ProgramIntake
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.scripting.network import Network
@@ -244,9 +244,8 @@ class Box:
             raise
         if control_port := numbers.pop(CONTROL, 0):
             close_to_scripts(self, control_port)
-        for name in (TOOL_LINE, *SOFTWARE_OF.values()):
-            if name in numbers:
-                self._network.own_ports[getattr(Ports(), name)] = (self._options.host, numbers[name])
+        for name, number in numbers.items():
+            self._network.own_ports[getattr(Ports(), name)] = (self._options.host, number)
         self.served_at = dataclasses.replace(
             self.served_at,
             ports=Ports.of(numbers),

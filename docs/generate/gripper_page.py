@@ -35,6 +35,8 @@ _HERE = {
     "LBL": "declared",
     "LGN": "declared",
     "SCN_BLOCK": "declared",
+    "MUTE": "declared",
+    "TOOL": "declared",
     "PRE": "exact",
     "STA": "exact",
     "OBJ": "exact",

@@ -26,6 +26,7 @@ USUAL = {
     ParamType.BOOL: "True",
     ParamType.INT: "1.0",
     ParamType.NUMBER: "1.0",
+    ParamType.NUMBER_OR_BOOL: "True",
     ParamType.STRING: '"a"',
     ParamType.STRING_OR_INT: "1.0",
     ParamType.POSE: POSE,

@@ -22,6 +22,16 @@ from ur_emulator.polyscope.report_files import BoxFacts
 
 OPTIONS = {"pace": "lockstep", "port_base": None, "seed": 7}
 
+PAUSE = """
+def guarded():
+  socket_open("127.0.0.1", 29999, "dashboard")
+  socket_send_line("pause", "dashboard")
+  socket_send_line("popup why", "dashboard")
+  socket_close("dashboard")
+  sleep(9)
+end
+"""
+
 
 @pytest.fixture
 def folder(tmp_path):
@@ -514,6 +524,13 @@ def test_what_a_client_asked_before_it_went_is_done(box):
         pass
     with Dashboard(box) as other:
         other.until("programState", "PLAYING wait.urp")
+
+
+def test_a_program_pauses_its_own_box_and_says_why(box):
+    """It closes at once, reads nothing, and expects the dashboard at its usual port."""
+    box.run_program(PAUSE)
+    assert box.wait_until(popup=True, program_state="PAUSED").popups == ("why",)
+    box.close_popups()
 
 
 def test_a_flood_behind_a_command_that_takes_its_time_ends_the_connection(folder, box):

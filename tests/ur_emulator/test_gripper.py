@@ -357,6 +357,7 @@ def test_a_client_activates_calibrates_and_moves_it(client):
     # Whoever asks for several at once reads once.
     assert ask(client, "GET STA\nGET OBJ\nGET SPE\n") == "STA 3\nOBJ 3\nSPE 255\n"
     assert ask(client, "GET SPEED\n") == "?\n"
+    assert ask(client, "SET MUTE 0 TOOL 1\n") == "ack"
     assert ask(client, "SET POS 999\n") == "nak"
     assert ask(client, "SET SID 2\n") == "nak"  # a program would take it for connected
     assert ask(client, "GET POS\n") == "POS ?\n"

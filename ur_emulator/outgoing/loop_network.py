@@ -15,7 +15,8 @@ class LoopNetwork:
     """Opens connections in a loop (see `scripting.network.Network`).
 
     Attributes:
-        own_ports: host and number of what programs expect at a port of 127.0.0.1: the software of a tool.
+        own_ports: host and number of each port of the box, by the number at which a robot has it: what a
+            program reaches at 127.0.0.1.
     """
 
     def __init__(self, loop: EventLoop, period_s: float, report: Report, own_address: str = "") -> None:

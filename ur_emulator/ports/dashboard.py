@@ -245,6 +245,9 @@ class DashboardPort(SessionPort["_DashboardSession"]):
 class _DashboardSession(Session):
     """A client; `lines` is what it has sent, and how answers are written."""
 
+    # Programs send `pause` and `popup` to their own box and close at once, without reading an answer.
+    outlives_client = True
+
     def __init__(self, connection: Connection, box: ServedBox, answers: DashboardAnswers) -> None:
         super().__init__(connection, box)
         self.lines = DashboardConnection(box.identity.software.dashboard)

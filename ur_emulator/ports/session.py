@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import NotRunningError
@@ -20,7 +20,10 @@ class Session(ABC):
 
     Attributes:
         is_busy: its requests are being answered.
+        outlives_client: what it has sent is also executed when it is gone; otherwise that ends with it.
     """
+
+    outlives_client: ClassVar[bool] = False
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
         """Prepare; nothing has arrived yet."""
@@ -58,7 +61,7 @@ class Session(ABC):
         A request that has waited for a cycle is the last of a turn: it is answered within the next cycle.
         """
         snapshot, work = self._box.snapshot, BUDGETS.client_work
-        while self.connection.is_open and self.connection.takes_answers:
+        while self.outlives_client or (self.connection.is_open and self.connection.takes_answers):
             if work <= 0 or self._box.snapshot is not snapshot:
                 return True
             cost = yield from self._answer_next()
@@ -77,7 +80,7 @@ class Session(ABC):
             self.connection.close()
         elif error is not None:
             self.connection.failed(error)
-        elif not self.connection.takes_answers:
+        elif not (self.connection.takes_answers or self.outlives_client):
             self.connection.close()  # gone: what it has sent ahead is not executed
         elif self.connection.has_ended:
             self.connection.close_when_sent()

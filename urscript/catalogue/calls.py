@@ -137,6 +137,7 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.BOOL: lambda value: type(value) is bool,
     ParamType.INT: _is_int,
     ParamType.NUMBER: is_number,
+    ParamType.NUMBER_OR_BOOL: lambda value: is_number(value) or type(value) is bool,
     ParamType.STRING: lambda value: isinstance(value, str),
     ParamType.STRING_OR_INT: lambda value: isinstance(value, str) or _is_int(value),
     ParamType.POSE: _is_pose,

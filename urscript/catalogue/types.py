@@ -138,6 +138,7 @@ class ParamType(Enum):
     BOOL = "True or False"
     INT = "an integer"
     NUMBER = "a number"
+    NUMBER_OR_BOOL = "a number, True or False"
     STRING = "a string"
     STRING_OR_INT = "a string or an integer"
     POSE = "a Pose on the form p[x,y,z,a,b,c]"
@@ -162,6 +163,7 @@ FIXED_SIZE: Final = frozenset(
         ParamType.BOOL,
         ParamType.INT,
         ParamType.NUMBER,
+        ParamType.NUMBER_OR_BOOL,
         ParamType.POSE,
         ParamType.JOINTS,
         ParamType.POSE_OR_JOINTS,
