@@ -311,7 +311,8 @@ def test_other_requests_are_refused(box):
     assert b" 403 " in post(box, CALL, Origin="http://evil.example")
     assert b" 413 " in post(box, CALL + b" " * 9000)
     for body in (b"", b"hello", b"<!DOCTYPE a><methodCall/>", b"<methodCall/>", b"<methodResponse/>",
-                 b"<methodCall><params/></methodCall>", b"<value>" * 100):  # fmt: skip
+                 b"<methodCall><params/></methodCall>", b"<value>" * 100,
+                 xmlrpc.client.dumps(([0] * 32,), "rg_stop").encode()):  # fmt: skip
         assert b"-503" in post(box, body)
 
 
