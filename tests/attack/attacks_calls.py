@@ -133,15 +133,17 @@ def _status(box: BoxUnderAttack, data: bytes) -> int:
 )
 def odd_calls(box: BoxUnderAttack, seconds: float) -> str:
     refused = [_call(5000 * "x"), _call("__init__"), _call("rg_grip.__call__"), _call("")]
-    answered = []
+    answered, seen = [], set()
     with _gripper_obeys(box) as server, _asking(box) as asking:
         for name in server.system.listMethods():
             types = server.system.methodSignature(name)[0][1:]
             given = [_SAMPLES[kind] for kind in types]
             refused += [_call(name, *given, _SAMPLES["int"])]
             refused += [_call(name, *given[:-1])] if given else []
-            for k in range(len(given)):
+            # What is no value is looked at by signature.
+            for k in range(0 if tuple(types) in seen else len(given)):
                 refused += [_call(name, *given[:k], value, *given[k + 1 :]) for value in _NO_VALUES]
+            seen.add(tuple(types))
             if name.startswith(("rg_", "cb_is")):
                 answered += [_call(name, f"<i8>{place}</i8>", *given[1:]) for place in _NO_PLACES]
         before, end = server.rg_get_all_variables(0), time.monotonic() + seconds
