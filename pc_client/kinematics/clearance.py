@@ -197,20 +197,27 @@ def load_hulls(description: RobotDescription) -> tuple[Any, ...]:
     geometry = description.geometry
     if isinstance(geometry, DhArm):
         return link_hulls(geometry, model)
-    meshes = pin.buildGeomFromUrdf(
-        model,
-        str(find_robot_file(geometry)),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(find_share_folder())],
-    )
     hulls = []
-    for mesh in meshes.geometryObjects:
-        if not isinstance(mesh.geometry, pin.coal.BVHModelBase):
-            continue  # ee_link carries a token box, not a part of the arm
+    for mesh in load_meshes(geometry, model):
         mesh.geometry.buildConvexHull(True, "Qt")  # Qt: triangles only, as coal needs
         hull = mesh.geometry.convex
         hulls.append(pin.GeometryObject(mesh.name, mesh.parentJoint, mesh.parentFrame, mesh.placement, hull))
     return tuple(hulls)
+
+
+def load_meshes(file: str, model: Any) -> list[Any]:
+    """The published meshes of the links, one pin.GeometryObject a link, base to wrist 3.
+
+    The links are placed by the frames of the Pinocchio model of the arm's URDF.
+    """
+    meshes = pin.buildGeomFromUrdf(
+        model,
+        str(find_robot_file(file)),
+        pin.GeometryType.COLLISION,
+        package_dirs=[str(find_share_folder())],
+    )
+    # ee_link carries a token box, not a part of the arm.
+    return [mesh for mesh in meshes.geometryObjects if isinstance(mesh.geometry, pin.coal.BVHModelBase)]
 
 
 _CORNERS = 24
@@ -227,22 +234,24 @@ def link_hulls(arm: DhArm, model: Any) -> tuple[Any, ...]:
     The links are placed by the frames of the Pinocchio model of the arm's URDF.
     """
     hulls = []
-    for link, points in _housings(arm).items():
+    for link, rings in housings(arm).items():
         frame = model.frames[index := model.getFrameId(link)]
-        hulls.append(pin.GeometryObject(link, frame.parentJoint, index, frame.placement, _hull(points)))
+        hull = _hull(np.vstack(rings))
+        hulls.append(pin.GeometryObject(link, frame.parentJoint, index, frame.placement, hull))
     return tuple(hulls)
 
 
-def _housings(arm: DhArm) -> dict[str, Array]:
-    """Points (n, 3) on the ends of the housings of each link, in the frame of the link [m]."""
+def housings(arm: DhArm) -> dict[str, tuple[Array, ...]]:
+    """Both ends (n, 3) of one or two round housings of each link, in the frame of the link [m]."""
     shoulder, elbow, wrist = arm.radii
     upper, half = arm.shoulder_offset / 2, arm.elbow_step / 2
     end, side, cap = arm.wrist_step / 2, arm.d5 / 2, _CAP * wrist
-    rings: dict[str, tuple[Array, ...]] = {
+    return {
         "base_link": (_about_z(0.0, 0.0, arm.foot), _about_z(0.0, arm.d1 - upper, shoulder)),
         "shoulder_link": (
             _about_z(0.0, -upper, shoulder),
             _about_z(0.0, upper, shoulder),
+            _about_y(0.0, 0.0, shoulder),
             _about_y(upper, 0.0, shoulder),
         ),
         "upper_arm_link": (
@@ -271,7 +280,6 @@ def _housings(arm: DhArm) -> dict[str, Array]:
         ),
         "wrist_3_link": (_about_y(side, 0.0, wrist), _about_y(arm.d6, 0.0, wrist)),
     }
-    return {link: np.vstack(parts) for link, parts in rings.items()}
 
 
 def _about_y(y: float, z: float, radius: float) -> Array:

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pc_client.arrays import Array
 from pc_client.errors import DriverError, PlanningError
-from pc_client.kinematics.arms import ROBOTS, JointLimits, RobotDescription
+from pc_client.kinematics.arms import ROBOTS, JointLimits, RobotDescription, Six
 from protocol.pose import Pose, T_to_pose, pose_inv, pose_trans
 from ur_hil.cell import NO_CELL, Cell
 
@@ -90,6 +90,11 @@ def robot_model(name: str = "ur3", cell: Cell = NO_CELL) -> RobotModel:
     description = ROBOTS.get(name)
     if description is None:
         raise PlanningError(f"no nominal model is called {name!r}; choose one of {', '.join(ROBOTS)}")
+    return model_of_arm(description, cell)
+
+
+def model_of_arm(description: RobotDescription, cell: Cell = NO_CELL) -> RobotModel:
+    """Return a fresh nominal model of an arm in its cell; PlanningError as `robot_model`."""
     model = load_pinocchio_model(description)
     tcp = index = int(model.getFrameId("tool0"))
     if length := cell.tool.length:
@@ -295,10 +300,7 @@ def _branches(model: RobotModel, T: Array, q6_near: float) -> Iterator[Array]:
 
     Source: K. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", 2013.
     """
-    z_tcp = tcp_pose(model, np.zeros(6))[:3, 3]
-    _, shoulder, elbow, wrist, wrist_2 = (model.pin_data.oMi[i].translation for i in range(1, 6))
-    d1, d4, d5, d6 = shoulder[2], -wrist_2[1], shoulder[2] - z_tcp[2], wrist_2[1] - z_tcp[1]
-    a2, a3 = elbow[0] - shoulder[0], wrist[0] - elbow[0]
+    d1, a2, a3, d4, d5, d6 = dh_lengths(model)
     x_tool, y_tool, z_tool = T[:3, :3].T
     centre = T[:3, 3] - d6 * z_tool
     if (r := hypot(centre[0], centre[1])) < abs(d4):
@@ -319,6 +321,14 @@ def _branches(model: RobotModel, T: Array, q6_near: float) -> Iterator[Array]:
                 q3 = up * acos(c3)
                 q2 = atan2(z, x) - atan2(a3 * sin(q3), a2 + a3 * cos(q3))
                 yield np.array((q1, q2, q3, atan2(ahead @ axis, -axis[2]) - q2 - q3, q5, q6))
+
+
+def dh_lengths(model: RobotModel) -> Six:
+    """Return d1, a2, a3, d4, d5, d6 of the DH table [m]; d6 is to the TCP."""
+    z_tcp = tcp_pose(model, np.zeros(6))[:3, 3]
+    _, shoulder, elbow, wrist, wrist_2 = (model.pin_data.oMi[i].translation for i in range(1, 6))
+    a2, a3 = elbow[0] - shoulder[0], wrist[0] - elbow[0]
+    return shoulder[2], a2, a3, -wrist_2[1], shoulder[2] - z_tcp[2], wrist_2[1] - z_tcp[1]
 
 
 def _pose_error(model: RobotModel, T_base_goal: Any, q: Array) -> Array:
