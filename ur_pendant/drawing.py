@@ -10,14 +10,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import count
-from math import hypot, isfinite
+from math import dist, hypot, isfinite
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import trimesh
 import viser
-from numpy.typing import ArrayLike
 from trimesh.convex import convex_hull
 
 from pc_client.arrays import Array
@@ -41,10 +40,7 @@ _TRANSLUCENT = 0.35
 _UNTURNED, _UNMOVED = 1e-4, 1e-5  # joints [rad] and things [m] that move by less stay: encoders have noise
 _VISIBLY = 0.05  # the target is drawn when a joint is further away [rad]: an arm that moves lags by 0.02
 _PER_NEWTON, _LONGEST = 0.005, 0.5  # length of an arrow [m/N], and the largest [m]
-_LEAST_FORCE, _LEAST_CONTACT = (
-    {True: 12.0, False: 6.0},
-    1.0,
-)  # less is no arrow [N]; the force of a CB3 is noisy
+_LEAST_CONTACT, _LEAST_FORCE, _LEAST_FORCE_CB3 = 1.0, 6.0, 12.0  # less is no arrow [N]: it may be noise
 _PATH_POINTS, _PATH_EVERY, _PATH_STEP = 300, 3, 0.001  # one an update, drawn every third; least step [m]
 _SIDE = 2.0  # of the square that stands for a plane [m]
 
@@ -144,13 +140,14 @@ class ArmDrawing:
         self.paint(colour, opacity)
         self.show(np.zeros(6))
 
-    def show(self, q: ArrayLike) -> None:
-        """Put it into a posture (6,) [rad]."""
-        angles = np.asarray(q, dtype=np.float64)
-        pin.framesForwardKinematics(self.model.pin_model, self._data, angles)
-        for joint in np.flatnonzero(np.abs(angles - self._q) > _UNTURNED).tolist():
-            self._q[joint] = angles[joint]
-            self.links[joint + 1].wxyz = _wxyz(self._data.liMi[joint + 1].rotation)
+    def show(self, q: Sequence[float] | Array) -> bool:
+        """Put it into a posture (6,) [rad]; return whether a joint turned visibly."""
+        if turned := [k for k in range(6) if abs(q[k] - self._q[k]) > _UNTURNED]:
+            self._q[turned] = [q[k] for k in turned]
+            pin.framesForwardKinematics(self.model.pin_model, self._data, self._q)
+            for k in turned:
+                self.links[k + 1].wxyz = _wxyz(self._data.liMi[k + 1].rotation)
+        return bool(turned)
 
     def paint(self, colour: Colour, opacity: float) -> None:
         """Give it a colour, and an opacity up to 1."""
@@ -211,6 +208,7 @@ class RobotDrawing:
         self.T_base_tcp: Array = np.eye(4)
         self._info: RobotInfo | None = None
         self._state: BoxState | None = None
+        self._offset: tuple[float, ...] = ()
         self._target: ArmDrawing | None = None
         self._shapes: dict[tuple[object, ...], viser.SceneNodeHandle] = {}
         self._path: deque[Array] = deque(maxlen=_PATH_POINTS)
@@ -235,12 +233,13 @@ class RobotDrawing:
         if self._is_lost != bool(self._robot.problem):
             self._is_lost = not self._is_lost
             arm.paint(*((_LOST, _TRANSLUCENT) if self._is_lost else (_HOUSING, 1.0)))
-        arm.show(q)
         offset = _six(values, "tcp_offset") or arm.model.tcp_offset
-        _place(self._tcp, offset)
-        self.T_base_tcp = arm.T_base_tcp(offset)
+        if arm.show(q) or offset != self._offset:
+            self.T_base_tcp, self._offset = arm.T_base_tcp(offset), offset
+            _place(self._tcp, offset)
         tcp, force = self.T_base_tcp[:3, 3], _six(values, "actual_TCP_force") or (0.0, 0.0, 0.0)
-        _point(self._force, [(tcp, force[:3])], _LEAST_FORCE[info.version.major < 5])
+        least = _LEAST_FORCE if info.version.major >= 5 else _LEAST_FORCE_CB3
+        _point(self._force, [(tcp, force[:3])], least)
         self._show_path(tcp)
         target = _six(values, "target_q") or q
         is_away = max(abs(a - b) for a, b in zip(q, target, strict=True)) > _VISIBLY
@@ -265,7 +264,8 @@ class RobotDrawing:
             self._scene.remove_by_name(f"{self._name}/{part}")
         self.arm = arm = ArmDrawing(self._scene, f"{self._name}/arm", model, _HOUSING)
         self.model, self.links = model, arm.links
-        self._target, self._state, self._is_lost = None, None, False
+        self._target, self._state, self._is_lost, self._offset = None, None, False, ()
+        self._path.clear()
         self._tcp: viser.FrameHandle = self._scene.add_frame(
             f"{arm.flange}/tcp", axes_length=0.08, axes_radius=0.003
         )
@@ -275,14 +275,13 @@ class RobotDrawing:
     def _show_path(self, tcp: Array) -> None:
         """Go on with the path of the TCP (3,) [m]."""
         last = self._path[-1] if self._path else tcp
-        self._path.append(tcp if np.abs(tcp - last).max() > _PATH_STEP else last)
+        self._path.append(tcp if dist(tcp, last) > _PATH_STEP else last)
         if next(self._turns) % _PATH_EVERY == 0:
-            points = np.array(self._path)
-            steps = np.stack((points[:-1], points[1:]), axis=1)
-            steps = steps[(steps[:, 0] != steps[:, 1]).any(axis=1)]
-            self._trace.visible = len(steps) > 0
-            if len(steps):
-                self._trace.points = steps
+            self._trace.visible = self._path[0] is not self._path[-1]
+            if self._trace.visible:
+                points = np.array(self._path)
+                steps = np.stack((points[:-1], points[1:]), axis=1)
+                self._trace.points = steps[(steps[:, 0] != steps[:, 1]).any(axis=1)]
 
     def _show_shapes(self, shapes: Iterable[BodyShape], flange: str) -> None:
         """Draw these shapes and no others."""
