@@ -195,6 +195,7 @@ class RobotDrawing:
         arm: as it was measured; None until the robot has said who it is and where it stands. Another kind of
             robot gets a new one, and with it other `model` and `links`, which are the arm's.
         T_base_tcp: (4, 4) of the measured TCP [m].
+        root: the node of its base.
     """
 
     def __init__(
@@ -213,7 +214,7 @@ class RobotDrawing:
         self._shapes: dict[tuple[object, ...], viser.SceneNodeHandle] = {}
         self._path: deque[Array] = deque(maxlen=_PATH_POINTS)
         self._numbers, self._turns, self._is_lost = count(), count(), False
-        self._scene.add_frame(name, show_axes=False, position=at)
+        self.root = self._scene.add_frame(name, show_axes=False, position=at)
         none = np.zeros((1, 2, 3))
         size = {"shaft_radius": 0.005, "head_radius": 0.012, "head_length": 0.03}
         arrows = partial(self._scene.add_arrows, points=none, visible=False, **size)

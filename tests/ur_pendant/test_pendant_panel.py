@@ -1,0 +1,525 @@
+"""The panel on a real server of viser, whose callbacks are called as viser does it; robot and hands are recorded."""
+
+import asyncio
+from collections import deque
+from dataclasses import replace
+from time import sleep
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import viser
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pc_client.kinematics.arms import ROBOTS
+from pc_client.kinematics.model import robot_model, tcp_pose
+from protocol.pose import pose_to_T
+from protocol.ur_types import Ports, ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from ur_emulator import ControlBox
+from ur_emulator.control_api.box_state import BoxState, Question, ThingNow
+from ur_emulator.control_api.operations import make
+from ur_pendant import hands
+from ur_pendant.drawing import RobotDrawing
+from ur_pendant.hands import HandError
+from ur_pendant.panel import (
+    AHEAD,
+    FREEDRIVE,
+    JUMP,
+    LINES,
+    MOST_FORCE,
+    ROWS,
+    STIFFNESS,
+    Panel,
+    columns,
+    jogged,
+    plain,
+    pulled,
+    reached,
+    stopping,
+)
+from ur_pendant.robot import PLOTTED, Address, LogLine, Robot, Sample
+
+Q = (0.3, -1.7, -2.0, -0.2, 1.4, 1.8)
+ZEROS = (0.0,) * 6
+HOSTILE = "<img src=x onerror=alert(1)>\n\x00\x1b[31m\u202e\ud800" + "x" * 10_000
+NAME = HOSTILE.replace("\ud800", "")[:900]
+MODEL = robot_model("ur5e")
+
+
+class Hands:
+    """Records what is done; refuses when it has a `refusal`."""
+
+    def __init__(self, *, has_control_api=True):
+        self.has_control_api, self.done, self.goal, self.refusal = has_control_api, [], None, ""
+
+    def _do(self, *what):
+        if self.refusal:
+            raise HandError(self.refusal)
+        self.done.append(what)
+        return "reply" if what[0] == "tell_dashboard" else {}
+
+    def press(self, key):
+        self._do("press", key.label)
+        return f"{key.label} done"
+
+    def operate(self, operation, **arguments):
+        make(operation, arguments)  # as the box takes it
+        return self._do(operation, arguments)
+
+    def tell_dashboard(self, line):
+        return self._do("tell_dashboard", line)
+
+    def run(self, program):
+        self._do("run", program)
+
+    def follow(self, q):
+        self._do("follow", tuple(np.round(q, 6)))
+        self.goal = np.array(q)
+
+
+class Client:
+    """A page that notes what it is told."""
+
+    client_id = 1
+
+    def __init__(self):
+        self.told = []
+
+    def add_notification(self, title, body, **_):
+        self.told.append((title, body))
+
+
+def a_robot(**changes):
+    values = {
+        "robot_mode": RobotMode.RUNNING, "safety_mode": SafetyMode.NORMAL, "runtime_state": ProgramState.STOPPED,
+        "actual_q": Q, "target_q": Q, "target_qd": ZEROS, "actual_digital_input_bits": 0b1, "speed_scaling": 0.5,
+        "target_speed_fraction": 0.5, "script_control_line": 0, "tcp_offset": (0.0, 0.0, 0.1, 0.0, 0.0, 0.0),
+    }  # fmt: skip
+    robot = SimpleNamespace(
+        is_held=True, view_only=False, problem="", title="UR5e 5.15.0 at 127.0.0.1", values=values,
+        info=SimpleNamespace(version=SoftwareVersion(5, 15), model="UR5e", tool=None), kinematics=None, state=None,
+        address=Address("127.0.0.1", Ports()), log=deque(), history=deque(), popups=(), questions=(), program="",
+        label="",
+    )  # fmt: skip
+    vars(robot).update(changes)
+    return robot
+
+
+def a_state(**changes):
+    return replace(
+        BoxState(
+            **{
+                name: ()
+                if kind.startswith("tuple") or "Vector" in kind
+                else {}
+                if kind == "Levels"
+                else ""
+                if kind == "str"
+                else 0
+                for name, kind in BoxState.__annotations__.items()
+            }
+        ),
+        **changes,
+    )
+
+
+class Window:
+    """A panel, its controls by label, and somebody at a page."""
+
+    def __init__(self, server, robot, hands):
+        self.server, self.robot, self.hands, self.client = server, robot, hands, Client()
+        self.drawing = RobotDrawing(server, "/robot0", robot)
+        self.panel = Panel(server, robot, hands, self.drawing)
+        self.update()
+
+    def update(self):
+        self.drawing.update()
+        self.panel._refreshed = 0.0
+        self.panel.update()
+
+    def controls(self):
+        return list(self.server.gui._gui_input_handle_from_uuid.values())
+
+    def labels(self):
+        return {handle.label for handle in self.controls()}
+
+    def control(self, label):
+        return next(handle for handle in self.controls() if handle.label == label)
+
+    def event(self, handle, **more):
+        return SimpleNamespace(client=self.client, client_id=1, target=handle, **more)
+
+    def use(self, label, value=True):
+        handle = self.control(label)
+        handle._impl.value = value
+        for callback in handle._impl.update_cb:
+            callback(self.event(handle))
+        self.work()
+
+    def hold(self, label):
+        handle = self.control(label)
+        for callbacks in handle._impl.hold_cbs_from_freq.values():
+            for callback in callbacks:
+                callback(self.event(handle))
+        self.work()
+
+    def work(self):
+        """Let the panel's worker do what it was asked for."""
+        self.panel._worker.submit(int).result()
+
+
+@pytest.fixture
+def server():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def window(server):
+    return Window(server, a_robot(), Hands())
+
+
+def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server):
+    robot = a_robot(is_held=False)
+    window = Window(server, robot, Hands())
+    assert window.control("Controls").value == "none: the robot does not say that it is simulated"
+    assert window.control("Mode").value == "RUNNING"
+    free = {"Pause", "Signal", "Filter"}  # of the page only
+    assert all(handle.disabled for handle in window.controls() if handle.label not in free)
+    assert window.panel._nodes == ()
+    assert not window.drawing.links[-1]._has_any_drag_callbacks()
+    robot.is_held = True
+    window.update()
+    assert {
+        "Power",
+        "Emergency",
+        "base +",
+        "Put obstacle",
+    } <= window.labels()
+    assert "Controls" not in window.labels()
+    assert window.drawing.links[-1]._has_any_drag_callbacks()
+    robot.is_held = False
+    window.update()
+    assert "Power" not in window.labels()
+    assert not window.drawing.links[-1]._has_any_drag_callbacks()
+    window.panel.remove()
+    assert not window.labels()
+
+
+@pytest.mark.parametrize(("major", "has_api"), [(3, True), (5, True), (10, True), (5, False)])
+def test_every_key_does_what_it_says_where_the_robot_has_it(server, major, has_api):
+    info = SimpleNamespace(version=SoftwareVersion(major, 15), model="UR5e")
+    hands = Hands(has_control_api=has_api)
+    window = Window(server, a_robot(info=info), hands)
+    for label, since, deeds in ROWS:
+        assert (
+            (label in window.labels() - {"Control"})
+            or label == "Control"
+            or since > (major if has_api else 0)
+        )
+        if since <= (major if has_api else 0):
+            row = next(
+                handle for handle in window.controls() if handle.label == label and hasattr(handle, "options")
+            )
+            for option in deeds:
+                row._impl.value = option
+                row._impl.update_cb[0](window.event(row))
+    pressed = {name for kind, name in (what for what in hands.done if len(what) == 2) if kind == "press"}
+    assert len(pressed) == 9
+    assert ("emergency_stop", {}) in hands.done if has_api else all(kind == "press" for kind, _ in hands.done)
+    assert (("enabling_device", {"position": "fully pressed"}) in hands.done) == (has_api and major >= 5)
+
+
+def test_what_is_not_done_is_told_once_and_replies_are_told(window):
+    window.use("Power", "Power on")
+    window.hands.refusal = "no power: it is <b>late</b>\n"
+    for _ in range(5):
+        window.hold("base +")
+    assert window.client.told == [("Robot", "Power on done"), ("Not done", "no power: it is <b>late</b> ")]
+
+
+def test_programs_speed_inputs_and_freedrive(window):
+    window.use("File", "a.urp\nquit")
+    window.use("Load program")
+    window.use("Speed %", 30)
+    window.use("In, standard", "0 ●")
+    window.use("In, tool", "1 ○")
+    for option in FREEDRIVE:
+        window.use("Freedrive", option)
+    *first, run, stop = window.hands.done
+    assert first == [
+        ("tell_dashboard", "load a.urp quit"),
+        ("set_speed", {"fraction": 0.3}),
+        ("set_digital_input", {"group": "standard", "n": 0, "level": False}),
+        ("set_digital_input", {"group": "tool", "n": 1, "level": True}),
+    ]
+    assert run[0] == "run"
+    assert "freedrive_mode()" in run[1]
+    assert stop == ("press", "Stop")
+
+
+def test_controls_follow_the_robot_and_nobody_is_asked(window):
+    window.robot.values = {
+        **window.robot.values,
+        "actual_digital_input_bits": 0b110,
+        "target_speed_fraction": 0.2,
+    }
+    window.control("Speed %")._impl.update_timestamp = 0.0
+    window.update()
+    assert window.control("Speed %").value == 20
+    assert window.control("In, standard").options[:4] == ("0 ○", "1 ●", "2 ●", "3 ○")
+    window.work()
+    assert window.hands.done == []
+
+
+def test_the_world(window):
+    window.use("Name", NAME)
+    window.use("At m", (0.5, 0.1, 0.2))
+    pose = (0.5, 0.1, 0.2, 0.0, 0.0, 0.0)
+    window.use("Shape", "sphere")
+    window.use("Put obstacle")
+    assert window.hands.done.pop() == (
+        "add_obstacle",
+        {"name": NAME, "shape": "sphere", "size": (0.1,), "pose": pose},
+    )
+    window.use("Name", "can")
+    window.use("Shape", "cylinder")
+    window.use("Put thing")
+    size = (0.1, 0.1)
+    thing = {"name": "can", "shape": "cylinder", "size": size, "pose": pose, "mass": 0.5}
+    assert window.hands.done.pop() == ("add_thing", thing)
+    window.use("Hang load on the flange")
+    assert window.hands.done.pop() == ("attach_payload", {"mass": 0.5})
+    window.use("Remove")
+    can = ThingNow("can", ZEROS, ZEROS, touches_tool=False)
+    window.robot.state = a_state(obstacles=(NAME, f"{NAME}y"), things=(can,))
+    window.update()
+    assert window.control("There").options == ("can", plain(NAME))
+    for name in window.control("There").options:
+        window.use("There", name)
+        window.use("Remove")
+    assert window.hands.done == [
+        ("remove_thing", {"name": "can"}),
+        ("remove_obstacle", {"name": f"{NAME}y"}),
+    ]
+
+
+@given(st.text(max_size=400))
+def test_text_is_one_line_of_what_prints(text):
+    assert plain(text).isprintable()
+    assert len(plain(text)) <= 160
+
+
+def test_hostile_texts_are_shown_as_text(window):
+    robot, question = window.robot, Question(3, "STRING", HOSTILE)
+    robot.state = a_state(program=HOSTILE)
+    robot.log.extend(LogLine(k, f"{k} {HOSTILE}") for k in range(100))
+    vars(robot).update(
+        problem=HOSTILE, program=HOSTILE, label=HOSTILE, popups=(HOSTILE,) * 9, questions=(question,)
+    )
+    window.update()
+    texts = [handle.value for handle in window.controls() if isinstance(handle.value, str)]
+    assert any("<img src=x onerror" in text for text in texts)
+    lines = [line for text in texts for line in text.split("\n")]
+    assert all(line.isprintable() and len(line) < 200 for line in lines)
+    assert window.control("Log").value.splitlines()[0].startswith("99.00  99 <img")
+    assert len(window.control("Log").value.splitlines()) == 40
+    window.use("Filter", "7 <IMG")
+    window.update()
+    assert len(window.control("Log").value.splitlines()) == 10
+
+
+def test_popups_and_questions_until_they_are_gone(window):
+    robot = window.robot
+    asked = [("BOOLEAN", "Yes", True), ("INTEGER", "7", 7), ("FLOAT", "2.5", 2.5), ("STRING", "a", "a")]
+    for k, (kind, text, value) in enumerate(asked):
+        robot.questions = (Question(k + 1, kind, "how?"),)
+        window.update()
+        assert window.control("Text").value == "how?"
+        if kind == "BOOLEAN":
+            window.use("Answer", text)
+        else:
+            window.use(kind.capitalize(), text)
+            window.use("Answer")
+        assert window.hands.done.pop() == ("answer", {"id": k + 1, "value": value})
+    robot.questions = (Question(9, "INTEGER", "how many?"),)
+    window.update()
+    window.use("Integer", "many")
+    window.use("Answer")
+    assert window.client.told[-1][0] == "Not done"
+    assert "many" in window.client.told[-1][1]
+    robot.questions, robot.popups = (), ("look",)
+    window.update()
+    row = next(handle for handle in window.controls() if getattr(handle, "options", ()) == ("Close",))
+    row._impl.value = "Close"
+    row._impl.update_cb[0](window.event(row))
+    assert window.hands.done.pop() == ("press", "Close popup")
+    robot.popups = ()
+    window.update()
+    assert "Text" not in window.labels()
+    assert not window.panel._modals
+
+
+# --- moving
+
+
+def test_a_button_that_is_held_moves_a_joint_and_its_release_stops_it(window):
+    window.hold("elbow +")
+    window.hold("elbow +")
+    window.hold("elbow +")
+    steps = [what[1][2] - Q[2] for what in window.hands.done]
+    assert steps == pytest.approx([0.06, 0.12, AHEAD])
+    window.robot.values = {**window.robot.values, "target_qd": (0.0, 0.0, 0.6, 0.0, 0.0, 0.0)}
+    window.panel._jogging = 0.0  # when it was heard
+    window.update()
+    assert window.hands.done[-1][1][2] - Q[2] == pytest.approx(0.036 + 0.12)
+    assert window.panel._jogging is None
+
+
+@pytest.mark.parametrize("label", ["base +", "Go there"])
+def test_an_arm_without_power_is_not_moved(window, label):
+    window.robot.values = {**window.robot.values, "robot_mode": RobotMode.IDLE}
+    window.hold(label) if label == "base +" else window.use(label)
+    assert window.hands.done == []
+    assert window.client.told == [("Not done", "the arm must be RUNNING: power it on, release the brakes")]
+
+
+def test_postures_are_stored_and_reached(window):
+    window.use("Go there")
+    window.use("Store posture")
+    window.update()
+    window.use("Posture", "posture 1")
+    window.use("Go there")
+    assert [what[1] for what in window.hands.done] == [
+        tuple(np.round((0, -np.pi / 2, 0, -np.pi / 2, 0, 0), 6)),
+        Q,
+    ]
+
+
+joint_angles = st.lists(st.floats(-6.0, 6.0), min_size=6, max_size=6).map(np.array)
+
+
+@given(joint_angles, joint_angles, st.integers(0, 5), st.floats(-1.0, 1.0))
+def test_jogging_keeps_near_and_within_the_limits(goal, q, joint, step):
+    wanted = jogged(goal, q, joint, step, MODEL)
+    others = np.arange(6) != joint
+    assert (wanted[others] == goal[others]).all()
+    assert abs(wanted[joint] - q[joint]) <= AHEAD + 1e-12
+    assert MODEL.limits.q_min[joint] <= wanted[joint] <= MODEL.limits.q_max[joint]
+
+
+def test_joints_stop_ahead_of_where_they_are():
+    assert stopping(np.zeros(2), np.array((0.6, -0.6))) == pytest.approx((0.156, -0.156))
+
+
+def drag(window, phase, T):
+    gizmo = window.panel._nodes[0]
+    gizmo._impl.position = T[:3, 3]
+    asyncio.run(window.panel._on_drag(window.event(gizmo, phase=phase)))
+    window.update()
+    window.work()
+
+
+def test_the_tool_goes_where_its_frame_is_dragged(window):
+    gizmo, start = window.panel._nodes[0], window.drawing.T_base_tcp
+    assert gizmo.visible
+    assert gizmo.position == pytest.approx(start[:3, 3])
+    drag(window, "start", start)
+    assert window.hands.done == []
+    T = start.copy()
+    for _ in range(4):
+        T[2, 3] += 0.02
+        drag(window, "update", T)
+    found = tcp_pose(MODEL, window.hands.goal) @ pose_to_T(window.robot.values["tcp_offset"])
+    assert found == pytest.approx(T, abs=1e-5)
+    far = T.copy()
+    for x in (5.0, 5.1, 5.2):
+        far[0, 3] = x
+        drag(window, "update", far)
+    drag(window, "end", far)
+    assert len(window.hands.done) == 4
+    assert len(window.client.told) == 1
+    assert gizmo.position == pytest.approx(start[:3, 3])  # where the robot still is
+
+
+def test_no_pose_is_reached_by_a_jump_or_beyond_a_limit():
+    q = np.array(Q)
+    assert reached(MODEL, tcp_pose(MODEL, q + 0.05), q) == pytest.approx(q + 0.05)
+    with pytest.raises(HandError, match="out of reach, beyond a joint's limit, or too far at once"):
+        reached(MODEL, tcp_pose(MODEL, q + (JUMP + 0.1) * np.eye(6)[0]), q)
+    at_limit = q.copy()
+    at_limit[5] = ROBOTS["ur5e"].limits.q_max[5] - 0.01
+    with pytest.raises(HandError):
+        reached(MODEL, tcp_pose(MODEL, at_limit + 0.05 * np.eye(6)[5]), at_limit)
+
+
+def pull(window, phase, start, end):
+    event = window.event(
+        window.drawing.links[-1], phase=phase, start_position=tuple(start), end_position=tuple(end)
+    )
+    asyncio.run(window.panel._on_pull(event))
+    window.panel._pushed = 0.0
+    window.update()
+    window.work()
+
+
+def test_the_arm_is_pushed_where_the_mouse_takes_it(window):
+    flange = window.drawing.arm.T_base_flange
+    pull(window, "start", flange[:3, 3], flange[:3, 3] + (0.0, 0.1, 0.0))
+    (name, given), arrow = window.hands.done.pop(), window.panel._nodes[1]
+    assert name == "push"
+    assert given["force"] == pytest.approx((0.0, 20.0, 0.0))
+    assert given["duration"] == 0.3
+    assert given["point"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert arrow.visible
+    pull(window, "update", (0.0, 0.0, 0.0), (9.0, 0.0, 0.0))  # at the foot, from which the flange is far
+    given = window.hands.done.pop()[1]
+    assert np.linalg.norm(given["point"]) == pytest.approx(0.3)
+    assert np.linalg.norm(given["force"]) == pytest.approx(80.0)
+    pull(window, "end", (0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
+    assert window.hands.done == []
+    assert not arrow.visible
+
+
+def test_a_spring_pulls_with_so_much_at_most():
+    assert pulled(np.zeros(3), np.array((0.1, 0.0, 0.0))) == pytest.approx((0.1 * STIFFNESS, 0.0, 0.0))
+    assert np.linalg.norm(pulled(np.zeros(3), np.array((3.0, 4.0, 0.0)))) == pytest.approx(MOST_FORCE)
+
+
+# --- values and plots
+
+
+def test_what_a_robot_does_not_report_is_empty(server):
+    window = Window(server, a_robot(is_held=False, values={}, info=None), Hands())
+    assert {window.control(label).value for label in ("Mode", "TCP mm", *LINES)} == {""}
+    assert window.control("Program").value == "none ()"
+
+
+def test_plots_have_as_many_lines_at_any_time():
+    samples = [Sample(float(k), {"actual_q": (float(k),) * 6, "speed_scaling": 0.5}) for k in range(3)]
+    samples.append(Sample(3.0, {}))
+    signals = {signal.name: signal for signal in PLOTTED}
+    for name in ("actual_q", "speed_scaling", "actual_momentum"):
+        data = columns(samples, signals[name], 3.0)
+        assert len(data) == 7
+        assert {column.shape for column in data} == {(4,)}
+        assert data[0].tolist() == [-3.0, -2.0, -1.0, 0.0]
+    assert columns(samples, signals["actual_q"], 3.0)[6].tolist()[:3] == [0.0, 1.0, 2.0]
+    assert len(columns([], signals["actual_q"], 3.0)) == 7
+
+
+def test_a_real_box_is_held(server):
+    """Values come, and a key acts."""
+    with ControlBox("ur5e", pace="lockstep", port_base=None, control_port=0) as box:
+        robot = Robot(Address("127.0.0.1", box.ports, box.control_port))
+        try:
+            while not (robot.is_held and robot.values and robot.state):
+                sleep(0.01)
+            window = Window(server, robot, hands.Hands(robot))
+            assert window.control("Robot").value.startswith("UR5e")
+            window.use("Emergency", "Emergency stop")
+            assert box.state.safety_mode == "ROBOT_EMERGENCY_STOP", window.client.told
+        finally:
+            robot.close()

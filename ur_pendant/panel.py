@@ -1,0 +1,529 @@
+"""What a robot reports as text and plots, and the controls that people have over an emulated one.
+
+Everything is done by `Hands`, in threads of viser or in one of the panel's own: `update` waits for nobody.
+What comes from robots and programs is shown as text only, cut, and without characters that do not print. A
+robot that is not held has values and no controls; the panel is made anew when that changes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from enum import IntEnum
+from functools import partial
+from math import degrees, nan, pi
+from operator import methodcaller
+from typing import Any
+
+import numpy as np
+import viser
+from viser import transforms, uplot
+
+from pc_client.arrays import Array
+from pc_client.kinematics.model import RobotModel, solve_ik
+from protocol.pose import pose_inv, pose_to_T
+from protocol.ur_types import ProgramState, RobotMode, SafetyStatus
+from ur_emulator.commands.surroundings import MAX_LEVER, SIZES, THING_SIZES
+from ur_emulator.control_api.box_state import Question
+from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
+from ur_pendant.drawing import ArmDrawing, RobotDrawing
+from ur_pendant.hands import ACCELERATION, KEYS, SPEED, HandError, Hands
+from ur_pendant.robot import PLOTTED, Robot, Sample, Signal
+
+# --- values
+
+Show = Callable[[Robot], str]
+
+
+def _numbers(robot: Robot, name: str) -> tuple[float, ...]:
+    """A signal as numbers; empty if it is not reported."""
+    value = robot.values.get(name, ())
+    return tuple(map(float, value)) if isinstance(value, tuple) else (float(value),)
+
+
+def _figures(form: str, *names: str, scale: float = 1.0, part: slice = slice(None)) -> Show:
+    return lambda r: "  ".join(format(scale * n, form) for name in names for n in _numbers(r, name)[part])
+
+
+def _named(kind: type[IntEnum], *names: str) -> Show:
+    """The name of a mode, by the first signal that is reported."""
+    known = {int(member): member.name for member in kind}
+    return lambda robot: next((known.get(int(n), "?") for name in names for n in _numbers(robot, name)), "")
+
+
+def _levels(word: str, group: DigitalGroup) -> Show:
+    return lambda robot: " ".join(str(int(n) >> bit & 1) for n in _numbers(robot, word) for bit in group.bits)
+
+
+def _program(robot: Robot) -> str:
+    lines = [f", line {n:.0f}" for n in _numbers(robot, "script_control_line") if n > 0 and robot.program]
+    return f"{robot.program or 'none'} ({_RUNTIME(robot).lower()}{''.join(lines)})"
+
+
+def _grippers(robot: Robot) -> str:
+    grippers = now.grippers if (now := robot.state) else ()
+    return "; ".join(", ".join(f"{name} {value:.4g}" for name, value in one.items()) for one in grippers)
+
+
+_RUNTIME = _named(ProgramState, "runtime_state")
+ABOUT: Mapping[str, Show] = {
+    "Robot": lambda robot: robot.problem or robot.title,
+    "Mode": _named(RobotMode, "robot_mode"),
+    "Safety": _named(SafetyStatus, "safety_status", "safety_mode"),
+    "Operation": lambda robot: now.operational_mode if (now := robot.state) else "",
+    "Control": lambda robot: ("local", "remote")[now.remote_control] if (now := robot.state) else "",
+    "Program": _program,
+    "At": lambda robot: robot.label,
+    "Popups": lambda robot: "; ".join((*robot.popups, *(question.text for question in robot.questions))),
+    "Speed": _figures(".0%", "target_speed_fraction"),
+}
+ARM: Mapping[str, Show] = {
+    "TCP mm": _figures(".1f", "actual_TCP_pose", scale=1e3, part=slice(3)),
+    "TCP rad": _figures(".3f", "actual_TCP_pose", part=slice(3, 6)),
+    "Force N": _figures(".1f", "actual_TCP_force", part=slice(3)),
+    "Torque Nm": _figures(".2f", "actual_TCP_force", part=slice(3, 6)),
+    "Payload kg": _figures(".2f", "payload"),
+    "Grippers": _grippers,
+}
+INPUTS = {f"In, {name}": _levels("actual_digital_input_bits", g) for name, g in DIGITAL_GROUPS.items()}
+OUTPUTS = {f"Out, {name}": _levels("actual_digital_output_bits", g) for name, g in DIGITAL_GROUPS.items()}
+LINES: Mapping[str, Show] = {
+    "Analog in": _figures(".3f", "standard_analog_input0", "standard_analog_input1"),
+    "Analog out": _figures(".3f", "standard_analog_output0", "standard_analog_output1"),
+    "Tool V": _figures(".0f", "tool_output_voltage"),
+    "Integers": _figures(".0f", *(f"output_int_register_{k}" for k in range(4))),
+    "Doubles": _figures(".4g", *(f"output_double_register_{k}" for k in range(4))),
+}
+
+# --- keys: those of a pendant, and operations of the control API
+
+Deed = Callable[[Hands], object]
+_do = partial(methodcaller, "operate")
+_KEYS: Mapping[str, Deed] = {key.label: methodcaller("press", key) for key in KEYS}
+_MODES, _POSITIONS = ("manual", "automatic", "none"), ("released", "pressed", "fully pressed", "none")
+_TROUBLE = {"Protective stop": "protective_stop", "Violation": "trigger_violation", "Fault": "trigger_fault"}
+ROWS: Sequence[tuple[str, int, Mapping[str, Deed]]] = (
+    ("Power", 0, {label: _KEYS[label] for label in ("Power on", "Release brakes", "Power off")}),
+    ("Program", 0, {label: _KEYS[label] for label in ("Play", "Pause", "Stop", "Close popup")}),
+    ("Safety", 0, {label: _KEYS[label] for label in ("Unlock protective stop", "Restart safety")}),
+    ("Emergency", 3, {"Emergency stop": _do("emergency_stop"), "Release": _do("release_emergency_stop")}),
+    ("Safeguard", 3, {"Open": _do("safeguard_stop"), "Close": _do("safeguard_stop", active=False)}),
+    ("Trouble", 3, {label: _do(operation) for label, operation in _TROUBLE.items()}),
+    ("Mode", 5, {mode.capitalize(): _do("set_operational_mode", mode=mode) for mode in _MODES}),
+    ("Enabling", 5, {where.capitalize(): _do("enabling_device", position=where) for where in _POSITIONS}),
+    ("Control", 5, {"Remote": _do("remote_control"), "Local": _do("remote_control", on=False)}),
+)
+"""Label, first major version of the software that has it (0: also without a control API), and buttons."""
+
+_FREEDRIVE = "def pendant_freedrive():\n  freedrive_mode()\n  while True:\n    sync()\n  end\nend\n"
+FREEDRIVE: Mapping[str, Deed] = {"On": methodcaller("run", _FREEDRIVE), "Off": _KEYS["Stop"]}
+
+# --- moving
+
+JOINTS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
+UPRIGHT = np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))
+JOG_RATE = 10.0  # How often a button that is held is heard [Hz],
+_RELEASED = 0.3  # and for how long it is not, when it has been released [s].
+AHEAD = 0.15  # By how much a button may ask a joint to be ahead of itself [rad].
+_LAG = 0.06  # From a measurement to its effect on the goal [s].
+JUMP = 0.5  # How far a joint may go for a step of a tool that is dragged [rad].
+STIFFNESS, MOST_FORCE = 200.0, 80.0  # Of the spring that pulls at the arm [N/m, N].
+
+
+def jogged(goal: Array, q: Array, joint: int, step: float, model: RobotModel) -> Array:
+    """The goal (6,) after a step of a joint, with the joints at q (6,) now [rad]."""
+    limits, wanted = model.limits, goal.copy()
+    ahead = np.clip(goal[joint] + step, q[joint] - AHEAD, q[joint] + AHEAD)
+    wanted[joint] = np.clip(ahead, limits.q_min[joint], limits.q_max[joint])
+    return wanted
+
+
+def stopping(q: Array, qd: Array) -> Array:
+    """Where joints at q (6,) with speeds qd (6,) come to rest with their ramp [rad, rad/s]."""
+    return q + qd * (_LAG + np.abs(qd) / (2.0 * ACCELERATION))
+
+
+def reached(model: RobotModel, T_base_flange: Array, q: Array) -> Array:
+    """The posture (6,) near q (6,) [rad] with the flange at a pose (4, 4). HandError without one."""
+    found, limits = solve_ik(replace(model, tcp_frame=model.flange_frame), T_base_flange, q), model.limits
+    is_near = (found.q >= limits.q_min) & (found.q <= limits.q_max) & (np.abs(found.q - q) <= JUMP)
+    if not (found.converged and is_near.all()):
+        raise HandError("the arm stays: there is out of reach, beyond a joint's limit, or too far at once")
+    return found.q
+
+
+def pulled(grip: Array, end: Array) -> Array:
+    """The force (3,) of a spring from one point to another (3,) [N, m]."""
+    force = STIFFNESS * (end - grip)
+    return force * min(1.0, MOST_FORCE / max(float(np.linalg.norm(force)), 1e-9))
+
+
+# --- text and plots
+
+_SLOWLY = 0.2  # Between two updates of text and plots [s].
+_AGAIN = 2.0  # Before the same is told again, and before what somebody has set follows the robot [s].
+_LONGEST, _LOG_LINES = 160, 40
+_PLOTTED = 20.0  # How much is plotted [s].
+_COLOURS = ("#d62728", "#2ca02c", "#1f77b4", "#ff7f0e", "#9467bd", "#17becf")
+_SIGNALS = {signal.name: signal for signal in PLOTTED}
+
+
+def plain(text: str) -> str:
+    """Text on one line, without what does not print, and cut."""
+    cut = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    return "".join(c if c.isprintable() else " " for c in cut)
+
+
+def columns(samples: Sequence[Sample], signal: Signal, now: float) -> tuple[Array, ...]:
+    """Times after now [s] and six numbers of a signal, each (n,); nan where there is none."""
+    width, missing = len(signal.parts) or 1, (nan,) * len(signal.parts) or nan
+    numbers = np.full((len(samples), len(_COLOURS)), nan)
+    numbers[:, :width] = np.reshape([s.values.get(signal.name, missing) for s in samples], (-1, width))
+    return (np.array([sample.time - now for sample in samples]), *numbers.T)
+
+
+class Panel:
+    """Values and controls of one robot."""
+
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, hands: Hands, drawing: RobotDrawing,
+        container: AbstractContextManager[Any] | None = None,
+    ) -> None:  # fmt: skip
+        """Make it in a tab or a folder, or beside the picture."""
+        self._server, self._gui, self._robot, self._hands = server, server.gui, robot, hands
+        self._drawing, self._container = drawing, container or nullcontext()
+        self._worker = ThreadPoolExecutor(1)
+        self._task: Future[Any] = self._worker.submit(int)
+        self._postures = {"upright": UPRIGHT}
+        self._told: tuple[object, ...] = ()
+        self._told_at = self._refreshed = self._pushed = 0.0
+        self._made_for: tuple[Any, ...] = ()
+
+    def update(self) -> None:
+        """Show what is new; call it 30 times a second, after the drawing's."""
+        is_held = self._robot.is_held
+        wanted = (is_held, is_held and self._hands.has_control_api, self._drawing.arm)
+        if wanted != self._made_for:
+            self.remove()
+            self._make(*wanted)
+            self._made_for = wanted
+        now = time.monotonic()
+        if self._jogging is not None and now - self._jogging > _RELEASED:
+            self._release()
+        if self._nodes:
+            self._update_nodes(now)
+        if now - self._refreshed >= _SLOWLY:
+            self._refreshed = now
+            for handle, name, show in self._following:
+                if getattr(handle, name) != (value := show()):
+                    setattr(handle, name, value)
+            self._show_modals()
+            self._draw_charts(now)
+
+    def remove(self) -> None:
+        """Take everything away."""
+        if self._made_for:
+            for handle in (*self._nodes, self._root):
+                handle.remove()
+            for modal in self._modals.values():
+                modal.close()
+            for link in self._drawing.links if self._made_for[2] is self._drawing.arm else ():
+                link.remove_drag_callback(self._on_pull)
+        self._made_for = ()
+
+    def _make(self, is_held: bool, has_api: bool, arm: ArmDrawing | None) -> None:
+        self._following: list[tuple[Any, str, Callable[[], object]]] = []
+        self._modals: dict[Question | str, Any] = {}
+        self._charts: list[tuple[Any, Any]] = []
+        self._nodes: tuple[Any, ...] = ()
+        self._has_api, self._is_dragged, self._placed = has_api, False, np.zeros((4, 4))
+        self._jogging: float | None = None
+        self._dragged: tuple[Any, Array] | None = None
+        self._pull: tuple[Any, Array, Array] | None = None
+        gui, arm = self._gui, arm if is_held else None
+        with self._container:
+            self._root = gui.add_folder(None)
+        with self._root:
+            tabs = gui.add_tab_group()
+        with tabs.add_tab("Robot"):
+            if not is_held:
+                reason = "is only shown" if self._robot.view_only else "does not say that it is simulated"
+                self._texts({"Controls": lambda robot: f"none: the robot {reason}"})
+            self._texts(ABOUT)
+            if is_held:
+                self._make_keys()
+        with tabs.add_tab("Move"):
+            self._make_moves(None if arm is None else arm.model)
+            self._texts(ARM)
+        with tabs.add_tab("I/O"):
+            for group in DIGITAL_GROUPS.values() if has_api else ():
+                self._make_inputs(group)
+            self._texts({**({} if has_api else INPUTS), **OUTPUTS, **LINES})
+        if has_api:
+            with tabs.add_tab("World"):
+                self._make_world()
+        with tabs.add_tab("Plots"):
+            self._pause = gui.add_checkbox("Pause", False)
+            scales, data = {"x": uplot.Scale(time=False, range=(-_PLOTTED, 0.0))}, np.zeros((7, 1))
+            for first in PLOTTED[0], PLOTTED[9]:
+                choice = gui.add_dropdown("Signal", tuple(_SIGNALS), initial_value=first.name)
+                plot = gui.add_uplot(tuple(data), tuple({} for _ in data), scales=scales, height=190)
+                self._charts.append((choice, plot))
+        with tabs.add_tab("Log"):
+            wanted = gui.add_text("Filter", "")
+            log = gui.add_text("Log", "", disabled=True, multiline=True)
+            self._following.append((log, "value", lambda: self._log(wanted.value.lower())))
+        if arm is not None:
+            self._make_nodes(arm)
+
+    def _make_keys(self) -> None:
+        robot, hands, gui = self._robot, self._hands, self._gui
+        major = robot.info.version.major if robot.info is not None and self._has_api else 0
+        for label, since, deeds in ROWS:
+            if since <= major:
+                self._row(label, deeds)
+        if self._has_api:
+            slider = gui.add_slider("Speed %", 0, 100, 1, 100)
+            call = self._calling(lambda: hands.operate("set_speed", fraction=slider.value / 100))
+            slider.on_update(
+                lambda event: self._worker.submit(call, event)
+            )  # in the order in which they come
+
+            def speed() -> int:
+                is_set = time.time() - slider.update_timestamp < _AGAIN
+                return slider.value if is_set else round(100 * sum(_numbers(robot, "target_speed_fraction")))
+
+            self._following.append((slider, "value", speed))
+        if robot.address.ports.dashboard:
+            name = gui.add_text("File", "", hint="of a program, in the box's folder")
+            self._button("Load program", lambda: hands.tell_dashboard(f"load {plain(name.value)}"))
+
+    def _make_moves(self, model: RobotModel | None) -> None:
+        gui, postures = self._gui, self._postures
+        if model is not None:
+            self._can_drag = gui.add_checkbox("Drag the tool", True, hint="by its frame in the picture")
+            self._row("Freedrive", FREEDRIVE)
+            stored = gui.add_dropdown("Posture", tuple(postures))
+            self._following.append((stored, "options", lambda: tuple(postures)))
+            q = partial(self._measured, "actual_q")
+            self._button("Store posture", lambda: postures.update({f"posture {len(postures)}": q()}))
+            self._button("Go there", lambda: self._go(postures[stored.value]))
+        for joint, name in enumerate(JOINTS):
+            figure = _figures(".1f", "actual_q", scale=degrees(1.0), part=slice(joint, joint + 1))
+            if model is None:
+                self._texts({f"{name} °": figure})
+                continue
+            low, high = degrees(model.limits.q_min[joint]), degrees(model.limits.q_max[joint])
+            self._texts({f"{name} {low:.0f}…{high:.0f}°": figure})
+            for sign, symbol in ((-1, "−"), (1, "+")):
+                button, step = gui.add_button(f"{name} {symbol}"), sign * SPEED / JOG_RATE
+                call = self._calling(partial(self._jog, joint, step, model))
+                button.on_hold(partial(self._unless_busy, call), callback_hz=JOG_RATE)
+                button.on_click(self._calling(self._release))
+
+    def _make_inputs(self, group: DigitalGroup) -> None:
+        """Buttons with a number and a level, which a click changes."""
+        labels, levels = [(f"{n} ○", f"{n} ●") for n in range(group.count)], INPUTS[f"In, {group.name}"]
+        change = partial(_do, "set_digital_input", group=group.name)
+        deeds = {pair[k]: change(n=n, level=not k) for k in (0, 1) for n, pair in enumerate(labels)}
+        row = self._row(f"In, {group.name}", deeds)
+
+        def options() -> tuple[str, ...]:
+            return tuple(labels[n][int(level)] for n, level in enumerate(levels(self._robot).split()))
+
+        self._following.append((row, "options", options))
+
+    def _make_world(self) -> None:
+        gui, robot, hands = self._gui, self._robot, self._hands
+        sizes: Mapping[Any, tuple[str, ...]] = {**SIZES, **THING_SIZES}
+        name = gui.add_text("Name", "block")
+        shape = gui.add_dropdown("Shape", tuple(sizes))
+        size = gui.add_vector3("Size m", (0.1, 0.1, 0.1), step=0.01, hint="edges; or radius, length")
+        at = gui.add_vector3("At m", (0.4, 0.2, 0.1), step=0.01, hint="of its middle, in the base frame")
+        mass = gui.add_number("Mass kg", 0.5, min=0.0, max=20.0, step=0.1)
+
+        def put(operation: str, **more: float) -> None:
+            n, pose = len(sizes[shape.value]), (*at.value, 0.0, 0.0, 0.0)
+            hands.operate(
+                operation, name=name.value, shape=shape.value, size=size.value[:n], pose=pose, **more
+            )
+
+        def found() -> Mapping[str, Deed]:
+            things, obstacles = (now.things, now.obstacles) if (now := robot.state) else ((), ())
+            removals = {plain(thing.name): _do("remove_thing", name=thing.name) for thing in things}
+            return removals | {plain(name): _do("remove_obstacle", name=name) for name in obstacles}
+
+        self._button("Put obstacle", lambda: put("add_obstacle"))
+        self._button("Put thing", lambda: put("add_thing", mass=mass.value))
+        self._button("Hang load on the flange", lambda: hands.operate("attach_payload", mass=mass.value))
+        there = gui.add_dropdown("There", ("nothing",))
+        self._following.append((there, "options", lambda: tuple(found()) or ("nothing",)))
+        self._button("Remove", lambda: [deed(hands) for name, deed in found().items() if name == there.value])
+
+    def _make_nodes(self, arm: ArmDrawing) -> None:
+        """What can be dragged in the picture."""
+        scene, name, look = (
+            self._server.scene,
+            self._drawing.root.name,
+            {"visible": False, "head_length": 0.03},
+        )
+        gizmo = scene.add_transform_controls(f"{name}/hand", 0.25, depth_test=False, visible=False)
+        points, colour = np.zeros((1, 2, 3)), (230, 60, 160)
+        arrow = scene.add_arrows(
+            f"{name}/pull", points, colour, shaft_radius=0.006, head_radius=0.014, **look
+        )
+        # Pinocchio's memory is of one thread: this model is the worker's.
+        self._model = replace(arm.model, pin_data=arm.model.pin_model.createData())
+        self._nodes, self._arm = (gizmo, arrow), arm
+        gizmo.on_update(self._on_drag)
+        for link in arm.links if self._has_api else ():
+            link.on_drag("left")(self._on_pull)
+
+    def _texts(self, shows: Mapping[str, Show]) -> None:
+        for label, show in shows.items():
+            text = self._gui.add_text(label, "", disabled=True)
+            self._following.append((text, "value", partial(self._plain, show)))
+
+    def _plain(self, show: Show) -> str:
+        return plain(show(self._robot))
+
+    def _button(self, label: str, action: Callable[[], object]) -> None:
+        self._gui.add_button(label).on_click(self._calling(action))
+
+    def _row(self, label: str, deeds: Mapping[str, Deed]) -> Any:
+        row = self._gui.add_button_group(label, tuple(deeds))
+        row.on_click(self._calling(lambda: deeds[row.value](self._hands)))
+        return row
+
+    def _calling(self, action: Callable[[], object]) -> Callable[[Any], None]:
+        """What viser calls when somebody uses a control; what the robot says to it is told."""
+
+        def call(event: Any) -> None:
+            try:
+                # Without a client the panel itself has changed the control.
+                said = None if event.client is None else action()
+                if said and isinstance(said, str):
+                    self._tell(event.client, "Robot", said)
+            except (HandError, ValueError) as error:
+                self._tell(event.client, "Not done", str(error))
+
+        return call
+
+    def _tell(self, client: Any, title: str, text: str) -> None:
+        """Tell somebody once, also if a button that is held has the same answer ten times a second."""
+        now, before, self._told = time.monotonic(), self._told, (client, text)
+        if before != self._told or now - self._told_at > _AGAIN:
+            client.add_notification(title, plain(text), auto_close_seconds=6.0)
+        self._told_at = now
+
+    def _unless_busy(self, call: Callable[[Any], None], event: Any) -> None:
+        """Have the worker do something, unless it has not done the last yet."""
+        if self._task.done():
+            self._task = self._worker.submit(call, event)
+
+    def _log(self, wanted: str) -> str:
+        lines = [line for line in list(self._robot.log) if wanted in line.text.lower()]
+        return "\n".join(f"{line.time:.2f}  {plain(line.text)}" for line in lines[: -_LOG_LINES - 1 : -1])
+
+    def _draw_charts(self, now: float) -> None:
+        if self._pause.value or not self._server.get_clients():
+            return
+        samples = [sample for sample in list(self._robot.history) if now - sample.time < _PLOTTED]
+        for choice, plot in self._charts:
+            signal = _SIGNALS[choice.value]
+            if plot.title != (title := f"{signal.name} [{signal.unit}]"):
+                # Always as many lines: data and lines fit at any time.
+                names = ("s", *(signal.parts or ("value",)), *[""] * len(_COLOURS))
+                lines = zip(names, ("", *_COLOURS), strict=False)
+                plot.series = tuple(uplot.Series(label=n, stroke=c, show=n != "") for n, c in lines)
+                plot.title = title
+            plot.data = columns(samples, signal, now)
+
+    def _show_modals(self) -> None:
+        """Show the popups and the questions that are open."""
+        robot = self._robot
+        now: set[Question | str] = {*robot.popups[:3], *robot.questions[:3]} if self._has_api else set()
+        for gone in self._modals.keys() - now:
+            self._modals.pop(gone).close()
+        for new in now - self._modals.keys():
+            modal = self._modals[new] = self._gui.add_modal("A program says")
+            with modal:
+                text = plain(new if isinstance(new, str) else new.text)
+                self._gui.add_text("Text", text, multiline=True, disabled=True)
+                if isinstance(new, str):
+                    self._row("Popup", {"Close": _KEYS["Close popup"]})
+                else:
+                    self._make_answer(new)
+                self._row("Program", {"Stop": _KEYS["Stop"]})
+
+    def _make_answer(self, question: Question) -> None:
+        reply = partial(self._hands.operate, "answer", id=question.id)
+        if question.kind == "BOOLEAN":
+            self._row("Answer", {"Yes": lambda _: reply(value=True), "No": lambda _: reply(value=False)})
+            return
+        read: Callable[[str], Any] = {"INTEGER": int, "FLOAT": float}.get(question.kind, str)
+        given = self._gui.add_text(question.kind.capitalize(), "")
+        self._button("Answer", lambda: reply(value=read(given.value)))
+
+    def _measured(self, name: str) -> Array:
+        return np.array(_numbers(self._robot, name))
+
+    def _go(self, q: Array) -> None:
+        if self._robot.values.get("robot_mode") != RobotMode.RUNNING:
+            raise HandError("the arm must be RUNNING: power it on, release the brakes")
+        self._hands.follow(q)
+
+    def _jog(self, joint: int, step: float, model: RobotModel) -> None:
+        q, goal = self._measured("actual_q"), self._hands.goal
+        self._go(jogged(self._measured("target_q") if goal is None else goal, q, joint, step, model))
+        self._jogging = time.monotonic()
+
+    def _release(self) -> None:
+        """Let the arm come to rest."""
+        self._jogging = None
+        if self._hands.goal is not None:
+            self._hands.follow(stopping(self._measured("target_q"), self._measured("target_qd")))
+
+    async def _on_drag(self, event: Any) -> None:
+        """Take the pose of the frame that somebody drags; the worker follows."""
+        T = transforms.SE3(np.append(event.target.wxyz, event.target.position)).as_matrix()
+        if event.phase == "start":
+            self._followed = self._measured("actual_q")
+        else:
+            self._dragged = event, T
+        self._is_dragged, self._placed = event.phase != "end", T
+
+    def _follow(self, T_base_tcp: Array) -> None:
+        offset = _numbers(self._robot, "tcp_offset") or (0.0,) * 6
+        q = reached(self._model, T_base_tcp @ pose_to_T(pose_inv(offset)), self._followed)
+        self._go(q)
+        self._followed = q
+
+    async def _on_pull(self, event: Any) -> None:
+        """Take where somebody pulls at a link: on the flange, or as far from it as the box can be pushed."""
+        base, flange = self._drawing.root.position, self._arm.T_base_flange
+        grip = (np.array(event.start_position) - base - flange[:3, 3]) @ flange[:3, :3]
+        grip *= min(1.0, MAX_LEVER / max(float(np.linalg.norm(grip)), 1e-9))
+        self._pull = None if event.phase == "end" else (event, grip, np.array(event.end_position) - base)
+
+    def _update_nodes(self, now: float) -> None:
+        (gizmo, arrow), T = self._nodes, self._drawing.T_base_tcp
+        gizmo.visible = self._can_drag.value and self._robot.values.get("robot_mode") == RobotMode.RUNNING
+        arrow.visible = self._pull is not None
+        if self._dragged is not None and self._task.done():
+            (event, wanted), self._dragged = self._dragged, None
+            self._unless_busy(self._calling(partial(self._follow, wanted)), event)
+        if not self._is_dragged and np.abs(T - self._placed).max() > 1e-5:
+            self._placed = T
+            gizmo.position, gizmo.wxyz = T[:3, 3], transforms.SO3.from_matrix(T[:3, :3]).wxyz
+        if self._pull is not None:
+            (event, grip, end), flange = self._pull, self._arm.T_base_flange
+            point = flange[:3, :3] @ grip + flange[:3, 3]
+            force = pulled(point, end)
+            arrow.points = np.array([[point, point + force / STIFFNESS]])
+            if now - self._pushed >= _SLOWLY:
+                self._pushed, given = now, {"force": force.tolist(), "point": grip.tolist(), "duration": 0.3}
+                self._unless_busy(self._calling(partial(self._hands.operate, "push", **given)), event)
