@@ -12,7 +12,7 @@ PAGES := README.md SECURITY.md CONTRIBUTING.md CHANGELOG.md docs examples
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: ablation attack pictures help setup demo draw explore pick soak test check check-static bench format docs clean
+.PHONY: ablation attack pictures help setup demo draw explore pick show soak test check check-static bench format docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -48,6 +48,9 @@ draw: $(STAMP) ## drawings on the emulated arm: extracted, executed, compared, i
 
 pick: $(STAMP) ## a block picked up like a hand and like a robot, page and film, into out/pick
 	$(BIN)/python examples/08_pick_like_a_hand.py
+
+show: $(STAMP) ## a box with its window: an arm that signs, then waits for your hands; into out/show
+	$(BIN)/python examples/09_show.py
 
 test: $(STAMP) ## all tests, in one process more than there are cores, at most four
 	$(PYTEST)

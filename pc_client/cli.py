@@ -47,6 +47,7 @@ for _command, _examples in (
     ),
     (recordings.report, ("ur-client report out/run", "ur-client report out/a out/b --out both.html")),
     (recordings.export, ("ur-client export out/run/lognorm_4_1_r1.mcap --to csv",)),
+    (recordings.view, ("ur-client view out/run/lognorm_4_1_r1.mcap", "ur-client view a.mcap b.mcap")),
     (
         doctor.doctor,
         ("ur-client doctor --robot 127.0.0.1", "ur-client doctor --robot 192.168.0.10 --seconds 10"),
@@ -64,6 +65,7 @@ _EXTRAS = {
     "jinja2": "report",
     "distributed": "cluster",
     "optuna": "search",
+    "viser": "pendant",
 }
 
 

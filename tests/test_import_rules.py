@@ -38,6 +38,7 @@ MAY_HAVE_EFFECTS = {
         "studies/sweep/store.py",
         "cli.py",
         "recording/recorder.py",
+        "results/window.py",
     },
     "ur_pendant": {"robot.py", "hands.py", "server.py", "panel.py", "recordings.py", "__main__.py"},
 }

@@ -6,11 +6,14 @@ import dataclasses
 import json
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
+from secrets import token_urlsafe
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -132,6 +135,10 @@ def serve(
         str,
         typer.Option(help="Services of a PolyScope X box to enable: primary,rtde.", show_default="none"),
     ] = "",
+    pendant: Annotated[
+        bool, typer.Option("--pendant", help="Open a window on the box in the browser, on port 29980.")
+    ] = False,
+    pendant_view: Annotated[bool, typer.Option("--pendant-view", help="The same, to look only.")] = False,
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -148,6 +155,12 @@ def serve(
         raise typer.Exit(ExitCode.FAILED) from None
     from ur_emulator.loop.processes import Role, prepare_children
 
+    has_pendant = pendant or pendant_view
+    if has_pendant:
+        _check_window()
+    if has_pendant and control_port is None:
+        control_port = 0  # for what the window does beside what a pendant can
+        token = token if is_loopback(host) else token or token_urlsafe()
     raise_descriptor_limit()
     prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
@@ -197,12 +210,16 @@ def serve(
         )
         if log:
             rack.follow_log(k, partial(_show_entry, err, f"{at.host} " if boxes > 1 else ""))
+    window = _open_window(served, token, view=pendant_view) if has_pendant else None
     try:
         rack.serve_forever()
     except EmulatorError as error:
         err.write(f"ur-emulator: {error}")
         raise typer.Exit(ExitCode.FAILED) from None
     finally:
+        if window is not None:
+            window.terminate()
+            window.wait()
         if ready_file is not None:
             with suppress(OSError):
                 ready_file.unlink(missing_ok=True)
@@ -241,6 +258,38 @@ def ctl(
     from ur_emulator.control_api.command_line import main as control
 
     raise typer.Exit(control(words or ()))
+
+
+@app.command(
+    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
+    add_help_option=False,
+)
+def pendant(words: Annotated[list[str] | None, typer.Argument(metavar="HOST ...")] = None) -> None:
+    """Open a window on a box, or to look only on a real arm, in the browser."""
+    _check_window()
+    command = _window_command("pendant", *(words or ("--help",)))
+    os.execv(command[0], command)
+
+
+def _check_window() -> None:
+    if find_spec("viser") is None:
+        _complain("a window needs the package viser: pip install 'ur-hil[pendant]'")
+        raise typer.Exit(ExitCode.FAILED)
+
+
+def _window_command(*words: str) -> list[str]:
+    """The command of the window: a process of its own, which is a client like others."""
+    return [sys.executable, "-m", "ur_pendant", *words]
+
+
+def _open_window(served: Sequence[ServedAt], token: str | None, *, view: bool) -> subprocess.Popen[bytes]:
+    """Start the window on boxes; it says by itself where it is, or why it is not there."""
+    base = served[0].port_base
+    words = ["pendant", *(at.host for at in served), "--port-base", str(base), "--port", str(29980 + base)]
+    for at in served:
+        words += ["--control-port", str(at.control_port)]
+    environment = os.environ | ({} if token is None else {TOKEN_VARIABLE: token})
+    return subprocess.Popen(_window_command(*words, *(["--view"] if view else [])), env=environment)
 
 
 def raise_descriptor_limit() -> int:

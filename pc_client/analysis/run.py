@@ -178,6 +178,16 @@ class Run(Signals):
 
         return draw(movement_sheet((self.measured,)))
 
+    def view(self, *others: Run) -> str:
+        """Show the arm moving, beside other runs, in a window in the browser; return its address.
+
+        Raises:
+            RecordingError: the window did not open.
+        """
+        from pc_client.results.window import open_window
+
+        return open_window(*(run.recording.path for run in (self, *others)))
+
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRun:

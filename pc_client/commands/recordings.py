@@ -1,5 +1,6 @@
 """`ur-client report` and `ur-client export`: what is done with recordings, without a robot."""
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -77,3 +78,19 @@ def export(
     path = write_table(recording, out or file.with_suffix(f".{to}"), to)
     say(f"data: {recording.provenance.origin.says}")
     say(str(path))
+
+
+def view(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Recordings, shown side by side.")],
+    save: Annotated[
+        Path | None,
+        typer.Option("--save", metavar="PAGE.html", help="Write a page that needs no server, and end."),
+    ] = None,
+    port: Annotated[int, typer.Option(help="Port of the window; 0 takes a free one.")] = 29980,
+) -> None:
+    """Show recordings in the browser: arm, reference, speeds and errors, with a bar of time."""
+    from pc_client.results.window import view_command
+
+    words = ["--port", str(port)] if save is None else ["--save", str(save)]
+    command = view_command(files, *words)
+    os.execv(command[0], command)
