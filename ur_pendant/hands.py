@@ -139,13 +139,20 @@ class Hands:
     def follow(self, q: Sequence[float] | Array) -> None:
         """Let the arm go to a posture (6,) [rad] from where it is, until `let_go` or a loss.
 
+        A box in lockstep, whose time would run away from a hand, gets a move to each posture.
+
         HandError if no program may run now.
         """
         self._check()
+        goal = tuple(map(float, q))
         with self._lock:
+            if self._robot.info is not None and self._robot.info.lockstep:
+                _check_rest(self._robot)
+                self.run(f"movej({list(goal)}, a={ACCELERATION}, v={SPEED})")
+                return
             if self._follower is None or not self._follower.is_alive:
                 self._follower = Follower(self._robot, self.run)
-            self._follower.goal = tuple(map(float, q))
+            self._follower.goal = goal
 
     @property
     def goal(self) -> Array | None:
@@ -177,12 +184,8 @@ class Follower:
 
     def __init__(self, robot: Robot, run: Callable[[str], None]) -> None:
         """Begin where the arm is. HandError if no program may run now."""
-        values = robot.values
-        if values.get("robot_mode") != RobotMode.RUNNING:
-            raise HandError("the arm has no power or its brakes are closed: power it on, release the brakes")
-        if values.get("runtime_state") != ProgramState.STOPPED:
-            raise HandError("a program runs: stop it before you move the arm")
-        self.goal = _six(values["target_q"])
+        _check_rest(robot)
+        self.goal = _six(robot.values["target_q"])
         assert robot.info is not None
         address, version = robot.address, robot.info.version
         first = 24 if version >= _UPPER_SINCE[version.major >= 5] else 0
@@ -227,6 +230,14 @@ class Follower:
             pass  # the program ends by itself
         finally:
             self._stream.close()
+
+
+def _check_rest(robot: Robot) -> None:
+    """Raise HandError if the arm cannot be moved by hand now."""
+    if robot.values.get("robot_mode") != RobotMode.RUNNING:
+        raise HandError("the arm has no power or its brakes are closed: power it on, release the brakes")
+    if robot.values.get("runtime_state") != ProgramState.STOPPED:
+        raise HandError("a program runs: stop it before you move the arm")
 
 
 def _program(register: int) -> str:

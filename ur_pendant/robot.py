@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -244,11 +244,11 @@ class Robot:
         while not self._closed.wait(_SLOWLY):
             try:
                 if box is None:
-                    box, seen = (
-                        AttachedBox(self.address.host, self.address.control_port, self.address.token),
-                        0,
-                    )
+                    at = self.address
+                    box, seen = AttachedBox(at.host, at.control_port, at.token), 0
                     self.log.clear()
+                    # Which ports it has: that of the dashboard server is not there with PolyScope X.
+                    self.address = replace(at, ports=box.served_at(0).ports)
                 state: BoxState = box.perform(0, "state", {})
                 news = box.perform(0, "log", {"after": seen})
             except EmulatorError:

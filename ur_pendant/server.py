@@ -97,7 +97,8 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
     rich.get_console().quiet = True  # on which viser tells what the caller tells better
     with patch.object(websockets.asyncio.server, "serve", serve_checked):
         server = PageServer(host=host, port=port, label=title, verbose=False)
-    server.gui.configure_theme(show_logo=False, show_share_button=False, control_layout="fixed")
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
     return server
 
 

@@ -1,0 +1,148 @@
+"""What a window reads of a robot, and what it may do to it."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from protocol.ur_types import Ports
+from ur_emulator import ControlBox
+from ur_pendant.hands import KEYS, HandError, Hands
+from ur_pendant.robot import Address, Robot
+
+LIMIT = 20.0  # s, for hangs
+
+
+def until(condition, what):
+    begun = time.monotonic()
+    while not condition():
+        assert time.monotonic() - begun < LIMIT, what
+        time.sleep(0.01)
+
+
+def address_of(box):
+    return Address(box.host, box.ports, box.control_port)
+
+
+@pytest.fixture(scope="module")
+def box():
+    with ControlBox("ur5e", pace="lockstep", port_base=None, control_port=0, seed=7) as box:
+        yield box
+
+
+@pytest.fixture
+def robot(box):
+    robot = Robot(address_of(box))
+    until(lambda: robot.values and robot.state is not None, "the robot")
+    yield robot
+    robot.close()
+
+
+def test_a_robot_is_read_by_rtde_the_primary_port_and_the_control_api(box, robot):
+    assert (robot.info.model, robot.problem) == ("UR5e", "")
+    assert robot.values["actual_q"] == box.state.q
+    assert robot.kinematics.dh_a[1] == pytest.approx(-0.425, abs=0.005)
+    box.run_program('def asks():\n  request_integer_from_primary_client("how many?")\nend\n')
+    until(lambda: robot.questions, "the question")
+    assert (robot.questions[0].text, robot.program) == ("how many?", "asks")
+    box.stop_program()
+    until(lambda: not robot.questions, "the end of the question")
+    assert any("asks" in line.text for line in robot.log)
+
+
+def test_without_the_control_api_the_primary_port_tells_of_programs_popups_and_questions(box):
+    robot = Robot(replace(address_of(box), control_port=0))
+    until(lambda: robot.values, "the robot")
+    box.run_program('def says():\n  popup("look")\n  request_string_from_primary_client("who?")\nend\n')
+    until(lambda: robot.popups and robot.questions, "popup and question")
+    assert (robot.popups, robot.questions[0].kind, robot.program) == (("Popup: look",), "STRING", "says")
+    box.stop_program()
+    box.close_popups()
+    until(lambda: not robot.questions, "the end of the question")
+    robot.close()
+
+
+def test_a_robot_that_does_not_answer_has_a_problem_and_is_not_held():
+    robot = Robot(Address("127.0.0.1", Ports.of({"primary": 1, "rtde": 1})))
+    until(lambda: "refuses" in robot.problem, "the problem")
+    assert not robot.is_held
+    robot.close()
+
+
+def test_keys_are_lines_of_the_dashboard(box, robot):
+    hands = Hands(robot)
+    key = {key.label: key for key in KEYS}
+    assert hands.press(key["Power off"]) == "Powering off"
+    box.wait_until(robot_mode="POWER_OFF")
+    with pytest.raises(HandError, match=r"(?i)fail|cannot|could not"):
+        hands.press(key["Play"])
+    hands.press(key["Release brakes"])
+    box.wait_until(robot_mode="RUNNING")
+
+
+def test_where_there_is_no_dashboard_keys_are_operations(box, robot):
+    robot.address = replace(robot.address, ports=replace(robot.address.ports, dashboard=0))
+    hands = Hands(robot)
+    for operation, mode in (("power_off", "POWER_OFF"), ("release_brakes", "RUNNING")):
+        hands.press(next(key for key in KEYS if key.operation == operation))
+        box.wait_until(robot_mode=mode)
+
+
+def test_operations_say_what_the_box_says(box, robot):
+    hands = Hands(robot)
+    hands.operate("add_obstacle", name="wall", shape="box", size=(0.1, 1, 1), pose=(0.9, 0, 0.5, 0, 0, 0))
+    assert box.state.obstacles == ("wall",)
+    hands.operate("remove_obstacle", name="wall")
+    with pytest.raises(HandError, match="there is no obstacle 'wall'"):
+        hands.operate("remove_obstacle", name="wall")
+
+
+def test_a_box_in_lockstep_moves_to_each_posture(box, robot):
+    goal = np.add(box.state.q, (0.2, 0.1, -0.1, 0.0, 0.1, 0.3))
+    Hands(robot).follow(goal)
+    state = box.wait_until(program_state="STOPPED", steady=True, time=box.state.time + 0.1)
+    assert state.q == pytest.approx(goal, abs=1e-3)
+
+
+@pytest.mark.parametrize("why", ["view only", "real arm", "unknown"])
+def test_a_robot_that_is_not_simulated_takes_nothing(robot, why):
+    if why == "view only":
+        robot.view_only = True
+    else:
+        robot.info = replace(robot.info, simulated=False if why == "real arm" else None)
+    hands = Hands(robot)
+    for do in (
+        lambda: hands.press(KEYS[0]),
+        lambda: hands.tell_dashboard("play"),
+        lambda: hands.run("movej([0,0,0,0,0,0])"),
+        lambda: hands.operate("power_off"),
+        lambda: hands.follow([0.0] * 6),
+    ):
+        with pytest.raises(HandError, match="only shows the robot"):
+            do()
+
+
+@pytest.mark.parametrize("software", [{"robot": "ur3", "version": "3.5.0"}, {"robot": "ur5e"}], ids=str)
+def test_the_arm_follows_a_hand_and_stops_when_the_hand_is_lost(software):
+    """In real time: the program in the box counts how long no target has come."""
+    with ControlBox(**software, port_base=None, control_port=0, seed=7) as box:
+        robot = Robot(address_of(box))
+        until(lambda: robot.values and robot.state is not None, "the robot")
+        hands, begin = Hands(robot), np.array(box.state.q)
+        near, far = begin + 0.1, begin + (1.5, 0, 0, 0, 0, 0)
+        hands.follow(near)
+        until(lambda: np.abs(np.array(robot.values["actual_q"]) - near).max() < 5e-3, "the near posture")
+        with pytest.raises(HandError, match="a program runs"):
+            Hands(robot).follow(begin)
+        hands.follow(far)
+        until(lambda: robot.values["actual_qd"][0] > 0.3, "speed")
+        hands._follower._stream.close()  # as when the process of the window is killed
+        state = box.wait_until(program_state="STOPPED", steady=True, timeout=LIMIT)
+        assert near[0] < state.q[0] < far[0] - 0.1
+        until(lambda: robot.values["runtime_state"] == 1, "the end")
+        hands.follow(begin)
+        until(lambda: hands.goal is not None, "the program")
+        hands.let_go()
+        assert hands.goal is None
+        robot.close()

@@ -1,0 +1,97 @@
+"""Who may open the page of a window."""
+
+import http.client
+import socket
+
+import pytest
+
+from ur_pendant.server import WindowError, open_server
+
+UPGRADE = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    "Sec-WebSocket-Protocol": "viser-v1.1.1",
+}
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = open_server("127.0.0.1", 0, None, "test")
+    yield server
+    server.stop()
+
+
+def get(server, path="/", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    if answer.status == 101:
+        connection.close()
+        return 101, "", answer
+    body = answer.read().decode()
+    connection.close()
+    return answer.status, body, answer
+
+
+@pytest.mark.parametrize("upgrade", [{}, UPGRADE], ids=["page", "websocket"])
+@pytest.mark.parametrize(
+    ("headers", "problem"),
+    [
+        ({}, ""),
+        ({"Host": "localhost:8000"}, ""),
+        ({"Host": "[::1]:29980", "Origin": "http://[::1]:29980"}, ""),
+        ({"Host": "evil.example"}, "host 'evil.example' given"),
+        ({"Host": "127.0.0.1.evil.example"}, "host '127.0.0.1.evil.example' given"),
+        ({"Host": ""}, "host '' given"),
+        ({"Origin": "http://evil.example"}, "pages of 'http://evil.example' may not"),
+        ({"Origin": "null"}, "pages of 'null' may not"),
+        ({"Host": "localhost:1", "Origin": "http://localhost:2"}, "pages of 'http://localhost:2' may not"),
+        ({"Host": "localhost:1", "Origin": "https://localhost:1"}, "pages of 'https://localhost:1' may not"),
+    ],
+)
+def test_only_pages_of_this_machine_open_it(server, headers, upgrade, problem):
+    status, body, answer = get(server, **headers, **upgrade)
+    if problem:
+        assert (status, problem in body) == (403, True)
+    elif upgrade:
+        assert status == 101
+    else:
+        assert (status, answer.headers["X-Frame-Options"]) == (200, "SAMEORIGIN")
+
+
+def test_a_token_is_shown_once_and_kept_as_its_digest():
+    server = open_server("127.0.0.1", 0, 'a"to;ken', "test")
+    try:
+        for path, cookie in (
+            ("/", ""),
+            ("/?token=b", ""),
+            ("/?token=", ""),
+            ("/", "ur_pendant=a"),
+            ("/", '"'),
+        ):
+            assert get(server, path, Cookie=cookie)[0] == 403, (path, cookie)
+        status, _, answer = get(server, "/?token=a%22to%3Bken", Host="box.example")
+        cookie = answer.headers["Set-Cookie"]
+        assert (status, "HttpOnly" in cookie, "SameSite=Strict" in cookie) == (200, True, True)
+        assert 'a"to;ken' not in cookie
+        assert get(server, Cookie=cookie.partition(";")[0], **UPGRADE)[0] == 101
+        assert get(server, Cookie=cookie.partition(";")[0], Origin="http://evil.example", **UPGRADE)[0] == 403
+    finally:
+        server.stop()
+
+
+def test_other_addresses_need_a_token_and_a_taken_port_is_an_error(server):
+    with pytest.raises(WindowError, match=r"--token.*ssh -L 29980:127.0.0.1:29980"):
+        open_server("0.0.0.0", 29980, None, "test")
+    with pytest.raises(WindowError, match="no blanks"):
+        open_server("127.0.0.1", 0, "a b", "test")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(WindowError, match=f"port {port} of 127.0.0.1 cannot be opened"):
+            open_server("127.0.0.1", port, None, "test")
+
+
+def test_nobody_can_publish_the_page(server):
+    assert server.request_share_url() is None
