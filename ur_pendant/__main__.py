@@ -9,6 +9,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated
@@ -121,16 +122,21 @@ def view(
 def _run(server: PageServer, updates: list[Callable[[], None]]) -> None:
     """Update the page thirty times a second, until the process is interrupted."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: `serve` ends its window with it
-    while updates:
-        begun = time.monotonic()
-        with server.atomic():
-            for update in list(updates):
-                try:
-                    update()
-                except Exception as error:  # what one robot sends must not end the window on the others
-                    updates.remove(update)
-                    _complain(f"a part of the window is shown no more: {type(error).__name__}: {error}")
-        time.sleep(max(0.0, 1.0 / RATE - (time.monotonic() - begun)))
+    with suppress(KeyboardInterrupt):
+        while updates:
+            begun = time.monotonic()
+            with server.atomic():
+                _update(updates)
+            time.sleep(max(0.0, 1.0 / RATE - (time.monotonic() - begun)))
+
+
+def _update(updates: list[Callable[[], None]]) -> None:
+    for update in list(updates):
+        try:
+            update()
+        except Exception as error:  # what one robot sends must not end the window on the others
+            updates.remove(update)
+            _complain(f"a part of the window is shown no more: {type(error).__name__}: {error}")
 
 
 def _announce(host: str, port: int, token: str | None) -> None:

@@ -23,10 +23,28 @@ from ur_hil.cell import NO_CELL, parse_cell
 from ur_pendant.drawing import ArmDrawing
 from ur_pendant.server import WindowError
 
-_COLOURS = ((0, 90, 160), (200, 90, 0), (0, 130, 80), (150, 60, 140))
+
+class _Colour(NamedTuple):
+    name: str
+    rgb: tuple[int, int, int]
+
+    @property
+    def css(self) -> str:
+        return f"rgb{self.rgb}"
+
+
+_COLOURS = tuple(
+    _Colour(*row)
+    for row in (
+        ("blue", (0, 90, 160)),
+        ("orange", (200, 90, 0)),
+        ("green", (0, 130, 80)),
+        ("purple", (150, 60, 140)),
+    )
+)
 """Of what was measured, a recording each; the reference is grey."""
 
-_GREY = (150, 150, 150)
+_GREY = _Colour("grey", (150, 150, 150))
 _BESIDE = 1.0
 """From one arm to the next [m]."""
 
@@ -101,8 +119,8 @@ class RecordingsWindow:
         self._begin = min(float(track.t[0]) for track in tracks)
         self._end = max(float(track.t[-1]) for track in tracks)
         gui = server.gui
-        for track, colour in zip(tracks, _COLOURS * len(tracks), strict=False):
-            gui.add_text("#{:02x}{:02x}{:02x}".format(*colour), track.title[:200], disabled=True)
+        for k, track in enumerate(tracks):
+            gui.add_text(_COLOURS[k % len(_COLOURS)].name, track.title[:200], disabled=True)
         self._bar = gui.add_slider("time [s]", self._begin, self._end, 0.001, max(0.0, self._begin))
         self._plays = gui.add_checkbox("play", False)
         self._speed = gui.add_dropdown("speed", tuple(_SPEEDS), "1/1")
@@ -147,15 +165,19 @@ class RecordingsWindow:
 
     def _draw(self, scene: viser.SceneApi, k: int, track: Track) -> tuple[ArmDrawing, ArmDrawing]:
         """Draw a recording's arm, its reference, and both paths."""
-        colour = _COLOURS[k % len(_COLOURS)]
+        colour = _COLOURS[k % len(_COLOURS)].rgb
         root = f"/recording{k}"
+        scene.add_grid("/floor", 4.0, 4.0, cell_size=0.1, section_size=0.5)
         scene.add_frame(root, show_axes=False, position=(0.0, -_BESIDE * k, 0.0))
-        for name, path, own in (("path", track.path, colour), ("desired_path", track.desired_path, _GREY)):
+        for name, path, own in (
+            ("path", track.path, colour),
+            ("desired_path", track.desired_path, _GREY.rgb),
+        ):
             points = path[_thinned(len(path))]
             segments = np.stack((points[:-1], points[1:]), axis=1)
             scene.add_line_segments(f"{root}/{name}", segments, own, thickness=2.0, thickness_units="screen")
         actual = ArmDrawing(scene, f"{root}/arm", track.model, colour)
-        return actual, ArmDrawing(scene, f"{root}/desired", track.model, _GREY, 0.25)
+        return actual, ArmDrawing(scene, f"{root}/desired", track.model, _GREY.rgb, 0.25)
 
 
 class _Plot:
@@ -175,15 +197,15 @@ class _Plot:
             ours = curves(track)
             for values in ours:
                 is_desired = len(ours) > 1 and values is ours[0]
-                stroke = "#{:02x}{:02x}{:02x}".format(*(_GREY if is_desired else colour))
-                rows.append(np.interp(self._t, track.t, values, np.nan, np.nan))
-                series.append({"label": "reference" if is_desired else "measured", "stroke": stroke})
+                drawn = _GREY if is_desired else colour
+                rows.append(np.interp(self._t, track.t, values))
+                series.append({"label": "reference" if is_desired else colour.name, "stroke": drawn.css})
         self._rows = tuple(rows)
-        self._top = float(np.nanmax(np.vstack(rows)))
-        series.append({"label": "now", "stroke": "#000000"})
+        self._top = float(np.max(rows))
+        series.append({"label": "now", "stroke": "black"})
         self._shown = -1
         self._plot = server.gui.add_uplot(
-            (self._t, *self._rows, np.full_like(self._t, np.nan)),
+            (self._t, *self._rows, np.zeros_like(self._t)),
             tuple(series),
             title=title,
             scales={"x": {"time": False}, "y": {"auto": True}},
@@ -196,9 +218,8 @@ class _Plot:
         if at == self._shown:
             return
         self._shown = at
-        line = np.full_like(self._t, np.nan)
+        line = np.zeros_like(self._t)
         line[at] = self._top
-        line[max(0, at - 1)] = 0.0
         self._plot.data = (self._t, *self._rows, line)
 
 

@@ -99,6 +99,7 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
         server = PageServer(host=host, port=port, label=title, verbose=False)
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
+    server.initial_camera.position, server.initial_camera.look_at = (1.5, -1.1, 0.9), (0.2, 0.0, 0.3)
     return server
 
 

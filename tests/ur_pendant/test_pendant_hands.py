@@ -130,7 +130,7 @@ def test_the_arm_follows_a_hand_and_stops_when_the_hand_is_lost(software):
         robot = Robot(address_of(box))
         until(lambda: robot.values and robot.state is not None, "the robot")
         hands, begin = Hands(robot), np.array(box.state.q)
-        near, far = begin + 0.1, begin + (1.5, 0, 0, 0, 0, 0)
+        near, far = begin + 0.1, np.add(begin, (1.5, 0, 0, 0, 0, 0))
         hands.follow(near)
         until(lambda: np.abs(np.array(robot.values["actual_q"]) - near).max() < 5e-3, "the near posture")
         with pytest.raises(HandError, match="a program runs"):
