@@ -1,8 +1,7 @@
 """What a robot reports as text and plots, and the controls that people have over an emulated one.
 
 Everything is done by `Hands`, in threads of viser or in one of the panel's own: `update` waits for nobody.
-What comes from robots and programs is shown as text only, cut, and without characters that do not print. A
-robot that is not held has values and no controls; the panel is made anew when that changes.
+What comes from robots is shown as text only, cut, and without characters that do not print.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
@@ -19,8 +18,7 @@ from operator import methodcaller
 from typing import Any
 
 import numpy as np
-import viser
-from viser import transforms, uplot
+from viser import ViserServer, transforms, uplot
 
 from pc_client.arrays import Array
 from pc_client.kinematics.model import RobotModel, solve_ik
@@ -32,8 +30,6 @@ from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
 from ur_pendant.hands import ACCELERATION, KEYS, SPEED, HandError, Hands
 from ur_pendant.robot import PLOTTED, Robot, Sample, Signal
-
-# --- values
 
 Show = Callable[[Robot], str]
 
@@ -58,24 +54,15 @@ def _levels(word: str, group: DigitalGroup) -> Show:
     return lambda robot: " ".join(str(int(n) >> bit & 1) for n in _numbers(robot, word) for bit in group.bits)
 
 
-def _program(robot: Robot) -> str:
-    lines = [f", line {n:.0f}" for n in _numbers(robot, "script_control_line") if n > 0 and robot.program]
-    return f"{robot.program or 'none'} ({_RUNTIME(robot).lower()}{''.join(lines)})"
-
-
-def _grippers(robot: Robot) -> str:
-    grippers = now.grippers if (now := robot.state) else ()
-    return "; ".join(", ".join(f"{name} {value:.4g}" for name, value in one.items()) for one in grippers)
-
-
 _RUNTIME = _named(ProgramState, "runtime_state")
 ABOUT: Mapping[str, Show] = {
     "Robot": lambda robot: robot.problem or robot.title,
     "Mode": _named(RobotMode, "robot_mode"),
     "Safety": _named(SafetyStatus, "safety_status", "safety_mode"),
-    "Operation": lambda robot: now.operational_mode if (now := robot.state) else "",
-    "Control": lambda robot: ("local", "remote")[now.remote_control] if (now := robot.state) else "",
-    "Program": _program,
+    "Operation": lambda robot: getattr(robot.state, "operational_mode", ""),
+    "Remote": lambda robot: str(getattr(robot.state, "remote_control", "")),
+    "Program": lambda robot: f"{robot.program or 'none'} ({_RUNTIME(robot).lower()})",
+    "Line": _figures(".0f", "script_control_line"),
     "At": lambda robot: robot.label,
     "Popups": lambda robot: "; ".join((*robot.popups, *(question.text for question in robot.questions))),
     "Speed": _figures(".0%", "target_speed_fraction"),
@@ -86,7 +73,7 @@ ARM: Mapping[str, Show] = {
     "Force N": _figures(".1f", "actual_TCP_force", part=slice(3)),
     "Torque Nm": _figures(".2f", "actual_TCP_force", part=slice(3, 6)),
     "Payload kg": _figures(".2f", "payload"),
-    "Grippers": _grippers,
+    "Grippers": lambda r: ", ".join(f"{k} {g[k]:.4g}" for g in getattr(r.state, "grippers", ()) for k in g),
 }
 INPUTS = {f"In, {name}": _levels("actual_digital_input_bits", g) for name, g in DIGITAL_GROUPS.items()}
 OUTPUTS = {f"Out, {name}": _levels("actual_digital_output_bits", g) for name, g in DIGITAL_GROUPS.items()}
@@ -124,7 +111,6 @@ FREEDRIVE: Mapping[str, Deed] = {"On": methodcaller("run", _FREEDRIVE), "Off": _
 # --- moving
 
 JOINTS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
-UPRIGHT = np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))
 JOG_RATE = 10.0  # How often a button that is held is heard [Hz],
 _RELEASED = 0.3  # and for how long it is not, when it has been released [s].
 AHEAD = 0.15  # By how much a button may ask a joint to be ahead of itself [rad].
@@ -139,11 +125,6 @@ def jogged(goal: Array, q: Array, joint: int, step: float, model: RobotModel) ->
     ahead = np.clip(goal[joint] + step, q[joint] - AHEAD, q[joint] + AHEAD)
     wanted[joint] = np.clip(ahead, limits.q_min[joint], limits.q_max[joint])
     return wanted
-
-
-def stopping(q: Array, qd: Array) -> Array:
-    """Where joints at q (6,) with speeds qd (6,) come to rest with their ramp [rad, rad/s]."""
-    return q + qd * (_LAG + np.abs(qd) / (2.0 * ACCELERATION))
 
 
 def reached(model: RobotModel, T_base_flange: Array, q: Array) -> Array:
@@ -168,13 +149,13 @@ _AGAIN = 2.0  # Before the same is told again, and before what somebody has set 
 _LONGEST, _LOG_LINES = 160, 40
 _PLOTTED = 20.0  # How much is plotted [s].
 _COLOURS = ("#d62728", "#2ca02c", "#1f77b4", "#ff7f0e", "#9467bd", "#17becf")
+_READS: Mapping[str, Callable[[str], Any]] = {"Boolean": "yes".__eq__, "Integer": int, "Float": float}
 _SIGNALS = {signal.name: signal for signal in PLOTTED}
 
 
 def plain(text: str) -> str:
     """Text on one line, without what does not print, and cut."""
-    cut = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-    return "".join(c if c.isprintable() else " " for c in cut)
+    return "".join(c if c.isprintable() else " " for c in text[:_LONGEST]) + "…" * (len(text) > _LONGEST)
 
 
 def columns(samples: Sequence[Sample], signal: Signal, now: float) -> tuple[Array, ...]:
@@ -185,48 +166,57 @@ def columns(samples: Sequence[Sample], signal: Signal, now: float) -> tuple[Arra
     return (np.array([sample.time - now for sample in samples]), *numbers.T)
 
 
+def _log(robot: Robot, wanted: str) -> str:
+    lines = [line for line in list(robot.log) if wanted in line.text.lower()][: -_LOG_LINES - 1 : -1]
+    return "\n".join(f"{line.time:.2f}  {plain(line.text)}" for line in lines)
+
+
+def _speed(robot: Robot, slider: Any) -> int:
+    is_set = time.time() - slider.update_timestamp < _AGAIN
+    return slider.value if is_set else round(100 * sum(_numbers(robot, "target_speed_fraction")))
+
+
 class Panel:
     """Values and controls of one robot."""
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, hands: Hands, drawing: RobotDrawing,
-        container: AbstractContextManager[Any] | None = None,
-    ) -> None:  # fmt: skip
-        """Make it in a tab or a folder, or beside the picture."""
+        self, server: ViserServer, robot: Robot, hands: Hands, drawing: RobotDrawing, container: Any = None
+    ) -> None:
+        """Make it in a `container` of viser, such as a tab, or beside the picture."""
         self._server, self._gui, self._robot, self._hands = server, server.gui, robot, hands
         self._drawing, self._container = drawing, container or nullcontext()
         self._worker = ThreadPoolExecutor(1)
         self._task: Future[Any] = self._worker.submit(int)
-        self._postures = {"upright": UPRIGHT}
+        self._postures = {"upright": np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))}
         self._told: tuple[object, ...] = ()
-        self._told_at = self._refreshed = self._pushed = 0.0
+        self._told_at = self._refreshed = self._pushed = self._jogging = 0.0
         self._made_for: tuple[Any, ...] = ()
 
     def update(self) -> None:
         """Show what is new; call it 30 times a second, after the drawing's."""
-        is_held = self._robot.is_held
-        wanted = (is_held, is_held and self._hands.has_control_api, self._drawing.arm)
+        wanted = (held := self._robot.is_held, held and self._hands.has_control_api, self._drawing.arm)
         if wanted != self._made_for:
             self.remove()
             self._make(*wanted)
             self._made_for = wanted
         now = time.monotonic()
-        if self._jogging is not None and now - self._jogging > _RELEASED:
+        if 0.0 < self._jogging < now - _RELEASED:
             self._release()
         if self._nodes:
             self._update_nodes(now)
         if now - self._refreshed >= _SLOWLY:
             self._refreshed = now
             for handle, name, show in self._following:
-                if getattr(handle, name) != (value := show()):
+                if getattr(handle, name) != (value := show(self._robot)):
                     setattr(handle, name, value)
             self._show_modals()
-            self._draw_charts(now)
+            if not self._pause.value and self._server.get_clients():
+                self._draw_charts(now)
 
     def remove(self) -> None:
         """Take everything away."""
         if self._made_for:
-            for handle in (*self._nodes, self._root):
+            for handle in (*self._nodes, self._tabs):
                 handle.remove()
             for modal in self._modals.values():
                 modal.close()
@@ -235,19 +225,16 @@ class Panel:
         self._made_for = ()
 
     def _make(self, is_held: bool, has_api: bool, arm: ArmDrawing | None) -> None:
-        self._following: list[tuple[Any, str, Callable[[], object]]] = []
+        self._following: list[tuple[Any, str, Callable[[Robot], object]]] = []
         self._modals: dict[Question | str, Any] = {}
         self._charts: list[tuple[Any, Any]] = []
         self._nodes: tuple[Any, ...] = ()
         self._has_api, self._is_dragged, self._placed = has_api, False, np.zeros((4, 4))
-        self._jogging: float | None = None
         self._dragged: tuple[Any, Array] | None = None
         self._pull: tuple[Any, Array, Array] | None = None
         gui, arm = self._gui, arm if is_held else None
         with self._container:
-            self._root = gui.add_folder(None)
-        with self._root:
-            tabs = gui.add_tab_group()
+            self._tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("Robot"):
             if not is_held:
                 reason = "is only shown" if self._robot.view_only else "does not say that it is simulated"
@@ -275,7 +262,7 @@ class Panel:
         with tabs.add_tab("Log"):
             wanted = gui.add_text("Filter", "")
             log = gui.add_text("Log", "", disabled=True, multiline=True)
-            self._following.append((log, "value", lambda: self._log(wanted.value.lower())))
+            self._following.append((log, "value", lambda robot: _log(robot, wanted.value.lower())))
         if arm is not None:
             self._make_nodes(arm)
 
@@ -288,15 +275,9 @@ class Panel:
         if self._has_api:
             slider = gui.add_slider("Speed %", 0, 100, 1, 100)
             call = self._calling(lambda: hands.operate("set_speed", fraction=slider.value / 100))
-            slider.on_update(
-                lambda event: self._worker.submit(call, event)
-            )  # in the order in which they come
-
-            def speed() -> int:
-                is_set = time.time() - slider.update_timestamp < _AGAIN
-                return slider.value if is_set else round(100 * sum(_numbers(robot, "target_speed_fraction")))
-
-            self._following.append((slider, "value", speed))
+            # In the order in which they come.
+            slider.on_update(lambda event: self._worker.submit(call, event))
+            self._following.append((slider, "value", lambda robot: _speed(robot, slider)))
         if robot.address.ports.dashboard:
             name = gui.add_text("File", "", hint="of a program, in the box's folder")
             self._button("Load program", lambda: hands.tell_dashboard(f"load {plain(name.value)}"))
@@ -307,34 +288,29 @@ class Panel:
             self._can_drag = gui.add_checkbox("Drag the tool", True, hint="by its frame in the picture")
             self._row("Freedrive", FREEDRIVE)
             stored = gui.add_dropdown("Posture", tuple(postures))
-            self._following.append((stored, "options", lambda: tuple(postures)))
+            self._following.append((stored, "options", lambda _: tuple(postures)))
             q = partial(self._measured, "actual_q")
             self._button("Store posture", lambda: postures.update({f"posture {len(postures)}": q()}))
             self._button("Go there", lambda: self._go(postures[stored.value]))
         for joint, name in enumerate(JOINTS):
             figure = _figures(".1f", "actual_q", scale=degrees(1.0), part=slice(joint, joint + 1))
-            if model is None:
-                self._texts({f"{name} °": figure})
-                continue
-            low, high = degrees(model.limits.q_min[joint]), degrees(model.limits.q_max[joint])
-            self._texts({f"{name} {low:.0f}…{high:.0f}°": figure})
-            for sign, symbol in ((-1, "−"), (1, "+")):
+            span = "" if model is None else f"±{degrees(model.limits.q_max[joint]):.0f}"
+            self._texts({f"{name} {span}°": figure})
+            for sign, symbol in () if model is None else ((-1, "−"), (1, "+")):
                 button, step = gui.add_button(f"{name} {symbol}"), sign * SPEED / JOG_RATE
-                call = self._calling(partial(self._jog, joint, step, model))
+                call = self._calling(partial(self._jog, joint, step))
                 button.on_hold(partial(self._unless_busy, call), callback_hz=JOG_RATE)
                 button.on_click(self._calling(self._release))
 
     def _make_inputs(self, group: DigitalGroup) -> None:
         """Buttons with a number and a level, which a click changes."""
-        labels, levels = [(f"{n} ○", f"{n} ●") for n in range(group.count)], INPUTS[f"In, {group.name}"]
-        change = partial(_do, "set_digital_input", group=group.name)
-        deeds = {pair[k]: change(n=n, level=not k) for k in (0, 1) for n, pair in enumerate(labels)}
-        row = self._row(f"In, {group.name}", deeds)
-
-        def options() -> tuple[str, ...]:
-            return tuple(labels[n][int(level)] for n, level in enumerate(levels(self._robot).split()))
-
-        self._following.append((row, "options", options))
+        label, change = f"In, {group.name}", partial(_do, "set_digital_input", group=group.name)
+        faces = {(n, k): f"{n} {'●' if k == '1' else '○'}" for k in "01" for n in range(group.count)}
+        row = self._row(label, {face: change(n=n, level=k == "0") for (n, k), face in faces.items()})
+        show = partial(
+            lambda show, robot: tuple(faces[pair] for pair in enumerate(show(robot).split())), INPUTS[label]
+        )
+        self._following.append((row, "options", show))
 
     def _make_world(self) -> None:
         gui, robot, hands = self._gui, self._robot, self._hands
@@ -346,13 +322,11 @@ class Panel:
         mass = gui.add_number("Mass kg", 0.5, min=0.0, max=20.0, step=0.1)
 
         def put(operation: str, **more: float) -> None:
-            n, pose = len(sizes[shape.value]), (*at.value, 0.0, 0.0, 0.0)
-            hands.operate(
-                operation, name=name.value, shape=shape.value, size=size.value[:n], pose=pose, **more
-            )
+            given = {"name": name.value, "shape": shape.value, "pose": (*at.value, 0.0, 0.0, 0.0)}
+            hands.operate(operation, size=size.value[: len(sizes[shape.value])], **given, **more)
 
-        def found() -> Mapping[str, Deed]:
-            things, obstacles = (now.things, now.obstacles) if (now := robot.state) else ((), ())
+        def found(robot: Robot) -> Mapping[str, Deed]:
+            things, obstacles = getattr(robot.state, "things", ()), getattr(robot.state, "obstacles", ())
             removals = {plain(thing.name): _do("remove_thing", name=thing.name) for thing in things}
             return removals | {plain(name): _do("remove_obstacle", name=name) for name in obstacles}
 
@@ -360,21 +334,14 @@ class Panel:
         self._button("Put thing", lambda: put("add_thing", mass=mass.value))
         self._button("Hang load on the flange", lambda: hands.operate("attach_payload", mass=mass.value))
         there = gui.add_dropdown("There", ("nothing",))
-        self._following.append((there, "options", lambda: tuple(found()) or ("nothing",)))
-        self._button("Remove", lambda: [deed(hands) for name, deed in found().items() if name == there.value])
+        self._following.append((there, "options", lambda robot: tuple(found(robot)) or ("nothing",)))
+        self._button("Remove", lambda: [do(hands) for k, do in found(robot).items() if k == there.value])
 
     def _make_nodes(self, arm: ArmDrawing) -> None:
-        """What can be dragged in the picture."""
-        scene, name, look = (
-            self._server.scene,
-            self._drawing.root.name,
-            {"visible": False, "head_length": 0.03},
-        )
+        scene, name = self._server.scene, self._drawing.root.name
         gizmo = scene.add_transform_controls(f"{name}/hand", 0.25, depth_test=False, visible=False)
-        points, colour = np.zeros((1, 2, 3)), (230, 60, 160)
-        arrow = scene.add_arrows(
-            f"{name}/pull", points, colour, shaft_radius=0.006, head_radius=0.014, **look
-        )
+        look = {"shaft_radius": 0.006, "head_radius": 0.014, "head_length": 0.03, "visible": False}
+        arrow = scene.add_arrows(f"{name}/pull", np.zeros((1, 2, 3)), (230, 60, 160), **look)
         # Pinocchio's memory is of one thread: this model is the worker's.
         self._model = replace(arm.model, pin_data=arm.model.pin_model.createData())
         self._nodes, self._arm = (gizmo, arrow), arm
@@ -385,10 +352,7 @@ class Panel:
     def _texts(self, shows: Mapping[str, Show]) -> None:
         for label, show in shows.items():
             text = self._gui.add_text(label, "", disabled=True)
-            self._following.append((text, "value", partial(self._plain, show)))
-
-    def _plain(self, show: Show) -> str:
-        return plain(show(self._robot))
+            self._following.append((text, "value", partial(lambda show, robot: plain(show(robot)), show)))
 
     def _button(self, label: str, action: Callable[[], object]) -> None:
         self._gui.add_button(label).on_click(self._calling(action))
@@ -403,8 +367,7 @@ class Panel:
 
         def call(event: Any) -> None:
             try:
-                # Without a client the panel itself has changed the control.
-                said = None if event.client is None else action()
+                said = None if event.client is None else action()  # or the panel itself has changed it
                 if said and isinstance(said, str):
                     self._tell(event.client, "Robot", said)
             except (HandError, ValueError) as error:
@@ -420,17 +383,10 @@ class Panel:
         self._told_at = now
 
     def _unless_busy(self, call: Callable[[Any], None], event: Any) -> None:
-        """Have the worker do something, unless it has not done the last yet."""
         if self._task.done():
             self._task = self._worker.submit(call, event)
 
-    def _log(self, wanted: str) -> str:
-        lines = [line for line in list(self._robot.log) if wanted in line.text.lower()]
-        return "\n".join(f"{line.time:.2f}  {plain(line.text)}" for line in lines[: -_LOG_LINES - 1 : -1])
-
     def _draw_charts(self, now: float) -> None:
-        if self._pause.value or not self._server.get_clients():
-            return
         samples = [sample for sample in list(self._robot.history) if now - sample.time < _PLOTTED]
         for choice, plot in self._charts:
             signal = _SIGNALS[choice.value]
@@ -443,30 +399,25 @@ class Panel:
             plot.data = columns(samples, signal, now)
 
     def _show_modals(self) -> None:
-        """Show the popups and the questions that are open."""
-        robot = self._robot
-        now: set[Question | str] = {*robot.popups[:3], *robot.questions[:3]} if self._has_api else set()
+        now: set[Question | str] = {*self._robot.popups[:3], *self._robot.questions[:3]}
         for gone in self._modals.keys() - now:
             self._modals.pop(gone).close()
-        for new in now - self._modals.keys():
-            modal = self._modals[new] = self._gui.add_modal("A program says")
-            with modal:
-                text = plain(new if isinstance(new, str) else new.text)
-                self._gui.add_text("Text", text, multiline=True, disabled=True)
-                if isinstance(new, str):
-                    self._row("Popup", {"Close": _KEYS["Close popup"]})
-                else:
-                    self._make_answer(new)
-                self._row("Program", {"Stop": _KEYS["Stop"]})
+        for new in now - self._modals.keys() if self._has_api else ():
+            self._modals[new] = self._make_modal(new)
 
-    def _make_answer(self, question: Question) -> None:
-        reply = partial(self._hands.operate, "answer", id=question.id)
-        if question.kind == "BOOLEAN":
-            self._row("Answer", {"Yes": lambda _: reply(value=True), "No": lambda _: reply(value=False)})
-            return
-        read: Callable[[str], Any] = {"INTEGER": int, "FLOAT": float}.get(question.kind, str)
-        given = self._gui.add_text(question.kind.capitalize(), "")
-        self._button("Answer", lambda: reply(value=read(given.value)))
+    def _make_modal(self, new: Question | str) -> Any:
+        gui, modal = self._gui, self._gui.add_modal("A program says")
+        with modal:
+            gui.add_text(
+                "Text", plain(new.text if isinstance(new, Question) else new), multiline=True, disabled=True
+            )
+            if isinstance(new, Question):
+                kind, answer = new.kind.capitalize(), partial(self._hands.operate, "answer", id=new.id)
+                is_choice, read = kind == "Boolean", _READS.get(kind, str)
+                given = gui.add_dropdown(kind, ("yes", "no")) if is_choice else gui.add_text(kind, "")
+                self._button("Answer", lambda: answer(value=read(given.value)))
+            self._row("Program", {label: _KEYS[label] for label in ("Close popup", "Stop")})
+        return modal
 
     def _measured(self, name: str) -> Array:
         return np.array(_numbers(self._robot, name))
@@ -476,16 +427,16 @@ class Panel:
             raise HandError("the arm must be RUNNING: power it on, release the brakes")
         self._hands.follow(q)
 
-    def _jog(self, joint: int, step: float, model: RobotModel) -> None:
-        q, goal = self._measured("actual_q"), self._hands.goal
-        self._go(jogged(self._measured("target_q") if goal is None else goal, q, joint, step, model))
+    def _jog(self, joint: int, step: float) -> None:
+        goal = self._measured("target_q") if self._hands.goal is None else self._hands.goal
+        self._go(jogged(goal, self._measured("actual_q"), joint, step, self._arm.model))
         self._jogging = time.monotonic()
 
     def _release(self) -> None:
-        """Let the arm come to rest."""
-        self._jogging = None
+        """Let the arm come to rest: the goal is where its ramp ends."""
+        self._jogging, qd = 0.0, self._measured("target_qd")
         if self._hands.goal is not None:
-            self._hands.follow(stopping(self._measured("target_q"), self._measured("target_qd")))
+            self._hands.follow(self._measured("target_q") + qd * (_LAG + np.abs(qd) / (2.0 * ACCELERATION)))
 
     async def _on_drag(self, event: Any) -> None:
         """Take the pose of the frame that somebody drags; the worker follows."""
@@ -496,7 +447,7 @@ class Panel:
             self._dragged = event, T
         self._is_dragged, self._placed = event.phase != "end", T
 
-    def _follow(self, T_base_tcp: Array) -> None:
+    def _reach(self, T_base_tcp: Array) -> None:
         offset = _numbers(self._robot, "tcp_offset") or (0.0,) * 6
         q = reached(self._model, T_base_tcp @ pose_to_T(pose_inv(offset)), self._followed)
         self._go(q)
@@ -515,7 +466,7 @@ class Panel:
         arrow.visible = self._pull is not None
         if self._dragged is not None and self._task.done():
             (event, wanted), self._dragged = self._dragged, None
-            self._unless_busy(self._calling(partial(self._follow, wanted)), event)
+            self._unless_busy(self._calling(partial(self._reach, wanted)), event)
         if not self._is_dragged and np.abs(T - self._placed).max() > 1e-5:
             self._placed = T
             gizmo.position, gizmo.wxyz = T[:3, 3], transforms.SO3.from_matrix(T[:3, :3]).wxyz
