@@ -1,11 +1,9 @@
 """An arm, what it carries, what stands around it and what presses on it, in space.
 
-The links of an arm are nodes below each other: a joint that turns is one new orientation of one node, and all
-that hangs on the flange follows. Shapes are those of the client's models: published meshes, or housings made
-of the lengths of an arm. Names of things are only shown as labels: paths of nodes have numbers.
+The links of an arm are nodes below each other: a joint that turns is one new orientation, and all that hangs
+on the flange follows. Names of things are only shown as labels: paths of nodes have numbers.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -18,6 +16,7 @@ import pinocchio as pin
 import trimesh
 import viser
 from trimesh.convex import convex_hull
+from viser._messages import SetOrientationMessage
 
 from pc_client.arrays import Array
 from pc_client.driver.report import RobotInfo
@@ -40,7 +39,7 @@ _TRANSLUCENT = 0.35
 _UNTURNED, _UNMOVED = 1e-4, 1e-5  # joints [rad] and things [m] that move by less stay: encoders have noise
 _VISIBLY = 0.05  # the target is drawn when a joint is further away [rad]: an arm that moves lags by 0.02
 _PER_NEWTON, _LONGEST = 0.005, 0.5  # length of an arrow [m/N], and the largest [m]
-_LEAST_CONTACT, _LEAST_FORCE, _LEAST_FORCE_CB3 = 1.0, 6.0, 12.0  # less is no arrow [N]: it may be noise
+_LEAST_CONTACT, _LEAST_FORCE = 1.0, (12.0, 6.0)  # less is no arrow [N]: it may be noise; CB3, later arms
 _PATH_POINTS, _PATH_EVERY, _PATH_STEP = 300, 3, 0.001  # one an update, drawn every third; least step [m]
 _SIDE = 2.0  # of the square that stands for a plane [m]
 
@@ -101,7 +100,6 @@ def _links(description: RobotDescription) -> tuple[tuple[trimesh.Trimesh, trimes
 
 
 def _mesh(geometry: Any) -> trimesh.Trimesh:
-    """A mesh of Pinocchio's collision library."""
     corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
     return trimesh.Trimesh(geometry.vertices(), [(c[0], c[1], c[2]) for c in corners])
 
@@ -146,7 +144,10 @@ class ArmDrawing:
             self._q[turned] = [q[k] for k in turned]
             pin.framesForwardKinematics(self.model.pin_model, self._data, self._q)
             for k in turned:
-                self.links[k + 1].wxyz = _wxyz(self._data.liMi[k + 1].rotation)
+                node, wxyz = self.links[k + 1]._impl, _wxyz(self._data.liMi[k + 1].rotation)
+                # As viser's setter, which compares arrays first: two thirds of the time of a drawing.
+                node.wxyz[:] = wxyz
+                node.api._queue_scene_message(SetOrientationMessage(node.name, wxyz))
         return bool(turned)
 
     def paint(self, colour: Colour, opacity: float) -> None:
@@ -192,8 +193,9 @@ class RobotDrawing:
     """Everything of one robot in space, below the node `name`.
 
     Attributes:
-        arm: as it was measured; None until the robot has said who it is and where it stands. Another kind of
-            robot gets a new one, and with it other `model` and `links`, which are the arm's.
+        root: node of the base, for what stands there.
+        arm: as it was measured; None until the robot says who it is and where it stands. Another kind of arm
+            gets a new one, and with it other `model` and `links`.
         T_base_tcp: (4, 4) of the measured TCP [m].
         root: the node of its base.
     """
@@ -212,7 +214,7 @@ class RobotDrawing:
         self._offset: tuple[float, ...] = ()
         self._target: ArmDrawing | None = None
         self._shapes: dict[tuple[object, ...], viser.SceneNodeHandle] = {}
-        self._path: deque[Array] = deque(maxlen=_PATH_POINTS)
+        self._path: Array = np.empty((0, 3))
         self._numbers, self._turns, self._is_lost = count(), count(), False
         self.root = self._scene.add_frame(name, show_axes=False, position=at)
         none = np.zeros((1, 2, 3))
@@ -221,6 +223,22 @@ class RobotDrawing:
         self._force = arrows(f"{name}/force", colors=_FORCE)
         self._contacts = arrows(f"{name}/contacts", colors=_CONTACT)
         self._trace = self._scene.add_line_segments(f"{name}/trace", none, _TRACE, thickness=0.003)
+
+    def _arm_of(self, info: RobotInfo) -> ArmDrawing:
+        """Return the arm as it is drawn, or begin with another kind of arm."""
+        model = model_of(info, self._robot.kinematics, self._cell)
+        if self.arm is not None and self.arm.model.description == model.description:
+            return self.arm
+        self._show_shapes((), "")
+        for part in ("arm", "target"):
+            self._scene.remove_by_name(f"{self._name}/{part}")
+        self.arm = arm = ArmDrawing(self._scene, f"{self._name}/arm", model, _HOUSING)
+        self.model, self.links = model, arm.links
+        self._target, self._state, self._is_lost, self._offset = None, None, False, ()
+        self._path = np.empty((0, 3))
+        self._tcp = self._scene.add_frame(f"{arm.flange}/tcp", axes_length=0.08, axes_radius=0.003)
+        self._show_shapes(_shapes_of(self._cell), arm.flange)
+        return arm
 
     def update(self) -> None:
         """Draw what the robot reports now."""
@@ -236,11 +254,12 @@ class RobotDrawing:
             arm.paint(*((_LOST, _TRANSLUCENT) if self._is_lost else (_HOUSING, 1.0)))
         offset = _six(values, "tcp_offset") or arm.model.tcp_offset
         if arm.show(q) or offset != self._offset:
-            self.T_base_tcp, self._offset = arm.T_base_tcp(offset), offset
-            _place(self._tcp, offset)
+            self.T_base_tcp = arm.T_base_tcp(offset)
+            if offset != self._offset:
+                self._offset = offset
+                _place(self._tcp, offset)
         tcp, force = self.T_base_tcp[:3, 3], _six(values, "actual_TCP_force") or (0.0, 0.0, 0.0)
-        least = _LEAST_FORCE if info.version.major >= 5 else _LEAST_FORCE_CB3
-        _point(self._force, [(tcp, force[:3])], least)
+        _point(self._force, [(tcp, force[:3])], _LEAST_FORCE[info.version.major >= 5])
         self._show_path(tcp)
         target = _six(values, "target_q") or q
         is_away = max(abs(a - b) for a, b in zip(q, target, strict=True)) > _VISIBLY
@@ -255,34 +274,16 @@ class RobotDrawing:
             self._show_shapes(state.shapes, arm.flange)
             _point(self._contacts, [(c.position, c.force) for c in state.contacts], _LEAST_CONTACT)
 
-    def _arm_of(self, info: RobotInfo) -> ArmDrawing:
-        """Return the arm as it is drawn, or begin with another kind of arm."""
-        model = model_of(info, self._robot.kinematics, self._cell)
-        if self.arm is not None and self.arm.model.description == model.description:
-            return self.arm
-        self._show_shapes((), "")
-        for part in ("arm", "target"):
-            self._scene.remove_by_name(f"{self._name}/{part}")
-        self.arm = arm = ArmDrawing(self._scene, f"{self._name}/arm", model, _HOUSING)
-        self.model, self.links = model, arm.links
-        self._target, self._state, self._is_lost, self._offset = None, None, False, ()
-        self._path.clear()
-        self._tcp: viser.FrameHandle = self._scene.add_frame(
-            f"{arm.flange}/tcp", axes_length=0.08, axes_radius=0.003
-        )
-        self._show_shapes(_shapes_of(self._cell), arm.flange)
-        return arm
-
     def _show_path(self, tcp: Array) -> None:
         """Go on with the path of the TCP (3,) [m]."""
-        last = self._path[-1] if self._path else tcp
-        self._path.append(tcp if dist(tcp, last) > _PATH_STEP else last)
+        last = self._path[-1] if len(self._path) else tcp
+        point = tcp if dist(tcp, last) > _PATH_STEP else last
+        self._path = path = np.vstack((self._path[1 - _PATH_POINTS :], point))
         if next(self._turns) % _PATH_EVERY == 0:
-            self._trace.visible = self._path[0] is not self._path[-1]
+            moved = (path[1:] != path[:-1]).any(axis=1)
+            self._trace.visible = bool(moved.any())
             if self._trace.visible:
-                points = np.array(self._path)
-                steps = np.stack((points[:-1], points[1:]), axis=1)
-                self._trace.points = steps[(steps[:, 0] != steps[:, 1]).any(axis=1)]
+                self._trace.points = np.stack((path[:-1][moved], path[1:][moved]), axis=1)
 
     def _show_shapes(self, shapes: Iterable[BodyShape], flange: str) -> None:
         """Draw these shapes and no others."""
