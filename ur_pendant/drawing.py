@@ -39,7 +39,7 @@ _TRANSLUCENT = 0.35
 _UNTURNED, _UNMOVED = 1e-4, 1e-5  # joints [rad] and things [m] that move by less stay: encoders have noise
 _VISIBLY = 0.05  # the target is drawn when a joint is further away [rad]: an arm that moves lags by 0.02
 _PER_NEWTON, _LONGEST = 0.005, 0.5  # length of an arrow [m/N], and the largest [m]
-_LEAST_CONTACT, _LEAST_FORCE = 1.0, (12.0, 6.0)  # less is no arrow [N]: it may be noise; CB3, later arms
+_LEAST_CONTACT, _LEAST_FORCE = 1.0, (15.0, 10.0)  # less is no arrow [N]: a bare CB3, or later arm, has 7 N
 _PATH_POINTS, _PATH_EVERY, _PATH_STEP = 300, 3, 0.001  # one an update, drawn every third; least step [m]
 _SIDE = 2.0  # of the square that stands for a plane [m]
 
