@@ -1,0 +1,207 @@
+"""The window in a browser: Debian's Chromium, which draws without a graphics card, driven by selenium.
+
+What people press acts on the box and is shown; what programs say stays text; the window outlives its box.
+"""
+
+import shutil
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+
+from ur_emulator import ControlBox
+
+webdriver = pytest.importorskip("selenium.webdriver")
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="needs chromium and chromedriver (Debian: chromium-driver)"),
+]  # fmt: skip
+LIMIT = 60.0  # s, for hangs: a picture without a graphics card takes seconds
+
+
+@contextmanager
+def window(*words):
+    """A window in a process of its own; gives its address."""
+    command = [sys.executable, "-m", "ur_pendant", *words, "--port", "0"]
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+    try:
+        yield process.stdout.readline().removeprefix("window at ").strip()
+    finally:
+        process.terminate()
+        assert process.wait(LIMIT) == 0
+        process.stdout.close()
+
+
+@contextmanager
+def browser(width=1366, height=900):
+    """A browser that has only the loopback interface to talk to."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for word in ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"):
+        options.add_argument(word)
+    options.add_argument(f"--window-size={width},{height}")
+    options.add_argument("--proxy-server=127.0.0.1:9")  # not of addresses of this machine
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    try:
+        yield driver
+    finally:
+        driver.quit()
+
+
+class Page:
+    """A page of a window."""
+
+    def __init__(self, driver, address):
+        self.driver = driver
+        driver.get(address)
+        self.until(lambda: self.find("//*[@role='tab']"), "the panel")
+
+    def until(self, condition, what):
+        begun = time.monotonic()
+        while not condition():
+            assert time.monotonic() - begun < LIMIT, f"{what}: {self.texts()}"
+            time.sleep(0.05)
+
+    def find(self, path):
+        return [found for found in self.driver.find_elements("xpath", path) if found.is_displayed()]
+
+    def tab(self, name):
+        self.find(f"//*[@role='tab'][normalize-space()='{name}']")[0].click()
+
+    def button(self, label):
+        self.until(lambda: self.find(f"//button[normalize-space()='{label}']"), label)
+        return self.find(f"//button[normalize-space()='{label}']")[0]
+
+    def texts(self):
+        """All that stands in fields."""
+        return self.driver.execute_script(
+            "return [...document.querySelectorAll('input,textarea')].map(field => field.value)"
+        )
+
+    def shows(self, text):
+        self.until(lambda: any(text in value for value in self.texts()), f"{text!r} is not shown")
+
+
+@pytest.fixture(scope="module")
+def box():
+    with ControlBox("ur5e", port_base=None, control_port=0, seed=7) as box:
+        yield box
+
+
+@pytest.fixture(scope="module")
+def page(box):
+    with window("pendant", box.host, "--control-port", str(box.control_port)) as address, browser() as driver:
+        yield Page(driver, address)
+
+
+def test_keys_act_on_the_box_and_what_it_does_is_shown(box, page):
+    page.tab("Robot")
+    page.shows("UR5e 5.15.0")
+    page.button("Power off").click()
+    box.wait_until(robot_mode="POWER_OFF", timeout=LIMIT)
+    page.shows("POWER_OFF")
+    page.button("Release brakes").click()
+    box.wait_until(robot_mode="RUNNING", timeout=LIMIT)
+    page.shows("RUNNING")
+
+
+def test_a_joint_goes_as_long_as_its_button_is_held(box, page):
+    page.tab("Move")
+    before = box.state.q[0]
+    hold = webdriver.ActionChains(page.driver)
+    hold.click_and_hold(page.button("base +")).perform()
+    box.wait_until(program_state="PLAYING", timeout=LIMIT)
+    page.until(lambda: box.state.q[0] > before + 0.1, "the joint")
+    hold.reset_actions()
+    webdriver.ActionChains(page.driver).release().perform()
+    q = box.wait_until(program_state="STOPPED", steady=True, timeout=LIMIT).q
+    assert q[1:] == pytest.approx(box.state.target_q[1:], abs=0.01)
+    page.tab("Robot")
+    page.shows("none (stopped)")
+
+
+def test_inputs_and_obstacles(box, page):
+    page.tab("I/O")
+    page.button("3 ○").click()
+    page.until(lambda: box.state.digital_inputs["standard"][3], "the input")
+    page.button("3 ●").click()
+    page.until(lambda: not box.state.digital_inputs["standard"][3], "the input")
+    page.tab("World")
+    page.button("Put obstacle").click()
+    page.until(lambda: box.state.obstacles == ("block",), "the obstacle")
+    page.until(lambda: "block" in page.texts(), "its name")
+    page.button("Remove").click()
+    page.until(lambda: box.state.obstacles == (), "no obstacle")
+
+
+HOSTILE = "<img src=x onerror=\\\"document.title='owned'\\\"><b>bold</b> [link](javascript:alert(1))"
+
+
+def test_what_programs_say_is_text(box, page):
+    said = HOSTILE.replace('\\"', "'")
+    box.run_program(f'def says():\n  textmsg("{said}")\n  popup("{said}", "{said}")\nend\n')
+    page.until(lambda: "<b>bold</b>" in page.driver.find_element("tag name", "body").text, "the popup")
+    assert not page.driver.find_elements(
+        "xpath", "//img[@src='x'] | //b[.='bold'] | //a[contains(@href,'script')]"
+    )
+    assert page.driver.title != "owned"
+    box.close_popups()
+    page.until(lambda: "<b>bold</b>" not in page.driver.find_element("tag name", "body").text, "no popup")
+
+
+def test_no_page_of_the_network_is_asked(page):
+    loaded = page.driver.execute_script(
+        "return performance.getEntriesByType('resource').map(one => one.name)"
+    )
+    own = page.driver.current_url
+    assert all(name.startswith((own, "data:", "blob:")) for name in loaded)
+
+
+def test_a_question_is_answered(box, page):
+    box.run_program(
+        'def asks():\n  textmsg("it is ", request_integer_from_primary_client("how many?"))\nend\n'
+    )
+    page.until(lambda: "how many?" in page.driver.find_element("tag name", "body").text, "the question")
+    (field,) = page.find("//*[@role='dialog']//input")
+    field.clear()
+    field.send_keys("42")
+    page.button("Answer").click()
+    box.wait_until(log="it is 42", timeout=LIMIT)
+
+
+def test_a_window_outlives_its_box(tmp_path):
+    ready = tmp_path / "ready.json"
+    serve = [sys.executable, "-m", "ur_emulator", "serve", "--host", "127.0.0.29", "--control-port", "29900"]
+
+    def start(*words):
+        ready.unlink(missing_ok=True)
+        process = subprocess.Popen([*serve, *words, "--ready-file", str(ready)], stdout=subprocess.DEVNULL)
+        while not ready.exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        return process
+
+    process = start()
+    with window("pendant", "127.0.0.29", "--control-port", "29900") as address, browser(390, 844) as driver:
+        driver.get(address)
+        page = Page.__new__(Page)
+        page.driver = driver
+        page.until(lambda: any("UR3 3.15" in text for text in page.texts()), "the first box")
+        process.terminate()
+        process.wait(LIMIT)
+        page.until(lambda: any("refuses" in text for text in page.texts()), "the loss")
+        process = start("--robot", "ur5e")
+        page.until(lambda: any("UR5e 5.15" in text for text in page.texts()), "the second box")
+        process.terminate()
+        process.wait(LIMIT)
+
+
+def test_a_robot_that_is_only_shown_has_no_buttons(box):
+    words = ("pendant", box.host, "--control-port", str(box.control_port), "--view")
+    with window(*words) as address, browser() as driver:
+        page = Page(driver, address)
+        page.shows("the robot is only shown")
+        assert not page.find("//button[normalize-space()='Power off']")
