@@ -47,7 +47,7 @@ def test_a_robot_is_read_by_rtde_the_primary_port_and_the_control_api(box, robot
     until(lambda: robot.questions, "the question")
     assert (robot.questions[0].text, robot.program) == ("how many?", "asks")
     box.stop_program()
-    until(lambda: not robot.questions, "the end of the question")
+    until(lambda: not robot.questions and robot.program == "", "the end of the question")
     assert any("asks" in line.text for line in robot.log)
 
 

@@ -147,7 +147,7 @@ def take_state(controller: Controller) -> BoxState:
         operational_mode=controller.state.operational.mode.name,
         remote_control=bool(pendant.remote_period),
         program_state=ProgramState(now.runtime_state).name,
-        program=now.program_name,
+        program="" if now.runtime_state == ProgramState.STOPPED else now.program_name,
         joint_modes=tuple(JointMode(mode).name for mode in now.joint_mode),
         steady=is_steady(controller),
         q=now.actual_q,
