@@ -197,7 +197,6 @@ class RobotDrawing:
         arm: as it was measured; None until the robot says who it is and where it stands. Another kind of arm
             gets a new one, and with it other `model` and `links`.
         T_base_tcp: (4, 4) of the measured TCP [m].
-        root: the node of its base.
     """
 
     def __init__(
