@@ -18,7 +18,8 @@ from operator import methodcaller
 from typing import Any
 
 import numpy as np
-from viser import ViserServer, transforms, uplot
+import pinocchio as pin
+from viser import ViserServer, uplot
 
 from pc_client.arrays import Array
 from pc_client.kinematics.model import RobotModel, solve_ik
@@ -29,7 +30,7 @@ from ur_emulator.control_api.box_state import Question
 from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
 from ur_pendant.hands import ACCELERATION, KEYS, SPEED, HandError, Hands
-from ur_pendant.robot import PLOTTED, Robot, Sample, Signal
+from ur_pendant.robot import PLOTTED, RATE, Robot, Sample, Signal
 
 Show = Callable[[Robot], str]
 
@@ -144,10 +145,9 @@ def pulled(grip: Array, end: Array) -> Array:
 
 # --- text and plots
 
-_SLOWLY = 0.2  # Between two updates of text and plots [s].
-_AGAIN = 2.0  # Before the same is told again, and before what somebody has set follows the robot [s].
+_SLOWLY, _AGAIN = 0.2, 2.0  # Between updates of text; before the same is told, or what was set is left [s].
 _LONGEST, _LOG_LINES = 160, 40
-_PLOTTED = 20.0  # How much is plotted [s].
+_PLOTTED = 20.0  # How much is plotted [s]: about every other sample, and always the same ones.
 _COLOURS = ("#d62728", "#2ca02c", "#1f77b4", "#ff7f0e", "#9467bd", "#17becf")
 _READS: Mapping[str, Callable[[str], Any]] = {"Boolean": "yes".__eq__, "Integer": int, "Float": float}
 _SIGNALS = {signal.name: signal for signal in PLOTTED}
@@ -155,13 +155,14 @@ _SIGNALS = {signal.name: signal for signal in PLOTTED}
 
 def plain(text: str) -> str:
     """Text on one line, without what does not print, and cut."""
-    return "".join(c if c.isprintable() else " " for c in text[:_LONGEST]) + "…" * (len(text) > _LONGEST)
+    cut = text[:_LONGEST] + "…" * (len(text) > _LONGEST)
+    return cut if cut.isprintable() else "".join(c if c.isprintable() else " " for c in cut)
 
 
 def columns(samples: Sequence[Sample], signal: Signal, now: float) -> tuple[Array, ...]:
     """Times after now [s] and six numbers of a signal, each (n,); nan where there is none."""
     width, missing = len(signal.parts) or 1, (nan,) * len(signal.parts) or nan
-    numbers = np.full((len(samples), len(_COLOURS)), nan)
+    numbers = np.full((len(samples), len(_COLOURS)), nan)  # always so many, as a plot has lines
     numbers[:, :width] = np.reshape([s.values.get(signal.name, missing) for s in samples], (-1, width))
     return (np.array([sample.time - now for sample in samples]), *numbers.T)
 
@@ -342,8 +343,7 @@ class Panel:
         gizmo = scene.add_transform_controls(f"{name}/hand", 0.25, depth_test=False, visible=False)
         look = {"shaft_radius": 0.006, "head_radius": 0.014, "head_length": 0.03, "visible": False}
         arrow = scene.add_arrows(f"{name}/pull", np.zeros((1, 2, 3)), (230, 60, 160), **look)
-        # Pinocchio's memory is of one thread: this model is the worker's.
-        self._model = replace(arm.model, pin_data=arm.model.pin_model.createData())
+        self._model = replace(arm.model, pin_data=arm.model.pin_model.createData())  # for the worker's thread
         self._nodes, self._arm = (gizmo, arrow), arm
         gizmo.on_update(self._on_drag)
         for link in arm.links if self._has_api else ():
@@ -387,11 +387,11 @@ class Panel:
             self._task = self._worker.submit(call, event)
 
     def _draw_charts(self, now: float) -> None:
-        samples = [sample for sample in list(self._robot.history) if now - sample.time < _PLOTTED]
+        last = list(self._robot.history)[-round(_PLOTTED * RATE) :]
+        samples = [s for s in last if now - s.time < _PLOTTED and s.time * RATE % 2.0 < 1.0]
         for choice, plot in self._charts:
             signal = _SIGNALS[choice.value]
             if plot.title != (title := f"{signal.name} [{signal.unit}]"):
-                # Always as many lines: data and lines fit at any time.
                 names = ("s", *(signal.parts or ("value",)), *[""] * len(_COLOURS))
                 lines = zip(names, ("", *_COLOURS), strict=False)
                 plot.series = tuple(uplot.Series(label=n, stroke=c, show=n != "") for n, c in lines)
@@ -440,7 +440,8 @@ class Panel:
 
     async def _on_drag(self, event: Any) -> None:
         """Take the pose of the frame that somebody drags; the worker follows."""
-        T = transforms.SE3(np.append(event.target.wxyz, event.target.position)).as_matrix()
+        xyzw = np.roll(event.target.wxyz, -1)
+        T: Array = pin.XYZQUATToSE3(np.append(event.target.position, xyzw)).homogeneous
         if event.phase == "start":
             self._followed = self._measured("actual_q")
         else:
@@ -449,8 +450,7 @@ class Panel:
 
     def _reach(self, T_base_tcp: Array) -> None:
         offset = _numbers(self._robot, "tcp_offset") or (0.0,) * 6
-        q = reached(self._model, T_base_tcp @ pose_to_T(pose_inv(offset)), self._followed)
-        self._go(q)
+        self._go(q := reached(self._model, T_base_tcp @ pose_to_T(pose_inv(offset)), self._followed))
         self._followed = q
 
     async def _on_pull(self, event: Any) -> None:
@@ -469,7 +469,7 @@ class Panel:
             self._unless_busy(self._calling(partial(self._reach, wanted)), event)
         if not self._is_dragged and np.abs(T - self._placed).max() > 1e-5:
             self._placed = T
-            gizmo.position, gizmo.wxyz = T[:3, 3], transforms.SO3.from_matrix(T[:3, :3]).wxyz
+            gizmo.position, gizmo.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
         if self._pull is not None:
             (event, grip, end), flange = self._pull, self._arm.T_base_flange
             point = flange[:3, :3] @ grip + flange[:3, 3]

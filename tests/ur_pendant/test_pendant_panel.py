@@ -308,7 +308,7 @@ def test_the_world(window):
 @given(st.text(max_size=400))
 def test_text_is_one_line_of_what_prints(text):
     assert plain(text).isprintable()
-    assert len(plain(text)) <= 160
+    assert len(plain(text)) <= 161
 
 
 def test_hostile_texts_are_shown_as_text(window):
