@@ -22,7 +22,15 @@ from typer.core import TyperCommand
 from protocol.errors import ProtocolError
 from ur_emulator import check_platform
 from ur_emulator.box_log import LogEntry, printable
-from ur_emulator.box_options import TOKEN_VARIABLE, BoxOptions, ServedAt, counted_up, is_loopback
+from ur_emulator.box_options import (
+    PAGE_TOKEN_VARIABLE,
+    PENDANT_PORT,
+    TOKEN_VARIABLE,
+    BoxOptions,
+    ServedAt,
+    counted_up,
+    is_loopback,
+)
 from ur_emulator.errors import EmulatorError
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
@@ -261,13 +269,44 @@ def ctl(
 
 
 @app.command(
-    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
-    add_help_option=False,
+    epilog=examples(
+        "ur-emulator pendant 127.0.0.1",
+        "ur-emulator pendant 127.0.0.1 --control-port 29900",
+        "ur-emulator pendant 192.168.0.10 --tool robotiq-2f85",
+    )
 )
-def pendant(words: Annotated[list[str] | None, typer.Argument(metavar="HOST ...")] = None) -> None:
-    """Open a window on a box, or to look only on a real arm, in the browser."""
+def pendant(
+    hosts: Annotated[list[str], typer.Argument(metavar="HOST...", help="Boxes or real arms.")],
+    port: Annotated[int, typer.Option(help="Port of the window; 0 takes a free one.")] = PENDANT_PORT,
+    port_base: Annotated[int, typer.Option(help="Offset of the robots' ports, as given to the box.")] = 0,
+    control_port: Annotated[
+        list[int] | None,
+        typer.Option(help="Control API of an emulated box, once for each host: opens what no pendant has."),
+    ] = None,
+    view: Annotated[bool, typer.Option("--view", help="Show only, hold nothing.")] = False,
+    tool: Annotated[
+        str | None, typer.Option(help="Tool of a robot without a control API: a name, or FILE.toml.")
+    ] = None,
+    cell: Annotated[Path | None, typer.Option(help="What stands around such a robot: a cell file.")] = None,
+    listen: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address of this machine that the window is on.")
+    ] = "127.0.0.1",
+    token: Annotated[
+        str | None,
+        typer.Option(
+            help="What a page must show, as /?token=...; needed beyond loopback.",
+            envvar=PAGE_TOKEN_VARIABLE,
+            show_envvar=True,
+        ),
+    ] = None,
+) -> None:
+    """Open a window on boxes in the browser, or on real arms, which are only shown."""
     _check_window()
-    command = _window_command("pendant", *(words or ("--help",)))
+    if token is not None:
+        os.environ[PAGE_TOKEN_VARIABLE] = token
+    command = _window_command(
+        hosts, control_port or (), port_base, port, view=view, tool=tool, cell=cell, listen=listen
+    )
     os.execv(command[0], command)
 
 
@@ -277,19 +316,37 @@ def _check_window() -> None:
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _window_command(*words: str) -> list[str]:
-    """The command of the window: a process of its own, which is a client like others."""
-    return [sys.executable, "-m", "ur_pendant", *words]
+def _window_command(
+    hosts: Sequence[str],
+    control_ports: Sequence[int],
+    port_base: int,
+    port: int,
+    *,
+    view: bool,
+    tool: str | None = None,
+    cell: Path | None = None,
+    listen: str = "127.0.0.1",
+) -> list[str]:
+    """The command of the window, a process of its own, which is a client like others."""
+    options = {
+        "hosts": hosts,
+        "control_ports": control_ports,
+        "port_base": port_base,
+        "port": port,
+        "view": view,
+        "tool": tool,
+        "cell": None if cell is None else str(cell),
+        "listen": listen,
+    }
+    return [sys.executable, "-m", "ur_pendant", json.dumps(options)]
 
 
 def _open_window(served: Sequence[ServedAt], token: str | None, *, view: bool) -> subprocess.Popen[bytes]:
     """Start the window on boxes; it says by itself where it is, or why it is not there."""
-    base = served[0].port_base
-    words = ["pendant", *(at.host for at in served), "--port-base", str(base), "--port", str(29980 + base)]
-    for at in served:
-        words += ["--control-port", str(at.control_port)]
+    base, controls = served[0].port_base, [at.control_port for at in served]
+    command = _window_command([at.host for at in served], controls, base, PENDANT_PORT + base, view=view)
     environment = os.environ | ({} if token is None else {TOKEN_VARIABLE: token})
-    return subprocess.Popen(_window_command(*words, *(["--view"] if view else [])), env=environment)
+    return subprocess.Popen(command, env=environment)
 
 
 def raise_descriptor_limit() -> int:

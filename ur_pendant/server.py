@@ -28,7 +28,6 @@ from websockets.http11 import Request, Response
 
 from ur_emulator.box_options import check_token, is_loopback
 
-DEFAULT_PORT = 29980
 MOST_PAGES = 20
 """Pages that may be open at once."""
 

@@ -91,6 +91,5 @@ def view(
     """Show recordings in the browser: arm, reference, speeds and errors, with a bar of time."""
     from pc_client.results.window import view_command
 
-    words = ["--port", str(port)] if save is None else ["--save", str(save)]
-    command = view_command(files, *words)
+    command = view_command(files, port, save)
     os.execv(command[0], command)

@@ -1,6 +1,7 @@
 """The window on recordings, a process of its own: `ur_pendant` imports this package, not the reverse."""
 
 import atexit
+import json
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -10,11 +11,12 @@ from pathlib import Path
 from pc_client.errors import RecordingError
 
 
-def view_command(files: Sequence[Path], *words: str) -> list[str]:
-    """The command that shows recordings, with options in `words`. ModuleNotFoundError without viser."""
+def view_command(files: Sequence[Path], port: int, save: Path | None = None) -> list[str]:
+    """The command that shows recordings, or saves a page. ModuleNotFoundError without viser."""
     if find_spec("viser") is None:
         raise ModuleNotFoundError("No module named 'viser'", name="viser")
-    return [sys.executable, "-m", "ur_pendant", "view", *map(str, files), *words]
+    options = {"files": [*map(str, files)], "port": port, "save": None if save is None else str(save)}
+    return [sys.executable, "-m", "ur_pendant", json.dumps(options)]
 
 
 def open_window(*files: Path) -> str:
@@ -23,7 +25,7 @@ def open_window(*files: Path) -> str:
     Raises:
         RecordingError: the window did not open.
     """
-    command = view_command(files, "--port", "0")
+    command = view_command(files, 0)
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
     atexit.register(process.terminate)
     assert process.stdout is not None

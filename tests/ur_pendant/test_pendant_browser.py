@@ -25,7 +25,7 @@ LIMIT = 60.0  # s, for hangs: a picture without a graphics card takes seconds
 @contextmanager
 def window(*words):
     """A window in a process of its own; gives its address."""
-    command = [sys.executable, "-m", "ur_pendant", *words, "--port", "0"]
+    command = [sys.executable, "-m", "ur_emulator", *words, "--port", "0"]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
     try:
         yield process.stdout.readline().removeprefix("window at ").strip()
