@@ -46,7 +46,7 @@ def test_what_only_its_own_module_uses_has_an_underscore():
     """Functions and values of a module; types may be what a public function returns."""
     texts = {
         path: path.read_text(encoding="utf-8")
-        for folder in ("pc_client", "ur_emulator", "docs", "examples", "tests", "bench")
+        for folder in ("pc_client", "ur_emulator", "ur_pendant", "docs", "examples", "tests", "bench")
         for pattern in ("*.py", "*.md", "*.ipynb")
         for path in (ROOT / folder).rglob(pattern)
     }

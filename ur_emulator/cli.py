@@ -194,7 +194,9 @@ def serve(
             remote_control=remote_control,
             services=services.replace(",", " ").split(),
         )
-        rack = LoopRack(counted_up(boxes, first))
+        options = counted_up(boxes, first)
+        window = _WindowProcess(token, view=pendant_view) if has_pendant else None
+        rack = LoopRack(options)
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
         raise typer.Exit(ExitCode.WRONG_USAGE) from None
@@ -218,7 +220,8 @@ def serve(
         )
         if log:
             rack.follow_log(k, partial(_show_entry, err, f"{at.host} " if boxes > 1 else ""))
-    window = _open_window(served, token, view=pendant_view) if has_pendant else None
+    if window is not None:
+        window.open(served)
     try:
         rack.serve_forever()
     except EmulatorError as error:
@@ -226,8 +229,7 @@ def serve(
         raise typer.Exit(ExitCode.FAILED) from None
     finally:
         if window is not None:
-            window.terminate()
-            window.wait()
+            window.close()
         if ready_file is not None:
             with suppress(OSError):
                 ready_file.unlink(missing_ok=True)
@@ -304,10 +306,10 @@ def pendant(
     _check_window()
     if token is not None:
         os.environ[PAGE_TOKEN_VARIABLE] = token
-    command = _window_command(
+    options = _window_options(
         hosts, control_port or (), port_base, port, view=view, tool=tool, cell=cell, listen=listen
     )
-    os.execv(command[0], command)
+    os.execv(sys.executable, [*_WINDOW, options])
 
 
 def _check_window() -> None:
@@ -316,7 +318,11 @@ def _check_window() -> None:
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _window_command(
+# The window is a process of its own, which is a client like others; its options are JSON.
+_WINDOW = (sys.executable, "-m", "ur_pendant")
+
+
+def _window_options(
     hosts: Sequence[str],
     control_ports: Sequence[int],
     port_base: int,
@@ -326,8 +332,7 @@ def _window_command(
     tool: str | None = None,
     cell: Path | None = None,
     listen: str = "127.0.0.1",
-) -> list[str]:
-    """The command of the window, a process of its own, which is a client like others."""
+) -> str:
     options = {
         "hosts": hosts,
         "control_ports": control_ports,
@@ -338,15 +343,32 @@ def _window_command(
         "cell": None if cell is None else str(cell),
         "listen": listen,
     }
-    return [sys.executable, "-m", "ur_pendant", json.dumps(options)]
+    return json.dumps(options)
 
 
-def _open_window(served: Sequence[ServedAt], token: str | None, *, view: bool) -> subprocess.Popen[bytes]:
-    """Start the window on boxes; it says by itself where it is, or why it is not there."""
-    base, controls = served[0].port_base, [at.control_port for at in served]
-    command = _window_command([at.host for at in served], controls, base, PENDANT_PORT + base, view=view)
-    environment = os.environ | ({} if token is None else {TOKEN_VARIABLE: token})
-    return subprocess.Popen(command, env=environment)
+class _WindowProcess:
+    """The window on boxes, which loads while they do. It says where it is, or why it is not there."""
+
+    def __init__(self, token: str | None, *, view: bool) -> None:
+        options, self._options = os.pipe()
+        environment = os.environ | ({} if token is None else {TOKEN_VARIABLE: token})
+        command = [*_WINDOW, f"fd:{options}"]
+        self._process = subprocess.Popen(command, env=environment, pass_fds=[options])
+        os.close(options)
+        self._view = view
+
+    def open(self, served: Sequence[ServedAt]) -> None:
+        """Tell it where the boxes are."""
+        base, controls = served[0].port_base, [at.control_port for at in served]
+        hosts, port = [at.host for at in served], PENDANT_PORT + base
+        with suppress(OSError):  # it has ended already
+            os.write(self._options, _window_options(hosts, controls, base, port, view=self._view).encode())
+        os.close(self._options)
+
+    def close(self) -> None:
+        """End it."""
+        self._process.terminate()
+        self._process.wait()
 
 
 def raise_descriptor_limit() -> int:

@@ -124,7 +124,11 @@ def _complain(text: str) -> None:
 def main() -> ExitCode:
     """Show what the options say."""
     try:
-        options = json.loads(sys.argv[1])
+        words = sys.argv[1]
+        if words.startswith("fd:"):  # options come when the boxes are there
+            with open(int(words[3:])) as pipe:
+                words = pipe.read() or sys.exit(ExitCode.DONE)
+        options = json.loads(words)
         (show_recordings if "files" in options else show_robots)(**options)
     except (IndexError, ValueError, TypeError):
         _complain("start it by `ur-emulator pendant HOST` or `ur-client view FILE`")

@@ -16,7 +16,6 @@ import pinocchio as pin
 import trimesh
 import viser
 from trimesh.convex import convex_hull
-from viser._messages import SetOrientationMessage
 
 from pc_client.arrays import Array
 from pc_client.driver.report import RobotInfo
@@ -144,10 +143,7 @@ class ArmDrawing:
             self._q[turned] = [q[k] for k in turned]
             pin.framesForwardKinematics(self.model.pin_model, self._data, self._q)
             for k in turned:
-                node, wxyz = self.links[k + 1]._impl, _wxyz(self._data.liMi[k + 1].rotation)
-                # As viser's setter, which compares arrays first: two thirds of the time of a drawing.
-                node.wxyz[:] = wxyz
-                node.api._queue_scene_message(SetOrientationMessage(node.name, wxyz))
+                self.links[k + 1].wxyz = _wxyz(self._data.liMi[k + 1].rotation)
         return bool(turned)
 
     def paint(self, colour: Colour, opacity: float) -> None:

@@ -120,10 +120,13 @@ class RecordingsWindow:
         self._end = max(float(track.t[-1]) for track in tracks)
         gui = server.gui
         for k, track in enumerate(tracks):
-            gui.add_text(_COLOURS[k % len(_COLOURS)].name, track.title[:200], disabled=True)
-        self._bar = gui.add_slider("time [s]", self._begin, self._end, 0.001, max(0.0, self._begin))
-        self._plays = gui.add_checkbox("play", False)
-        self._speed = gui.add_dropdown("speed", tuple(_SPEEDS), "1/1")
+            gui.add_text(_COLOURS[k % len(_COLOURS)].name, initial_value=track.title[:200], disabled=True)
+        begin = max(0.0, self._begin)
+        self._bar = gui.add_slider(
+            "time [s]", min=self._begin, max=self._end, step=0.001, initial_value=begin
+        )
+        self._plays = gui.add_checkbox("play", initial_value=False)
+        self._speed = gui.add_dropdown("speed", tuple(_SPEEDS), initial_value="1/1")
         self._plots = [
             _Plot(server, f"{what} [{unit}]", tracks, curves)
             for what, unit, curves in (

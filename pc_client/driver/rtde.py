@@ -19,7 +19,7 @@ RtdeValues = Mapping[str, RtdeValue]
 
 _CONNECT_TIMEOUT = 2.0
 
-PACKAGE_TIMEOUT = 1.0
+_PACKAGE_TIMEOUT = 1.0
 """Longest wait for one package [s]. Source: UR's RTDE client in Python."""
 
 _MOST_PACKAGES = 100
@@ -131,12 +131,12 @@ class RtdeStream:
 
     def _next(self, *, wait: bool) -> ClientEvent | None:
         """Return the next package; texts for the log are passed over. None: nothing more is there."""
-        deadline = self._network.now() + PACKAGE_TIMEOUT
+        deadline = self._network.now() + _PACKAGE_TIMEOUT
         try:
             while self._network.now() <= deadline:
                 event = self._rtde.next_event()
                 if event is None:
-                    data = self._connection.receive(PACKAGE_TIMEOUT if wait else 0.0)
+                    data = self._connection.receive(_PACKAGE_TIMEOUT if wait else 0.0)
                     if data == b"":
                         raise DriverError("the robot closed the RTDE connection")
                     if data is None:
