@@ -134,6 +134,12 @@ class Hands:
         except EmulatorError as error:
             raise HandError(str(error)) from None
 
+    def let_pass(self, seconds: float) -> None:
+        """Let time of a box in lockstep pass, which stands still while nothing moves. HandError if not."""
+        state = self._robot.state
+        if state is not None:
+            self.operate("wait_until", time=state.time + seconds)
+
     # --- moving the arm
 
     def follow(self, q: Sequence[float] | Array) -> None:

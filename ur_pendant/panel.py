@@ -273,6 +273,9 @@ class Panel:
         for label, since, deeds in ROWS:
             if since <= major:
                 self._row(label, deeds)
+        if self._has_api and robot.info is not None and robot.info.lockstep:
+            spans = {"One cycle": robot.info.period, "0.1 s": 0.1, "1 s": 1.0}
+            self._row("Time", {label: methodcaller("let_pass", span) for label, span in spans.items()})
         if self._has_api:
             slider = gui.add_slider("Speed %", 0, 100, 1, 100)
             call = self._calling(lambda: hands.operate("set_speed", fraction=slider.value / 100))

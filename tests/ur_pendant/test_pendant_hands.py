@@ -98,6 +98,12 @@ def test_operations_say_what_the_box_says(box, robot):
         hands.operate("remove_obstacle", name="wall")
 
 
+def test_time_in_lockstep_passes_by_steps(box, robot):
+    before = box.state.tick
+    Hands(robot).let_pass(robot.info.period)
+    assert before < box.state.tick <= before + 3
+
+
 def test_a_box_in_lockstep_moves_to_each_posture(box, robot):
     goal = np.add(box.state.q, (0.2, 0.1, -0.1, 0.0, 0.1, 0.3))
     Hands(robot).follow(goal)
