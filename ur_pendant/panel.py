@@ -319,7 +319,7 @@ class Panel:
     def _make_world(self) -> None:
         gui, robot, hands = self._gui, self._robot, self._hands
         sizes: Mapping[Any, tuple[str, ...]] = {**SIZES, **THING_SIZES}
-        name = gui.add_text("Name", "block")
+        name = gui.add_text("Name", "box")
         shape = gui.add_dropdown("Shape", tuple(sizes))
         size = gui.add_vector3("Size m", (0.1, 0.1, 0.1), step=0.01, hint="edges; or radius, length")
         at = gui.add_vector3("At m", (0.4, 0.2, 0.1), step=0.01, hint="of its middle, in the base frame")
