@@ -447,8 +447,7 @@ class Panel:
         T: Array = pin.XYZQUATToSE3(np.append(event.target.position, xyzw)).homogeneous
         if event.phase == "start":
             self._followed = self._measured("actual_q")
-        else:
-            self._dragged = event, T
+        self._dragged = None if event.phase == "start" else (event, T)
         self._is_dragged, self._placed = event.phase != "end", T
 
     def _reach(self, T_base_tcp: Array) -> None:
@@ -458,10 +457,11 @@ class Panel:
 
     async def _on_pull(self, event: Any) -> None:
         """Take where somebody pulls at a link: on the flange, or as far from it as the box can be pushed."""
-        base, flange = self._drawing.root.position, self._arm.T_base_flange
-        grip = (np.array(event.start_position) - base - flange[:3, 3]) @ flange[:3, :3]
+        flange, start = self._arm.T_base_flange, np.array(event.start_position)
+        grip = (start - self._drawing.root.position - flange[:3, 3]) @ flange[:3, :3]
         grip *= min(1.0, MAX_LEVER / max(float(np.linalg.norm(grip)), 1e-9))
-        self._pull = None if event.phase == "end" else (event, grip, np.array(event.end_position) - base)
+        end = flange[:3, :3] @ grip + flange[:3, 3] + event.end_position - start
+        self._pull = None if event.phase == "end" else (event, grip, end)
 
     def _update_nodes(self, now: float) -> None:
         (gizmo, arrow), T = self._nodes, self._drawing.T_base_tcp
