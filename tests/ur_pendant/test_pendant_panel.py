@@ -97,7 +97,7 @@ def a_robot(**changes):
     }  # fmt: skip
     robot = SimpleNamespace(
         is_held=True, view_only=False, problem="", title="UR5e 5.15.0 at 127.0.0.1", values=values,
-        info=SimpleNamespace(version=SoftwareVersion(5, 15), model="UR5e", tool=None), kinematics=None, state=None,
+        info=SimpleNamespace(version=SoftwareVersion(5, 15), model="UR5e", lockstep=False), kinematics=None, state=None,
         address=Address("127.0.0.1", Ports()), log=deque(), history=deque(), popups=(), questions=(), program="",
         label="",
     )  # fmt: skip
@@ -209,7 +209,7 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
 
 @pytest.mark.parametrize(("major", "has_api"), [(3, True), (5, True), (10, True), (5, False)])
 def test_every_key_does_what_it_says_where_the_robot_has_it(server, major, has_api):
-    info = SimpleNamespace(version=SoftwareVersion(major, 15), model="UR5e")
+    info = SimpleNamespace(version=SoftwareVersion(major, 15), model="UR5e", lockstep=False)
     hands = Hands(has_control_api=has_api)
     window = Window(server, a_robot(info=info), hands)
     for label, since, deeds in ROWS:
