@@ -202,7 +202,7 @@ class Panel:
             self._made_for = wanted
         now = time.monotonic()
         if 0.0 < self._jogging < now - _RELEASED:
-            self._release()
+            self._worker.submit(self._release)
         if self._nodes:
             self._update_nodes(now)
         if now - self._refreshed >= _SLOWLY:

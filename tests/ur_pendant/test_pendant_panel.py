@@ -370,6 +370,7 @@ def test_a_button_that_is_held_moves_a_joint_and_its_release_stops_it(window):
     window.robot.values = {**window.robot.values, "target_qd": (0.0, 0.0, 0.6, 0.0, 0.0, 0.0)}
     window.panel._jogging = 1e-9  # when it was heard
     window.update()
+    window.work()
     assert window.hands.done[-1][1][2] - Q[2] == pytest.approx(0.036 + 0.12)
     assert window.panel._jogging == 0.0
 
