@@ -116,6 +116,15 @@ def test_pick(run, tmp_path):
 
 
 @pytest.mark.slow
+def test_show(run, tmp_path):
+    letter = EXAMPLES / "drawings" / "letter_i.txt"
+    said = run("09_show.py", "--once", "--port", 0, "--out", tmp_path, DRAWING=letter)
+    assert "window at http://127.0.0.1:" in said
+    assert (tmp_path / "report.html").exists()
+    assert "<script" in (tmp_path / "signature.html").read_text()
+
+
+@pytest.mark.slow
 def test_ablation(run, tmp_path):
     said = run("ablation.py", "--quick", "--out", tmp_path)
     assert len(said.splitlines()) == 1

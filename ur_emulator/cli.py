@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from importlib.util import find_spec
@@ -166,6 +166,8 @@ def serve(
     has_pendant = pendant or pendant_view
     if has_pendant:
         _check_window()
+    # Who may not use the control API may not use it through the window.
+    tokens = {} if token is None else {PAGE_TOKEN_VARIABLE: token}
     if has_pendant and control_port is None:
         control_port = 0  # for what the window does beside what a pendant can
         token = token if is_loopback(host) else token or token_urlsafe()
@@ -195,7 +197,8 @@ def serve(
             services=services.replace(",", " ").split(),
         )
         options = counted_up(boxes, first)
-        window = _WindowProcess(token, view=pendant_view) if has_pendant else None
+        tokens |= {} if token is None else {TOKEN_VARIABLE: token}
+        window = _WindowProcess(tokens, view=pendant_view) if has_pendant else None
         rack = LoopRack(options)
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
@@ -349,11 +352,10 @@ def _window_options(
 class _WindowProcess:
     """The window on boxes, which loads while they do. It says where it is, or why it is not there."""
 
-    def __init__(self, token: str | None, *, view: bool) -> None:
+    def __init__(self, tokens: Mapping[str, str], *, view: bool) -> None:
         options, self._options = os.pipe()
-        environment = os.environ | ({} if token is None else {TOKEN_VARIABLE: token})
         command = [*_WINDOW, f"fd:{options}"]
-        self._process = subprocess.Popen(command, env=environment, pass_fds=[options])
+        self._process = subprocess.Popen(command, env={**os.environ, **tokens}, pass_fds=[options])
         os.close(options)
         self._view = view
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from docs.generate.page_parts import table
 from pc_client.files import FILE_KINDS
 from protocol.ur_types import Ports
+from ur_emulator.box_options import PENDANT_PORT
 from ur_emulator.budgets import rows
 from ur_emulator.control_api.http_client import DEFAULT_PORT
 from ur_hil.input_files import MIB
@@ -139,6 +140,11 @@ def _ports() -> Iterator[tuple[str, ...]]:
     for row in _PORTS:
         given = ", ".join(str(getattr(numbers, name)) for name in row.names)
         yield given or f"control port, e.g. {DEFAULT_PORT}; closed by default", row.may, row.asks
+    yield (
+        f"{PENDANT_PORT}, of the window, a process of its own; closed by default",
+        "do all of this to a box that was opened with its control port; only look at a real arm",
+        "a token beyond loopback, and that of `serve --token`; pages of other sites are refused",
+    )
 
 
 def _budgets() -> Iterator[tuple[str, ...]]:
