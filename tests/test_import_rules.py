@@ -19,7 +19,7 @@ MAY_IMPORT = {
         "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "markupsafe", "plotly", "polars", "distributed", "optuna",
     },
     "ur_pendant": {
-        "ur_hil", "protocol", "ur_emulator", "pc_client", "numpy", "pinocchio", "typer", "rich", "trimesh", "viser", "websockets",
+        "ur_hil", "protocol", "ur_emulator", "pc_client", "numpy", "pinocchio", "typer", "rich", "viser", "websockets",
     },
 }  # fmt: skip
 # Modules of the standard library that a layer must not touch, and the folders in which it may.

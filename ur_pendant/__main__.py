@@ -24,7 +24,6 @@ from ur_hil.command_line import ExitCode
 from ur_pendant.drawing import RobotDrawing
 from ur_pendant.hands import Hands
 from ur_pendant.panel import Panel
-from ur_pendant.recordings import RecordingsWindow, load_track
 from ur_pendant.robot import RATE, Address, Robot
 from ur_pendant.server import PageServer, WindowError, open_server
 
@@ -66,6 +65,8 @@ def show_robots(
 
 def show_recordings(files: Sequence[str], save: str | None, port: int) -> None:
     """Show recordings until the process is interrupted, or save a page; options as of `ur-client view`."""
+    from ur_pendant.recordings import RecordingsWindow, load_track  # with scipy, which the robots do not need
+
     tracks = [load_track(Path(file)) for file in files]
     server = open_server("127.0.0.1", 0 if save is not None else port, None, "UR recordings")
     window = RecordingsWindow(server, tracks)

@@ -4,18 +4,16 @@ The links of an arm are nodes below each other: a joint that turns is one new or
 on the flange follows. Names of things are only shown as labels: paths of nodes have numbers.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import count
-from math import dist, hypot, isfinite
-from typing import Any
+from math import dist, hypot, isfinite, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-import trimesh
 import viser
-from trimesh.convex import convex_hull
 
 from pc_client.arrays import Array
 from pc_client.driver.report import RobotInfo
@@ -76,38 +74,67 @@ _TUBES = {"upper_arm_link": 1, "forearm_link": 2}
 _LIDS = {"upper_arm_link": (1, 3), "forearm_link": (0, 2), "wrist_1_link": (2,), "wrist_2_link": (2,)}
 
 
+class _Mesh(NamedTuple):
+    """Corners (n, 3) [m] and triangles (m, 3) of them; triangles that share corners look round."""
+
+    vertices: Array
+    faces: Array
+    is_flat: bool = False
+
+
 @lru_cache(maxsize=16)
-def _links(description: RobotDescription) -> tuple[tuple[trimesh.Trimesh, trimesh.Trimesh | None], ...]:
+def _links(description: RobotDescription) -> tuple[tuple[_Mesh, _Mesh | None], ...]:
     """Housing and lids of each link, base to wrist 3, in the frame of its joint; shared, never changed."""
     model, geometry = load_pinocchio_model(description), description.geometry
     if not isinstance(geometry, DhArm):
-        return tuple((_smooth([_mesh(m.geometry)], m.placement), None) for m in load_meshes(geometry, model))
+        return tuple((_published(mesh), None) for mesh in load_meshes(geometry, model))
     links = []
     for name, rings in housings(geometry).items():
         centres = [ring.mean(axis=0) for ring in rings]
-        body, lids = [convex_hull(np.vstack(rings[k : k + 2])) for k in range(0, len(rings), 2)], []
-        if name in _TUBES:
-            ends = [(centres[k] + centres[k + 1]) / 2 for k in (0, 2)]
-            body.append(trimesh.creation.cylinder(0.85 * geometry.radii[_TUBES[name]], segment=ends))
+        body, lids = [_loft(*rings[k : k + 2]) for k in range(0, len(rings), 2)], []
+        if name in _TUBES:  # along z
+            radius = 0.85 * geometry.radii[_TUBES[name]]
+            body.append(_loft(*(_ring(radius) + (centres[k] + centres[k + 1]) / 2 for k in (0, 2))))
         for k in _LIDS.get(name, ()):
             outward = centres[k] - centres[k ^ 1]
             top = centres[k] + 0.12 * geometry.radii[2] * outward / hypot(*outward)
-            lids.append(convex_hull(np.vstack((rings[k], top + 0.9 * (rings[k] - centres[k])))))
+            lids.append(_loft(rings[k], top + 0.9 * (rings[k] - centres[k])))
         at = model.frames[model.getFrameId(name)].placement
-        links.append((_smooth(body, at), _smooth(lids, at) if lids else None))
+        links.append((_joined(body, at), _joined(lids, at) if lids else None))
     return tuple(links)
 
 
-def _mesh(geometry: Any) -> trimesh.Trimesh:
-    corners = (geometry.tri_indices(k) for k in range(geometry.num_tris))
-    return trimesh.Trimesh(geometry.vertices(), [(c[0], c[1], c[2]) for c in corners])
+def _published(link: Any) -> _Mesh:
+    """A mesh of Pinocchio's collision library, at its place."""
+    mesh = link.geometry
+    corners = (mesh.tri_indices(k) for k in range(mesh.num_tris))
+    faces = np.array([(c[0], c[1], c[2]) for c in corners])
+    return _joined([_Mesh(mesh.vertices(), faces, True)], link.placement)
 
 
-def _smooth(parts: Iterable[trimesh.Trimesh], placement: Any) -> trimesh.Trimesh:
-    """Put parts together, at their place, with edges that light shows."""
-    mesh = trimesh.util.concatenate([trimesh.graph.smooth_shade(part, angle=0.6) for part in parts])
-    assert isinstance(mesh, trimesh.Trimesh)
-    return mesh.apply_transform(placement.homogeneous)
+def _joined(parts: Sequence[_Mesh], placement: Any) -> _Mesh:
+    """One mesh of several, at their place."""
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.vstack([part.vertices for part in parts]) @ placement.rotation.T + placement.translation
+    faces = [part.faces + offset for part, offset in zip(parts, offsets, strict=False)]
+    return _Mesh(vertices, np.vstack(faces), parts[0].is_flat)
+
+
+def _loft(*rings: Array) -> _Mesh:
+    """A closed body through rings of points (n, 3), each about its axis from the same side on."""
+    n = len(rings[0])
+    k, after = np.arange(n), np.roll(np.arange(n), -1)
+    side = np.vstack((np.column_stack((k, after, n + k)), np.column_stack((after, n + after, n + k))))
+    fan = np.column_stack((np.zeros(n - 2, int), k[1:-1], k[2:]))
+    # The ends have corners of their own, so that light shows the edge.
+    faces = [side + n * i for i in range(len(rings) - 1)] + [fan + n * len(rings), fan + n * (len(rings) + 1)]
+    return _Mesh(np.vstack((*rings, rings[0], rings[-1])), np.vstack(faces))
+
+
+def _ring(radius: float, z: float = 0.0) -> Array:
+    """Points (n, 3) of a circle about z."""
+    turn = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+    return np.column_stack((radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, z)))
 
 
 class ArmDrawing:
@@ -128,9 +155,10 @@ class ArmDrawing:
         for joint, (body, lid) in enumerate(_links(model.description)):
             name = f"{name}/{joint}"
             at = model.pin_model.jointPlacements[joint].translation
-            links.append(scene.add_mesh_simple(name, body.vertices, body.faces, position=at))
+            look = {"flat_shading": body.is_flat, "side": "double"}
+            links.append(scene.add_mesh_simple(name, body.vertices, body.faces, position=at, **look))
             if lid is not None:
-                lids.append(scene.add_mesh_simple(f"{name}/lid", lid.vertices, lid.faces, color=_LID))
+                lids.append(scene.add_mesh_simple(f"{name}/lid", lid.vertices, lid.faces, color=_LID, **look))
         self.links, self._lids, self.flange = tuple(links), lids, f"{name}/flange"
         at = model.pin_model.frames[model.flange_frame].placement
         scene.add_frame(self.flange, show_axes=False, position=at.translation, wxyz=_wxyz(at.rotation))
@@ -163,13 +191,12 @@ class ArmDrawing:
         return np.asarray(self.T_base_flange @ pose_to_T(offset))
 
 
-_MESHES: Mapping[str, Callable[..., trimesh.Trimesh]] = {
-    "box": lambda *edges: trimesh.creation.box(edges),
-    "cylinder": trimesh.creation.cylinder,
-    "capsule": lambda radius, length: trimesh.creation.capsule(length, radius),
-    "sphere": lambda radius: trimesh.creation.icosphere(radius=radius),
-    "plane": lambda: trimesh.creation.box((_SIDE, _SIDE, 0.001)),
-}
+def _round(radius: float, length: float, caps: bool) -> _Mesh:
+    """A cylinder along z, or a capsule, whose length is without its ends."""
+    up = radius * np.sin(np.linspace(0.0, pi / 2.0, 7)) if caps else np.zeros(1)
+    across = np.sqrt(np.maximum(radius * radius - up * up, 1e-12))
+    half = [(r, length / 2.0 + z) for r, z in zip(across, up, strict=True)]
+    return _loft(*(_ring(r, -z) for r, z in reversed(half)), *(_ring(r, z) for r, z in half))
 
 
 def _shapes_of(cell: Cell) -> list[BodyShape]:
@@ -299,10 +326,18 @@ class RobotDrawing:
         """Draw a shape, with its name if it has one of its own."""
         if (shape.name, shape.shape) == ("table", "plane"):
             return self._scene.add_grid(path, 2 * _SIDE, 2 * _SIDE, cell_size=0.1, section_size=0.5)
-        mesh = _smooth([_MESHES[shape.shape](*shape.size)], pin.SE3.Identity())
         colour = _CARRIED if shape.is_carried else _SCENE if shape.name == "scene" else _THING
-        opacity = 0.2 if shape.shape == "plane" else None
-        node = self._scene.add_mesh_simple(path, mesh.vertices, mesh.faces, color=colour, opacity=opacity)
+        match shape.shape:
+            case "box":
+                node = self._scene.add_box(path, colour, shape.size)
+            case "plane":
+                node = self._scene.add_box(path, colour, (_SIDE, _SIDE, 0.001), opacity=0.2)
+            case _:
+                radius, length = (*shape.size, 0.0)[:2]
+                mesh = _round(radius, length, shape.shape != "cylinder")
+                node = self._scene.add_mesh_simple(
+                    path, mesh.vertices, mesh.faces, color=colour, side="double"
+                )
         if colour == _THING:
             self._scene.add_label(f"{path}/0", shape.name)
         return node
