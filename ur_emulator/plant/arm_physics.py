@@ -6,6 +6,7 @@ so that it acts within every sub-step, in C, and implicitly in speed. The drives
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from protocol.pose import rotvec_from_flat
 from ur_emulator.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
-from ur_emulator.models.robot_model import DhRow, RobotModel, six
+from ur_emulator.models.robot_model import DhRow, RobotModel, Vector3, Vector6, six
 from ur_emulator.models.things import BodyShape, Contact
 from ur_emulator.plant.drives import Drives, ServoGains
 from ur_emulator.plant.friction import Presliding
@@ -132,6 +133,7 @@ class ArmPhysics:
         self.scene.bind(model, data)
         for hand in self.hands:
             hand.bind(model, data)
+        self._sort_shapes()
 
     def _recompile(self) -> None:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
@@ -200,24 +202,46 @@ class ArmPhysics:
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
         """Shapes around the arm and on its flange, at the start of the last sub-step."""
-        model, data = self.model, self.data
-        shapes = []
+        data, shapes = self.data, [*self._fixed_shapes]
+        for shape, (dx, dy, dz), at in self._sliding_shapes:
+            q, (x, y, z, rx, ry, rz) = float(data.qpos[at]), shape.pose
+            shapes.append(replace(shape, pose=(x + dx * q, y + dy * q, z + dz * q, rx, ry, rz)))
+        for shape, geom in self._moving_shapes:
+            shapes.append(replace(shape, pose=_pose(data.geom_xpos[geom], data.geom_xmat[geom])))
+        return (*shapes, *self.obstacles.shapes)
+
+    def _sort_shapes(self) -> None:
+        """Look which shapes stay, which slide on the flange as fingers do, and which are free to move.
+
+        Clients may ask for shapes as often as they like, so all that can be known before is.
+        """
+        model, data = self.model, mujoco.MjData(self.model)
+        mujoco.mj_kinematics(model, data)  # with fingers at 0
+        site = model.site(FLANGE).id
+        flange, to_flange = data.site_xpos[site], data.site_xmat[site].reshape(3, 3).T
+        self._fixed_shapes: list[BodyShape] = []
+        self._sliding_shapes: list[tuple[BodyShape, Vector3, int]] = []
+        self._moving_shapes: list[tuple[BodyShape, int]] = []
         for geom in range(model.ngeom):
-            body = model.geom_bodyid[geom]
-            row = _SHAPES.get(model.geom_type[geom])
-            is_used = model.geom_contype[geom] | model.geom_conaffinity[geom]
-            name = self._name_of(geom) if is_used else ""
-            if row is None or not is_used or name == "base" or model.body(body).name in LINKS:
+            body, row = model.body(model.geom_bodyid[geom]), _SHAPES.get(model.geom_type[geom])
+            if row is None or body.name in (*LINKS, OBSTACLES) or (name := self._name_of(geom)) == "base":
                 continue
-            position, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-            is_carried = bool(self._is_arm[body])
+            shape, is_carried = row[0], bool(self._is_arm[body.id])
+            size = row[1](*model.geom_size[geom].tolist())
+            position, rotation = data.geom_xpos[geom], data.geom_xmat[geom]
             if is_carried:
-                to_flange = self.flange_rotation.T
-                position, rotation = to_flange @ (position - self.flange_position), to_flange @ rotation
-            pose = six([*position.tolist(), *rotvec_from_flat(*rotation.ravel().tolist())])
-            shape, size = row
-            shapes.append(BodyShape(name, is_carried, shape, size(*model.geom_size[geom].tolist()), pose))
-        return tuple(shapes)
+                position = to_flange @ (position - flange)
+                rotation = (to_flange @ rotation.reshape(3, 3)).ravel()
+            drawn = BodyShape(name, is_carried, shape, size, _pose(position, rotation))
+            carrier = model.body(model.body_weldid[body.id])
+            joint = int(carrier.jntadr[0])
+            if joint < 0 or carrier.name in LINKS:
+                self._fixed_shapes.append(drawn)
+            elif is_carried:
+                axis = (to_flange @ data.xaxis[joint]).tolist()
+                self._sliding_shapes.append((drawn, tuple(axis), int(model.jnt_qposadr[joint])))
+            else:
+                self._moving_shapes.append((drawn, geom))
 
     def _name_of(self, geom: int) -> str:
         """What people call the body of a shape: a link, a tool, an obstacle, a thing, the table."""
@@ -309,6 +333,11 @@ class ArmPhysics:
 
 
 # --- the model
+
+
+def _pose(position: NDArray[np.float64], rotation: NDArray[np.float64]) -> Vector6:
+    """The pose of a position (3,) [m] and a rotation (9,)."""
+    return six([*position.tolist(), *rotvec_from_flat(*rotation.tolist())])
 
 
 class _Sizes(NamedTuple):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.errors import RefusedError
 from ur_emulator.models.robot_model import Vector6
+from ur_emulator.models.things import BodyShape
 
 OBSTACLES = "obstacles"
 SLOTS = 16
@@ -73,6 +74,7 @@ class Obstacles:
 
     def __init__(self) -> None:
         self._slots: dict[str, int] = {}
+        self._shapes: dict[str, BodyShape] = {}
 
     def bind(self, model: mujoco.MjModel, q: NDArray[np.float64]) -> None:
         """Be in this model from now on; `q` has the positions of all joints: none must overlap the arm."""
@@ -85,6 +87,11 @@ class Obstacles:
     def names(self) -> tuple[str, ...]:
         """Their names, in the order in which they were added."""
         return tuple(self._slots)
+
+    @property
+    def shapes(self) -> tuple[BodyShape, ...]:
+        """What they are, in the same order."""
+        return tuple(self._shapes.values())
 
     def name_of(self, geom: int) -> str:
         """The obstacle that a shape of the model is."""
@@ -113,10 +120,12 @@ class Obstacles:
         if not in_place:
             self.remove(name)
         self._slots[name] = slot
+        self._shapes[name] = BodyShape(name, False, shape, tuple(size), pose)
 
     def remove(self, name: str) -> None:
         """Remove an obstacle, if it exists."""
         slot = self._slots.pop(name, None)
+        self._shapes.pop(name, None)
         if slot is not None:
             self._hide(slot)
 
