@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import select
+import shutil
 import socket
 import subprocess
 import sys
@@ -286,3 +287,27 @@ def test_minimalmodbus(line):
         with pytest.raises(client.SlaveReportedException, match="illegal data address"):
             gripper.read_register(0)
         gripper.serial.close()
+
+
+def test_minimalmodbus_through_socat(line, tmp_path):
+    """As the maker's script for tool communication does it: a serial port that socat makes of a connection."""
+    client = pytest.importorskip("minimalmodbus")
+    if shutil.which("socat") is None:
+        pytest.skip("needs socat")
+    port, (host, number) = tmp_path / "ttyUR", line
+    socat = ["socat", f"pty,link={port},raw,ignoreeof,waitslave", f"tcp:{host}:{number}"]
+    with subprocess.Popen(socat) as process:
+        try:
+            wait_until(port.exists, "the serial port")
+            gripper = client.Instrument(str(port), 9)
+            gripper.serial.baudrate, gripper.serial.timeout = 115200, TIMEOUT
+            gripper.write_registers(0x03E8, [0, 0, 0])
+            gripper.write_registers(0x03E8, [0x0100, 0, 0])
+            while gripper.read_register(0x07D0, functioncode=4) != 0x3100:
+                pass
+            gripper.write_registers(0x03E8, [0x0900, 0x00FF, 0xFFFF])
+            while gripper.read_registers(0x07D0, 3, functioncode=4) != [0xF900, 0x00FF, 0xE600]:
+                pass
+            gripper.serial.close()
+        finally:
+            process.terminate()
