@@ -246,7 +246,7 @@ class _DashboardSession(Session):
     """A client; `lines` is what it has sent, and how answers are written."""
 
     # Programs send `pause` and `popup` to their own box and close at once, without reading an answer.
-    outlives_client = True
+    most_of_the_gone = 4
 
     def __init__(self, connection: Connection, box: ServedBox, answers: DashboardAnswers) -> None:
         super().__init__(connection, box)

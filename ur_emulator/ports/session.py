@@ -20,16 +20,17 @@ class Session(ABC):
 
     Attributes:
         is_busy: its requests are being answered.
-        outlives_client: what it has sent is also executed when it is gone; otherwise that ends with it.
+        most_of_the_gone: how many requests are still answered when their client is gone.
     """
 
-    outlives_client: ClassVar[bool] = False
+    most_of_the_gone: ClassVar[int] = 0
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
         """Prepare; nothing has arrived yet."""
         self.connection = connection
         self.is_busy = False
         self._box = box
+        self._n_of_the_gone = 0
 
     def receive(self, data: bytes) -> None:
         """Take what has arrived, and answer what can be answered now."""
@@ -61,7 +62,7 @@ class Session(ABC):
         A request that has waited for a cycle is the last of a turn: it is answered within the next cycle.
         """
         snapshot, work = self._box.snapshot, BUDGETS.client_work
-        while self.outlives_client or (self.connection.is_open and self.connection.takes_answers):
+        while self._is_served():
             if work <= 0 or self._box.snapshot is not snapshot:
                 return True
             cost = yield from self._answer_next()
@@ -69,6 +70,13 @@ class Session(ABC):
                 break
             work -= cost
         return False
+
+    def _is_served(self) -> bool:
+        """Whether its next request is answered."""
+        if self.connection.is_open and self.connection.takes_answers:
+            return True
+        self._n_of_the_gone += 1
+        return self._n_of_the_gone <= self.most_of_the_gone
 
     def _finished(self, goes_on: bool | None, error: Exception | None) -> None:
         """The turn is over, all are answered, the box has ended, or an error of ours the answering."""
@@ -80,8 +88,8 @@ class Session(ABC):
             self.connection.close()
         elif error is not None:
             self.connection.failed(error)
-        elif not (self.connection.takes_answers or self.outlives_client):
-            self.connection.close()  # gone: what it has sent ahead is not executed
+        elif not self.connection.takes_answers:
+            self.connection.close()  # gone: what else it has sent ahead is not executed
         elif self.connection.has_ended:
             self.connection.close_when_sent()
         else:
