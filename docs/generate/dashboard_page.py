@@ -36,7 +36,7 @@ replies `{REMOTE_CONTROL_ONLY}`.
 While a line waits for its reply, the lines after it wait too. The box closes the connection of a
 client that sends a line of more than {MAX_LINE} bytes or does not read its replies. A client that
 closes its sending side still gets all replies. A command that has begun is completed even if the
-client is gone; the lines after it are not executed.
+client is gone; of the lines after it four are executed.
 """
 
 
