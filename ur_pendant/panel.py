@@ -465,12 +465,14 @@ class Panel:
 
     def _update_nodes(self, now: float) -> None:
         (gizmo, arrow), T = self._nodes, self._drawing.T_base_tcp
-        gizmo.visible = self._can_drag.value and self._robot.values.get("robot_mode") == RobotMode.RUNNING
+        mode, program = (self._robot.values.get(name) for name in ("robot_mode", "runtime_state"))
+        is_free = program == ProgramState.STOPPED or self._hands.goal is not None  # no program has the arm
+        gizmo.visible = self._can_drag.value and mode == RobotMode.RUNNING and is_free
         arrow.visible = self._pull is not None
         if self._dragged is not None and self._task.done():
             (event, wanted), self._dragged = self._dragged, None
             self._unless_busy(self._calling(partial(self._reach, wanted)), event)
-        if not self._is_dragged and np.abs(T - self._placed).max() > 1e-5:
+        if gizmo.visible and not self._is_dragged and np.abs(T - self._placed).max() > 1e-5:
             self._placed = T
             gizmo.position, gizmo.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
         if self._pull is not None:
