@@ -88,6 +88,9 @@ def _serve(server: PageServer, updates: list[Update]) -> None:
                 for update in list(updates):
                     _try(update, updates)
             time.sleep(max(0.0, 1.0 / RATE - (time.monotonic() - begun)))
+    # Ctrl-C reaches this process and `serve`, which then ends it, too: once is enough.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
     server.stop()
 
 
