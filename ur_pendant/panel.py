@@ -24,7 +24,7 @@ from viser import ViserServer, uplot
 from pc_client.arrays import Array
 from pc_client.kinematics.model import RobotModel, solve_ik
 from protocol.pose import pose_inv, pose_to_T
-from protocol.ur_types import ProgramState, RobotMode, SafetyStatus
+from protocol.ur_types import JOINT_NAMES, ProgramState, RobotMode, SafetyStatus
 from ur_emulator.commands.surroundings import MAX_LEVER, SIZES, THING_SIZES
 from ur_emulator.control_api.box_state import Question
 from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
@@ -111,7 +111,6 @@ FREEDRIVE: Mapping[str, Deed] = {"On": methodcaller("run", _FREEDRIVE), "Off": _
 
 # --- moving
 
-JOINTS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 JOG_RATE = 10.0  # How often a button that is held is heard [Hz],
 _RELEASED = 0.3  # and for how long it is not, when it has been released [s].
 AHEAD = 0.15  # By how much a button may ask a joint to be ahead of itself [rad].
@@ -296,7 +295,7 @@ class Panel:
             q = partial(self._measured, "actual_q")
             self._button("Store posture", lambda: postures.update({f"posture {len(postures)}": q()}))
             self._button("Go there", lambda: self._go(postures[stored.value]))
-        for joint, name in enumerate(JOINTS):
+        for joint, name in enumerate(JOINT_NAMES):
             figure = _figures(".1f", "actual_q", scale=degrees(1.0), part=slice(joint, joint + 1))
             span = "" if model is None else f"±{degrees(model.limits.q_max[joint]):.0f}"
             self._texts({f"{name} {span}°": figure})

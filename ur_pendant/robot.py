@@ -30,7 +30,7 @@ from protocol.primary.messages import (
     RuntimeExceptionMessage,
     TextMessage,
 )
-from protocol.ur_types import Ports
+from protocol.ur_types import JOINT_NAMES, Ports
 from ur_emulator.control_api.box_state import BoxState, Question
 from ur_emulator.control_api.http_client import AttachedBox
 from ur_emulator.errors import EmulatorError
@@ -58,16 +58,15 @@ class Signal(NamedTuple):
     parts: tuple[str, ...] = ()
 
 
-_JOINTS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 
 PLOTTED = (
-    Signal("actual_q", "rad", _JOINTS),
-    Signal("target_q", "rad", _JOINTS),
-    Signal("actual_qd", "rad/s", _JOINTS),
-    Signal("target_qd", "rad/s", _JOINTS),
-    Signal("actual_current", "A", _JOINTS),
-    Signal("joint_temperatures", "°C", _JOINTS),
+    Signal("actual_q", "rad", JOINT_NAMES),
+    Signal("target_q", "rad", JOINT_NAMES),
+    Signal("actual_qd", "rad/s", JOINT_NAMES),
+    Signal("target_qd", "rad/s", JOINT_NAMES),
+    Signal("actual_current", "A", JOINT_NAMES),
+    Signal("joint_temperatures", "°C", JOINT_NAMES),
     Signal("actual_TCP_pose", "m, rad", _POSE),
     Signal("target_TCP_pose", "m, rad", _POSE),
     Signal("actual_TCP_speed", "m/s, rad/s", _POSE),
