@@ -4,7 +4,7 @@ The links of an arm are nodes below each other: a joint that turns is one new or
 on the flange follows. Names of things are only shown as labels: paths of nodes have numbers.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import count
@@ -21,7 +21,7 @@ from pc_client.driver.rtde import RtdeValues
 from pc_client.kinematics.arms import ROBOTS, DhArm, RobotDescription, Six
 from pc_client.kinematics.clearance import housings, load_meshes
 from pc_client.kinematics.model import RobotModel, dh_lengths, load_pinocchio_model, model_of_arm
-from protocol.pose import pose_to_T, rpy_to_rotvec
+from protocol.pose import pose_inv, pose_to_T, pose_trans, rpy_to_rotvec
 from protocol.primary.layout import KinematicsInfo
 from ur_emulator.control_api.box_state import BoxState
 from ur_emulator.models.things import BodyShape
@@ -30,7 +30,7 @@ from ur_pendant.robot import Robot
 
 Colour = tuple[int, int, int]
 _HOUSING, _LID, _LOST, _TARGET = (206, 209, 213), (104, 132, 160), (130, 130, 130), (60, 150, 70)
-_CARRIED, _SCENE, _THING = (72, 76, 82), (196, 178, 148), (70, 130, 180)
+_CARRIED, _SCENE, _THING, _LIMIT = (72, 76, 82), (196, 178, 148), (70, 130, 180), (240, 190, 40)
 _FORCE, _CONTACT, _TRACE = (210, 60, 60), (230, 150, 0), (30, 110, 200)
 _TRANSLUCENT = 0.35
 _UNTURNED, _UNMOVED = 1e-4, 1e-5  # joints [rad] and things [m] that move by less stay: encoders have noise
@@ -234,6 +234,7 @@ class RobotDrawing:
         self._info: RobotInfo | None = None
         self._state: BoxState | None = None
         self._offset: tuple[float, ...] = ()
+        self._held: Set[str] = frozenset()
         self._target: ArmDrawing | None = None
         self._shapes: dict[tuple[object, ...], viser.SceneNodeHandle] = {}
         self._path: Array = np.empty((0, 3))
@@ -292,8 +293,8 @@ class RobotDrawing:
             if is_away:
                 self._target.show(target)
         if state is not None and state is not self._state:
-            self._state = state
-            self._show_shapes(state.shapes, arm.flange)
+            self._state, self._held = state, {thing.name for thing in state.things if thing.touches_tool}
+            self._show_shapes(map(self._gripped, state.shapes), arm.flange)
             _point(self._contacts, [(c.position, c.force) for c in state.contacts], _LEAST_CONTACT)
 
     def _show_path(self, tcp: Array) -> None:
@@ -322,15 +323,28 @@ class RobotDrawing:
         for node in before.values():
             node.remove()
 
+    def _gripped(self, shape: BodyShape) -> BodyShape:
+        """The shape of a thing that is held as one that hangs on the flange: states come seldom."""
+        if shape.name not in self._held or self._state is None:
+            return shape
+        to_flange = pose_trans(self._offset, pose_inv(self._state.tcp_pose))
+        return replace(shape, is_carried=True, pose=pose_trans(to_flange, shape.pose))
+
     def _add(self, path: str, shape: BodyShape) -> viser.SceneNodeHandle:
         """Draw a shape, with its name if it has one of its own."""
         if (shape.name, shape.shape) == ("table", "plane"):
             return self._scene.add_grid(path, 2 * _SIDE, 2 * _SIDE, cell_size=0.1, section_size=0.5)
-        colour = _CARRIED if shape.is_carried else _SCENE if shape.name == "scene" else _THING
+        is_tool = shape.is_carried and shape.name not in self._held
+        if is_tool:
+            colour = _CARRIED
+        elif shape.shape == "safety plane":
+            colour = _LIMIT
+        else:
+            colour = _SCENE if shape.name == "scene" else _THING
         match shape.shape:
             case "box":
                 node = self._scene.add_box(path, colour, shape.size)
-            case "plane":
+            case "plane" | "safety plane":
                 node = self._scene.add_box(path, colour, (_SIDE, _SIDE, 0.001), opacity=0.2)
             case _:
                 radius, length = (*shape.size, 0.0)[:2]
@@ -338,7 +352,7 @@ class RobotDrawing:
                 node = self._scene.add_mesh_simple(
                     path, mesh.vertices, mesh.faces, color=colour, side="double"
                 )
-        if colour == _THING:
+        if colour in (_THING, _LIMIT):
             self._scene.add_label(f"{path}/0", shape.name)
         return node
 

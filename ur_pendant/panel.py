@@ -7,12 +7,13 @@ What comes from robots is shown as text only, cut, and without characters that d
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
+from itertools import islice
 from math import degrees, nan, pi
 from operator import methodcaller
 from typing import Any
@@ -78,6 +79,10 @@ ARM: Mapping[str, Show] = {
 }
 INPUTS = {f"In, {name}": _levels("actual_digital_input_bits", g) for name, g in DIGITAL_GROUPS.items()}
 OUTPUTS = {f"Out, {name}": _levels("actual_digital_output_bits", g) for name, g in DIGITAL_GROUPS.items()}
+LISTS: Mapping[str, Callable[[Robot], Sequence[str]]] = {
+    "Clients": lambda robot: getattr(robot.state, "clients", ()),
+    "Variables": lambda robot: [f"{name} = {value}" for name, value in list(robot.variables.items())],
+}
 LINES: Mapping[str, Show] = {
     "Analog in": _figures(".3f", "standard_analog_input0", "standard_analog_input1"),
     "Analog out": _figures(".3f", "standard_analog_output0", "standard_analog_output1"),
@@ -145,7 +150,7 @@ def pulled(grip: Array, end: Array) -> Array:
 # --- text and plots
 
 _SLOWLY, _AGAIN = 0.2, 2.0  # Between updates of text; before the same is told, or what was set is left [s].
-_LONGEST, _LOG_LINES = 160, 40
+_LONGEST, _LINES = 160, 40
 _PLOTTED = 20.0  # How much is plotted [s]: about every other sample, and always the same ones.
 _COLOURS = ("#d62728", "#2ca02c", "#1f77b4", "#ff7f0e", "#9467bd", "#17becf")
 _READS: Mapping[str, Callable[[str], Any]] = {"Boolean": "yes".__eq__, "Integer": int, "Float": float}
@@ -166,9 +171,13 @@ def columns(samples: Sequence[Sample], signal: Signal, now: float) -> tuple[Arra
     return (np.array([sample.time - now for sample in samples]), *numbers.T)
 
 
-def _log(robot: Robot, wanted: str) -> str:
-    lines = [line for line in list(robot.log) if wanted in line.text.lower()][: -_LOG_LINES - 1 : -1]
-    return "\n".join(f"{line.time:.2f}  {plain(line.text)}" for line in lines)
+def _listed(texts: Iterable[str]) -> str:
+    return "\n".join(plain(text) for text in islice(texts, _LINES))
+
+
+def _log(robot: Robot, wanted: str) -> Iterator[str]:
+    """Yield the lines of the log with a text that is wanted, the newest first."""
+    return (f"{at:.2f}  {text}" for at, text in list(robot.log)[::-1] if wanted in text.lower())
 
 
 def _speed(robot: Robot, slider: Any) -> int:
@@ -260,9 +269,10 @@ class Panel:
                 plot = gui.add_uplot(tuple(data), tuple({} for _ in data), scales=scales, height=190)
                 self._charts.append((choice, plot))
         with tabs.add_tab("Log"):
+            for label, items in LISTS.items():
+                self._list(label, items)
             wanted = gui.add_text("Filter", "")
-            log = gui.add_text("Log", "", disabled=True, multiline=True)
-            self._following.append((log, "value", lambda robot: _log(robot, wanted.value.lower())))
+            self._list("Log", lambda robot: _log(robot, wanted.value.lower()))
         if arm is not None:
             self._make_nodes(arm)
 
@@ -355,6 +365,10 @@ class Panel:
         for label, show in shows.items():
             text = self._gui.add_text(label, "", disabled=True)
             self._following.append((text, "value", partial(lambda show, robot: plain(show(robot)), show)))
+
+    def _list(self, label: str, items: Callable[[Robot], Iterable[str]]) -> None:
+        text = self._gui.add_text(label, "", disabled=True, multiline=True)
+        self._following.append((text, "value", lambda robot: _listed(items(robot))))
 
     def _button(self, label: str, action: Callable[[], object]) -> None:
         self._gui.add_button(label).on_click(self._calling(action))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -30,6 +31,7 @@ from protocol.primary.messages import (
     RuntimeExceptionMessage,
     TextMessage,
 )
+from protocol.primary.values import TypedValue
 from protocol.ur_types import JOINT_NAMES, Ports
 from ur_emulator.control_api.box_state import BoxState, Question
 from ur_emulator.control_api.http_client import AttachedBox
@@ -147,6 +149,7 @@ class Robot:
         popups: texts of the popups that are shown.
         questions: of programs, which wait for an answer.
         program: name of the program that runs, "" without one.
+        variables: globals of the program, by name, also of the last that ran.
         label: where in its program tree the program is, "" where that is not reported.
     """
 
@@ -165,6 +168,7 @@ class Robot:
         self.questions: tuple[Question, ...] = ()
         self.program = ""
         self.label = ""
+        self.variables: Mapping[str, TypedValue] = {}
         self._closed = threading.Event()
         self._threads = [threading.Thread(target=self._read_signals, daemon=True)]
         if address.control_port:
@@ -205,6 +209,7 @@ class Robot:
         ports = StatePorts(network, address.host, address.ports)
         try:
             info = ports.identify()
+            self.variables = ports.primary.variables
             self.kinematics = ports.primary.newest(KinematicsInfo)
             self.info = info
             with RtdeStream(network, address.host, address.ports.rtde, OUTPUTS, RATE) as stream:
@@ -224,9 +229,9 @@ class Robot:
             if text is not None and not has_state:
                 self.log.append(LogLine(1e-6 * message.timestamp, text))
             match message:
-                case KeyMessage(title="PROGRAM_XXX_STARTED", text=name):
+                case KeyMessage(title=KeyMessage.STARTED, text=name):
                     self.program, self.label = name, ""
-                case KeyMessage(title="PROGRAM_XXX_STOPPED"):
+                case KeyMessage(title=KeyMessage.STOPPED):
                     self.program, self.label, self.popups, self.questions = "", "", (), ()
                 case ProgramThreadsMessage(threads=(first, *_)):
                     self.label = first.text

@@ -6,6 +6,7 @@ robot has to hold back its packages.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 from pc_client.driver.transport import MOST_WAITING, Network, Transport
@@ -17,6 +18,7 @@ from protocol.primary.framing import SubPackage
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
 from protocol.primary.messages import (
     ErrorCodeMessage,
+    KeyMessage,
     ReportLevel,
     RobotMessage,
     RuntimeExceptionMessage,
@@ -24,6 +26,12 @@ from protocol.primary.messages import (
     decode_message,
 )
 from protocol.primary.packages import decode_sub_package, split_state
+from protocol.primary.values import (
+    GlobalVariablesSetup,
+    GlobalVariablesUpdate,
+    TypedValue,
+    decode_program_state,
+)
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import OLDEST
 from ur_hil.patience import LONGEST_STEP, Patience
@@ -36,6 +44,8 @@ _VERSION_TIMEOUT = 5.0
 _HEADER_SIZE = 5
 _ROBOT_STATE = 16
 _ROBOT_MESSAGE = 20
+_PROGRAM_STATE = 25
+_MOST_VARIABLES = 1000
 _LONGEST_PACKAGE = 1 << 20
 _KEPT = {record.SUB_TYPE for record in (RobotModeData, CartesianInfo, ConfigurationData, KinematicsInfo)}
 """Sub-packages of a state that somebody asks for."""
@@ -49,6 +59,7 @@ class PackageStream:
 
     Attributes:
         version: software of the controller, once its version message came.
+        variables: globals of the program that runs or was the last, by name; for people.
     """
 
     def __init__(self, transport: Transport, network: Network, name: str) -> None:
@@ -58,6 +69,8 @@ class PackageStream:
         self._buffer = FrameBuffer(_LONGEST_PACKAGE, _HEADER_SIZE)
         self._early: list[RobotMessage] = []
         self.version: SoftwareVersion | None = None
+        self.variables: dict[str, TypedValue] = {}
+        self._variable_names: list[str] = []
         self._newest: dict[int, bytes] = {}
         self._unread = 0  # bytes since a poll found nothing more
 
@@ -146,6 +159,8 @@ class PackageStream:
                     for sub_type, body in split_state(package[_HEADER_SIZE:]):
                         if sub_type in _KEPT:
                             self._newest[sub_type] = body
+                if package[4] == _PROGRAM_STATE:
+                    self._take_variables(package[_HEADER_SIZE:])
                 if package[4] != _ROBOT_MESSAGE:
                     continue
                 message = decode_message(package[_HEADER_SIZE:], self.version or _OLDEST)
@@ -153,10 +168,26 @@ class PackageStream:
                     self.version = SoftwareVersion(
                         message.major, message.minor, message.bugfix, message.build
                     )
+                if isinstance(message, KeyMessage) and message.title == KeyMessage.STARTED:
+                    self.variables.clear()  # a program without any sends no names
                 messages.append(message)
         except RemoteProtocolError as error:
             raise DriverError(f"the {self._name} port does not speak its protocol: {error}") from error
         return messages
+
+    def _take_variables(self, body: bytes) -> None:
+        """Take names, which begin anew with those of another program, or values by the numbers of names.
+
+        No movement depends on them, so what cannot be read is left out.
+        """
+        with suppress(RemoteProtocolError):
+            match decode_program_state(body, self.version or _OLDEST):
+                case GlobalVariablesSetup(start_index=start, names=names):
+                    if start == 0:
+                        self.variables.clear()
+                    self._variable_names[start:] = names[:_MOST_VARIABLES]
+                case GlobalVariablesUpdate(start_index=start, values=values):
+                    self.variables.update(zip(self._variable_names[start:], values, strict=False))
 
 
 def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:

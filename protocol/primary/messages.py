@@ -187,9 +187,16 @@ class ErrorCodeMessage(RobotMessage):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyMessage(RobotMessage):
-    """Life of a program: title PROGRAM_XXX_STARTED, _PAUSED or _STOPPED, text its name."""
+    """Life of a program: the title is one of those below, the text its name.
+
+    Sources: captures quoted by the public client library; PAUSED from Hirebotics/urscript-tools. None is
+    known for a program that goes on after a pause.
+    """
 
     MESSAGE_TYPE: ClassVar[int] = 7
+    STARTED: ClassVar[str] = "PROGRAM_XXX_STARTED"
+    PAUSED: ClassVar[str] = "PROGRAM_XXX_PAUSED"
+    STOPPED: ClassVar[str] = "PROGRAM_XXX_STOPPED"
 
     code: int = wire("i")
     argument: int = wire("i")

@@ -14,8 +14,15 @@ from pc_client.driver.session import UrDriver, stop_script
 from pc_client.errors import DriverError, RobotStoppedError
 from pc_client.recording.provenance import origin_of
 from protocol.primary.layout import CartesianInfo, ConfigurationData, KinematicsInfo, RobotModeData
-from protocol.primary.messages import TextMessage
-from protocol.primary.packages import encode_state
+from protocol.primary.messages import KeyMessage, TextMessage
+from protocol.primary.packages import encode_message_package, encode_state
+from protocol.primary.values import (
+    GlobalVariablesSetup,
+    GlobalVariablesUpdate,
+    TypedValue,
+    ValueType,
+    encode_program_state,
+)
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotType, SoftwareVersion
 
 
@@ -252,6 +259,32 @@ def test_of_the_states_the_newest_sub_package_of_each_type_is_kept():
     stream.poll()
     with pytest.raises(DriverError, match="does not speak its protocol"):
         stream.newest(CartesianInfo)
+
+
+def test_variables_are_those_of_the_program_that_runs():
+    robot = FakeRobot()
+    pipe = Pipe(robot, "primary")
+    stream = PackageStream(pipe, robot, "primary")
+    version = SoftwareVersion(3, 3)  # what is not told yet
+
+    def tell(*packages):
+        pipe.incoming.extend(packages)
+        stream.poll()
+        return {name: str(value) for name, value in stream.variables.items()}
+
+    def names(start, *texts):
+        return encode_program_state(GlobalVariablesSetup(start_index=start, names=texts), version)
+
+    def values(start, *numbers):
+        typed = tuple(TypedValue(ValueType.INT, number) for number in numbers)
+        return encode_program_state(GlobalVariablesUpdate(start_index=start, values=typed), version)
+
+    assert tell(names(0, "a", "b"), names(2, "c"), values(0, 1, 2)) == {"a": "1", "b": "2"}
+    assert tell(values(1, 5, 6, 7)) == {"a": "1", "b": "5", "c": "6"}
+    assert tell(b"\0\0\0\x06\x19\0", values(2, 8)) == {"a": "1", "b": "5", "c": "8"}  # one that nobody reads
+    assert tell(names(0, "d"), values(0, 9)) == {"d": "9"}
+    without_any = KeyMessage(title=KeyMessage.STARTED, text="p")
+    assert tell(encode_message_package(without_any, version)) == {}
 
 
 def test_messages_before_the_question_for_the_version_are_kept():

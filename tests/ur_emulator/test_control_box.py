@@ -1,6 +1,7 @@
 """What the operations do to a box, called as methods from another thread."""
 
 import queue
+import socket
 import threading
 import time
 from dataclasses import replace
@@ -10,6 +11,7 @@ import pytest
 from box_support import TIMEOUT, Bench, inside
 from control_support import control_box
 
+from protocol.pose import pose_to_T
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import AnswerRequest, StopProgram
@@ -45,6 +47,43 @@ def test_the_state_is_a_frozen_view_of_the_last_cycle(box):
     with pytest.raises(AttributeError):
         state.tick = 0
     assert box.state == state  # in lockstep nothing happens by itself
+
+
+SCENE = """<mujoco>
+<asset><mesh name="wedge" vertex="0 0 0  .2 0 0  .2 .1 0  0 .1 0  0 0 .3"/></asset>
+<worldbody>
+<geom type="mesh" mesh="wedge" pos=".5 .3 0"/>
+<body name="loose" pos="-.5 .3 .2"><freejoint/><geom type="mesh" mesh="wedge"/></body>
+</worldbody></mujoco>"""
+
+
+def test_the_state_has_what_is_to_be_drawn(tmp_path):
+    """Meshes are the boxes around them, along the axes of their file; safety planes look to the allowed side."""
+    scene = tmp_path / "scene.xml"
+    scene.write_text(SCENE, "utf-8")
+    planes = {"left": (0.0, -0.6, -0.8), "top": (0.0, 0.0, -1.0), "bottom": (0.0, 0.0, 1.0)}
+    with control_box(control_port=None, scene=scene) as box:
+        for name, normal in planes.items():
+            box.set_safety_plane(name, [1.0, 2.0, 3.0], normal, "reduced")
+        shapes = {shape.name: shape for shape in box.state.shapes}
+    for name, corner in {"scene": (0.5, 0.3, 0.0), "loose": (-0.5, 0.3, 0.2)}.items():
+        assert (shapes[name].shape, shapes[name].size) == ("box", pytest.approx((0.2, 0.1, 0.3)))
+        middle = [at + size / 2 for at, size in zip(corner, shapes[name].size, strict=True)]
+        assert shapes[name].pose == pytest.approx((*middle, 0.0, 0.0, 0.0), abs=0.01)  # one falls
+    for name, normal in planes.items():
+        assert shapes[name].pose[:3] == (1.0, 2.0, 3.0)
+        assert pose_to_T(shapes[name].pose)[:3, 2] == pytest.approx(normal)
+
+
+def test_the_state_names_who_is_connected(box):
+    def until(*clients):
+        begun = time.monotonic()
+        while box.state.clients != clients:
+            assert time.monotonic() - begun < TIMEOUT
+
+    with socket.create_connection((box.host, box.ports.rtde)) as client:
+        until("{}:{} at rtde {}".format(*client.getsockname(), box.ports.rtde))
+    until()
 
 
 def test_waiting_ends_in_the_cycle_in_which_all_holds(box):

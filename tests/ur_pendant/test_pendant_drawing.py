@@ -16,7 +16,7 @@ from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import dh_lengths, model_of_arm
 from pc_client.kinematics.tool import surroundings
-from protocol.pose import pose_to_T
+from protocol.pose import T_to_pose, pose_to_T
 from protocol.primary.layout import KinematicsInfo
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.models.things import BodyShape, Contact
@@ -130,8 +130,10 @@ class FakeRobot(SimpleNamespace):
         self.values = {"actual_q": tuple(q), "target_q": tuple(q)} | values
 
 
-def state(shapes=(), contacts=()):
-    return SimpleNamespace(shapes=tuple(shapes), contacts=tuple(contacts))
+def state(shapes=(), contacts=(), things=(), tcp_pose=(0.0,) * 6):
+    return SimpleNamespace(
+        shapes=tuple(shapes), contacts=tuple(contacts), things=tuple(things), tcp_pose=tcp_pose
+    )
 
 
 def drawing(server, robot, *args) -> RobotDrawing:
@@ -182,6 +184,7 @@ def test_shapes_come_move_and_go_and_names_are_only_text(server):
         BodyShape("scene", False, "box", (0.2, 0.2, 0.1), (0.9, 0.0, 0.05, 0.0, 0.0, 0.3)),
         BodyShape(HOSTILE, False, "cylinder", (0.03, 0.1), (0.4, 0.3, 0.05, 0.0, 0.0, 0.0)),
         BodyShape("ball", False, "sphere", (0.05,), (0.4, -0.3, 0.05, 0.0, 0.0, 0.0)),
+        BodyShape("left", False, "safety plane", (), (0.0, 0.5, 0.0, 1.0, 0.0, 0.0)),
     ]
     robot = FakeRobot(info=info(), state=state([carried, *things]))
     robot.report()
@@ -189,7 +192,7 @@ def test_shapes_come_move_and_go_and_names_are_only_text(server):
     drawn.update()
     assert all(PATHS.fullmatch(path) for path in nodes(server) if path.startswith("/robot0"))
     texts = labels(server)
-    assert set(texts) == {HOSTILE, "ball"}
+    assert set(texts) == {HOSTILE, "ball", "left"}
     np.testing.assert_allclose(place(server, texts["ball"])[:3, 3], (1.4, 1.7, 0.05), atol=1e-9)
 
     (hanging,) = (path for path in nodes(server) if re.fullmatch(rf"{drawn.arm.flange}/\d+", path))
@@ -208,6 +211,33 @@ def test_shapes_come_move_and_go_and_names_are_only_text(server):
     np.testing.assert_allclose(place(server, texts["ball"]), base @ pose_to_T(moved.pose), atol=1e-6)
     assert not {hanging, texts[HOSTILE]} & set(nodes(server))
     assert len([path for path in nodes(server) if re.fullmatch(r"/robot0/\d+", path)]) == 3
+
+
+def test_what_is_gripped_goes_with_the_flange_until_the_next_state(server):
+    robot = FakeRobot(info=info())
+    robot.report(tcp_offset=(0.0, 0.0, 0.2, 0.0, 0.0, 0.0))
+    drawn = drawing(server, robot)
+    drawn.update()
+    tcp, base = T_to_pose(drawn.T_base_tcp), (0.4, 0.1, 0.2, 0.3, 0.4, 0.5)
+    block, other = (BodyShape(name, False, "sphere", (0.03,), base) for name in ("block", "other"))
+    for touches in (True, False):
+        things = [
+            SimpleNamespace(name="block", touches_tool=touches),
+            SimpleNamespace(name="other", touches_tool=False),
+        ]
+        robot.report(tcp_offset=(0.0, 0.0, 0.2, 0.0, 0.0, 0.0))
+        drawn.update()
+        robot.state = state([block, other], (), things, tcp)
+        drawn.update()
+        before = drawn.T_base_tcp
+        robot.report(q=np.add(Q, 0.1), tcp_offset=(0.0, 0.0, 0.2, 0.0, 0.0, 0.0))
+        drawn.update()
+        moved = drawn.T_base_tcp @ np.linalg.inv(before) @ pose_to_T(base)
+        texts = labels(server)
+        np.testing.assert_allclose(
+            place(server, texts["block"]), moved if touches else pose_to_T(base), atol=1e-4
+        )
+        np.testing.assert_allclose(place(server, texts["other"]), pose_to_T(base), atol=1e-6)
 
 
 def test_a_cell_is_drawn_where_no_box_says_what_is_there(server):

@@ -99,7 +99,7 @@ def a_robot(**changes):
         is_held=True, view_only=False, problem="", title="UR5e 5.15.0 at 127.0.0.1", values=values,
         info=SimpleNamespace(version=SoftwareVersion(5, 15), model="UR5e", lockstep=False), kinematics=None, state=None,
         address=Address("127.0.0.1", Ports()), log=deque(), history=deque(), popups=(), questions=(), program="",
-        label="",
+        label="", variables={},
     )  # fmt: skip
     vars(robot).update(changes)
     return robot
@@ -313,7 +313,7 @@ def test_text_is_one_line_of_what_prints(text):
 
 def test_hostile_texts_are_shown_as_text(window):
     robot, question = window.robot, Question(3, "STRING", HOSTILE)
-    robot.state = a_state(program=HOSTILE)
+    robot.state, robot.variables = a_state(program=HOSTILE, clients=(HOSTILE,)), {HOSTILE: HOSTILE}
     robot.log.extend(LogLine(k, f"{k} {HOSTILE}") for k in range(100))
     vars(robot).update(
         problem=HOSTILE, program=HOSTILE, label=HOSTILE, popups=(HOSTILE,) * 9, questions=(question,)
@@ -324,6 +324,8 @@ def test_hostile_texts_are_shown_as_text(window):
     lines = [line for text in texts for line in text.split("\n")]
     assert all(line.isprintable() and len(line) < 200 for line in lines)
     assert window.control("Log").value.splitlines()[0].startswith("99.00  99 <img")
+    assert window.control("Clients").value.startswith("<img")
+    assert window.control("Variables").value.startswith("<img")
     assert len(window.control("Log").value.splitlines()) == 40
     window.use("Filter", "7 <IMG")
     window.update()
@@ -435,6 +437,23 @@ def test_the_tool_goes_where_its_frame_is_dragged(window):
     assert len(window.hands.done) == 4
     assert len(window.client.told) == 1
     assert gizmo.position == pytest.approx(start[:3, 3])  # where the robot still is
+
+
+def test_no_frame_to_drag_while_a_program_has_the_arm(window):
+    gizmo, values = window.panel._nodes[0], window.robot.values
+    for mode, program, goal, is_there in (
+        (RobotMode.RUNNING, ProgramState.PLAYING, None, False),
+        (RobotMode.RUNNING, ProgramState.PLAYING, np.array(Q), True),  # the window's own
+        (RobotMode.IDLE, ProgramState.STOPPED, None, False),
+        (RobotMode.RUNNING, ProgramState.STOPPED, None, True),
+    ):
+        values.update(robot_mode=mode, runtime_state=program)
+        window.hands.goal = goal
+        window.update()
+        assert gizmo.visible is is_there
+    window.use("Drag the tool", False)
+    window.update()
+    assert not gizmo.visible
 
 
 def test_no_pose_is_reached_by_a_jump_or_beyond_a_limit():

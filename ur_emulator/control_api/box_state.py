@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import atan2, hypot, pi
 from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
@@ -13,6 +14,8 @@ from ur_emulator.models.things import BodyShape, Contact
 
 if TYPE_CHECKING:
     from ur_emulator.controller.controller import Controller
+    from ur_emulator.controller.safety.boundaries import SafetyPlane
+    from ur_emulator.loop.served_box import ServedBox
 
 # Slower than this counts as standing still [rad/s]: more than what the sensors make of an arm at rest.
 STANDING_SPEED = 0.01
@@ -26,7 +29,7 @@ class Question:
 
     Attributes:
         id: its number, for `answer`.
-        kind: type of the answer: BOOLEAN, INTEGER, FLOAT, STRING, POSE or JOINT_VECTOR.
+        kind: type of the answer: BOOLEAN, INTEGER, FLOAT or STRING, for which URScript has functions.
         text: what is asked.
     """
 
@@ -85,12 +88,13 @@ class BoxState:
         tool_voltage: supply of the tool [V].
         obstacles: names of those that were added.
         things: what can be moved around the arm.
-        shapes: of all that stands around the arm and hangs on its flange, for those who draw it.
+        shapes: of all that stands around the arm and hangs on its flange, and safety planes; to be drawn.
         contacts: points in which bodies press on each other, also two things or the pads of a tool.
         grippers: of each tool: width between the pads [m]; SID, STA, OBJ and FLT of a Robotiq gripper, unit
             and status of one of OnRobot; the vacuum of a cup as a share of the full one.
         popups: texts of the popups on the screen.
         questions: of programs, which wait for an answer.
+        clients: address and port of each, as "127.0.0.1:51234 at rtde 30004"; not those of the control API.
     """
 
     tick: int
@@ -126,6 +130,7 @@ class BoxState:
     grippers: tuple[dict[str, float], ...]
     popups: tuple[str, ...]
     questions: tuple[Question, ...]
+    clients: tuple[str, ...]
 
 
 def is_steady(controller: Controller) -> bool:
@@ -134,8 +139,9 @@ def is_steady(controller: Controller) -> bool:
     return not moves and max(map(abs, controller.snapshot.actual_qd)) < STANDING_SPEED
 
 
-def take_state(controller: Controller) -> BoxState:
+def take_state(box: ServedBox) -> BoxState:
     """Return the state of a box; in the thread of its loop, or when it does not run."""
+    controller = box.controller
     now, pendant = controller.snapshot, controller.state.pendant
     popups = tuple(r.text for r in pendant.requests if r.kind is RequestedType.NONE)
     return BoxState(
@@ -167,7 +173,7 @@ def take_state(controller: Controller) -> BoxState:
         tool_voltage=now.tool_output_voltage,
         obstacles=controller.plant.obstacles.names,
         things=_things(controller),
-        shapes=controller.plant.shapes,
+        shapes=(*controller.plant.shapes, *map(_shape_of, controller.state.safety.limits.boundaries.planes)),
         contacts=controller.plant.contacts,
         grippers=tuple(gripper.summary() for gripper in controller.state.grippers),
         popups=(*pendant.shown, *popups),
@@ -176,6 +182,7 @@ def take_state(controller: Controller) -> BoxState:
             for r in pendant.requests
             if r.kind is not RequestedType.NONE
         ),
+        clients=box.clients,
     )
 
 
@@ -183,6 +190,15 @@ def _things(controller: Controller) -> tuple[ThingNow, ...]:
     scene = controller.plant.scene
     states = ((name, scene.state(name)) for name in scene.names)
     return tuple(ThingNow(name, now.pose, now.twist, now.touches_tool) for name, now in states)
+
+
+def _shape_of(plane: SafetyPlane) -> BodyShape:
+    """A safety plane to be drawn."""
+    x, y, z = plane.normal
+    across = hypot(x, y)
+    angle = atan2(across, z) / across if across else pi * (z < 0.0)
+    turn = (-y * angle, x * angle, 0.0) if across else (angle, 0.0, 0.0)  # takes z to the normal
+    return BodyShape(plane.name, False, "safety plane", (), (*plane.position, *turn))
 
 
 def _levels(word: int) -> Levels:

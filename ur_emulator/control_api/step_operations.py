@@ -65,7 +65,7 @@ class ReadState(StepOperation[BoxState]):
     def steps(self, context: Context) -> Steps[Any]:
         """Take the state."""
         yield from ()
-        return take_state(context.box.controller)
+        return take_state(context.box)
 
 
 class ReadLog(StepOperation[tuple[LogEntry, ...]]):
@@ -192,7 +192,7 @@ class WaitUntil(StepOperation[BoxState]):
             if controller.snapshot.tick < begin:
                 missing.append(f"time is {controller.snapshot.timestamp:g} s, not {self.time:g} s")
             if not missing:
-                return take_state(controller)
+                return take_state(context.box)
             if monotonic() >= end:
                 raise WaitTimeoutError(f"waited {self.timeout:g} s in vain: {', '.join(missing)}")
             yield

@@ -178,6 +178,11 @@ class Listener:
         self.number: int = self._sock.getsockname()[1]
         loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
 
+    @property
+    def clients(self) -> list[str]:
+        """Address of each client, and the port, for people."""
+        return [f"{connection.peer} at {self._name} {self.number}" for connection in self.connections]
+
     def close(self) -> None:
         """Stop listening, and close all connections."""
         self._loop.remove(self)

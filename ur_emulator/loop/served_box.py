@@ -27,6 +27,7 @@ from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ControlError, RefusedError
 from ur_emulator.loop.barrier import Failed, describe_error, guarded
 from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.listener import Listener
 from ur_emulator.loop.memory import MemoryWatch
 from ur_emulator.loop.pacing import Pacer, RealtimePacer
 from ur_emulator.loop.steps import StepRunner, Steps, settle
@@ -77,6 +78,7 @@ class ServedBox:
         identity: names and numbers by which clients know the box.
         steps: advances what takes several cycles; the last of the publishers.
         log: programs, errors, modes, text messages, clients.
+        listeners: those of the open ports, without that of the control API.
         backlog: the connections with bytes in their outbox; they enter and leave it themselves.
         watch: measures the memory of a process that only serves boxes; None in a process of the user.
         stops: how many commands so far stop the program and all that waits to be compiled.
@@ -114,6 +116,7 @@ class ServedBox:
         self.stops = 0
         self.newest = 0.0
         self.watch: MemoryWatch | None = None
+        self.listeners: tuple[Listener, ...] = ()
         self.backlog: set[Any] = set()
         self._on_failure = on_failure
         self._given_up: set[Any] = set()
@@ -135,6 +138,11 @@ class ServedBox:
     def snapshot(self) -> Snapshot:
         """State at the end of the last cycle."""
         return self.controller.snapshot
+
+    @property
+    def clients(self) -> tuple[str, ...]:
+        """Address and port of each client, for people."""
+        return tuple(client for listener in self.listeners for client in listener.clients)
 
     @property
     def takes_commands(self) -> bool:

@@ -39,9 +39,10 @@ class BodyShape:
     """A shape around the arm, or on its flange, for those who draw it; the links of the arm are none.
 
     Attributes:
-        name: of the body that it is a part of: a tool, an obstacle, a thing, "table" or "scene".
+        name: of the body that it is a part of: a tool, an obstacle, a thing, "table" or "scene"; of a plane.
         is_carried: it hangs on the flange.
-        shape: "box", "cylinder" or "capsule" (along z), "sphere" or "plane" (z points away from it).
+        shape: "box" (also around a mesh), "cylinder" or "capsule" (along z), "sphere", "plane" (z points away
+            from it) or "safety plane" (z points to the allowed side).
         size: three edges; radius and length, of a capsule without its ends; radius [m].
         pose: of its middle in the base frame, of one that is carried in the flange frame [m, rad].
     """

@@ -53,6 +53,8 @@ _SHAPES: dict[int, tuple[str, Callable[..., tuple[float, ...]]]] = {
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", lambda r, half, _: (r, 2 * half)),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", lambda r, *_: (r,)),
     int(mujoco.mjtGeom.mjGEOM_PLANE): ("plane", lambda *_: ()),
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
+    int(mujoco.mjtGeom.mjGEOM_MESH): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
 }
 
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
@@ -206,8 +208,8 @@ class ArmPhysics:
         for shape, (dx, dy, dz), at in self._sliding_shapes:
             q, (x, y, z, rx, ry, rz) = float(data.qpos[at]), shape.pose
             shapes.append(replace(shape, pose=(x + dx * q, y + dy * q, z + dz * q, rx, ry, rz)))
-        for shape, geom in self._moving_shapes:
-            shapes.append(replace(shape, pose=_pose(data.geom_xpos[geom], data.geom_xmat[geom])))
+        for shape, geom, middle, turn in self._moving_shapes:
+            shapes.append(replace(shape, pose=_pose(*_placed(data, geom, middle, turn))))
         return (*shapes, *self.obstacles.shapes)
 
     def _sort_shapes(self) -> None:
@@ -221,17 +223,18 @@ class ArmPhysics:
         flange, to_flange = data.site_xpos[site], data.site_xmat[site].reshape(3, 3).T
         self._fixed_shapes: list[BodyShape] = []
         self._sliding_shapes: list[tuple[BodyShape, Vector3, int]] = []
-        self._moving_shapes: list[tuple[BodyShape, int]] = []
+        self._moving_shapes: list[tuple[BodyShape, int, NDArray[np.float64], NDArray[np.float64]]] = []
         for geom in range(model.ngeom):
             body, row = model.body(model.geom_bodyid[geom]), _SHAPES.get(model.geom_type[geom])
             if row is None or body.name in (*LINKS, OBSTACLES) or (name := self._name_of(geom)) == "base":
                 continue
+            middle, turn, half = _box_around(model, geom)
             shape, is_carried = row[0], bool(self._is_arm[body.id])
-            size = row[1](*model.geom_size[geom].tolist())
-            position, rotation = data.geom_xpos[geom], data.geom_xmat[geom]
+            size = row[1](*half.tolist())
+            position, rotation = _placed(data, geom, middle, turn)
             if is_carried:
                 position = to_flange @ (position - flange)
-                rotation = (to_flange @ rotation.reshape(3, 3)).ravel()
+                rotation = to_flange @ rotation
             drawn = BodyShape(name, is_carried, shape, size, _pose(position, rotation))
             carrier = model.body(model.body_weldid[body.id])
             joint = int(carrier.jntadr[0])
@@ -241,7 +244,7 @@ class ArmPhysics:
                 axis = (to_flange @ data.xaxis[joint]).tolist()
                 self._sliding_shapes.append((drawn, tuple(axis), int(model.jnt_qposadr[joint])))
             else:
-                self._moving_shapes.append((drawn, geom))
+                self._moving_shapes.append((drawn, geom, middle, turn))
 
     def _name_of(self, geom: int) -> str:
         """What people call the body of a shape: a link, a tool, an obstacle, a thing, the table."""
@@ -336,8 +339,35 @@ class ArmPhysics:
 
 
 def _pose(position: NDArray[np.float64], rotation: NDArray[np.float64]) -> Vector6:
-    """The pose of a position (3,) [m] and a rotation (9,)."""
-    return six([*position.tolist(), *rotvec_from_flat(*rotation.tolist())])
+    """The pose of a position (3,) [m] and a rotation (3, 3)."""
+    return six([*position.tolist(), *rotvec_from_flat(*rotation.ravel().tolist())])
+
+
+_Box = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def _box_around(model: mujoco.MjModel, geom: int) -> _Box:
+    """Middle (3,) and rotation (3, 3) of a shape in MuJoCo's frame of it, and its sizes (3,) [m].
+
+    That of a mesh is its principal axes; the box around it has those of its file.
+    """
+    if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
+        return np.zeros(3), np.eye(3), model.geom_size[geom]
+    mesh, flat = int(model.geom_dataid[geom]), np.empty(9)
+    mujoco.mju_quat2Mat(flat, model.mesh_quat[mesh])
+    to_file = flat.reshape(3, 3)
+    begin = model.mesh_vertadr[mesh]
+    corners = model.mesh_vert[begin : begin + model.mesh_vertnum[mesh]] @ to_file.T
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return to_file.T @ (low + high) / 2.0, to_file.T, (high - low) / 2.0
+
+
+def _placed(
+    data: mujoco.MjData, geom: int, middle: NDArray[np.float64], turn: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position (3,) [m] and rotation (3, 3) of such a box in the base frame."""
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    return data.geom_xpos[geom] + rotation @ middle, rotation @ turn
 
 
 class _Sizes(NamedTuple):

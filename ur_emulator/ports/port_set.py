@@ -80,6 +80,7 @@ class PortSet:
                 if name not in _PRIVILEGED:
                     raise
                 self.notices.append(f"no {_PRIVILEGED[name]}: {error}")
+        self._box.listeners = tuple(open for name, open in self._listeners.items() if name != CONTROL)
         return {name: listener.number for name, listener in self._listeners.items()}
 
     def close(self) -> None:

@@ -25,12 +25,6 @@ from urscript import RunningProgram
 
 # --- Controller events as robot messages of the primary port
 
-
-# Titles of the key messages about a program's life. Sources: captures quoted by the public client library;
-# PAUSED from Hirebotics/urscript-tools. None is known for a program that goes on after a pause.
-STARTED_TITLE = "PROGRAM_XXX_STARTED"
-PAUSED_TITLE = "PROGRAM_XXX_PAUSED"
-STOPPED_TITLE = "PROGRAM_XXX_STOPPED"
 SECONDARY_EXCEPTION_TITLE = "SECONDARY_PROGRAM_EXCEPTION_XXX"
 
 
@@ -38,11 +32,11 @@ def message_for(event: events.Event, timestamp: int) -> messages.RobotMessage | 
     """Return the message for an event, with a time stamp [us]; None for events that stand only in the log."""
     match event:
         case events.ProgramStarted(name):
-            return messages.KeyMessage(timestamp=timestamp, title=STARTED_TITLE, text=name)
+            return messages.KeyMessage(timestamp=timestamp, title=messages.KeyMessage.STARTED, text=name)
         case events.ProgramStopped(name):
-            return messages.KeyMessage(timestamp=timestamp, title=STOPPED_TITLE, text=name)
+            return messages.KeyMessage(timestamp=timestamp, title=messages.KeyMessage.STOPPED, text=name)
         case events.ProgramPaused(name):
-            return messages.KeyMessage(timestamp=timestamp, title=PAUSED_TITLE, text=name)
+            return messages.KeyMessage(timestamp=timestamp, title=messages.KeyMessage.PAUSED, text=name)
         case events.ProgramResumed() | events.RobotModeChanged() | events.LogAdded():
             return None  # no client knows a message for the first; the states show the second
         case events.TextPrinted(text):
