@@ -14,6 +14,7 @@ from pathlib import Path
 
 from ur_emulator import ControlBox
 from ur_emulator.errors import PortError
+from ur_hil import PENDANT_PORT
 
 DRAWING = Path(__file__).parent / "drawings" / "signature.csv"
 
@@ -21,7 +22,7 @@ DRAWING = Path(__file__).parent / "drawings" / "signature.csv"
 def main() -> int:
     parser = argparse.ArgumentParser(description="A box with its window, and an arm that signs.")
     parser.add_argument("--out", type=Path, default=Path("out/show"))
-    parser.add_argument("--port", type=int, default=29980, help="of the window")
+    parser.add_argument("--port", type=int, default=PENDANT_PORT, help="of the window")
     parser.add_argument("--once", action="store_true", help="end after the signature")
     options = parser.parse_args()
     for base in range(0, 20_000, 1000):

@@ -181,9 +181,13 @@ def test_a_host_that_does_not_exist_is_named_by_ctl(run):
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_ctrl_c_while_a_command_is_loaded_is_one_line(name, tmp_path, monkeypatch, capfd):
-    """Ctrl-C may come while modules are imported."""
-    (tmp_path / "slow_module.py").write_text("raise KeyboardInterrupt\n")
+@pytest.mark.parametrize(
+    "raised", ["KeyboardInterrupt", "ImportError() from KeyboardInterrupt()"], ids=["python", "c"]
+)
+def test_ctrl_c_while_a_command_is_loaded_is_one_line(name, raised, tmp_path, monkeypatch, capfd):
+    """Ctrl-C may come while modules are imported; those in C fail then."""
+    (tmp_path / "slow_module.py").write_text(f"raise {raised}\n")
+    monkeypatch.delitem(sys.modules, "slow_module", raising=False)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(sys, "argv", [f"/somewhere/{name}"])
     with pytest.raises(SystemExit) as end:

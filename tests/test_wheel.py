@@ -15,8 +15,10 @@ from zipfile import ZipFile
 
 import pytest
 
+import ur_hil
+
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client", "ur_pendant", "ur_hil")
+PACKAGES = (*ur_hil.PACKAGES, "ur_hil")
 BARE = ("--no-deps", "--no-index", "--no-compile")
 PROGRAM = """
 import pathlib, sys

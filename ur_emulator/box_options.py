@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 # Environment variable with the token: what stands on a command line is seen by all users of a machine.
 TOKEN_VARIABLE = "UR_EMULATOR_TOKEN"
-# The window on a box: its port, and the variable with the token that its page must show.
-PENDANT_PORT, PAGE_TOKEN_VARIABLE = 29980, "UR_PENDANT_TOKEN"
+# Likewise of the page of a window.
+PAGE_TOKEN_VARIABLE = "UR_PENDANT_TOKEN"
 MAX_TOKEN = 200
 # Printed ASCII without the blank: it goes through HTTP as it is.
 _TOKEN_CHARACTERS = frozenset(map(chr, range(0x21, 0x7F)))

@@ -24,7 +24,6 @@ from ur_emulator import check_platform
 from ur_emulator.box_log import LogEntry, printable
 from ur_emulator.box_options import (
     PAGE_TOKEN_VARIABLE,
-    PENDANT_PORT,
     TOKEN_VARIABLE,
     BoxOptions,
     ServedAt,
@@ -32,6 +31,7 @@ from ur_emulator.box_options import (
     is_loopback,
 )
 from ur_emulator.errors import EmulatorError
+from ur_hil import PENDANT_PORT
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
 if TYPE_CHECKING:

@@ -10,7 +10,10 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client")
+PACKAGES = ("protocol", "urscript", "ur_emulator", "pc_client", "ur_pendant")
+PENDANT_PORT = 29980
+"""Of the window on a box, an arm or recordings."""
+
 _HOME = Path(__file__).resolve().parents[1]
 
 
@@ -31,9 +34,16 @@ def run_command(module: str) -> None:
     """
     try:
         import_module(module).main()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ImportError) as error:
+        if not _is_interrupt(error):
+            raise
         sys.stderr.write(f"{Path(sys.argv[0]).name}: interrupted\n")
         sys.exit(130)
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether it is Ctrl-C, or the error that a module in C has made of it while it was loaded."""
+    return isinstance(error, KeyboardInterrupt) or (error is not None and _is_interrupt(error.__cause__))
 
 
 def check_packages() -> None:

@@ -6,7 +6,7 @@
     panel.py        controls and values beside them
     server.py       the page: whose it is, and who may open it
     recordings.py   recordings in place of a robot
-    __main__.py     the commands
+    window.py       the process
 
 It is a process of its own, and a client like others: a box has no line for it. A robot that does not say that
 it is simulated is only shown (`Robot.is_held`).

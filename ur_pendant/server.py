@@ -100,7 +100,7 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
     # Shadows and a sky of pictures take most of a core where there is no graphics card.
     server.scene.configure_default_lights(cast_shadow=False)
     server.scene.configure_environment_map(None)
-    server.scene.add_light_hemisphere("/sky", (255, 255, 255), (150, 150, 160), intensity=2.5)
+    server.scene.add_light_hemisphere("/sky", ground_color=(150, 150, 160), intensity=2.5)
     server.gui.main_panel.dock_right()
     server.initial_camera.position, server.initial_camera.look_at = (1.5, -1.1, 0.9), (0.2, 0.0, 0.3)
     return server

@@ -8,6 +8,7 @@ import typer
 
 from pc_client.commands.options import console, say, show_report
 from pc_client.errors import RecordingError, one_line
+from ur_hil import PENDANT_PORT
 from ur_hil.command_line import ExitCode
 
 
@@ -86,7 +87,7 @@ def view(
         Path | None,
         typer.Option("--save", metavar="PAGE.html", help="Write a page that needs no server, and end."),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port of the window; 0 takes a free one.")] = 29980,
+    port: Annotated[int, typer.Option(help="Port of the window; 0 takes a free one.")] = PENDANT_PORT,
 ) -> None:
     """Show recordings in the browser: arm, reference, speeds and errors, with a bar of time."""
     from pc_client.results.window import view_command
