@@ -9,6 +9,7 @@ nothing is published.
 from __future__ import annotations
 
 import http
+import logging
 import os
 import re
 import socket
@@ -91,8 +92,10 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
                 response.headers.update(_headers(token))
             return response
 
-        return serve(handler, sock=listening, process_request=look_first, **options)
+        return serve(handler, sock=listening, process_request=look_first, logger=quiet, **options)
 
+    quiet = logging.getLogger(__name__)  # of connections that send what is no message
+    quiet.disabled = True
     rich.get_console().quiet = True  # on which viser tells what the caller tells better
     with patch.object(websockets.asyncio.server, "serve", serve_checked):
         server = PageServer(host=host, port=port, label=title, verbose=False)

@@ -8,8 +8,9 @@ from attacks_failures import FAILURES
 from attacks_grippers import GRIPPERS
 from attacks_places import PLACES
 from attacks_scripts import SCRIPTS
+from attacks_window import WINDOW
 
-SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS, CALLS)
+SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS, CALLS, WINDOW)
 
 
 def described() -> list[dict[str, object]]:
