@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 import viser
+from viser._messages import SetOrientationMessage
 
 from pc_client.arrays import Array
 from pc_client.driver.report import RobotInfo
@@ -171,7 +172,7 @@ class ArmDrawing:
             self._q[turned] = [q[k] for k in turned]
             pin.framesForwardKinematics(self.model.pin_model, self._data, self._q)
             for k in turned:
-                self.links[k + 1].wxyz = _wxyz(self._data.liMi[k + 1].rotation)
+                _turn(self.links[k + 1], _wxyz(self._data.liMi[k + 1].rotation))
         return bool(turned)
 
     def paint(self, colour: Colour, opacity: float) -> None:
@@ -365,6 +366,12 @@ def _six(values: RtdeValues, name: str) -> tuple[float, ...] | None:
 def _wxyz(rotation: Array) -> tuple[float, float, float, float]:
     quaternion = pin.Quaternion(rotation)
     return quaternion.w, quaternion.x, quaternion.y, quaternion.z
+
+
+def _turn(node: viser.SceneNodeHandle, wxyz: tuple[float, float, float, float]) -> None:
+    """Set an orientation that has changed; viser would compare it first, for a third of the window's time."""
+    node._impl.wxyz[:] = wxyz
+    node._impl.api._queue_scene_message(SetOrientationMessage(node._impl.name, wxyz))
 
 
 def _place(node: viser.SceneNodeHandle, pose: Sequence[float]) -> None:
