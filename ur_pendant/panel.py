@@ -211,7 +211,7 @@ class Panel:
         now = time.monotonic()
         if 0.0 < self._jogging < now - _RELEASED:
             self._worker.submit(self._release)
-        if self._nodes:
+        if self._gizmo is not None:
             self._update_nodes(now)
         if now - self._refreshed >= _SLOWLY:
             self._refreshed = now
@@ -237,7 +237,8 @@ class Panel:
         self._following: list[tuple[Any, str, Callable[[Robot], object]]] = []
         self._modals: dict[Question | str, Any] = {}
         self._charts: list[tuple[Any, Any]] = []
-        self._nodes: tuple[Any, ...] = ()
+        self._nodes: list[Any] = []
+        self._gizmo: Any = None
         self._has_api, self._is_dragged, self._placed = has_api, False, np.zeros((4, 4))
         self._dragged: tuple[Any, Array] | None = None
         self._pull: tuple[Any, Array, Array] | None = None
@@ -333,6 +334,16 @@ class Panel:
         size = gui.add_vector3("Size m", (0.1, 0.1, 0.1), step=0.01, hint="edges; or radius, length")
         at = gui.add_vector3("At m", (0.4, 0.2, 0.1), step=0.01, hint="of its middle, in the base frame")
         mass = gui.add_number("Mass kg", 0.5, min=0.0, max=20.0, step=0.1)
+        shows_place = gui.add_checkbox(
+            "Show the place", False, hint="by a frame in the picture, to be dragged"
+        )
+        place = self._server.scene.add_transform_controls(
+            f"{self._drawing.root.name}/place", 0.2, disable_rotations=True, position=at.value, visible=False
+        )
+        self._nodes.append(place)
+        shows_place.on_update(lambda _: setattr(place, "visible", shows_place.value))
+        place.on_update(lambda _: setattr(at, "value", tuple(np.round(place.position, 3))))
+        at.on_update(lambda _: setattr(place, "position", at.value))
 
         def put(operation: str, **more: float) -> None:
             given = {"name": name.value, "shape": shape.value, "pose": (*at.value, 0.0, 0.0, 0.0)}
@@ -352,11 +363,14 @@ class Panel:
 
     def _make_nodes(self, arm: ArmDrawing) -> None:
         scene, name = self._server.scene, self._drawing.root.name
-        gizmo = scene.add_transform_controls(f"{name}/hand", 0.25, depth_test=False, visible=False)
+        self._gizmo = gizmo = scene.add_transform_controls(
+            f"{name}/hand", 0.25, depth_test=False, visible=False
+        )
         look = {"shaft_radius": 0.006, "head_radius": 0.014, "head_length": 0.03, "visible": False}
-        arrow = scene.add_arrows(f"{name}/pull", np.zeros((1, 2, 3)), (230, 60, 160), **look)
+        self._arrow = scene.add_arrows(f"{name}/pull", np.zeros((1, 2, 3)), (230, 60, 160), **look)
         self._model = replace(arm.model, pin_data=arm.model.pin_model.createData())  # for the worker's thread
-        self._nodes, self._arm = (gizmo, arrow), arm
+        self._nodes += (gizmo, self._arrow)
+        self._arm = arm
         gizmo.on_update(self._on_drag)
         for link in arm.links if self._has_api else ():
             link.on_drag("left")(self._on_pull)
@@ -477,7 +491,7 @@ class Panel:
         self._pull = None if event.phase == "end" else (event, grip, end)
 
     def _update_nodes(self, now: float) -> None:
-        (gizmo, arrow), T = self._nodes, self._drawing.T_base_tcp
+        gizmo, arrow, T = self._gizmo, self._arrow, self._drawing.T_base_tcp
         mode, program = (self._robot.values.get(name) for name in ("robot_mode", "runtime_state"))
         is_free = program == ProgramState.STOPPED or self._hands.goal is not None  # no program has the arm
         gizmo.visible = self._can_drag.value and mode == RobotMode.RUNNING and is_free

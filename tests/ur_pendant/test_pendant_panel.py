@@ -187,7 +187,7 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
     assert window.control("Mode").value == "RUNNING"
     free = {"Pause", "Signal", "Filter"}  # of the page only
     assert all(handle.disabled for handle in window.controls() if handle.label not in free)
-    assert window.panel._nodes == ()
+    assert window.panel._nodes == []
     assert not window.drawing.links[-1]._has_any_drag_callbacks()
     robot.is_held = True
     window.update()
@@ -289,6 +289,15 @@ def test_the_world(window):
     size = (0.1, 0.1)
     thing = {"name": "can", "shape": "cylinder", "size": size, "pose": pose, "mass": 0.5}
     assert window.hands.done.pop() == ("add_thing", thing)
+    window.use("Show the place")
+    (place,) = (node for node in window.panel._nodes if node.name.endswith("/place"))
+    assert place.visible
+    window.use("At m", (0.1, 0.2, 0.3))
+    assert tuple(place.position) == (0.1, 0.2, 0.3)
+    place.position = (0.30001, 0.2, 0.3)
+    for callback in place._impl_aux.update_cb:
+        callback(window.event(place))
+    assert window.control("At m").value == (0.3, 0.2, 0.3)
     window.use("Hang load on the flange")
     assert window.hands.done.pop() == ("attach_payload", {"mass": 0.5})
     window.use("Remove")
@@ -410,7 +419,7 @@ def test_jogging_keeps_near_and_within_the_limits(goal, q, joint, step):
 
 
 def drag(window, phase, T):
-    gizmo = window.panel._nodes[0]
+    gizmo = window.panel._gizmo
     gizmo._impl.position = T[:3, 3]
     asyncio.run(window.panel._on_drag(window.event(gizmo, phase=phase)))
     window.update()
@@ -418,7 +427,7 @@ def drag(window, phase, T):
 
 
 def test_the_tool_goes_where_its_frame_is_dragged(window):
-    gizmo, start = window.panel._nodes[0], window.drawing.T_base_tcp
+    gizmo, start = window.panel._gizmo, window.drawing.T_base_tcp
     assert gizmo.visible
     assert gizmo.position == pytest.approx(start[:3, 3])
     drag(window, "start", start)
@@ -440,7 +449,7 @@ def test_the_tool_goes_where_its_frame_is_dragged(window):
 
 
 def test_no_frame_to_drag_while_a_program_has_the_arm(window):
-    gizmo, values = window.panel._nodes[0], window.robot.values
+    gizmo, values = window.panel._gizmo, window.robot.values
     for mode, program, goal, is_there in (
         (RobotMode.RUNNING, ProgramState.PLAYING, None, False),
         (RobotMode.RUNNING, ProgramState.PLAYING, np.array(Q), True),  # the window's own
@@ -480,7 +489,7 @@ def pull(window, phase, start, end):
 def test_the_arm_is_pushed_where_the_mouse_takes_it(window):
     flange = window.drawing.arm.T_base_flange
     pull(window, "start", flange[:3, 3], flange[:3, 3] + (0.0, 0.1, 0.0))
-    (name, given), arrow = window.hands.done.pop(), window.panel._nodes[1]
+    (name, given), arrow = window.hands.done.pop(), window.panel._arrow
     assert name == "push"
     assert given["force"] == pytest.approx((0.0, 20.0, 0.0))
     assert given["duration"] == 0.3
