@@ -39,6 +39,7 @@ _VISIBLY = 0.05  # the target is drawn when a joint is further away [rad]: an ar
 _PER_NEWTON, _LONGEST = 0.005, 0.5  # length of an arrow [m/N], and the largest [m]
 _LEAST_CONTACT, _LEAST_FORCE = 1.0, (15.0, 10.0)  # less is no arrow [N]: a bare CB3, or later arm, has 7 N
 _PATH_POINTS, _PATH_EVERY, _PATH_STEP = 300, 3, 0.001  # one an update, drawn every third; least step [m]
+_SEEN_FROM = (1.8, -1.3, 1.1)  # by pages that are opened [reaches of the arm]
 _SIDE = 2.0  # of the square that stands for a plane [m]
 
 
@@ -228,6 +229,7 @@ class RobotDrawing:
     ) -> None:
         """Put its base to the point `at` [m]; draw `cell` and its tool if no control API has others."""
         self._scene, self._name, self._robot, self._cell = server.scene, name, robot, cell
+        self._camera = server.initial_camera
         self.arm: ArmDrawing | None = None
         self.model: RobotModel | None = None
         self.links: tuple[viser.MeshHandle, ...] = ()
@@ -262,6 +264,7 @@ class RobotDrawing:
         self._path = np.empty((0, 3))
         self._tcp = self._scene.add_frame(f"{arm.flange}/tcp", axes_length=0.08, axes_radius=0.003)
         self._show_shapes(_shapes_of(self._cell), arm.flange)
+        self._camera.position = np.multiply(_SEEN_FROM, model.description.reach)
         return arm
 
     def update(self) -> None:

@@ -354,12 +354,15 @@ class Panel:
             removals = {plain(thing.name): _do("remove_thing", name=thing.name) for thing in things}
             return removals | {plain(name): _do("remove_obstacle", name=name) for name in obstacles}
 
+        def nothing(_: Hands) -> None:
+            raise HandError("nothing of this name is there to be removed")
+
         self._button("Put obstacle", lambda: put("add_obstacle"))
         self._button("Put thing", lambda: put("add_thing", mass=mass.value))
         self._button("Hang load on the flange", lambda: hands.operate("attach_payload", mass=mass.value))
         there = gui.add_dropdown("There", ("nothing",))
         self._following.append((there, "options", lambda robot: tuple(found(robot)) or ("nothing",)))
-        self._button("Remove", lambda: [do(hands) for k, do in found(robot).items() if k == there.value])
+        self._button("Remove", lambda: found(robot).get(there.value, nothing)(hands))
 
     def _make_nodes(self, arm: ArmDrawing) -> None:
         scene, name = self._server.scene, self._drawing.root.name

@@ -301,6 +301,7 @@ def test_the_world(window):
     window.use("Hang load on the flange")
     assert window.hands.done.pop() == ("attach_payload", {"mass": 0.5})
     window.use("Remove")
+    assert window.client.told.pop()[1] == "nothing of this name is there to be removed"
     can = ThingNow("can", ZEROS, ZEROS, touches_tool=False)
     window.robot.state = a_state(obstacles=(NAME, f"{NAME}y"), things=(can,))
     window.update()
