@@ -45,7 +45,8 @@ _HEADER_SIZE = 5
 _ROBOT_STATE = 16
 _ROBOT_MESSAGE = 20
 _PROGRAM_STATE = 25
-_MOST_VARIABLES = 1000
+_MOST_VARIABLES, _LONGEST_VARIABLES = 1000, 4096
+"""Variables that are kept, and bytes of a package of them: robots send no longer ones."""
 _LONGEST_PACKAGE = 1 << 20
 _KEPT = {record.SUB_TYPE for record in (RobotModeData, CartesianInfo, ConfigurationData, KinematicsInfo)}
 """Sub-packages of a state that somebody asks for."""
@@ -70,7 +71,7 @@ class PackageStream:
         self._early: list[RobotMessage] = []
         self.version: SoftwareVersion | None = None
         self.variables: dict[str, TypedValue] = {}
-        self._variable_names: list[str] = []
+        self._variable_names: dict[int, str] = {}
         self._newest: dict[int, bytes] = {}
         self._unread = 0  # bytes since a poll found nothing more
 
@@ -159,7 +160,7 @@ class PackageStream:
                     for sub_type, body in split_state(package[_HEADER_SIZE:]):
                         if sub_type in _KEPT:
                             self._newest[sub_type] = body
-                if package[4] == _PROGRAM_STATE:
+                if package[4] == _PROGRAM_STATE and len(package) <= _LONGEST_VARIABLES:
                     self._take_variables(package[_HEADER_SIZE:])
                 if package[4] != _ROBOT_MESSAGE:
                     continue
@@ -185,9 +186,13 @@ class PackageStream:
                 case GlobalVariablesSetup(start_index=start, names=names):
                     if start == 0:
                         self.variables.clear()
-                    self._variable_names[start:] = names[:_MOST_VARIABLES]
+                        self._variable_names.clear()
+                    self._variable_names |= {
+                        k: name for k, name in enumerate(names, start) if k < _MOST_VARIABLES
+                    }
                 case GlobalVariablesUpdate(start_index=start, values=values):
-                    self.variables.update(zip(self._variable_names[start:], values, strict=False))
+                    known = self._variable_names
+                    self.variables |= {known[k]: new for k, new in enumerate(values, start) if k in known}
 
 
 def raise_on_error(messages: list[RobotMessage], program: str = "") -> None:

@@ -282,7 +282,12 @@ def test_variables_are_those_of_the_program_that_runs():
     assert tell(names(0, "a", "b"), names(2, "c"), values(0, 1, 2)) == {"a": "1", "b": "2"}
     assert tell(values(1, 5, 6, 7)) == {"a": "1", "b": "5", "c": "6"}
     assert tell(b"\0\0\0\x06\x19\0", values(2, 8)) == {"a": "1", "b": "5", "c": "8"}  # one that nobody reads
-    assert tell(names(0, "d"), values(0, 9)) == {"d": "9"}
+    assert tell(names(0, "d"), names(2, "f"), values(0, 9, 10, 11)) == {"d": "9", "f": "11"}
+    assert tell(names(999, "y", "z"), values(999, 1, 2), names(3, 5000 * "g")) == {
+        "d": "9",
+        "f": "11",
+        "y": "1",
+    }
     without_any = KeyMessage(title=KeyMessage.STARTED, text="p")
     assert tell(encode_message_package(without_any, version)) == {}
 
