@@ -21,6 +21,7 @@ from typing import Any
 from unittest.mock import patch
 from urllib.parse import parse_qs, urlsplit
 
+import numpy as np
 import rich
 import viser
 import websockets.asyncio.server
@@ -31,6 +32,9 @@ from ur_emulator.box_options import check_token, is_loopback
 
 MOST_PAGES = 20
 """Pages that may be open at once."""
+
+_LOOK_AT = (0.2, 0.0, 0.3)
+_NARROW, _BELOW = 600, 0.8  # pixels, m
 
 _COOKIE = "ur_pendant"
 _HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+)(?::[0-9]{1,5})?")
@@ -77,14 +81,13 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
             f"port {port} of {host} cannot be opened ({os.strerror(error.errno or 0)}): give another --port"
         ) from None
     serve = websockets.asyncio.server.serve
-    server: PageServer | None = None
+    pages: set[Any] = set()  # also those that have not said yet how they look at the scene
 
     def serve_checked(
         handler: Any, host: str, port: int, *, process_request: Callable[..., Any], **options: Any
     ) -> Any:
         def look_first(connection: Any, request: Request) -> Response | None:
-            is_full = server is not None and len(server.get_clients()) >= MOST_PAGES
-            refusal = _refusal(request, token, is_full=is_full)
+            refusal = _refusal(request, token, is_full=len(pages) >= MOST_PAGES)
             if refusal is not None:
                 return refusal
             response: Response | None = process_request(connection, request)
@@ -92,7 +95,14 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
                 response.headers.update(_headers(token))
             return response
 
-        return serve(handler, sock=listening, process_request=look_first, logger=quiet, **options)
+        async def count(page: Any) -> None:
+            pages.add(page)
+            try:
+                await handler(page)
+            finally:
+                pages.remove(page)
+
+        return serve(count, sock=listening, process_request=look_first, logger=quiet, **options)
 
     quiet = logging.getLogger(__name__)  # of connections that send what is no message
     quiet.disabled = True
@@ -105,8 +115,15 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
     server.scene.configure_environment_map(None)
     server.scene.add_light_hemisphere("/sky", ground_color=(150, 150, 160), intensity=2.5)
     server.gui.main_panel.dock_right()
-    server.initial_camera.position, server.initial_camera.look_at = (1.5, -1.1, 0.9), (0.2, 0.0, 0.3)
+    server.initial_camera.position, server.initial_camera.look_at = (1.5, -1.1, 0.9), _LOOK_AT
+    server.on_client_connect(_look_below)
     return server
+
+
+def _look_below(client: viser.ClientHandle) -> None:
+    """Let a phone look below the arm, which is then above the panel."""
+    if client.camera.image_width < _NARROW:
+        client.camera.look_at = np.subtract(_LOOK_AT, (0.0, 0.0, _BELOW))
 
 
 def _refusal(request: Request, token: str | None, *, is_full: bool) -> Response | None:

@@ -15,7 +15,7 @@ import viser
 from attack_record import Section
 from attackers import in_background, until
 from box_under_attack import CONTROL_PORT, ONE, PATIENCE, PORT_BASE, BoxUnderAttack
-from websockets.exceptions import WebSocketException
+from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
@@ -94,6 +94,11 @@ def pages_that_lie(box: BoxUnderAttack, seconds: float) -> str:
 
     n = 0
     with _window(box) as port:
+        with ExitStack() as stack:
+            for _ in range(MOST_PAGES):
+                stack.enter_context(_page(port))
+            with suppress(InvalidStatus), _page(port):
+                raise AssertionError(f"more than {MOST_PAGES} pages are open")
         end = time.monotonic() + seconds
         with in_background(lie, port), in_background(lie, port):
             while time.monotonic() < end or not n:
