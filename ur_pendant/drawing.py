@@ -220,7 +220,7 @@ class RobotDrawing:
     Attributes:
         root: node of the base, for what stands there.
         arm: as it was measured; None until the robot says who it is and where it stands. Another kind of arm
-            gets a new one, and with it other `model` and `links`.
+            gets a new one.
         T_base_tcp: (4, 4) of the measured TCP [m].
     """
 
@@ -231,8 +231,6 @@ class RobotDrawing:
         self._scene, self._name, self._robot, self._cell = server.scene, name, robot, cell
         self._camera = server.initial_camera
         self.arm: ArmDrawing | None = None
-        self.model: RobotModel | None = None
-        self.links: tuple[viser.MeshHandle, ...] = ()
         self.T_base_tcp: Array = np.eye(4)
         self._info: RobotInfo | None = None
         self._state: BoxState | None = None
@@ -259,7 +257,6 @@ class RobotDrawing:
         for part in ("arm", "target"):
             self._scene.remove_by_name(f"{self._name}/{part}")
         self.arm = arm = ArmDrawing(self._scene, f"{self._name}/arm", model, _HOUSING)
-        self.model, self.links = model, arm.links
         self._target, self._state, self._is_lost, self._offset = None, None, False, ()
         self._path = np.empty((0, 3))
         self._tcp = self._scene.add_frame(f"{arm.flange}/tcp", axes_length=0.08, axes_radius=0.003)

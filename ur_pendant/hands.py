@@ -143,7 +143,7 @@ class Hands:
     # --- moving the arm
 
     def follow(self, q: Sequence[float] | Array) -> None:
-        """Let the arm go to a posture (6,) [rad] from where it is, until `let_go` or a loss.
+        """Let the arm go to a posture (6,) [rad] from where it is, until it rests there or a loss.
 
         A box in lockstep, whose time would run away from a hand, gets a move to each posture.
 
@@ -166,12 +166,6 @@ class Hands:
         follower = self._follower
         return np.array(follower.goal) if follower is not None and follower.is_alive else None
 
-    def let_go(self) -> None:
-        """End following: the arm stops with a ramp."""
-        with self._lock:
-            if self._follower is not None:
-                self._follower.end()
-
     def _check(self) -> None:
         """Raise HandError for a robot that is only shown."""
         if not self._robot.is_held:
@@ -185,7 +179,7 @@ class Hands:
 class Follower:
     """A program in the box that goes to `goal`, and the stream of its targets.
 
-    It ends by `end`, when nothing has changed for `_REST`, and when its program has ended, as by a stop.
+    It ends when nothing has changed for `_REST`, and when its program has ended, as by a stop.
     """
 
     def __init__(self, robot: Robot, run: Callable[[str], None]) -> None:
@@ -206,7 +200,6 @@ class Follower:
             run(_program(first))
         except ClientError as error:
             raise HandError(str(error)) from None
-        self._ending = threading.Event()
         self._thread = threading.Thread(target=self._feed, daemon=True)
         self._thread.start()
 
@@ -215,15 +208,10 @@ class Follower:
         """Whether the program still follows."""
         return self._thread.is_alive()
 
-    def end(self) -> None:
-        """Let the arm stop with a ramp."""
-        self._ending.set()
-        self._thread.join()
-
     def _feed(self) -> None:
         counter, resting, has_run, last = 2, 0.0, False, self.goal
         try:
-            while not self._ending.is_set() and resting < _REST:
+            while resting < _REST:
                 values = self._stream.receive()  # 30 times a second
                 runs = values["runtime_state"] == ProgramState.PLAYING
                 resting = 0.0 if self.goal != last else resting + 1.0 / _RATE

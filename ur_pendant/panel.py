@@ -229,7 +229,8 @@ class Panel:
                 handle.remove()
             for modal in self._modals.values():
                 modal.close()
-            for link in self._drawing.links if self._made_for[2] is self._drawing.arm else ():
+            arm = self._made_for[2]
+            for link in arm.links if arm is self._drawing.arm and arm else ():
                 link.remove_drag_callback(self._on_pull)
         self._made_for = ()
 

@@ -148,10 +148,10 @@ def test_nothing_is_drawn_before_a_robot_says_who_and_where_it_is(server):
     drawn.update()
     robot.report(q=(float("nan"),) * 6)
     drawn.update()
-    assert (drawn.arm, drawn.model, drawn.links) == (None, None, ())
+    assert drawn.arm is None
     robot.report(tcp_offset=(0.0, 0.0, 0.2, 0.0, 0.0, 0.0))
     drawn.update()
-    assert (drawn.model.name, len(drawn.links)) == ("ur5e", 7)
+    assert (drawn.arm.model.name, len(drawn.arm.links)) == ("ur5e", 7)
     np.testing.assert_allclose(
         drawn.T_base_tcp, dh_frames(kinematics(*UR5E), Q)[6] @ pose_to_T((0, 0, 0.2, 0, 0, 0)), atol=1e-6
     )
@@ -173,7 +173,7 @@ def test_noise_of_encoders_moves_nothing(server, monkeypatch):
     assert not sent
     robot.report(q=np.add(Q, (0.01, 0, 0, 0, 0, 0)))
     drawn.update()
-    assert {message.name for message in sent} == {drawn.links[1].name}
+    assert {message.name for message in sent} == {drawn.arm.links[1].name}
 
 
 def test_shapes_come_move_and_go_and_names_are_only_text(server):
@@ -339,17 +339,17 @@ def test_a_lost_robot_is_grey_and_another_one_is_drawn_anew(server):
     robot.report()
     drawn = drawing(server, robot)
     drawn.update()
-    arm, colour = drawn.arm, drawn.links[3].color
+    arm, colour = drawn.arm, drawn.arm.links[3].color
     robot.problem = "connection lost"
     drawn.update()
-    assert (drawn.links[3].color != colour, drawn.links[3].opacity) == (True, 0.35)
+    assert (drawn.arm.links[3].color != colour, drawn.arm.links[3].opacity) == (True, 0.35)
     robot.problem, robot.info = "", info()  # the same kind of arm answers again
     drawn.update()
-    assert (drawn.arm, drawn.links[3].color, drawn.links[3].opacity) == (arm, colour, None)
+    assert (drawn.arm, drawn.arm.links[3].color, drawn.arm.links[3].opacity) == (arm, colour, None)
     robot.info, robot.kinematics = info("UR3", 3), kinematics(*UR3)
     robot.report(target_q=np.add(Q, 0.3).tolist())
     drawn.update()
     assert drawn.arm is not arm
-    assert drawn.model.name == "ur3"
+    assert drawn.arm.model.name == "ur3"
     assert not [path for path in nodes(server) if path.endswith("/lid")]  # published meshes have none
     np.testing.assert_allclose(place(server, drawn.arm.flange), dh_frames(kinematics(*UR3), Q)[6], atol=1e-4)

@@ -188,7 +188,7 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
     free = {"Pause", "Signal", "Filter"}  # of the page only
     assert all(handle.disabled for handle in window.controls() if handle.label not in free)
     assert window.panel._nodes == []
-    assert not window.drawing.links[-1]._has_any_drag_callbacks()
+    assert not window.drawing.arm.links[-1]._has_any_drag_callbacks()
     robot.is_held = True
     window.update()
     assert {
@@ -198,11 +198,11 @@ def test_a_robot_that_is_not_held_has_values_and_no_controls_until_it_is(server)
         "Put obstacle",
     } <= window.labels()
     assert "Controls" not in window.labels()
-    assert window.drawing.links[-1]._has_any_drag_callbacks()
+    assert window.drawing.arm.links[-1]._has_any_drag_callbacks()
     robot.is_held = False
     window.update()
     assert "Power" not in window.labels()
-    assert not window.drawing.links[-1]._has_any_drag_callbacks()
+    assert not window.drawing.arm.links[-1]._has_any_drag_callbacks()
     window.panel.remove()
     assert not window.labels()
 
@@ -479,7 +479,7 @@ def test_no_pose_is_reached_by_a_jump_or_beyond_a_limit():
 
 def pull(window, phase, start, end):
     event = window.event(
-        window.drawing.links[-1], phase=phase, start_position=tuple(start), end_position=tuple(end)
+        window.drawing.arm.links[-1], phase=phase, start_position=tuple(start), end_position=tuple(end)
     )
     asyncio.run(window.panel._on_pull(event))
     window.panel._pushed = 0.0
