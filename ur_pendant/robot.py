@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import count
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -40,8 +41,8 @@ from ur_emulator.errors import EmulatorError
 RATE = 30.0
 """Packages a second that RTDE is asked for: a screen shows twice as many at best."""
 
-_SLOWLY = 0.2
-"""Between two questions to the control API [s]."""
+_SLOWLY, _LOG_EVERY = 0.2, 3
+"""Between two questions to the control API [s]; every third time it is asked for the log, too."""
 
 _PAUSE = 1.0
 """Before the next try when a robot does not answer [s]."""
@@ -244,7 +245,7 @@ class Robot:
     def _read_state(self) -> None:
         """Ask the control API for the state and for new lines of the log."""
         box: AttachedBox | None = None
-        seen = 0
+        seen, turns = 0, count()
         while not self._closed.wait(_SLOWLY):
             try:
                 if box is None:
@@ -254,13 +255,14 @@ class Robot:
                     # Which ports it has: that of the dashboard server is not there with PolyScope X.
                     self.address = replace(at, ports=box.served_at(0).ports)
                 state: BoxState = box.perform(0, "state", {})
-                news = box.perform(0, "log", {"after": seen})
+                if next(turns) % _LOG_EVERY == 0:
+                    news = box.perform(0, "log", {"after": seen})
+                    seen = news["next"]
+                    self.log.extend(LogLine(entry["time"], entry["text"]) for entry in news["entries"])
             except EmulatorError:
                 self.state, box = None, None
                 self._closed.wait(_PAUSE)
                 continue
-            seen = news["next"]
-            self.log.extend(LogLine(entry["time"], entry["text"]) for entry in news["entries"])
             self.state, self.program = state, state.program
             self.popups, self.questions = state.popups, state.questions
 

@@ -48,7 +48,7 @@ def test_a_robot_is_read_by_rtde_the_primary_port_and_the_control_api(box, robot
     assert (robot.questions[0].text, robot.program) == ("how many?", "asks")
     box.stop_program()
     until(lambda: not robot.questions and robot.program == "", "the end of the question")
-    assert any("asks" in line.text for line in robot.log)
+    until(lambda: any("asks" in line.text for line in robot.log), "its line in the log")
     box.run_program("def counts():\n  global n = 7\n  sync()\nend\n")
     until(lambda: {name: str(value) for name, value in robot.variables.items()} == {"n": "7"}, "the variable")
     assert [client.partition(" at ")[2].split()[0] for client in robot.state.clients] == ["rtde", "primary"]
