@@ -7,6 +7,7 @@ What comes from robots is shown as text only, cut, and without characters that d
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import nullcontext
@@ -220,7 +221,7 @@ class Panel:
                     setattr(handle, name, value)
             self._show_modals()
             if not self._pause.value and self._server.get_clients():
-                self._draw_charts(now)
+                self._draw_chart(now)
 
     def remove(self) -> None:
         """Take everything away."""
@@ -237,7 +238,7 @@ class Panel:
     def _make(self, is_held: bool, has_api: bool, arm: ArmDrawing | None) -> None:
         self._following: list[tuple[Any, str, Callable[[Robot], object]]] = []
         self._modals: dict[Question | str, Any] = {}
-        self._charts: list[tuple[Any, Any]] = []
+        self._charts: deque[tuple[Any, Any]] = deque()
         self._nodes: list[Any] = []
         self._gizmo: Any = None
         self._has_api, self._is_dragged, self._placed = has_api, False, np.zeros((4, 4))
@@ -420,17 +421,19 @@ class Panel:
         if self._task.done():
             self._task = self._worker.submit(call, event)
 
-    def _draw_charts(self, now: float) -> None:
+    def _draw_chart(self, now: float) -> None:
+        """Draw the chart whose turn it is."""
         last = list(self._robot.history)[-round(_PLOTTED * RATE) :]
         samples = [s for s in last if now - s.time < _PLOTTED and s.time * RATE % 2.0 < 1.0]
-        for choice, plot in self._charts:
-            signal = _SIGNALS[choice.value]
-            if plot.title != (title := f"{signal.name} [{signal.unit}]"):
-                names = ("s", *(signal.parts or ("value",)), *[""] * len(_COLOURS))
-                lines = zip(names, ("", *_COLOURS), strict=False)
-                plot.series = tuple(uplot.Series(label=n, stroke=c, show=n != "") for n, c in lines)
-                plot.title = title
-            plot.data = columns(samples, signal, now)
+        choice, plot = self._charts[0]
+        self._charts.rotate()
+        signal = _SIGNALS[choice.value]
+        if plot.title != (title := f"{signal.name} [{signal.unit}]"):
+            names = ("s", *(signal.parts or ("value",)), *[""] * len(_COLOURS))
+            lines = zip(names, ("", *_COLOURS), strict=False)
+            plot.series = tuple(uplot.Series(label=n, stroke=c, show=n != "") for n, c in lines)
+            plot.title = title
+        plot.data = columns(samples, signal, now)
 
     def _show_modals(self) -> None:
         now: set[Question | str] = {*self._robot.popups[:3], *self._robot.questions[:3]}
