@@ -19,6 +19,7 @@ _NO_NAMES = "import socket, threading\nsocket.getaddrinfo = lambda *names: threa
 def worker_of(box: BoxUnderAttack) -> psutil.Process:
     """The worker process; its parent is the server of processes."""
     (server,) = psutil.Process(box.process.pid).children()
+    until(server.children, "the worker process, for which the server loads the compiler first")
     (worker,) = server.children()
     return worker
 

@@ -9,6 +9,7 @@ import random
 import socket
 import struct
 import sys
+import time
 from collections import Counter
 from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType, FunctionType
@@ -186,8 +187,13 @@ def ask(stream, line):
 
 
 def end_worker(box):
+    """End the process for long tasks, which begins a moment after the box: its server loads the compiler first."""
     (server,) = psutil.Process(box.process.pid).children()
-    for process in server.children():
+    begun = time.monotonic()
+    while not (workers := server.children()):
+        assert time.monotonic() - begun < TIMEOUT
+        time.sleep(0.01)
+    for process in workers:
         process.kill()
         process.wait(TIMEOUT)
 
