@@ -155,6 +155,14 @@ def test_a_task_that_never_ends_is_given_up(bench, monkeypatch):
     assert has_ended(pid)
 
 
+def test_a_task_that_takes_much_processor_time_loses_its_priority(bench):
+    """Not one that only waits for a busy machine."""
+    before = bench.ask(os.nice, 0)
+    assert 0.0 < bench.ask(signal.getitimer, signal.ITIMER_VIRTUAL)[0] < 1.1 * module.LONG
+    bench.ask(signal.raise_signal, signal.SIGVTALRM)
+    assert bench.ask(os.nice, 0) == min(19, before + 10)
+
+
 def test_a_task_may_take_so_much_processor_time_and_no_more(bench):
     assert 0.0 < bench.ask(signal.getitimer, signal.ITIMER_PROF)[0] < 1.1 * BUDGETS.task_seconds
     error = bench.ask(signal.raise_signal, signal.SIGPROF)

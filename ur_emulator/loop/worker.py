@@ -30,7 +30,7 @@ from ur_emulator.loop.memory import is_stopped, resident
 from ur_emulator.loop.processes import OUT_OF_MEMORY, Child, Pipe, Role, framed, read_message, start_child
 
 LONG: Final = 1.0
-"""After so much real time a task takes long [s]."""
+"""After so much real time a task takes long, and after so much processor time it has a lower priority [s]."""
 # By so much the priority of a long task is lower: the loop comes first.
 _NICENESS = 10
 # The collector looks when so many objects are new: the trees of a long program are no garbage before its end.
@@ -53,15 +53,16 @@ def run(pipe: socket.socket) -> None:
     """Do tasks until the other end is closed; the main function of the process."""
     gc.enable()
     gc.set_threshold(_MANY_OBJECTS)
-    signal.signal(signal.SIGALRM, _take_long)
+    signal.signal(signal.SIGVTALRM, _take_long)
     _limit_memory()
     with pipe, suppress(OSError, EOFError):
         while True:
             task = read_message(pipe)
-            signal.setitimer(signal.ITIMER_REAL, LONG)
+            # Of its own time: on a busy machine a short task would lose its priority, and take for ever.
+            signal.setitimer(signal.ITIMER_VIRTUAL, LONG)
             signal.setitimer(signal.ITIMER_PROF, BUDGETS.task_seconds)  # its signal ends the process
             answer = _answer(task)
-            for timer in (signal.ITIMER_REAL, signal.ITIMER_PROF):
+            for timer in (signal.ITIMER_VIRTUAL, signal.ITIMER_PROF):
                 signal.setitimer(timer, 0.0)
             pipe.sendall(framed(answer))
 
