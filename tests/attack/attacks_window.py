@@ -33,12 +33,14 @@ _JUNK = (b"", b"\xc1", b"\x81\xa4type\xa1x", b"\x91" * 500, random.Random(7).ran
 def _window(box: BoxUnderAttack) -> Iterator[int]:
     """A window that shows the box, before and after; gives its port."""
 
-    def shows() -> bool:
+    def readers() -> int:
         clients = ControlClient(box.host, CONTROL_PORT, None).perform("state", {})["clients"]
-        return sum(" at rtde " in client or " at primary " in client for client in clients) == others + 2
+        return sum(" at rtde " in client or " at primary " in client for client in clients)
 
-    clients = ControlClient(box.host, CONTROL_PORT, None).perform("state", {})["clients"]
-    others = sum(" at rtde " in client or " at primary " in client for client in clients)
+    def shows() -> bool:
+        return readers() == others + 2
+
+    others = readers()
     command = [sys.executable, "-m", "ur_emulator", "pendant", box.host, "--port", "0"]
     command += ["--port-base", str(PORT_BASE), "--control-port", str(CONTROL_PORT)]
     window = subprocess.Popen(

@@ -58,7 +58,7 @@ def run(pipe: socket.socket) -> None:
     with pipe, suppress(OSError, EOFError):
         while True:
             task = read_message(pipe)
-            # Of its own time: on a busy machine a short task would lose its priority, and take for ever.
+            # Processor time: by the clock, also a short task would lose its priority on a busy machine.
             signal.setitimer(signal.ITIMER_VIRTUAL, LONG)
             signal.setitimer(signal.ITIMER_PROF, BUDGETS.task_seconds)  # its signal ends the process
             answer = _answer(task)
