@@ -153,7 +153,7 @@ class _Run:
             self._waits_since = math.inf
         commands, self._commands = self._commands, []
         motion = self._controller.state.motion
-        self._move = motion.move_of(motion.owner) or self._move
+        self._move = motion.move or self._move
         self._controller.tick(commands)
         self._due = now + self._controller.period_s
         for event in self._controller.state.events.take():

@@ -49,6 +49,7 @@ SECOND = RobotGeneration(
         most_averaging=0.2,
     ),
     execution_time=1.5,
+    run_up_time=0.2,
     gravity=9.82,
     reports_control_as_target=True,
     has_operational_modes=True,

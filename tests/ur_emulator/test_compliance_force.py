@@ -419,6 +419,5 @@ def test_what_is_not_in_use_is_not_looked_after(monkeypatch):
 
     bench = above_table("  movej([0.2,-1.5,-1.5,-1.5,1.5,0])\n  sleep(1)", z=0.2)
     monkeypatch.setattr(Compliance, "step", never)
-    monkeypatch.setattr(Compliance, "freedrive_target", never)
     monkeypatch.setattr(Compliance, "find_violation", never)
     bench.tick(200)

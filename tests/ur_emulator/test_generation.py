@@ -191,9 +191,10 @@ def test_programs_get_the_cycle_and_sync_takes_one(generation):
     [
         ("sleep(0.5)", 0.5),
         ("speedj([0.2, 0, 0, 0, 0, 0], 2, 0.5)", 0.5),
-        ("movej([0.3, -1.57, -1.57, -1.57, 1.57, 0], t=1)", 1.0),
+        # The time of a program's first move runs up in 0.16 s.
+        ("movej([0.3, -1.57, -1.57, -1.57, 1.57, 0], t=1)", 1.0 + 0.08),
         # 0.1 m: 0.1/0.25 + 0.25/1.2 s.
-        ("movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]))", 0.608),
+        ("movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]))", 0.608 + 0.08),
     ],
     ids=["sleep", "speedj", "movej", "movel"],
 )

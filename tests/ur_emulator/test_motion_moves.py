@@ -241,6 +241,7 @@ def test_a_chain_of_all_kinds_of_moves_never_rests_between(bench):
 def test_the_speed_slider_is_taken_on_without_a_jump(bench):
     bench.start(f"movel({shifted(0.1)}, v=0.1)\n")
     bench.tick(40)
+    bench.snapshots.clear()
     bench.tick(1, SetSpeedSlider(0.1))
     bench.tick(60)
     speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])

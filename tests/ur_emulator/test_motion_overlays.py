@@ -111,13 +111,13 @@ def test_a_move_under_way_keeps_the_displacement_of_a_removed_overlay_to_its_end
 def test_a_stream_goes_on_from_the_displaced_target(motion):
     swing = Swing()
     motion.add_overlay(swing)
-    motion.command("me", SpeedJ((0.1,) * 6, 2.0))
+    command = motion.command("me", SpeedJ((0.1,) * 6, 2.0))
     for _ in range(60):
-        motion.renew()
+        command.renew()
         motion.step(DT, 1.0)
     before = motion.target
     motion.remove_overlay(swing)
-    motion.renew()
+    command.renew()
     after = motion.step(DT, 1.0)
     assert np.abs(np.subtract(after.qd, before.qd)).max() <= 2.0 * DT * 1.001
 

@@ -123,8 +123,8 @@ def test_speedl_stays_on_its_line_for_ten_seconds_and_through_the_stop(renewed):
     v = np.array([0.004, 0.012, 0.016, 0.0, 0.0, 0.03])
     for k in range(1250):
         if k % renewed == 0:
-            motion.command(owner, SpeedL(tuple(v), 1.0, 1.0, TOOL))
-        motion.renew()
+            command = motion.command(owner, SpeedL(tuple(v), 1.0, 1.0, TOOL))
+        command.renew()
         motion.step(DT, 1.0)
     half = TOOL.pose(motion.target.q)
     motion.command(owner, StopL(1.0, 1.0, TOOL))

@@ -21,7 +21,8 @@ from ur_emulator.models.robot_model import ZERO6, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.axis_hold import AxisHold
 from ur_emulator.motion.force_mode import ForceMode
-from ur_emulator.motion.generators import JointTarget, TorqueCommand
+from ur_emulator.motion.generators import TorqueCommand
+from ur_emulator.motion.ownership import ArmState
 from ur_emulator.plant.plant import PlantState
 
 # An external force above this when freedrive begins means a wrong payload or a push [N]. It is twice the
@@ -32,14 +33,12 @@ _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 class Compliance:
-    """Requests for freedrive and force mode.
+    """Requests for freedrive and force mode; each acts on the motion of the arm when it comes.
 
     Attributes:
         by_program, by_client, by_input: who has requested freedrive; an input or the teach button also acts.
-        force_mode: the overlay of force mode; None without it.
         force_damping: as programs have set it, for a force mode to come; 0..1.
         force_gain_scaling: likewise, 0..2.
-        is_on: `step` must be called in every cycle.
     """
 
     def __init__(
@@ -62,47 +61,76 @@ class Compliance:
         self._inputs = inputs
         self._past = past
         self.force_damping, self.force_gain_scaling = 0.0, 1.0
-        self.mode = ControlMode.POSITION
         self.by_program = self.by_client = self.by_input = False
-        self.force_mode: ForceMode | None = None
+        self._force: ForceMode | None = None
         self._hold: AxisHold | None = None
-        self.is_on = False
         self._is_refused = False
         self._is_teach_pressed = False
 
     @property
     def is_in_freedrive(self) -> bool:
         """True while the arm is in freedrive."""
-        return self.by_program or self.by_client or self.by_input
+        return self._motion.state is ArmState.BY_HAND
+
+    @property
+    def force_mode(self) -> ForceMode | None:
+        """The overlay of force mode; None without it. Stops of the arm end it."""
+        force = self._force
+        return force if force is not None and self._motion.has_overlay(force) else None
+
+    @property
+    def mode(self) -> ControlMode:
+        """How the arm is driven."""
+        match self._motion.state:
+            case ArmState.BY_HAND:
+                return ControlMode.TEACH
+            case ArmState.BY_TORQUE:
+                return ControlMode.TORQUE
+        return ControlMode.POSITION if self.force_mode is None else ControlMode.FORCE
+
+    @property
+    def is_on(self) -> bool:
+        """True while `step` must be called in every cycle."""
+        return self._motion.is_compliant or self._is_teach_pressed or self.force_mode is not None
 
     # --- requests
 
     def start_freedrive(
-        self, *, by_program: bool = False, by_client: bool = False, hold: AxisHold | None = None
+        self,
+        *,
+        by_program: bool = False,
+        by_client: bool = False,
+        hold: AxisHold | None = None,
+        wrench: Vector6 = ZERO6,
     ) -> None:
-        """Start freedrive in this cycle; `hold` has the axes that the program blocks, None for none."""
+        """Start freedrive.
+
+        Args:
+            by_program, by_client: who asks for it.
+            hold: has the axes that the program blocks, None for none.
+            wrench: from outside; if it is not expected, the arm is stopped when freedrive begins [N, Nm].
+        """
         if by_program:
             self._hold = hold
         self.by_program = self.by_program or by_program
         self.by_client = self.by_client or by_client
-        self.is_on = True
+        if not self.is_in_freedrive:
+            self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
+        self._hand_over()
 
     def press_teach_button(self, pressed: bool) -> None:
         """Press or release the teach button: it acts as an input that is set up for freedrive."""
         self._is_teach_pressed = pressed
-        self.is_on = True
-
-    def check_payload(self, wrench: Vector6) -> None:
-        """Stop protectively when freedrive begins while an external wrench acts that is not expected."""
-        self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
 
     def end_freedrive_by_program(self) -> None:
         """End the freedrive that the program has requested."""
         self.by_program = False
+        self._hand_over()
 
     def end_freedrive_by_client(self) -> None:
         """End the freedrive that a client has requested."""
         self.by_client = False
+        self._hand_over()
 
     def set_force_damping(self, damping: float) -> None:
         """Set the damping of a force mode to come, 0..1."""
@@ -115,70 +143,54 @@ class Compliance:
     def begin_force(self, force_mode: ForceMode) -> None:
         """Go into force mode; freedrive by the program ends."""
         self.end_force()
-        self.by_program = False
-        self.force_mode = force_mode
-        self._motion.add_overlay(force_mode)
-        self.is_on = True
+        self.end_freedrive_by_program()
+        if not self.is_in_freedrive:
+            self._force = force_mode
+            self._motion.add_overlay(force_mode)
 
     def end_force(self) -> None:
         """Leave force mode, if the arm is in it; the arm stays where it is."""
-        if self.force_mode is not None:
-            self._motion.remove_overlay(self.force_mode)
-            self.force_mode = None
+        if self._force is not None:
+            self._motion.remove_overlay(self._force)
+            self._force = None
 
     def program_ended(self) -> None:
         """End freedrive and force mode of the program."""
-        self.by_program = False
+        self.end_freedrive_by_program()
         self.end_force()
+
+    def _hand_over(self) -> None:
+        """Let a hand guide the arm if anybody has requested it and nothing forbids it, else hold the arm."""
+        if self._is_forbidden:
+            self.by_program = self.by_client = self.by_input = False
+        if self.by_program or self.by_client or self.by_input:
+            self._motion.guide(self._past.measured)
+        else:
+            self._motion.let_go()
+
+    @property
+    def _is_forbidden(self) -> bool:
+        return self._robot_mode.mode is not RobotMode.RUNNING or self._safety.is_stopped
 
     # --- cycle
 
-    def drive_by_torque(self) -> ControlMode:
-        """Return the control mode of a cycle in which a program gives the torques."""
-        self.mode = ControlMode.TORQUE
-        self.is_on = True
-        return self.mode
-
-    def step(self) -> ControlMode:
-        """Return the control mode of this cycle, after the scripts have run."""
-        motion = self._motion
-        if self._robot_mode.mode is not RobotMode.RUNNING or self._safety.is_stopped:
-            self.by_program = self.by_client = self.by_input = False
+    def step(self) -> None:
+        """Follow inputs, and what forbids compliance, after the scripts have run."""
+        may_guide = self._operational.allows.allows_freedrive
+        self.by_client = self.by_client and may_guide
+        wanted = may_guide and (self._is_teach_pressed or self._inputs.requests_freedrive())
+        self.by_input = wanted and (self.by_input or not self._motion.is_moving)
+        self._hand_over()
+        if self._is_forbidden:
             self.end_force()
-        else:
-            may_guide = self._operational.allows.allows_freedrive
-            self.by_client = self.by_client and may_guide
-            wanted = may_guide and (self._is_teach_pressed or self._inputs.requests_freedrive())
-            self.by_input = wanted and (self.by_input or not motion.is_moving)
-        was_guided = self.mode is ControlMode.TEACH
-        if self.is_in_freedrive:
-            self.end_force()
-            self.mode = ControlMode.TEACH
-        else:
-            if was_guided:
-                sensed = self._past.sensed
-                motion.place(sensed.actual_q, sensed.actual_qd)
-            self.mode = ControlMode.POSITION
-            if self.force_mode is not None:
-                self.mode = ControlMode.FORCE
-                if not motion.has_overlay(self.force_mode):
-                    # A stop has ended it, such as that of a thread that was killed in motion.
-                    motion.add_overlay(self.force_mode)
-        self.is_on = self.mode is not ControlMode.POSITION or self._is_teach_pressed
-        return self.mode
 
-    def freedrive_target(self) -> JointTarget:
-        """Return the target of an arm in freedrive: its measured position.
+    def torque(self) -> TorqueCommand | None:
+        """Return what the drives shall give beside the hand, or in place of a position; None for nothing.
 
-        Moves have no effect on the arm. They take their time, and end with freedrive.
+        In freedrive it holds the axes that the program has blocked; a client or an input frees all.
         """
-        sensed = self._past.sensed
-        if not self._motion.is_moving:
-            self._motion.place(sensed.actual_q)
-        return JointTarget(sensed.actual_q, sensed.actual_qd)
-
-    def holding_torque(self) -> TorqueCommand | None:
-        """Return what holds the axes that the program has blocked; None if a client or an input frees all."""
+        if not self.is_in_freedrive:
+            return self._motion.torque
         if self._hold is None or self.by_client or self.by_input:
             return None
         sensed = self._past.sensed
@@ -186,15 +198,16 @@ class Compliance:
 
     def find_violation(self, sensed: PlantState) -> Violation | None:
         """Return a violation by a compliant arm in this cycle, or None."""
-        if self.mode is ControlMode.TEACH and self._is_refused:
+        if self.is_in_freedrive and self._is_refused:
             self._is_refused = False
             return WRONG_PAYLOAD
-        if self.mode in (ControlMode.TEACH, ControlMode.TORQUE):
+        if self._motion.is_compliant:
             return _moved_too_far(self._safety.limits, sensed)
-        if self.force_mode is None:
+        force_mode = self.force_mode
+        if force_mode is None:
             return None
         error = sensed.position_error
-        deviation = self.force_mode.deviation(sensed.actual_q, error)
+        deviation = force_mode.deviation(sensed.actual_q, error)
         if deviation is None:
             return None
         joint = max(range(6), key=lambda i: abs(error[i]))

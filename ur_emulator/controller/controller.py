@@ -170,7 +170,7 @@ class Controller:
         # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
         # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
-        motion = ArmMotion(q, robot.stop_deceleration)
+        motion = ArmMotion(q, robot.stop_deceleration, generation.run_up_time)
         self.state = make_state(
             robot,
             ArmModel(robot, draw_calibration(fidelity, seed)),
@@ -293,14 +293,10 @@ class Controller:
     def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget, TorqueCommand | None]:
         """How the arm is driven in this cycle, to where, and by which torque."""
         state, compliance = self.state, self.state.compliance
-        control = _BY_POSITION
         if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
-            control = compliance.step()
+            compliance.step()
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed.slider)
-        if control is _BY_HAND:
-            return control, compliance.freedrive_target(), compliance.holding_torque()
-        torque = state.motion.torque
-        return control if torque is None else compliance.drive_by_torque(), target, torque
+        return compliance.mode, target, compliance.torque()
 
     def _step_grippers(self) -> None:
         """Let the grippers see their fingers, and drive them in the next cycle."""
@@ -357,7 +353,7 @@ class Controller:
             scale = limiter.step(state.motion, state.arm, state.tool.tcp_offset, scale, self.period_s)
         try:
             target = state.motion.step(self.period_s, scale)
-            if target is before or state.safety.is_stopped or state.motion.torque is not None:
+            if target is before or state.safety.is_stopped or state.motion.is_compliant:
                 return target
             violation = self._setpoints.find_invalid(state.safety.limits, before, target)
             if violation is None and state.safety.boundaries:
@@ -393,5 +389,5 @@ class Controller:
         return True
 
 
-_BY_POSITION, _BY_HAND = ControlMode.POSITION, ControlMode.TEACH
+_BY_HAND = ControlMode.TEACH
 _REQUESTED_STOP = Violation(ErrorReported(209, 0, ReportLevel.WARNING, "Protective stop requested"))

@@ -58,6 +58,10 @@ class PastCycles:
         self.sensed = sensed
         self.q_history.appendleft(sensed.actual_q)
 
+    def measured(self) -> JointTarget:
+        """Return the measured arm as a set-point."""
+        return JointTarget(self.sensed.actual_q, self.sensed.actual_qd)
+
     def joint_accelerations(self) -> Vector6:
         """Return measured joint accelerations [rad/s^2], in the middle of PARABOLA_TIME."""
         n = min(len(self.q_history), 1 + max(2, self._generation.cycles(PARABOLA_TIME)))

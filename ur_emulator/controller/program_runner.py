@@ -126,6 +126,7 @@ class ProgramRunner:
         self._is_loaded = loaded
         if loaded:
             self._state.planning.set_motion_version(1)
+        self._state.motion.begin_program()
         self._state.io_configuration.program_started()
         self._state.interpreter.program_started()
         self._state.force_sense.program_started(self._state.past.steady_cycles)
@@ -186,6 +187,7 @@ class ProgramRunner:
             self._primary.fail(text)
             self._report(self._primary)
             self._end(unscheduled=True)
+            self._state.motion.stop()
 
     def forget(self) -> None:
         """Drop the variables of the last program if it has ended."""

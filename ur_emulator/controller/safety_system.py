@@ -114,7 +114,7 @@ class SafetySystem:
         if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
             self.handle(modes.SafetyEvent.RANGE_KEPT)
         if self._cut_after is not None:
-            if any(state.motion.target.qd):
+            if state.motion.is_moving:
                 self._rests_since = None
             elif self._rests_since is None:
                 self._rests_since = state.clock.tick

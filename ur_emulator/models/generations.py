@@ -74,6 +74,7 @@ CB3 = RobotGeneration(
         control_rate=8.0,
     ),
     execution_time=0.0,  # chosen: the unit is not known
+    run_up_time=0.16,  # recordings of a real UR3 and of the maker's simulator: .05 in each of 20 cycles
     gravity=9.81,
     reports_control_as_target=False,
     has_operational_modes=False,
@@ -171,6 +172,7 @@ E_SERIES = RobotGeneration(
         control_rate=24.0,  # C: the loop takes a third of the time of a CB3's, about 20 ms
     ),
     execution_time=0.82,  # A: mean while a program runs; .59 to 1.04
+    run_up_time=0.0,  # chosen: no recording shows the start of a program
     gravity=9.82,  # B: `target_moment` at rest
     reports_control_as_target=True,  # A
     has_operational_modes=True,

@@ -51,6 +51,7 @@ class RobotGeneration:
         force_sensing: how its arms know the wrench at the flange.
         execution_time: run time of a control cycle without programs, as the box reports it [ms]; 0: it is
             always reported as 0.
+        run_up_time: in which the time on the path of a program's first move runs up to its full rate [s].
         gravity: that the controller's model of the arm has [m/s²].
         reports_control_as_target: `joint_control_output` is `target_current`, not what the servos ask for.
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
@@ -82,6 +83,7 @@ class RobotGeneration:
     electrics: Electrics
     force_sensing: ForceSensing
     execution_time: float
+    run_up_time: float
     gravity: float
     reports_control_as_target: bool
     has_operational_modes: bool

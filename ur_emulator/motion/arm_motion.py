@@ -1,6 +1,7 @@
 """The motion of the arm: along the path of the program, displaced by overlays; its pauses and its stops.
 
-The rules of ownership are the controller's behaviour as users report it:
+`ownership.TABLE` says who has the arm and what takes it from whom: here is what computes the set-point. The
+rules are the controller's behaviour as users report it:
 
 * only one script thread moves the arm at a time; a second one gets "Another thread is already controlling
   the robot";
@@ -13,96 +14,71 @@ Must not know scripts or physics: an owner is any object, compared by identity.
 
 from collections.abc import Callable, Iterator
 from math import inf
-from typing import NamedTuple
 
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.motion.generators import (
     DirectTorque,
     Generator,
-    Hold,
     JointTarget,
+    Kind,
     StopJ,
-    StopL,
     Streamed,
     TorqueCommand,
 )
 from ur_emulator.motion.leg import move_j
 from ur_emulator.motion.move import Move
 from ur_emulator.motion.overlay import Overlay, OverlayChain
+from ur_emulator.motion.ownership import TRANSITIONS, ArmState, Command, Event, Fate
 
-# --- Pauses: the time on the path slows down to a standstill, and speeds up again later
+# --- Time on the path: a pause slows it down to a standstill, and the first motion of a program runs it up
 #
 # An arm that has stopped on its path continues exactly there. An arm that has left its path, in a fast stop
 # or moved by hand, first returns to where it left it: slowly, all joints together (chosen; a real box
-# leaves that to the operator).
+# leaves that to the operator). The time of streams is not scaled: they ramp to rest and up again by themselves.
 
 
-# Rate of change of the time scaling [1/s]. Chosen: as for the speed slider, at rest after 0.25 s.
+# Rate of the time scaling in a pause and after it [1/s]. Chosen: as for the speed slider.
 PAUSE_RATE = 4.0
 # Leading axis on the return to the path [rad/s, rad/s^2]. Chosen: slow.
 RETURN_SPEED, RETURN_ACCELERATION = 0.25, 1.0
 
 
-class TimeScaling:
-    """The rate of time on the path: a factor that ramps to 0 while `paused`, else to 1; `slowing` in 1/s."""
+class PathTime:
+    """The rate of time on the path: a factor that ramps to 0 while `paused`, else to 1.
+
+    The target of a cycle is where the factor at its beginning leads; its speed is that of the factor at its
+    end. Source: recordings of the first move of a program; there the first cycle already advances by a step
+    of the ramp (`runs_up`).
+
+    Attributes:
+        slowing, rising: rates of change of the factor [1/s].
+    """
 
     def __init__(self) -> None:
-        self.paused = False
+        self.paused = self.runs_up = False
         self.factor = 1.0
-        self.slowing = PAUSE_RATE
+        self.slowing = self.rising = PAUSE_RATE
 
     @property
     def is_normal(self) -> bool:
         """True without a pause, at a factor of 1."""
         return not self.paused and self.factor == 1.0
 
+    def begin(self, rate: float, *, runs_up: bool = False) -> None:
+        """Rise from a standstill."""
+        self.factor, self.rising, self.runs_up = 0.0, rate, runs_up
+
     def step(self, dt: float) -> float:
-        """Advance the ramp by a cycle."""
+        """Advance the ramp by a cycle; return the factor at its beginning."""
+        begin = self.factor
         if self.paused:
-            self.factor = max(0.0, self.factor - self.slowing * dt)
-        else:
-            self.factor = min(1.0, self.factor + PAUSE_RATE * dt)
-        return self.factor
-
-    def reset(self) -> None:
-        """End a pause without a ramp."""
-        self.paused = False
-        self.factor = 1.0
-
-
-class Suspended(NamedTuple):
-    """What continues after a pause: a move that left its path at `q` [rad], or a stream if it is renewed."""
-
-    generator: Generator
-    owner: object | None
-    q: Vector6
-
-
-class ReturnToPath:
-    """The return to where a move left its path, at `back_to` [rad]; then the move continues."""
-
-    def __init__(self, move: Move, back_to: Vector6) -> None:
-        self.move = move
-        self.back_to = back_to
-        self._return: Move | None = None
-        self.done = False
-
-    @property
-    def is_braking(self) -> bool:
-        """True until the return has begun."""
-        return self._return is None
-
-    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Come to rest, then return."""
-        if self._return is None:
-            if any(target.qd):
-                return StopJ(RETURN_ACCELERATION).step(target, dt, scale)
-            leg = move_j(target.q, self.back_to, self.move.leg.tool, a=RETURN_ACCELERATION, v=RETURN_SPEED)
-            self._return = Move(leg)
-        move = self._return
-        after = move.step(target, dt, scale)
-        self.done = move.done
-        return after
+            self.factor = max(0.0, begin - self.slowing * dt)
+        elif begin < 1.0:
+            rise = self.rising * dt
+            if self.runs_up and begin == 0.0:
+                begin = rise
+            self.factor = begin + rise if begin + rise < 1.0 - 1e-9 else 1.0
+        return begin
 
 
 # Rate of change of the speed scaling [1/s], so that the joint speeds have no step. Chosen.
@@ -111,15 +87,18 @@ SCALING_RATE = 4.0
 # The way of a slow arm: at its speed for this long [s], so that rounding is less. Chosen.
 _LEAST_LOOK_AHEAD = 0.02
 
-HOLD = Hold()
+_AT_REST = frozenset({ArmState.HOLDING, ArmState.SUSPENDED})
+_TO_REST = frozenset({ArmState.BRAKING, ArmState.SUSPENDING})
+_IN_TIME = frozenset({ArmState.MOVING, ArmState.RETURNING})
+_HOLDING, _SUSPENDED, _BY_HAND = ArmState.HOLDING, ArmState.SUSPENDED, ArmState.BY_HAND
 
 
 class OwnershipError(Exception):
-    """Another owner has the arm."""
+    """Another owner has the arm, or a pause stands."""
 
 
 class ArmMotion:
-    """One generator on the path of the program, one owner, overlays, and the joint target that follows.
+    """What the arm does, the command that has it, overlays, and the joint target that follows.
 
     When a program ends, is replaced or killed during a motion, the leading axis brakes with
     `stop_deceleration`. Users call the real stop "abrupt"; its value is not published. Chosen: the value of
@@ -127,66 +106,88 @@ class ArmMotion:
 
     Attributes:
         stop_deceleration: of the leading axis in every stop [rad/s^2].
+        state: what the arm does along the path.
         path: target along the path of the program, which generators work on.
-        target: of the joints; the same object as `path` unless overlays displace it.
+        target: of the joints; the same object as `path` unless overlays displace it or a hand guides the arm.
+        scale: speed scaling of the last cycle, 0..1.
         scaling_rate: rate of change of the speed scaling [1/s].
         braking: gives the greatest deceleration of the leading axis [rad/s^2] that the drives can give in a
             stop, in the direction of the path's velocity; None: a stop brakes as it was asked to.
     """
 
-    def __init__(self, q: Vector6, stop_deceleration: float) -> None:
+    def __init__(self, q: Vector6, stop_deceleration: float, run_up_time: float = 0.0) -> None:
+        """Hold the arm at `q` [rad]; the time on the path of a program's first move runs up so long [s]."""
         self.stop_deceleration = stop_deceleration
         self.path = self.target = JointTarget(q)
         self.braking: Callable[[JointTarget], float] | None = None
         self.scaling_rate = SCALING_RATE
-        self._generator: Generator = HOLD
-        self._owner: object | None = None
-        self._renewed = False
-        self._scale = 1.0
-        self._time_scaling = TimeScaling()
-        self._suspended: Suspended | None = None
+        self.scale = 1.0
+        self.state = _HOLDING
+        self._command: Command | None = None
+        # What brings the arm to rest, or back to its path.
+        self._ramp: Generator = StopJ(stop_deceleration)
+        self._measure: Callable[[], JointTarget] = lambda: self.path
+        self._time = PathTime()
+        self._run_up_time = run_up_time
+        self._begins_program = False
         self._chain = OverlayChain()
         self._overlays = self._chain.overlays
-        # Overlays or a pause: a single test in the hot path.
+        # Overlays, or time that is not normal: a single test in the hot path.
         self._is_special = False
+
+    # --- what others ask
 
     @property
     def owner(self) -> object | None:
         """The object that has the arm, or None."""
-        return self._owner
+        return None if self._command is None else self._command.owner
 
     @property
-    def scale(self) -> float:
-        """Speed scaling of the last cycle, 0..1."""
-        return self._scale
+    def move(self) -> Move | None:
+        """The current move, also while it is suspended."""
+        command = self._command
+        return command.generator if command is not None and isinstance(command.generator, Move) else None
 
     @property
     def goal(self) -> Vector6:
         """Joint angles at the next waypoint; those of the path if there is none [rad]."""
-        move = self._move
+        move = self.move
         goal = None if move is None else move.goal
         return self.path.q if goal is None else goal
 
     @property
     def is_moving(self) -> bool:
-        """True while a generator or an overlay moves the arm, unless a pause has stopped it."""
-        return (self._generator is not HOLD or bool(self._overlays)) and not self.is_paused
+        """True while a command, a ramp or an overlay moves the arm, unless a pause has stopped it."""
+        if self.state is _BY_HAND:
+            return self._command is not None and not self._time.paused
+        return (self.state not in _AT_REST or bool(self._overlays)) and not self.is_paused
 
     @property
     def is_paused(self) -> bool:
-        """True when a pause has brought the arm to rest."""
-        return self._time_scaling.paused and not any(self.target.qd)
+        """True when a pause has brought the arm to rest; a hand may still guide it."""
+        time = self._time
+        return time.paused and time.factor == 0.0 and self.state in (_SUSPENDED, _BY_HAND)
 
     @property
     def is_returning(self) -> bool:
-        """True while the arm returns to the path that it left in an interruption."""
-        return isinstance(self._generator, ReturnToPath)
+        """True while a move that goes on first comes to rest and back to the path that it left."""
+        if self.state is ArmState.SUSPENDING:
+            return self.move is not None and not self._time.paused
+        return self.state is ArmState.RETURNING
+
+    @property
+    def is_compliant(self) -> bool:
+        """True while the target follows the measured arm: in freedrive, and in control by torque."""
+        return self.state is _BY_HAND or self.state is ArmState.BY_TORQUE
 
     @property
     def torque(self) -> TorqueCommand | None:
         """What the drives shall give; None where they follow `target`."""
-        generator = self._generator
-        return generator.command if isinstance(generator, DirectTorque) else None
+        command = self._command
+        if self.state is not ArmState.BY_TORQUE or command is None:
+            return None
+        assert isinstance(command.generator, DirectTorque)
+        return command.generator.command
 
     def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
         """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
@@ -196,41 +197,36 @@ class ArmMotion:
             time = share * max(braking_time, _LEAST_LOOK_AHEAD)
             yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
 
-    @property
-    def _move(self) -> Move | None:
-        """The current move, also while it is interrupted."""
-        generator = self._generator if self._suspended is None else self._suspended.generator
-        if isinstance(generator, ReturnToPath):
-            return generator.move
-        return generator if isinstance(generator, Move) else None
+    # --- what threads do
 
-    # --- commands of the owner
+    def command_of(self, owner: object) -> Command | None:
+        """Return the command of `owner`, if it has the arm."""
+        return self._command if self._command is not None and self._command.owner is owner else None
 
-    def move_of(self, owner: object) -> Move | None:
-        """Return the current move of `owner`, if it has one."""
-        return self._move if self._owner is owner else None
+    def command(self, owner: object, generator: Generator) -> Command:
+        """Move the arm for `owner` from the next cycle on.
 
-    def command(self, owner: object, generator: Generator) -> None:
-        """Move the arm for `owner` from the next cycle on; OwnershipError if another owner has the arm."""
-        if self._owner is not None and self._owner is not owner:
-            raise OwnershipError
-        if isinstance(self._generator, Streamed):
-            self._generator.when_replaced(generator)
-        self._owner = owner
-        self._generator = generator
-        self._renewed = True
-
-    def command_torque(self, owner: object, generator: DirectTorque) -> None:
-        """Drive the arm by torque for `owner` in the next cycle; overlays end.
-
-        OwnershipError if another owner has the arm.
+        OwnershipError if another owner has the arm, or a pause stands. Overlays end where torque begins.
         """
-        self.command(owner, generator)
-        self._chain.clear()
-
-    def renew(self) -> None:
-        """Renew a streamed velocity for one more cycle."""
-        self._renewed = True
+        before = self._command
+        if self._time.paused or (self.owner is not None and self.owner is not owner):
+            raise OwnershipError
+        if before is not None:
+            if self.state is ArmState.STREAMING and isinstance(before.generator, Streamed):
+                before.generator.when_replaced(generator)
+            before.fate = Fate.TAKEN
+        self._command = command = Command(owner, generator, self.path.q)
+        self._go(Event.COMMAND)
+        if self._begins_program:
+            self._begins_program = False
+            if command.kind is Kind.MOVE:
+                self._time.begin(1.0 / self._run_up_time, runs_up=True)
+                self._is_special = True
+        if command.kind is Kind.STOP:
+            self._ramp = generator
+        elif command.kind is Kind.TORQUE:
+            self._chain.clear()
+        return command
 
     def release(self, owner: object) -> None:
         """End the ownership of `owner`, if it has the arm, and stop its motion at once.
@@ -238,79 +234,65 @@ class ArmMotion:
         A move whose instruction has returned for a blend continues to its waypoint: the end of a program is
         the same with and without a blend in its last move.
         """
-        if self._owner is owner:
-            move = self._move
-            if move is not None and move.returned:
-                self._owner = None
-            else:
-                self.stop()
+        command = self.command_of(owner)
+        if command is None:
+            return
+        if isinstance(command.generator, Move) and command.generator.returned:
+            command.owner = None
+        else:
+            self._go(Event.RELEASE, StopJ(self.stop_deceleration))
 
-    # --- pauses
+    # --- programs: they begin, pause, go on and end
+
+    def begin_program(self) -> None:
+        """Let the time on the path run up in the first move that follows, if that comes before a stream."""
+        self._begins_program = self._run_up_time > 0.0
 
     def pause(self, deceleration: float = 0.0) -> None:
         """Ramp the arm to rest on its path; a stream is stopped; overlays stand still too.
 
         `deceleration` of the leading axis [rad/s²], if that is faster than PAUSE_RATE.
         """
-        scaling = self._time_scaling
-        if scaling.paused:
+        time, generator = self._time, None if self._command is None else self._command.generator
+        if time.paused:
             return
-        scaling.paused = self._is_special = True
+        time.paused = self._is_special = True
         speed = max(map(abs, self.path.qd))
-        scaling.slowing = max(PAUSE_RATE, deceleration * scaling.factor / speed if speed > 0.0 else 0.0)
-        generator = self._generator
+        time.slowing = max(PAUSE_RATE, deceleration * time.factor / speed if speed > 0.0 else 0.0)
+        ramp: Generator | None = None
         if isinstance(generator, Streamed):
-            self._suspend()
-            self._generator = StopJ(deceleration) if deceleration else generator.when_paused()
+            ramp = StopJ(deceleration) if deceleration else generator.when_paused()
+        self._go(Event.PAUSE, ramp)
+        if self.state not in _IN_TIME and not self._overlays:
+            time.factor = 0.0
 
     def resume(self) -> None:
         """End a pause: a move continues, and a stream if it is renewed in this cycle."""
-        if not self._time_scaling.paused:
+        if not self._time.paused:
             return
-        self._time_scaling.paused = False
-        if (suspended := self._suspended) is not None:
-            self._suspended = None
-            generator, self._owner, back_to = suspended
-            self._generator = ReturnToPath(generator, back_to) if isinstance(generator, Move) else generator
-            self._renewed = True
-
-    def _suspend(self) -> None:
-        generator = self._generator
-        if self._suspended is None and isinstance(generator, Move | ReturnToPath | Streamed):
-            if isinstance(generator, ReturnToPath):
-                self._suspended = Suspended(generator.move, self._owner, generator.back_to)
-            else:
-                self._suspended = Suspended(generator, self._owner, self.path.q)
-
-    def _abandon(self) -> None:
-        """End the current move; it does not continue after a pause."""
-        if (move := self._move) is not None:
-            move.abandon()
-        self._suspended = None
-
-    # --- stops
-
-    def stop(self) -> None:
-        """Take the arm from its owner and ramp it to rest.
-
-        All overlays and a pause end; the path continues from the displaced target.
-        """
-        self._abandon()
-        self._brake()
-        self._time_scaling.reset()
+        self._time.paused = self._time.runs_up = False
+        self._time.rising = PAUSE_RATE
+        if self._command is not None:
+            self._command.renew()
+        self._go(Event.RESUME)
+        self._turn_back()
 
     def interrupt(self) -> None:
         """Pause by a stop that leaves the path.
 
         Overlays end, and with them a move that they displace.
         """
+        if self.state is _BY_HAND:
+            self.let_go()
+        ramp = StopJ(self.stop_deceleration)
         if self._overlays:
-            self._abandon()
-        else:
-            self._suspend()
-        self._brake()
-        self._time_scaling.paused = self._is_special = True
-        self._time_scaling.factor = 0.0
+            if self.move is not None:
+                self._end_command(Fate.TAKEN)
+            self._drop_overlays()
+        self._go(Event.INTERRUPT, ramp)
+        self._catch_drift()
+        self._time.paused = self._is_special = True
+        self._time.factor = 0.0
 
     def abort(self) -> None:
         """End a movej or movel, as one whose waypoint is where the arm comes to rest.
@@ -318,40 +300,52 @@ class ArmMotion:
         The leading axis brakes with `stop_deceleration`. A real arm does not come to rest if the move has a
         blend radius: it blends into the next one.
         """
-        if (move := self._move) is not None and not move.leg.process:
-            self._abandon()
-            self._brake()
+        if (move := self.move) is not None and not move.leg.process:
+            self._go(Event.ABORT, StopJ(self.stop_deceleration))
 
-    def place(self, q: Vector6, qd: Vector6 = ZERO6) -> None:
-        """Set the target to `q` [rad], where the joints are without a motion of the program.
+    def stop(self) -> None:
+        """Take the arm from its owner and ramp it to rest; all overlays and a pause end."""
+        self._time = PathTime()
+        self._begins_program = False
+        self._drop_overlays()
+        self._go(Event.END, StopJ(self.stop_deceleration))
+        self._catch_drift()
 
-        If they still move, with `qd` [rad/s], they are ramped to rest. A paused move returns to its path from
-        there.
+    # --- the arm is where nobody commanded it
+
+    def place(self, q: Vector6) -> None:
+        """Set the target to `q` [rad], where the joints are without a motion of the program, at rest.
+
+        A suspended move returns to its path from there.
         """
-        if self._time_scaling.paused:
-            self._suspend()
-        else:
-            self._abandon()
-        self._owner = None
-        self._generator = HOLD
         self._chain.clear()
-        self.path = self.target = JointTarget(q, qd)
-        if any(qd):
-            self._generator = StopJ(self.stop_deceleration)
+        self.path = self.target = JointTarget(q)
+        self._go(Event.PLACE)
+        if self.state is ArmState.SUSPENDING:
+            self._arrive()
+
+    def guide(self, measure: Callable[[], JointTarget]) -> None:
+        """Let the arm follow a hand; `measure` gives the measured arm. Overlays end."""
+        self._measure = measure
+        self._chain.clear()
+        self._go(Event.GUIDE)
+        if not self._time.paused:
+            self._go(Event.RESUME)
+
+    def let_go(self) -> None:
+        """Hold the arm again, where a hand has left it; joints that still move are ramped to rest."""
+        if self.state is _BY_HAND:
+            self._chain.clear()
+            self.path = self.target = self._measure()
+            event = Event.LET_GO_IN_PAUSE if self._time.paused else Event.LET_GO
+            self._go(event, StopJ(self.stop_deceleration))
 
     def retract(self, target: JointTarget) -> None:
         """Undo the last step: `target` is the one before it."""
         self._chain.clear()
         self.path = self.target = target
-        if (move := self._move) is not None:
+        if self.state is ArmState.MOVING and (move := self.move) is not None:
             move.take_back()
-
-    def _brake(self) -> None:
-        """Take the arm from its owner and ramp the joint target to rest."""
-        self._owner = None
-        if self._generator is not HOLD or self._overlays:
-            self._take_over_target()
-            self._generator = StopJ(self.stop_deceleration)
 
     # --- overlays
 
@@ -371,20 +365,73 @@ class ArmMotion:
         """
         if overlay in self._overlays:
             self._chain.keep_last(overlay)
-            if self._chain.all_ended and self._move is None:
-                self._take_over_target()
-                if self._generator is HOLD and any(self.path.qd):
-                    self._generator = StopJ(self.stop_deceleration)
+            if self._chain.all_ended and self.move is None:
+                self._drop_overlays()
+                self._catch_drift()
+
+    def _drop_overlays(self) -> None:
+        """End all overlays; the path continues from the displaced target."""
+        if self._overlays:
+            self._chain.clear()
+            self.path = self.target
 
     def _may_settle(self) -> bool:
         """True when all overlays have ended, and the move that they displaced has ended at rest."""
-        if not self._chain.all_ended or self._move is not None:
+        if not self._chain.all_ended or self.move is not None:
             return False
-        return self._generator is not HOLD or not any(self.target.qd)
+        return self.state not in _AT_REST or not any(self.target.qd)
 
-    def _take_over_target(self) -> None:
-        self._chain.clear()
-        self.path = self.target
+    def _catch_drift(self) -> None:
+        """Ramp an arm to rest that only an overlay moved."""
+        if self.state in _AT_REST and any(self.path.qd):
+            self._go(Event.DRIFT, StopJ(self.stop_deceleration))
+
+    # --- transitions
+
+    def _go(self, event: Event, ramp: Generator | None = None) -> None:
+        """Follow the table; `ramp` brings the arm to rest where that is what follows."""
+        command = self._command
+        row = TRANSITIONS.get((self.state, event, None if command is None else command.kind))
+        if row is None:
+            return
+        self.state = row.after
+        if command is not None:
+            if row.fate is Fate.SUSPENDED and command.fate is Fate.ACTIVE:
+                command.left_at, command.is_renewed = self.path.q, False
+                if isinstance(command.generator, Streamed):
+                    command.generator.scale = 0.0
+            self._end_command(row.fate)
+        if ramp is not None and row.after in _TO_REST:
+            self._ramp = ramp
+
+    def _end_command(self, fate: Fate) -> None:
+        command = self._command
+        if command is not None:
+            command.fate = fate
+            if command.is_over:
+                self._command = None
+
+    def _arrive(self) -> None:
+        """The move has arrived, or the ramp has ended."""
+        was = self.state
+        self._go(Event.STAND if self._time.paused and was is ArmState.SUSPENDING else Event.DONE)
+        if was is ArmState.RETURNING:
+            self._time.begin(PAUSE_RATE)
+            self._is_special = True
+        self._turn_back()
+        if self._time.paused:
+            self._go(Event.PAUSE)
+
+    def _turn_back(self) -> None:
+        """Begin a return to the path, if that is what follows; a move that has not left it goes on at once."""
+        command, move = self._command, self.move
+        if self.state is not ArmState.RETURNING or command is None or move is None:
+            return
+        if self.path.q == command.left_at:
+            self._go(Event.DONE)
+        else:
+            way = move_j(self.path.q, command.left_at, move.leg.tool, a=RETURN_ACCELERATION, v=RETURN_SPEED)
+            self._ramp = Move(way)
 
     # --- the cycle
 
@@ -394,64 +441,93 @@ class ArmMotion:
         `scale` is the commanded speed scaling, 0..1; during a motion it is reached gradually.
         UnreachableError if the arm cannot reach the path there.
         """
+        advance = rate = 1.0
         if self._is_special:
-            return self._special_step(dt, scale)
-        if self._generator is HOLD:
-            if any(self.target.qd) or any(self.target.qdd):
-                self.path = self.target = self.target.at_rest()
-            self._scale = scale
-            return self.target
-        self.target = self._advance(dt, scale, 1.0)
-        return self.target
-
-    def _special_step(self, dt: float, scale: float) -> JointTarget:
-        """Step with overlays or in a pause."""
-        before = self.target
-        time_factor = self._time_scaling.step(dt)
-        if time_factor > 0.0 or _brakes(self._generator):
-            path = self._advance(dt, scale, time_factor)
+            advance, rate = self._time.step(dt), self._time.factor
+        before, state = self.target, self.state
+        if state is _BY_HAND:
+            self._follow_hand(dt, scale, advance)
+        elif state in _AT_REST:
+            if any(self.path.qd) or any(self.path.qdd):
+                self.path = self.path.at_rest()
+            self.scale = scale
         else:
-            path = self.path = self.path if not any(self.path.qd) else self.path.at_rest()
-        if not self._overlays:
-            self.target = path
-        elif time_factor > 0.0 or any(path.qd):
-            self.target = self._chain.displace(path, before, dt, time_factor)
-            if self._may_settle():
-                self._take_over_target()
-        elif any(before.qd) or any(before.qdd):
-            self.target = before.at_rest()
-        self._is_special = bool(self._overlays) or not self._time_scaling.is_normal
-        return self.target
+            self._approach_scale(dt, scale)
+            self.path = self._advance(dt, advance, rate)
+        if not self._is_special:
+            if state is not _BY_HAND:
+                self.target = self.path
+            return self.target
+        return self._displace(dt, before, rate)
 
-    def _advance(self, dt: float, scale: float, time_factor: float) -> JointTarget:
-        """Advance on the path by one cycle."""
-        generator = self._generator
-        if scale != self._scale:
+    def _approach_scale(self, dt: float, scale: float) -> None:
+        if scale != self.scale:
             change = self.scaling_rate * dt
-            self._scale = scale = min(max(scale, self._scale - change), self._scale + change)
-        if isinstance(generator, Streamed):
-            if not self._renewed:
-                generator = self._generator = generator.when_lost()
-            self._renewed = False
-        if self.braking is not None and isinstance(generator, StopJ):
-            generator.allowed = self.braking(self.path)
-        path = self.path = generator.step(self.path, dt, scale * time_factor)
-        if generator.done and not isinstance(generator, Streamed):
-            self._end_of(generator)
+            self.scale = min(max(scale, self.scale - change), self.scale + change)
+
+    def _advance(self, dt: float, advance: float, rate: float) -> JointTarget:
+        """Return the target on the path after a cycle; the time factors are those of its beginning and end."""
+        state, command, scale = self.state, self._command, self.scale
+        if state in _IN_TIME:
+            generator = self._ramp if state is ArmState.RETURNING or command is None else command.generator
+            assert isinstance(generator, Move)
+            path = generator.step(self.path, dt, scale * advance, scale * rate)
+            if generator.done:
+                self.path = path
+                self._arrive()
+            elif self._time.paused and rate == 0.0:
+                self.path = path
+                self._go(Event.STAND)
+            return path
+        if command is not None and isinstance(stream := command.generator, Streamed):
+            goes_on = command.is_renewed and not self._time.paused and stream.fits(self.path, scale)
+            command.is_renewed = False
+            if state is ArmState.SUSPENDING:
+                if goes_on:
+                    self._go(Event.RENEW)
+            elif not goes_on:
+                self._go(Event.LOST, stream.when_lost())
+            if goes_on:
+                return stream.step(self.path, dt, scale)
+        ramp = self._ramp
+        if self.braking is not None and isinstance(ramp, StopJ):
+            ramp.allowed = self.braking(self.path)
+        path = ramp.step(self.path, dt, scale)
+        if ramp.done:
+            self.path = path
+            self._arrive()
         return path
 
-    def _end_of(self, generator: Generator) -> None:
-        if isinstance(generator, ReturnToPath):
-            self._generator = generator.move
-            self._time_scaling.factor = 0.0
-            self._is_special = True
+    def _follow_hand(self, dt: float, scale: float, advance: float) -> None:
+        """Follow the measured arm; a command takes its time, from where the arm was when it came."""
+        measured = self._measure()
+        command = self._command
+        if command is None or command.fate is Fate.SUSPENDED:
+            self.path = JointTarget(measured.q)
         else:
-            self._generator = HOLD
-            self._owner = None
+            self._approach_scale(dt, scale)
+            generator = command.generator
+            self.path = generator.step(self.path, dt, self.scale * advance)
+            if isinstance(generator, Streamed):
+                if not command.is_renewed:
+                    self._go(Event.LOST)
+                command.is_renewed = False
+            elif generator.done:
+                self._go(Event.DONE)
+        self.target = measured
 
-
-def _brakes(generator: Generator) -> bool:
-    """True for generators that brake; they do so in a pause too."""
-    return isinstance(generator, StopJ | StopL) or (
-        isinstance(generator, ReturnToPath) and generator.is_braking
-    )
+    def _displace(self, dt: float, before: JointTarget, rate: float) -> JointTarget:
+        """Return the target beside overlays, or in time that is not normal."""
+        path = self.path
+        if self.state is _BY_HAND:
+            pass
+        elif not self._overlays:
+            self.target = path
+        elif rate > 0.0 or any(path.qd):
+            self.target = self._chain.displace(path, before, dt, rate)
+            if self._may_settle():
+                self._drop_overlays()
+        elif any(before.qd) or any(before.qdd):
+            self.target = before.at_rest()
+        self._is_special = bool(self._overlays) or not self._time.is_normal
+        return self.target

@@ -7,9 +7,10 @@ keeps the rest of its state itself. When `done`, its last target stays in force.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from enum import Enum
 from math import hypot, inf
 from operator import sub
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.models.robot_model import ZERO6, Vector6, six
@@ -45,9 +46,19 @@ REST_SPEED = 1e-6  # rad/s
 PAUSE_DECELERATION = 4.0
 
 
+class Kind(Enum):
+    """What a generator does for the thread that commands it."""
+
+    MOVE = "a move"
+    STREAM = "a stream"
+    TORQUE = "a torque"
+    STOP = "a stop"
+
+
 class Generator(Protocol):
     """A motion, cycle by cycle, until it is `done`: it has reached its goal."""
 
+    kind: ClassVar[Kind]
     done: bool
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
@@ -86,16 +97,6 @@ def ramp_towards(
     )
 
 
-class Hold:
-    """Stands still where the last motion ended."""
-
-    done = True
-
-    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Return the same position, at rest."""
-        return target if target.qd is ZERO6 else JointTarget(target.q)
-
-
 class Streamed:
     """A motion that a script must renew in every cycle. Its time is that of the speed slider.
 
@@ -106,9 +107,22 @@ class Streamed:
         surplus: scaled time that it has run longer than it was asked to [s].
     """
 
+    kind: ClassVar[Kind] = Kind.STREAM
     done: bool
     scale = 0.0
     surplus = 0.0
+
+    def fits(self, target: JointTarget, scale: float) -> bool:
+        """Return whether the stream can go on from a target.
+
+        A stream that begins at a lowered speed scaling begins with a speed that it can have there. Faster
+        joints are braked first: a ramp in scaled time would be much longer.
+        """
+        return self.scale > 0.0 or scale >= 1.0 or self._speed_share(target) <= scale * (1.0 + 1e-9)
+
+    def _speed_share(self, target: JointTarget) -> float:
+        """Return the speed of a target as a share of the greatest of this stream."""
+        raise NotImplementedError
 
     def when_replaced(self, by: Generator) -> None:
         """Hand over to the generator that replaces this one."""
@@ -161,9 +175,16 @@ class SpeedJ(Streamed):
             qd = six([scale * v for v in after.qd])
         return target.continued(qd, dt)
 
+    def _speed_share(self, target: JointTarget) -> float:
+        return _share(max(map(abs, target.qd)), max(map(abs, self.qd)))
+
     def when_lost(self) -> Generator:
         """Stop with the acceleration of the last command."""
         return StopJ(self.a)
+
+
+def _share(speed: float, most: float) -> float:
+    return 0.0 if speed <= 0.0 else inf if most <= 0.0 else speed / most
 
 
 class StopJ:
@@ -171,6 +192,8 @@ class StopJ:
 
     `allowed` is the greatest deceleration in the next cycle. Source: URScript manual CB3 3.15, stopj.
     """
+
+    kind: ClassVar[Kind] = Kind.STOP
 
     def __init__(self, a: float) -> None:
         self.a = a
@@ -231,6 +254,9 @@ class ServoJ(Streamed):
             six([scale * w for w in after]),
             six([(scale * w - v) / dt for v, w in zip(target.qd, after, strict=True)]),
         )
+
+    def _speed_share(self, target: JointTarget) -> float:
+        return max(map(_share, map(abs, target.qd), self._qd_max))
 
     def when_lost(self) -> Generator:
         """Stop."""
@@ -330,6 +356,10 @@ class SpeedL(Streamed):
         if isinstance(by, SpeedL | StopL) and by.course.tool == self.course.tool:
             by.course = self.course
 
+    def _speed_share(self, target: JointTarget) -> float:
+        now, most = self.course.twist_at(target), self._twist
+        return max(_share(hypot(*now[:3]), hypot(*most[:3])), _share(hypot(*now[3:]), hypot(*most[3:])))
+
     def when_lost(self) -> Generator:
         """Stop with the accelerations of the last command."""
         return self._stop(self._a, self._a_rot)
@@ -346,6 +376,8 @@ class SpeedL(Streamed):
 
 class StopL:
     """Decelerate the tool to rest. Source: URScript manual CB3 3.15, stopl."""
+
+    kind: ClassVar[Kind] = Kind.STOP
 
     def __init__(self, a: float, a_rot: float, tool: Tool) -> None:
         """Take the decelerations [m/s^2, rad/s^2]."""
@@ -388,6 +420,7 @@ class TorqueCommand(NamedTuple):
 class DirectTorque(Streamed):
     """Follow the measured arm while the drives give a torque; `measure` gives its angles and speeds."""
 
+    kind: ClassVar[Kind] = Kind.TORQUE
     done = False
 
     def __init__(self, command: TorqueCommand, measure: Callable[[], JointTarget]) -> None:
@@ -397,6 +430,9 @@ class DirectTorque(Streamed):
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Return the measured arm; speed scaling has no effect."""
         return self._measure()
+
+    def _speed_share(self, target: JointTarget) -> float:
+        return 0.0
 
     def when_lost(self) -> Generator:
         """Hold the position where the arm comes to rest."""

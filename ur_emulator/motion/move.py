@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import accumulate
 from math import ceil, dist, inf, sqrt
+from typing import ClassVar
 
 from ur_emulator.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.motion.blend import Blend, blend
-from ur_emulator.motion.generators import JointTarget
+from ur_emulator.motion.generators import JointTarget, Kind
 from ur_emulator.motion.leg import Leg
 from ur_emulator.motion.path import JointCurve, JointPath
 from ur_emulator.motion.path_samples import JOINT_SPEED_SHARE, Limits, Sample, joint_limits
@@ -156,6 +157,8 @@ class Move:
         left_out: the move after the last one of the chain, if its waypoint is left out for now.
     """
 
+    kind: ClassVar[Kind] = Kind.MOVE
+
     def __init__(self, leg: Leg) -> None:
         """Plan a leg from rest to rest."""
         self._leg = leg = leg.with_duration()
@@ -254,8 +257,11 @@ class Move:
             radius *= _SHRINK
         return False
 
-    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Advance on the path by `scale * dt`; UnreachableError if the arm cannot reach the path there."""
+    def step(self, target: JointTarget, dt: float, scale: float, rate: float | None = None) -> JointTarget:
+        """Advance on the path by `scale * dt`; UnreachableError if the arm cannot reach the path there.
+
+        `rate` is the speed scaling at the end of the cycle, if that is another one.
+        """
         self._cycle = dt
         self.n_joined = 0
         time = self._time + scale * dt
@@ -270,18 +276,13 @@ class Move:
         segment = self._segments[k]
         begin = self._ends[k - 1] if k > 0 else 0.0
         q, slope = segment.path.at(min(segment.begin + (s - begin) / segment.scale, segment.end), near)
-        rate = scale * speed / segment.scale
-        qd = six([rate * x for x in slope])
+        factor = (scale if rate is None else rate) * speed / segment.scale
+        qd = six([factor * x for x in slope])
         return JointTarget(q, qd, six([(b - a) / dt for a, b in zip(target.qd, qd, strict=True)]))
 
     def take_back(self) -> None:
         """Undo the last step: its target was not accepted."""
         self._time = self._time_before
-
-    def abandon(self) -> None:
-        """End the move where the arm is, for those that wait for its end."""
-        self.done = True
-        self.left_out = None
 
     def _use(self, found: SpeedPlan | SmoothPlan) -> None:
         """Begin to execute a plan for the segments."""

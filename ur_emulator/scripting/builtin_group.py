@@ -15,8 +15,10 @@ from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.motion.generators import Generator as MotionGenerator
+from ur_emulator.motion.generators import StopJ, StopL
+from ur_emulator.motion.ownership import Command
 from ur_emulator.motion.tool import Tool
-from urscript import HostFunction, ScriptRuntimeError
+from urscript import NEXT_CYCLE, HostFunction, ScriptRuntimeError
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -77,12 +79,22 @@ class ScriptArm:
         """Return the twist of the TCP at joint angles [rad] and speeds [rad/s]."""
         return self.model.state(q, qd, self.settings.tcp_offset).tcp_speed
 
-    def take(self, thread: object, generator: MotionGenerator) -> None:
+    def stop(self, thread: object, ramp: StopJ | StopL) -> Cycles:
+        """Bring the arm to rest for `thread`, and wait until it rests, or something else has the arm."""
+        yield from until_over(self.take(thread, ramp))
+
+    def take(self, thread: object, generator: MotionGenerator) -> Command:
         """Let `thread` move the arm with `generator` from the next cycle on."""
         try:
-            self.motion.command(thread, generator)
+            return self.motion.command(thread, generator)
         except OwnershipError:
             raise ScriptRuntimeError("Another thread is already controlling the robot") from None
+
+
+def until_over(command: Command) -> Cycles:
+    """Wait until a motion has come to its end, or was taken away."""
+    while not command.is_over:
+        yield NEXT_CYCLE
 
 
 def require_positive(function: str, **limits: float) -> None:

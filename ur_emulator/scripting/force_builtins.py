@@ -54,9 +54,8 @@ class ForceBuiltins(BuiltinGroup):
             )
         blocked = [x == 0 for x in free_axes]
         hold = AxisHold(self._arm.tool, turn, blocked, q) if any(blocked) else None
-        if not self._compliance.is_in_freedrive:
-            self._compliance.check_payload(self._force_sense.residual(self._past.steady_cycles))
-        self._compliance.start_freedrive(by_program=True, hold=hold)
+        wrench = self._force_sense.residual(self._past.steady_cycles)
+        self._compliance.start_freedrive(by_program=True, hold=hold, wrench=wrench)
 
     @builtin("freedrive_mode_no_incorrect_payload_check")
     def _begin_freedrive_unchecked(self, thread: object) -> None:

@@ -13,6 +13,7 @@ from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.generators import StopJ
 from ur_emulator.motion.leg import Leg, move_j, move_tool
 from ur_emulator.motion.move import Follow, Move
+from ur_emulator.motion.ownership import Command, Fate
 from ur_emulator.motion.path import PoseLine, PosePath, arc_through
 from ur_emulator.scripting.builtin_group import (
     BuiltinGroup,
@@ -22,6 +23,7 @@ from ur_emulator.scripting.builtin_group import (
     floats,
     require_positive,
     require_range,
+    until_over,
 )
 from ur_emulator.scripting.move_planner import MovePlanner
 from urscript import NEXT_CYCLE, HostFunction, ScriptRuntimeError
@@ -160,13 +162,13 @@ class MoveBuiltins(BuiltinGroup):
         `may_overlap`: no warning about a waypoint that is left out.
         """
         arm, motion = self._arm, self._motion
-        move = motion.move_of(thread)
-        if move is not None and move.returned and not move.done:
+        before = motion.command_of(thread)
+        if before is not None and isinstance(move := before.generator, Move) and move.returned:
             last = move.leg
             if last.goal is not None and last.tool.tcp == arm.settings.tcp_offset:
                 outcome = move.follow(make(last.goal, last.goal_pose))
                 if outcome is Follow.BLENDED:
-                    yield from _wait_for_return(move)
+                    yield from _until_open(before, move)
                     return
                 if outcome is Follow.SKIPPED:
                     if not may_overlap:
@@ -175,20 +177,14 @@ class MoveBuiltins(BuiltinGroup):
                     if may_overlap or move.n_joined >= MAX_PER_CYCLE:
                         yield NEXT_CYCLE
                     return
-            while not move.done:
-                yield NEXT_CYCLE
-            if move.left_out is not None:  # without a blend none overlaps
-                arm.take(thread, lead := Move(move.left_out))
-                while not lead.done:
-                    yield NEXT_CYCLE
+            yield from until_over(before)
+            if before.fate is Fate.DONE and move.left_out is not None:  # without a blend none overlaps
+                yield from until_over(arm.take(thread, Move(move.left_out)))
         if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
-            arm.take(thread, stop := StopJ(motion.stop_deceleration))
-            while not stop.done:
-                yield NEXT_CYCLE
+            yield from arm.stop(thread, StopJ(motion.stop_deceleration))
         start = motion.path.q
         move = Move(make(start, arm.tcp_pose(start)))
-        arm.take(thread, move)
-        yield from _wait_for_return(move)
+        yield from _until_open(arm.take(thread, move), move)
 
     def _goal_of(self, function: str, goal: Any) -> Any:
         """Return joint angles or a pose in the base; a goal may be a frame, or a pose in one."""
@@ -233,11 +229,11 @@ class MoveBuiltins(BuiltinGroup):
             )
 
 
-def _wait_for_return(move: Move) -> Cycles:
+def _until_open(command: Command, move: Move) -> Cycles:
     """Wait until a move's instruction returns; with waypoints close together perhaps in this cycle."""
     if move.done:
         yield NEXT_CYCLE
-    while not move.open or (move.n_joined >= MAX_PER_CYCLE and not move.done):
+    while not (command.is_over or (move.open and (move.done or move.n_joined < MAX_PER_CYCLE))):
         yield NEXT_CYCLE
     move.returned = True
 

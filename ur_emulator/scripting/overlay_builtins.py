@@ -16,8 +16,9 @@ from ur_emulator.scripting.builtin_group import (
     builtin,
     floats,
     require_positive,
+    until_over,
 )
-from urscript import NEXT_CYCLE, ScriptRuntimeError
+from urscript import ScriptRuntimeError
 from urscript.values import Pose, wrap_int
 
 # The encoder of the old builtins that give none.
@@ -49,10 +50,9 @@ class PathOffsetBuiltins(BuiltinGroup):
     @builtin("path_offset_disable")
     def _disable(self, thread: object, a: float) -> Cycles:
         require_positive("path_offset_disable", a=a)
-        self._arm.take(thread, ramp := StopJ(a))
+        command = self._arm.take(thread, StopJ(a))
         self.end()
-        while not ramp.done:
-            yield NEXT_CYCLE
+        yield from until_over(command)
 
     @builtin("path_offset_set")
     def _set(self, thread: object, offset: Any, kind: float) -> None:
@@ -191,10 +191,9 @@ class ConveyorBuiltins(BuiltinGroup):
     def _stop(self, thread: object, a: float) -> Cycles:
         a = a or STOP_DECELERATION  # field programs write 0
         require_positive("stop_conveyor_tracking", a=a)
-        self._arm.take(thread, ramp := StopJ(a))
+        command = self._arm.take(thread, StopJ(a))
         self.end()
-        while not ramp.done:
-            yield NEXT_CYCLE
+        yield from until_over(command)
 
     @builtin("get_target_tcp_pose_along_path")
     def _pose_along_path(self, thread: object) -> Pose:

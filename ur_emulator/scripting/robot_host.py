@@ -77,7 +77,7 @@ class RobotHost:
             ConveyorBuiltins(arm, state.encoders, state.clock),
             PathOffsetBuiltins(arm),
         )
-        torque = TorqueBuiltins(state.motion, state.compliance, state.past, state.events)
+        torque = TorqueBuiltins(arm, state.past, state.events)
         own = _functions((*self._ending, torque))
         self._builtins = {**shared, **own, "random": lambda thread: random()}
 

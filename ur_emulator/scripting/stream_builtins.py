@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ur_emulator.controller.compliance import Compliance
 from ur_emulator.controller.events import EventQueue, LogAdded
 from ur_emulator.controller.past_cycles import PastCycles
 from ur_emulator.models.robot_model import ZERO6, Vector6
 from ur_emulator.motion import generators
-from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.scripting.builtin_group import (
     MIN_LIMIT,
     BuiltinGroup,
@@ -56,37 +54,31 @@ class StreamBuiltins(BuiltinGroup):
     @builtin("stopj")
     def _stopj(self, thread: object, a: float) -> Cycles:
         require_positive("stopj", a=a)
-        return self._stop(thread, generators.StopJ(a))
+        return self._arm.stop(thread, generators.StopJ(a))
 
     @builtin("stopl")
     def _stopl(self, thread: object, a: float, aRot: float | None) -> Cycles:
         a_rot = a if aRot is None else aRot
         require_positive("stopl", a=a, aRot=a_rot)
-        return self._stop(thread, generators.StopL(a, a_rot, self._arm.tool))
+        return self._arm.stop(thread, generators.StopL(a, a_rot, self._arm.tool))
 
     def _stream(self, thread: object, generator: generators.Streamed, t: float | None) -> Cycles:
         """Renew a motion for the time t [s] of the speed slider, or until it is done."""
         motion, step_time = self._motion, self._step_time
-        self._arm.take(thread, generator)
+        command = self._arm.take(thread, generator)
         if t is not None and t > 0.0:
             left = t - generator.surplus
-            motion.renew()
             yield NEXT_CYCLE
             # Exactly one cycle for t = step time at full speed, whatever the rounding.
-            while (left := left - motion.scale * step_time) > 1e-6 * step_time:
-                motion.renew()
+            while (left := left - motion.scale * step_time) > 1e-6 * step_time and not command.is_over:
+                command.renew()
                 yield NEXT_CYCLE
             # A slow cycle is not lost or gained in the sum of many short commands.
             generator.surplus = -left if motion.scale < 1.0 else 0.0
         else:
-            while not generator.done:
-                motion.renew()
+            while not (generator.done or command.is_over):
+                command.renew()
                 yield NEXT_CYCLE
-
-    def _stop(self, thread: object, generator: generators.StopJ | generators.StopL) -> Cycles:
-        self._arm.take(thread, generator)
-        while not generator.done:
-            yield NEXT_CYCLE
 
 
 def _limit(function: str, t: float | None, **limit: float) -> float:
@@ -116,11 +108,8 @@ _COULOMB_SCALE = (0.8, 0.8, 0.7, 0.8, 0.8, 0.8)
 class TorqueBuiltins(BuiltinGroup):
     """The torque control of one program."""
 
-    def __init__(
-        self, motion: ArmMotion, compliance: Compliance, past: PastCycles, events: EventQueue
-    ) -> None:
-        self._motion = motion
-        self._compliance = compliance
+    def __init__(self, arm: ScriptArm, past: PastCycles, events: EventQueue) -> None:
+        self._arm = arm
         self._past = past
         self._events = events
         self._has_logged = False
@@ -144,16 +133,8 @@ class TorqueBuiltins(BuiltinGroup):
             _scale("viscous_scale", viscous, _VISCOUS_SCALE) if compensates else ZERO6,
             _scale("coulomb_scale", coulomb, _COULOMB_SCALE) if compensates else ZERO6,
         )
-        self._compliance.end_force()
-        try:
-            self._motion.command_torque(thread, generators.DirectTorque(command, self._measure))
-        except OwnershipError:
-            raise ScriptRuntimeError("Another thread is already controlling the robot") from None
+        self._arm.take(thread, generators.DirectTorque(command, self._past.measured))
         yield NEXT_CYCLE
-
-    def _measure(self) -> generators.JointTarget:
-        sensed = self._past.sensed
-        return generators.JointTarget(sensed.actual_q, sensed.actual_qd)
 
 
 def _scale(name: str, given: Sequence[float] | None, default: Vector6) -> Vector6:
