@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from urscript.recording_host import RecordingHost
     from urscript.run.host import Host, HostFunction
     from urscript.run.threads import ScriptThread
-    from urscript.run.waits import NEXT_CYCLE, Blocked
+    from urscript.run.waits import NEXT_CYCLE, Blocked, Outside
     from urscript.values import Matrix, Pose
 
 check_packages()
@@ -41,7 +41,7 @@ _NAMES: Final = {
     "recording_host": ("RecordingHost",),
     "run.host": ("Host", "HostFunction"),
     "run.threads": ("ScriptThread",),
-    "run.waits": ("NEXT_CYCLE", "Blocked"),
+    "run.waits": ("NEXT_CYCLE", "Blocked", "Outside"),
     "values": ("Matrix", "Pose"),
 }  # fmt: skip
 _HOME: Final = {name: module for module, names in _NAMES.items() for name in names}
@@ -54,6 +54,7 @@ __all__ = [
     "Host",
     "HostFunction",
     "Matrix",
+    "Outside",
     "Pose",
     "ProgramStatus",
     "RecordingHost",

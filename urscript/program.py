@@ -29,6 +29,7 @@ from urscript.run.interpreter_mode import InterpreterMode
 from urscript.run.metering import Meter, WorkBudget
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
+from urscript.run.waits import Outside
 from urscript.source import Source, as_bytes
 from urscript.syntax.parser import parse
 from urscript.values import size_of
@@ -201,15 +202,19 @@ class RunningProgram:
         return self._scheduler.is_between
 
     @property
-    def waits_outside(self) -> bool:
-        """Whether all threads have had their turn, and one waits for something outside the box."""
+    def waits_outside(self) -> Outside | None:
+        """Who outside the box the program waits for, when all threads have had their turn.
+
+        For a peer if one thread does; for the operator if one does and no thread can run.
+        """
         if self._scheduler.is_between:
-            return False
-        for thread in self._scheduler.threads:
-            wait = thread.wait
-            if wait is not None and wait.outside and not wait.ready():
-                return True
-        return False
+            return None
+        waits = [thread.wait for thread in self._scheduler.threads]
+        who = {wait.outside for wait in waits if wait is not None and wait.outside and not wait.ready()}
+        if Outside.PEER in who:
+            return Outside.PEER
+        is_idle = all(wait is not None and not wait.ready() for wait in waits)
+        return Outside.OPERATOR if who and is_idle else None
 
     def step(self) -> ProgramStatus:
         """Run one control cycle; after the end it does nothing."""

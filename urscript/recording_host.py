@@ -16,7 +16,7 @@ from urscript.catalogue import CB3_3_15, STEP_TIME, Builtin, Catalogue, TimeClas
 from urscript.program import CompiledProgram, ProgramStatus, RunningProgram
 from urscript.run.host import EnterMode, HostFunction
 from urscript.run.threads import ScriptThread
-from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
+from urscript.run.waits import NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import Pose, Struct
 
 MOVE_CYCLES: Final = 3
@@ -224,7 +224,7 @@ class RecordingHost:
     ) -> Generator[Wait, None, list[int]]:
         peer = self.sockets.get(socket_name)
         if peer is not None and not peer.is_readable():
-            yield Blocked(peer.is_readable, outside=True)
+            yield Blocked(peer.is_readable, Outside.PEER)
         if peer is None or not peer.frames:
             return [0] + [-1] * number
         return [number, *peer.frames.popleft()]

@@ -45,6 +45,7 @@ from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import FlangePush, Plant, PlantState
 from ur_hil.tools import ToolModel
 from urscript.run.host import Host
+from urscript.run.waits import Outside
 
 # --- The snapshot of a cycle: the records of target, sensors and box one after the other
 
@@ -206,20 +207,23 @@ class Controller:
     @property
     def is_busy(self) -> bool:
         """True while a program runs, the arm moves, a mode changes or a protective stop is locked."""
+        return self.programs.has_work or self._settle > self._settle_cycles or self._is_moving
+
+    @property
+    def waits_outside(self) -> Outside | None:
+        """Who outside the box a script waits for; None while the arm or its surroundings need time."""
+        waits = self.programs.waits_outside
+        return None if waits is Outside.OPERATOR and self._is_moving else waits
+
+    @property
+    def _is_moving(self) -> bool:
         return (
-            self.programs.has_work
-            or self.state.motion.is_moving
+            self.state.motion.is_moving
             or self.state.mode.is_changing
             or self.safety.is_stopping
-            or self._settle > self._settle_cycles
             or self.push.will_end
             or any(gripper.is_busy for gripper in self.state.grippers)
         )
-
-    @property
-    def waits_outside(self) -> bool:
-        """True while a script waits for data from outside the box."""
-        return self.programs.waits_outside
 
     def tick(self, commands: Iterable[Command]) -> Snapshot:
         """Advance one control cycle; return what ports publish of it.

@@ -12,6 +12,7 @@ from ur_emulator.controller import events
 from ur_emulator.controller.state import ControllerState
 from urscript import CompiledProgram, Host, ProgramStatus, RunningProgram
 from urscript.run.metering import WorkBudget
+from urscript.run.waits import Outside
 
 # Looked up once: a cycle asks for them several times.
 _PLAYING, _PAUSED = ProgramState.PLAYING, ProgramState.PAUSED
@@ -101,9 +102,9 @@ class ProgramRunner:
         return self._primary.position(self._primary.threads[0])[0]
 
     @property
-    def waits_outside(self) -> bool:
-        """True when a program waits for data from outside the box."""
-        return self._primary is not None and self._phase is _PLAYING and self._primary.waits_outside
+    def waits_outside(self) -> Outside | None:
+        """Who outside the box the program waits for."""
+        return self._primary.waits_outside if self._primary and self._phase is _PLAYING else None
 
     # --- commands
 

@@ -34,6 +34,7 @@ from ur_emulator.loop.steps import StepRunner, Steps, settle
 from ur_emulator.loop.worker import Ticket
 from ur_emulator.models.robot_generation import Software
 from urscript import CompiledProgram
+from urscript.run.waits import Outside
 
 T = TypeVar("T")
 
@@ -290,8 +291,12 @@ class ServedBox:
 
     @property
     def waits_outside(self) -> bool:
-        """True while a script waits for the outside and no command wants a cycle."""
-        return not self._commands and self.controller.waits_outside
+        """True while a script waits for the outside and no command wants a cycle.
+
+        Who waits for a time does not wait for the operator.
+        """
+        waits = self.controller.waits_outside
+        return bool(waits and not self._commands and not (waits is Outside.OPERATOR and self._is_awake))
 
     @property
     def readers_full(self) -> bool:

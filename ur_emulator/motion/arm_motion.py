@@ -15,7 +15,7 @@ Must not know scripts or physics: an owner is any object, compared by identity.
 from collections.abc import Callable, Iterator
 from math import inf
 
-from ur_emulator.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.models.robot_model import Vector6, six
 from ur_emulator.motion.generators import (
     DirectTorque,
     Generator,
@@ -34,7 +34,7 @@ from ur_emulator.motion.ownership import TRANSITIONS, ArmState, Command, Event, 
 #
 # An arm that has stopped on its path continues exactly there. An arm that has left its path, in a fast stop
 # or moved by hand, first returns to where it left it: slowly, all joints together (chosen; a real box
-# leaves that to the operator). The time of streams is not scaled: they ramp to rest and up again by themselves.
+# leaves that to the operator). Streams are not scaled: they ramp to rest and up again by themselves.
 
 
 # Rate of the time scaling in a pause and after it [1/s]. Chosen: as for the speed slider.
@@ -64,6 +64,11 @@ class PathTime:
         """True without a pause, at a factor of 1."""
         return not self.paused and self.factor == 1.0
 
+    def resume(self) -> None:
+        """End a pause; the factor rises from where it is."""
+        self.paused = self.runs_up = False
+        self.rising = PAUSE_RATE
+
     def begin(self, rate: float, *, runs_up: bool = False) -> None:
         """Rise from a standstill."""
         self.factor, self.rising, self.runs_up = 0.0, rate, runs_up
@@ -88,9 +93,8 @@ SCALING_RATE = 4.0
 _LEAST_LOOK_AHEAD = 0.02
 
 _AT_REST = frozenset({ArmState.HOLDING, ArmState.SUSPENDED})
-_TO_REST = frozenset({ArmState.BRAKING, ArmState.SUSPENDING})
 _IN_TIME = frozenset({ArmState.MOVING, ArmState.RETURNING})
-_HOLDING, _SUSPENDED, _BY_HAND = ArmState.HOLDING, ArmState.SUSPENDED, ArmState.BY_HAND
+_BRAKING, _BY_HAND = ArmState.BRAKING, ArmState.BY_HAND
 
 
 class OwnershipError(Exception):
@@ -122,7 +126,7 @@ class ArmMotion:
         self.braking: Callable[[JointTarget], float] | None = None
         self.scaling_rate = SCALING_RATE
         self.scale = 1.0
-        self.state = _HOLDING
+        self.state = ArmState.HOLDING
         self._command: Command | None = None
         # What brings the arm to rest, or back to its path.
         self._ramp: Generator = StopJ(stop_deceleration)
@@ -166,12 +170,12 @@ class ArmMotion:
     def is_paused(self) -> bool:
         """True when a pause has brought the arm to rest; a hand may still guide it."""
         time = self._time
-        return time.paused and time.factor == 0.0 and self.state in (_SUSPENDED, _BY_HAND)
+        return time.paused and time.factor == 0.0 and self.state in (ArmState.SUSPENDED, _BY_HAND)
 
     @property
     def is_returning(self) -> bool:
-        """True while a move that goes on first comes to rest and back to the path that it left."""
-        if self.state is ArmState.SUSPENDING:
+        """True while a move that goes on comes to rest first, and then back to the path that it has left."""
+        if self.state is _BRAKING:
             return self.move is not None and not self._time.paused
         return self.state is ArmState.RETURNING
 
@@ -183,11 +187,10 @@ class ArmMotion:
     @property
     def torque(self) -> TorqueCommand | None:
         """What the drives shall give; None where they follow `target`."""
-        command = self._command
-        if self.state is not ArmState.BY_TORQUE or command is None:
-            return None
-        assert isinstance(command.generator, DirectTorque)
-        return command.generator.command
+        if self.state is ArmState.BY_TORQUE and self._command is not None:
+            generator = self._command.generator
+            return generator.command if isinstance(generator, DirectTorque) else None
+        return None
 
     def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
         """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
@@ -208,7 +211,7 @@ class ArmMotion:
 
         OwnershipError if another owner has the arm, or a pause stands. Overlays end where torque begins.
         """
-        before = self._command
+        before, kind = self._command, generator.kind
         if self._time.paused or (self.owner is not None and self.owner is not owner):
             raise OwnershipError
         if before is not None:
@@ -217,15 +220,15 @@ class ArmMotion:
             before.fate = Fate.TAKEN
         self._command = command = Command(owner, generator, self.path.q)
         self._go(Event.COMMAND)
+        if kind is Kind.STOP:
+            self._ramp = generator
+        elif kind is Kind.TORQUE:
+            self._chain.clear()
         if self._begins_program:
             self._begins_program = False
-            if command.kind is Kind.MOVE:
+            if kind is Kind.MOVE:
                 self._time.begin(1.0 / self._run_up_time, runs_up=True)
                 self._is_special = True
-        if command.kind is Kind.STOP:
-            self._ramp = generator
-        elif command.kind is Kind.TORQUE:
-            self._chain.clear()
         return command
 
     def release(self, owner: object) -> None:
@@ -234,18 +237,17 @@ class ArmMotion:
         A move whose instruction has returned for a blend continues to its waypoint: the end of a program is
         the same with and without a blend in its last move.
         """
-        command = self.command_of(owner)
-        if command is None:
+        if (command := self.command_of(owner)) is None:
             return
         if isinstance(command.generator, Move) and command.generator.returned:
             command.owner = None
         else:
-            self._go(Event.RELEASE, StopJ(self.stop_deceleration))
+            self._brake(Event.TAKEN)
 
     # --- programs: they begin, pause, go on and end
 
     def begin_program(self) -> None:
-        """Let the time on the path run up in the first move that follows, if that comes before a stream."""
+        """Let the time on the path run up in the first motion that follows, if that is a move."""
         self._begins_program = self._run_up_time > 0.0
 
     def pause(self, deceleration: float = 0.0) -> None:
@@ -259,10 +261,10 @@ class ArmMotion:
         time.paused = self._is_special = True
         speed = max(map(abs, self.path.qd))
         time.slowing = max(PAUSE_RATE, deceleration * time.factor / speed if speed > 0.0 else 0.0)
-        ramp: Generator | None = None
         if isinstance(generator, Streamed):
-            ramp = StopJ(deceleration) if deceleration else generator.when_paused()
-        self._go(Event.PAUSE, ramp)
+            self._go(Event.PAUSE, StopJ(deceleration) if deceleration else generator.when_paused())
+        else:
+            self._go(Event.PAUSE)
         if self.state not in _IN_TIME and not self._overlays:
             time.factor = 0.0
 
@@ -270,8 +272,7 @@ class ArmMotion:
         """End a pause: a move continues, and a stream if it is renewed in this cycle."""
         if not self._time.paused:
             return
-        self._time.paused = self._time.runs_up = False
-        self._time.rising = PAUSE_RATE
+        self._time.resume()
         if self._command is not None:
             self._command.renew()
         self._go(Event.RESUME)
@@ -282,15 +283,12 @@ class ArmMotion:
 
         Overlays end, and with them a move that they displace.
         """
-        if self.state is _BY_HAND:
-            self.let_go()
-        ramp = StopJ(self.stop_deceleration)
+        self.let_go()
         if self._overlays:
             if self.move is not None:
-                self._end_command(Fate.TAKEN)
+                self._brake(Event.TAKEN)
             self._drop_overlays()
-        self._go(Event.INTERRUPT, ramp)
-        self._catch_drift()
+        self._brake(Event.INTERRUPT)
         self._time.paused = self._is_special = True
         self._time.factor = 0.0
 
@@ -301,44 +299,54 @@ class ArmMotion:
         blend radius: it blends into the next one.
         """
         if (move := self.move) is not None and not move.leg.process:
-            self._go(Event.ABORT, StopJ(self.stop_deceleration))
+            self._brake(Event.TAKEN)
 
     def stop(self) -> None:
         """Take the arm from its owner and ramp it to rest; all overlays and a pause end."""
-        self._time = PathTime()
         self._begins_program = False
         self._drop_overlays()
-        self._go(Event.END, StopJ(self.stop_deceleration))
-        self._catch_drift()
+        self._brake(Event.TAKEN)
+        self._time = PathTime()
+        self._go(Event.RESUME)
+
+    def _brake(self, event: Event) -> None:
+        """Follow an event with the deceleration of every stop, also where only an overlay moved the arm."""
+        ramp = StopJ(self.stop_deceleration)
+        self._go(event, ramp)
+        if self.state in _AT_REST and any(self.path.qd):
+            self._go(Event.DRIFT, ramp)
 
     # --- the arm is where nobody commanded it
 
     def place(self, q: Vector6) -> None:
         """Set the target to `q` [rad], where the joints are without a motion of the program, at rest.
 
-        A suspended move returns to its path from there.
+        A move that is suspended in a pause returns to its path from there.
         """
+        if not self._time.paused:
+            self._go(Event.TAKEN)
         self._chain.clear()
         self.path = self.target = JointTarget(q)
-        self._go(Event.PLACE)
-        if self.state is ArmState.SUSPENDING:
+        if self.state is _BRAKING:
             self._arrive()
 
     def guide(self, measure: Callable[[], JointTarget]) -> None:
         """Let the arm follow a hand; `measure` gives the measured arm. Overlays end."""
-        self._measure = measure
-        self._chain.clear()
-        self._go(Event.GUIDE)
-        if not self._time.paused:
-            self._go(Event.RESUME)
+        if self.state is not _BY_HAND:
+            self._measure = measure
+            self._chain.clear()
+            self._go(Event.GUIDE)
+            if not self._time.paused:
+                self._go(Event.RESUME)
 
     def let_go(self) -> None:
         """Hold the arm again, where a hand has left it; joints that still move are ramped to rest."""
         if self.state is _BY_HAND:
+            if not self._time.paused:
+                self._go(Event.TAKEN)
             self._chain.clear()
             self.path = self.target = self._measure()
-            event = Event.LET_GO_IN_PAUSE if self._time.paused else Event.LET_GO
-            self._go(event, StopJ(self.stop_deceleration))
+            self._brake(Event.LET_GO)
 
     def retract(self, target: JointTarget) -> None:
         """Undo the last step: `target` is the one before it."""
@@ -367,7 +375,7 @@ class ArmMotion:
             self._chain.keep_last(overlay)
             if self._chain.all_ended and self.move is None:
                 self._drop_overlays()
-                self._catch_drift()
+                self._brake(Event.DRIFT)
 
     def _drop_overlays(self) -> None:
         """End all overlays; the path continues from the displaced target."""
@@ -375,55 +383,39 @@ class ArmMotion:
             self._chain.clear()
             self.path = self.target
 
-    def _may_settle(self) -> bool:
-        """True when all overlays have ended, and the move that they displaced has ended at rest."""
-        if not self._chain.all_ended or self.move is not None:
-            return False
-        return self.state not in _AT_REST or not any(self.target.qd)
-
-    def _catch_drift(self) -> None:
-        """Ramp an arm to rest that only an overlay moved."""
-        if self.state in _AT_REST and any(self.path.qd):
-            self._go(Event.DRIFT, StopJ(self.stop_deceleration))
-
     # --- transitions
 
     def _go(self, event: Event, ramp: Generator | None = None) -> None:
-        """Follow the table; `ramp` brings the arm to rest where that is what follows."""
+        """Follow the table; `ramp` brings the arm to rest where it has to brake."""
         command = self._command
-        row = TRANSITIONS.get((self.state, event, None if command is None else command.kind))
+        row = TRANSITIONS.get((self.state, event, None if command is None else command.generator.kind))
         if row is None:
             return
         self.state = row.after
-        if command is not None:
+        if ramp is not None and row.after is _BRAKING:
+            self._ramp = ramp
+        if command is not None and row.fate is not None:
             if row.fate is Fate.SUSPENDED and command.fate is Fate.ACTIVE:
                 command.left_at, command.is_renewed = self.path.q, False
                 if isinstance(command.generator, Streamed):
                     command.generator.scale = 0.0
-            self._end_command(row.fate)
-        if ramp is not None and row.after in _TO_REST:
-            self._ramp = ramp
-
-    def _end_command(self, fate: Fate) -> None:
-        command = self._command
-        if command is not None:
-            command.fate = fate
+            command.fate = row.fate
             if command.is_over:
                 self._command = None
 
     def _arrive(self) -> None:
         """The move has arrived, or the ramp has ended."""
-        was = self.state
-        self._go(Event.STAND if self._time.paused and was is ArmState.SUSPENDING else Event.DONE)
+        was, is_paused = self.state, self._time.paused
+        self._go(Event.STAND if was is _BRAKING and is_paused else Event.DONE)
         if was is ArmState.RETURNING:
             self._time.begin(PAUSE_RATE)
             self._is_special = True
         self._turn_back()
-        if self._time.paused:
+        if is_paused:
             self._go(Event.PAUSE)
 
     def _turn_back(self) -> None:
-        """Begin a return to the path, if that is what follows; a move that has not left it goes on at once."""
+        """Begin a return to the path; a move that has not left it goes on at once."""
         command, move = self._command, self.move
         if self.state is not ArmState.RETURNING or command is None or move is None:
             return
@@ -444,80 +436,70 @@ class ArmMotion:
         advance = rate = 1.0
         if self._is_special:
             advance, rate = self._time.step(dt), self._time.factor
-        before, state = self.target, self.state
-        if state is _BY_HAND:
-            self._follow_hand(dt, scale, advance)
-        elif state in _AT_REST:
-            if any(self.path.qd) or any(self.path.qdd):
-                self.path = self.path.at_rest()
+        path, before = self.path, self.target
+        if self.state in _AT_REST:
             self.scale = scale
+            if any(path.qd) or any(path.qdd):
+                path = path.at_rest()
         else:
-            self._approach_scale(dt, scale)
-            self.path = self._advance(dt, advance, rate)
-        if not self._is_special:
-            if state is not _BY_HAND:
-                self.target = self.path
-            return self.target
-        return self._displace(dt, before, rate)
-
-    def _approach_scale(self, dt: float, scale: float) -> None:
-        if scale != self.scale:
-            change = self.scaling_rate * dt
-            self.scale = min(max(scale, self.scale - change), self.scale + change)
+            if scale != self.scale:
+                change = self.scaling_rate * dt
+                self.scale = min(max(scale, self.scale - change), self.scale + change)
+            path = (
+                self._follow_hand(dt, advance) if self.state is _BY_HAND else self._advance(dt, advance, rate)
+            )
+        self.path = path
+        if self._is_special:
+            self._displace(before, dt, rate)
+        elif self.state is not _BY_HAND:
+            self.target = path
+        return self.target
 
     def _advance(self, dt: float, advance: float, rate: float) -> JointTarget:
-        """Return the target on the path after a cycle; the time factors are those of its beginning and end."""
-        state, command, scale = self.state, self._command, self.scale
-        if state in _IN_TIME:
-            generator = self._ramp if state is ArmState.RETURNING or command is None else command.generator
-            assert isinstance(generator, Move)
-            path = generator.step(self.path, dt, scale * advance, scale * rate)
-            if generator.done:
-                self.path = path
+        """Return the path a cycle on; the factors of its time are those of the cycle's beginning and end."""
+        command, scale = self._command, self.scale
+        if self.state in _IN_TIME:
+            move = self._ramp if self.state is ArmState.RETURNING or command is None else command.generator
+            assert isinstance(move, Move)
+            self.path = move.step(self.path, dt, scale * advance, scale * rate)
+            if move.done:
                 self._arrive()
-            elif self._time.paused and rate == 0.0:
-                self.path = path
+            elif rate == 0.0 and self._time.paused:
                 self._go(Event.STAND)
-            return path
+            return self.path
         if command is not None and isinstance(stream := command.generator, Streamed):
             goes_on = command.is_renewed and not self._time.paused and stream.fits(self.path, scale)
             command.is_renewed = False
-            if state is ArmState.SUSPENDING:
-                if goes_on:
-                    self._go(Event.RENEW)
-            elif not goes_on:
-                self._go(Event.LOST, stream.when_lost())
             if goes_on:
+                self._go(Event.RENEWED)
                 return stream.step(self.path, dt, scale)
+            self._go(Event.LOST, stream.when_lost())
         ramp = self._ramp
         if self.braking is not None and isinstance(ramp, StopJ):
             ramp.allowed = self.braking(self.path)
-        path = ramp.step(self.path, dt, scale)
+        self.path = ramp.step(self.path, dt, scale)
         if ramp.done:
-            self.path = path
             self._arrive()
-        return path
+        return self.path
 
-    def _follow_hand(self, dt: float, scale: float, advance: float) -> None:
-        """Follow the measured arm; a command takes its time, from where the arm was when it came."""
-        measured = self._measure()
+    def _follow_hand(self, dt: float, advance: float) -> JointTarget:
+        """Follow the measured arm; return the path of a command, which takes its time without effect."""
+        self.target = self._measure()
         command = self._command
         if command is None or command.fate is Fate.SUSPENDED:
-            self.path = JointTarget(measured.q)
-        else:
-            self._approach_scale(dt, scale)
-            generator = command.generator
-            self.path = generator.step(self.path, dt, self.scale * advance)
-            if isinstance(generator, Streamed):
-                if not command.is_renewed:
-                    self._go(Event.LOST)
-                command.is_renewed = False
-            elif generator.done:
+            return JointTarget(self.target.q)
+        generator = command.generator
+        path = generator.step(self.path, dt, self.scale * advance)
+        if not isinstance(generator, Streamed):
+            if generator.done:
                 self._go(Event.DONE)
-        self.target = measured
+        elif not command.is_renewed:
+            self._go(Event.TAKEN)
+        command.is_renewed = False
+        return path
 
-    def _displace(self, dt: float, before: JointTarget, rate: float) -> JointTarget:
-        """Return the target beside overlays, or in time that is not normal."""
+    def _displace(self, before: JointTarget, dt: float, rate: float) -> None:
+        """Compute the target beside overlays, or in time that is not normal."""
         path = self.path
         if self.state is _BY_HAND:
             pass
@@ -530,4 +512,9 @@ class ArmMotion:
         elif any(before.qd) or any(before.qdd):
             self.target = before.at_rest()
         self._is_special = bool(self._overlays) or not self._time.is_normal
-        return self.target
+
+    def _may_settle(self) -> bool:
+        """True when all overlays have ended, and the move that they displaced has ended at rest."""
+        if not self._chain.all_ended or self.move is not None:
+            return False
+        return self.state not in _AT_REST or not any(self.target.qd)

@@ -18,7 +18,7 @@ from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from urscript.errors import ScriptRuntimeError
 from urscript.run.host import EnterMode, HostFunction
 from urscript.run.threads import ProgramHalted
-from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
+from urscript.run.waits import NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
 _KINDS = {
@@ -66,7 +66,7 @@ class PendantBuiltins(BuiltinGroup):
 
     def _wait_for(self, request: PendantRequest) -> Generator[Blocked, None, Answer | None]:
         try:
-            yield Blocked(lambda: request.is_answered, outside=True)
+            yield Blocked(lambda: request.is_answered, Outside.OPERATOR)
         finally:
             self._pendant.withdraw(request)  # the program may have been stopped meanwhile
         return request.answer

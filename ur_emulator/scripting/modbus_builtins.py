@@ -28,7 +28,7 @@ from ur_emulator.controller.io.modbus_signals import (
 from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network
-from urscript import Blocked, ScriptRuntimeError
+from urscript import Blocked, Outside, ScriptRuntimeError
 from urscript.values import is_number, log_form, wrap_int
 
 # Source: URScript manual, modbus_add_signal.
@@ -226,7 +226,7 @@ class ModbusBuiltins(BuiltinGroup):
         if not signals:
             raise ScriptRuntimeError(f'{function}: no signal is connected to "{connection_id}"')
         if is_blocking:
-            yield Blocked(lambda: not any(signal.connection_error for signal in signals), outside=True)
+            yield Blocked(lambda: not any(signal.connection_error for signal in signals), Outside.PEER)
 
     def _signal(self, function: str, name: str, wanted: SignalType | None = None) -> ModbusSignal:
         """Return a signal, which must be of the wanted type."""

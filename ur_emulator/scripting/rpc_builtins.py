@@ -20,7 +20,7 @@ from ur_emulator.scripting.network import Network, RemoteCall, RemoteCallError, 
 from urscript import ScriptRuntimeError, ScriptThread
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.run.variables import same_type
-from urscript.run.waits import NEXT_CYCLE, Blocked, Wait
+from urscript.run.waits import NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import INT_MAX, INT_MIN, Matrix, Pose, Struct, a_type, to_script_text
 
 _IN_LISTS: Final = frozenset({bool, int, float, str, Pose, Struct})
@@ -96,7 +96,7 @@ class RemoteHandle:
         while not self._program.may_send(n_values):
             yield NEXT_CYCLE
         call: RemoteCall = self._server.call(method, [_to_wire(value) for value in arguments])
-        yield Blocked(lambda: call.is_done, outside=True)
+        yield Blocked(lambda: call.is_done, Outside.PEER)
         try:
             return _from_wire(call.result(), self._program.has_structs)
         except RemoteCallError as error:

@@ -16,7 +16,7 @@ from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network, ScriptSocket
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
-from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Wait
+from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
 # --- how a program reads a socket: texts are found in the inbox without looking at a byte twice
@@ -31,9 +31,9 @@ class SocketReader:
         self.has_asked = False
 
     @property
-    def waits_outside(self) -> bool:
-        """Bytes can come that time must wait for: from outside, or the answer of a port of the box itself."""
-        return self.has_asked or not self.socket.is_own
+    def outside(self) -> Outside | None:
+        """Who time must wait for: a peer, also a port of the box itself that was asked."""
+        return Outside.PEER if self.has_asked or not self.socket.is_own else None
 
     def take(self, size: int) -> bytes:
         """Take bytes out of the inbox."""
@@ -128,7 +128,7 @@ class SocketBuiltins(BuiltinGroup):
         reader = self._sockets[name] = SocketReader(socket)
         expired = self._timer(OPEN_TIMEOUT)
         if socket.is_connecting:
-            yield Blocked(lambda: not socket.is_connecting or expired(), outside=True)
+            yield Blocked(lambda: not socket.is_connecting or expired(), Outside.PEER)
         elif not socket.is_open:
             yield NEXT_CYCLE  # a loop of opens that fail at once must not fill the log
         if not socket.is_open or socket.is_connecting:
@@ -217,7 +217,7 @@ class SocketBuiltins(BuiltinGroup):
                 yield NEXT_CYCLE
             if is_over():
                 break
-            yield Blocked(lambda: not self._may_search() or is_over(), outside=reader.waits_outside)
+            yield Blocked(lambda: not self._may_search() or is_over(), reader.outside)
             has_waited = True
         if not has_waited:
             yield CHECKPOINT
@@ -262,10 +262,10 @@ class SocketBuiltins(BuiltinGroup):
             def has_come(n_bytes: int) -> bool:
                 return len(inbox) >= n_bytes or not socket.is_open or clock.program_tick >= end
 
-            if socket.is_own and reader.waits_outside:
+            if socket.is_own and reader.outside:
                 # The box's own answer comes whole: what it lacks will not come.
-                yield Blocked(lambda: has_come(1), outside=True)
-            yield Blocked(lambda: has_come(enough), outside=not socket.is_own)
+                yield Blocked(lambda: has_come(1), Outside.PEER)
+            yield Blocked(lambda: has_come(enough), None if socket.is_own else Outside.PEER)
         else:
             yield CHECKPOINT
         if not 0 < size <= len(inbox):

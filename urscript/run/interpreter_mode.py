@@ -15,7 +15,7 @@ from urscript.run.host import EnterMode
 from urscript.run.metering import Meter
 from urscript.run.threads import Scheduler, ScriptThread
 from urscript.run.variables import UNDEFINED
-from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Wait
+from urscript.run.waits import CHECKPOINT, Blocked, Outside, Wait
 from urscript.source import Source
 
 _LINK_STATEMENTS: Final = 10
@@ -94,9 +94,7 @@ class InterpreterMode:
                 queue.cleared()
             statements = queue.take()
             if statements is None:
-                # Time passes while other threads run; alone, the program waits for the outside.
-                alone = all(thread.finished or thread is main for thread in scheduler.threads)
-                yield Blocked(queue.is_ready, outside=True) if alone else NEXT_CYCLE
+                yield Blocked(queue.is_ready, Outside.OPERATOR)
                 continue
             scheduler.deepen(main, statements.depth)
             yield from self._link(statements)()

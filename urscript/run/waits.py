@@ -16,18 +16,24 @@ NEXT_CYCLE: Final = _NextCycle.NEXT_CYCLE
 """The thread's time slice of this cycle is used up: it continues in the next one."""
 
 
+class Outside(Enum):
+    """Who outside the box lets a thread wait. In lockstep, time stops meanwhile."""
+
+    PEER = "a program, whose bytes or connection have not come"
+    OPERATOR = "a person, or who acts for one: only if nothing else in the box needs time"
+
+
 class Blocked:
     """The thread cannot run until `ready()` is true.
 
     Attributes:
         ready: Called once a cycle or more often; must be cheap and without side effects.
-        outside: The thread waits for something outside the box (bytes of a peer); in lockstep, time
-            stops until it comes.
+        outside: Who outside the box it waits for; None: for the box itself.
     """
 
     __slots__ = ("outside", "ready")
 
-    def __init__(self, ready: Callable[[], bool], outside: bool = False) -> None:
+    def __init__(self, ready: Callable[[], bool], outside: Outside | None = None) -> None:
         self.ready = ready
         self.outside = outside
 
