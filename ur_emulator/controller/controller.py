@@ -256,6 +256,8 @@ class Controller:
         was_active = was_active or (control is _BY_HAND and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
         snapshot = make_snapshot(state, self.programs, self.plant.report(state.past.sensed))
+        # What has stopped the arm may have dropped its target.
+        target = state.motion.target
         state.past.add(snapshot, target, sensed, is_still=not control and not any(target.qd))
         return snapshot
 

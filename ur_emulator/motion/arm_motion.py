@@ -131,6 +131,7 @@ class ArmMotion:
         # What brings the arm to rest, or back to its path.
         self._ramp: Generator = StopJ(stop_deceleration)
         self._measure: Callable[[], JointTarget] = lambda: self.path
+        self._has_followed_hand = False
         self._time = PathTime()
         self._run_up_time = run_up_time
         self._begins_program = False
@@ -321,8 +322,9 @@ class ArmMotion:
     def place(self, q: Vector6) -> None:
         """Set the target to `q` [rad], where the joints are without a motion of the program, at rest.
 
-        A move that is suspended in a pause returns to its path from there.
+        A hand lets go. A move that is suspended in a pause returns to its path from there.
         """
+        self.let_go()
         if not self._time.paused:
             self._go(Event.TAKEN)
         self._chain.clear()
@@ -333,8 +335,8 @@ class ArmMotion:
     def guide(self, measure: Callable[[], JointTarget]) -> None:
         """Let the arm follow a hand; `measure` gives the measured arm. Overlays end."""
         if self.state is not _BY_HAND:
-            self._measure = measure
-            self._chain.clear()
+            self._measure, self._has_followed_hand = measure, False
+            self._drop_overlays()
             self._go(Event.GUIDE)
             if not self._time.paused:
                 self._go(Event.RESUME)
@@ -345,7 +347,8 @@ class ArmMotion:
             if not self._time.paused:
                 self._go(Event.TAKEN)
             self._chain.clear()
-            self.path = self.target = self._measure()
+            if self._has_followed_hand:
+                self.path = self.target = self._measure()
             self._brake(Event.LET_GO)
 
     def retract(self, target: JointTarget) -> None:
@@ -484,7 +487,7 @@ class ArmMotion:
 
     def _follow_hand(self, dt: float, advance: float) -> JointTarget:
         """Follow the measured arm; return the path of a command, which takes its time without effect."""
-        self.target = self._measure()
+        self.target, self._has_followed_hand = self._measure(), True
         command = self._command
         if command is None or command.fate is Fate.SUSPENDED:
             return JointTarget(self.target.q)

@@ -192,7 +192,8 @@ class ForceMode:
         self._sensing = sensing
         self._joint_compliance = 1.0 / np.array(stiffness)
         self._shift: Pose = ZERO6
-        self._speed = np.zeros(6)  # of the displacement, base axes
+        self._speed = np.zeros(6)  # of the displacement, beside what it cancels of the path; base axes
+        self._cancelling = np.zeros((6, 6))
         measured = measure()
         self._wrench = np.array(measured.wrench)
         self._twist = np.array(measured.twist)
@@ -221,24 +222,24 @@ class ForceMode:
     def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """See Overlay."""
         along_path = ZERO6 if self._path_pose is None else pose_sub(tool_pose, self._path_pose)
-        self._path_pose = tool_pose
         measured = self._measure()
         share = dt / (self._sensing.filter_time + dt)
         self._wrench += share * (np.array(measured.wrench) - self._wrench)
         self._twist += share * (np.array(measured.twist) - self._twist)
         place = pose_add(self._shift, tool_pose)
         axes = self.frame.turn(place, [displacement / dt for displacement in along_path])
-        if axes is None or not self._chosen.any():
-            speed = np.zeros(6)
-            cancelled = np.zeros(6)
-        else:
-            rotation = _block_diagonal(axes)
-            speed = rotation @ self._axis_speeds(rotation, measured.q, dt)
-            # The program's motion along compliant axes, turned by the displacement, is cancelled.
-            displacement = np.array(along_path)
-            displacement[3:] = rotvec_to_matrix(self._shift[3:]) @ displacement[3:]
-            cancelled = rotation @ np.where(self._chosen, rotation.T @ displacement, 0.0)
-        step = 0.5 * dt * (self._speed + speed) - cancelled
+        rotation = np.eye(6) if axes is None else _block_diagonal(axes)
+        chosen = np.zeros(6, dtype=bool) if axes is None else self._chosen
+        # The program's motion along compliant axes, turned by the displacement, is cancelled. The tool goes on
+        # with its speed where axes begin or cease to be compliant.
+        displacement = np.array(along_path)
+        displacement[3:] = rotvec_to_matrix(self._shift[3:]) @ displacement[3:]
+        if self._path_pose is not None:
+            before, self._cancelling = self._cancelling, (rotation * chosen) @ rotation.T
+            self._speed = self._speed + (self._cancelling - before) @ displacement / dt
+        speed = rotation @ self._axis_speeds(rotation, chosen, measured.q, dt)
+        step = 0.5 * dt * (self._speed + speed) - self._cancelling @ displacement
+        self._path_pose = tool_pose
         self._speed = speed
         self._shift = pose_add(six(step.tolist()), self._shift)
         return pose_add(self._shift, tool_pose)
@@ -259,9 +260,12 @@ class ForceMode:
         return Deviation(axis, float(off[axis]), float(limits[axis]))
 
     def _axis_speeds(
-        self, rotation: NDArray[np.float64], q: Sequence[float], dt: float
+        self, rotation: NDArray[np.float64], chosen: NDArray[np.bool_], q: Sequence[float], dt: float
     ) -> NDArray[np.float64]:
-        """Return the speeds along the axes of the task frame at the end of this cycle."""
+        """Return the speeds along the axes of the task frame at the end of this cycle, 0 of stiff axes."""
+        before = rotation.T @ self._speed
+        if not chosen.any():
+            return before - np.clip(before, -_ACCELERATION * dt, _ACCELERATION * dt)
         if self._gain_time_left < 0.5 * dt:
             self._gain = self._rate * self._compliance(rotation, q)
             self._gain_time_left = _GAIN_TIME
@@ -269,7 +273,6 @@ class ForceMode:
         gain = self._gain
         missing = self._demanded + rotation.T @ self._wrench
         pressing = gain * missing
-        before = rotation.T @ self._speed
         kept = self._kept ** (dt / _DAMPING_TIME)
         # The exact solution: the force acts for a shorter time while the damping takes from what it gives.
         gained = self._mobility * dt * ((kept - 1.0) / log(kept) if 0.0 < kept < 1.0 else kept)
@@ -277,8 +280,8 @@ class ForceMode:
         # A motion that a wrench within the friction causes is not free.
         moved = _FREE_SHARE * _shortened(rotation.T @ self._twist, gain * _IDLE_WRENCH)
         wanted = pressing + np.clip(free, np.minimum(moved, 0.0), np.maximum(moved, 0.0))
-        wanted = np.clip(wanted, before - _ACCELERATION * dt, before + _ACCELERATION * dt)
-        return np.where(self._chosen, np.clip(wanted, -self._limits, self._limits), 0.0)
+        wanted = np.where(chosen, np.clip(wanted, -self._limits, self._limits), 0.0)
+        return np.clip(wanted, before - _ACCELERATION * dt, before + _ACCELERATION * dt)
 
     def _compliance(self, rotation: NDArray[np.float64], q: Sequence[float]) -> NDArray[np.float64]:
         """Return the least compliance of the tool along compliant axes (6,), for forces and for moments."""

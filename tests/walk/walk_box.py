@@ -1,0 +1,223 @@
+"""A served box that stands still unless it is told to go on: its loop runs in this thread, cycle by cycle.
+
+All its ports are open. Clients of this process are served between the cycles, and the box waits for its worker,
+so the same actions in the same cycles give the same walk, but for the turns of the sockets.
+"""
+
+import math
+import socket
+import struct
+import time
+from dataclasses import dataclass
+
+from ur_emulator.box import Box
+from ur_emulator.box_options import BoxOptions
+from ur_emulator.errors import EmulatorError
+from ur_emulator.loop.event_loop import EventLoop
+
+_HANG = 30.0  # s of real time; no walk waits for it
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A robot and its software."""
+
+    name: str
+    robot: str
+    version: str
+    tool: str = "none"
+    services: tuple[str, ...] = ()
+
+
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("CB3 3.15", "ur3", "3.15"),
+        Kind("CB3 3.4", "ur5", "3.4"),
+        Kind("5.12", "ur3e", "5.12", "robotiq-2f85"),
+        Kind("5.25", "ur5e", "5.25.1"),
+        Kind("X", "ur5e", "10.12", services=("primary", "rtde")),
+    )
+}
+
+
+class WalkBox:
+    """A box on a loop of its own.
+
+    Attributes:
+        served: the box behind its ports.
+        clients: open connections by name; those that broke are gone.
+    """
+
+    publish_at = -math.inf
+
+    def __init__(self, kind, seed, programs, fidelity="typical"):
+        options = BoxOptions(
+            kind.robot, kind.version, port_base=None, seed=seed, programs=programs, fidelity=fidelity,
+            tool=kind.tool, services=kind.services,
+        )  # fmt: skip
+        self._loop = EventLoop(precise=False)
+        self._box = Box(options, loop=self._loop)
+        self._box.on_end = self._loop.stop
+        self.served = self._box._box
+        self.served._pacer, self.served._repeats = self, False
+        self.player = self._box._player
+        self.clients = {}
+        self._left = 0
+        self._until = None
+        self._began = 0.0
+        self._error = None
+        self._box.listen()
+        self._loop.add(self)
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.listener.setblocking(False)
+        self.peers = []
+
+    @property
+    def controller(self):
+        return self.served.controller
+
+    @property
+    def now(self):
+        return self.served.snapshot
+
+    @property
+    def port(self):
+        """Where programs may connect to."""
+        return self.listener.getsockname()[1]
+
+    def watch(self, look, note):
+        """Call `look(snapshot)` after every cycle, and `note(event)`; an error in `look` is raised by `tick`."""
+        box = self
+
+        class Watcher:
+            def publish(self, snapshot):
+                try:
+                    if box._error is None:
+                        look(snapshot)
+                except AssertionError as error:
+                    box._error = error
+
+        self.served._publishers = (*self.served._publishers, Watcher())
+        self.served._listeners = (*self.served._listeners, note)
+
+    # --- the pacer
+
+    def may_tick(self, now, situation):
+        if self._left <= 0 or not self._loop.tasks.is_idle:
+            return False
+        self._left -= 1
+        return True
+
+    def next_call(self, now):
+        return now if self._left > 0 else now + 1e-3
+
+    # --- a service of the loop, after the box
+
+    def advance(self, now):
+        if now - self._began > _HANG:
+            raise AssertionError("the box hangs: it does not tick")
+        if self._until() or self._error is not None:
+            self._loop.stop()
+        return now + 1e-3
+
+    def failed(self, error):
+        raise error
+
+    def _run(self, until):
+        self._until, self._began = until, time.monotonic()
+        self._loop._stopping = False
+        self._loop.run()
+        if self._error is not None:
+            raise self._error
+        if self._box.failure is not None:
+            raise AssertionError("the box has ended") from self._box.failure
+
+    # --- what a walk does
+
+    def tick(self, cycles):
+        self._left += cycles
+        self._run(lambda: self._left <= 0)
+
+    def settle(self, turns=5):
+        """Give clients and worker their turns; no time passes."""
+        left = [turns]
+
+        def is_settled():
+            left[0] -= 1
+            return left[0] <= 0 and self._loop.tasks.is_idle
+
+        self._run(is_settled)
+
+    def perform(self, name, /, **arguments):
+        """Have an operation of the control API done, in a cycle or some; what is refused is refused."""
+        self._do(lambda done: self._box.operations.begin(name, arguments, done))
+
+    def steps(self, steps):
+        """Have done what the player does in steps."""
+        self._do(lambda done: self.served.steps.start(steps, done))
+
+    def _do(self, begin):
+        outcome = []
+        begin(lambda result, error: outcome.append(error))
+        for _ in range(50):
+            self.tick(1)
+            if outcome:
+                break
+        if outcome and outcome[0] is not None and not isinstance(outcome[0], EmulatorError):
+            raise AssertionError("an operation failed") from outcome[0]
+
+    def connect(self, name):
+        """A client of a port; the one before it leaves."""
+        self.leave(name)
+        number = getattr(self._box.served_at.ports, name)
+        if number:
+            client = socket.create_connection(("127.0.0.1", number))
+            client.setblocking(False)
+            self.clients[name] = client
+            self.settle()
+
+    def leave(self, name):
+        if client := self.clients.pop(name, None):
+            client.close()
+            self.settle()
+
+    def send(self, name, data):
+        """Send what a client says, connecting first if need be, and read what came."""
+        if name not in self.clients:
+            self.connect(name)
+        if client := self.clients.get(name):
+            try:
+                client.send(data)
+            except OSError:
+                self.leave(name)
+        self.settle()
+        self.read()
+
+    def read(self):
+        """Let all clients read what they have, and peers of programs be silent."""
+        for name, client in tuple(self.clients.items()):
+            try:
+                while client.recv(1 << 16):
+                    pass
+                self.leave(name)
+            except BlockingIOError:
+                pass
+            except OSError:
+                self.leave(name)
+        try:
+            while True:
+                self.peers.append(self.listener.accept()[0])
+        except BlockingIOError:
+            pass
+
+    def close(self):
+        for sock in (*self.clients.values(), *self.peers, self.listener):
+            sock.close()
+        self._box.close()
+        self._loop.close()
+
+
+def rtde(kind, payload=b""):
+    """A package of RTDE."""
+    return struct.pack(">HB", 3 + len(payload), ord(kind)) + payload
