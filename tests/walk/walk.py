@@ -9,7 +9,7 @@ import shutil
 import struct
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from walk_box import KINDS, WalkBox, rtde
@@ -21,8 +21,7 @@ from dashboard_support import external_control, installation, urp
 
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 
-RECOVERY = 40  # one step of so many is a recovery
-LOADED = 4  # program files of a walk
+LOADED = 9  # program files of a walk; the last one asks a PC for its program
 
 
 @dataclass(frozen=True)
@@ -98,11 +97,11 @@ _OPERATIONS = (
     (1, "confirm_safety", {}),
 )
 _ACTIONS = (
-    (14, "play", None),
-    (6, "load", lambda rng, make: (rng.randrange(LOADED),)),
+    (6, "play", None),
+    (1, "load", lambda rng, make: (rng.randrange(LOADED),)),
     (3, "player pause", None),
-    (2, "player stop", None),
-    (8, "send", _sent),
+    (1, "player stop", None),
+    (2, "send", _sent),
     (
         3,
         "secondary",
@@ -127,7 +126,6 @@ _ACTIONS = (
         lambda rng, make: (rng.choice(["SET ACT 1 GTO 1", "SET POS 255", "SET POS 0", "GET POS"]),),
     ),
     (2, "obstacle", lambda rng, make: (rng.choice([True, False]),)),
-    (2, "recover", None),
 )
 
 
@@ -139,15 +137,24 @@ def make_walk(kind_name, seed, length):
         home, version = box.controller.state.robot.home_q, box.served.identity.software
         names = statements_of(version.catalogue)
 
-    def make(rng, count=None):
-        chosen = rng.sample(names, min(len(names), count or rng.randint(1, 5)))
+    def make(rng):
+        chosen = rng.sample(names, rng.randint(1, 4))
         return program(rng, chosen, home, "{port}")
 
     table = [(weight, "operation", (name, drawn)) for weight, name, drawn in _OPERATIONS]
     table += [(weight, name, drawn) for weight, name, drawn in _ACTIONS]
     weights = [weight for weight, _, _ in table]
     steps = []
-    while len(steps) < length:
+    for _ in range(length):
+        if rng.random() < 0.25:
+            # A program is at work for a while, before anything happens to it.
+            started = (
+                Step("send", _sent(rng, make))
+                if rng.random() < 0.3
+                else Step("start", (rng.randrange(LOADED),))
+            )
+            steps += [Step("recover"), replace(started, cycles=rng.randint(1, 300))]
+            continue
         _, name, drawn = rng.choices(table, weights)[0]
         if name == "operation":
             operation, values = drawn
@@ -159,8 +166,6 @@ def make_walk(kind_name, seed, length):
             )
         cycles = rng.choice([1, 1, 2, 3, 5, 10, 30, 60, 120])
         steps.append(Step(name, arguments, cycles))
-        if len(steps) % RECOVERY == 0:
-            steps.append(Step("recover"))
     files = tuple(make(rng) for _ in range(LOADED - 1))
     return Walk(kind_name, seed, files, (*steps, Step("recover"), Step("new program")))
 
@@ -189,6 +194,11 @@ class Walker:
 
     def _load(self, number):
         self._box.steps(self._box.player.load(f"walk{number}.urp"))
+
+    def _start(self, number):
+        self._player_stop()
+        self._load(number)
+        self._play()
 
     def _player_pause(self):
         self._box.steps(self._box.player.pause())
@@ -287,7 +297,19 @@ class Walker:
         self._interpreter("end_interpreter()")
         if box.now.runtime_state in (ProgramState.PAUSED, ProgramState.PAUSING):
             box.perform("resume_program")
-        box.tick(round(2.0 / box.controller.period_s))
+        self._expect_progress()
+
+    def _expect_progress(self):
+        """A program that plays gets on now, or ends; the rules know how long that may take."""
+        box = self._box
+        before = self.rules.n_places
+        while not self._is_stopped() and self.rules.n_places < before + 3:
+            if box.now.runtime_state in (ProgramState.STOPPED, ProgramState.PAUSED):
+                break
+            self._interpreter("end_interpreter()")
+            box.perform("close_popups")
+            box.perform("answer", value=3)
+            box.tick(round(0.2 / box.controller.period_s))
 
     def _new_program(self):
         """The box takes a new program, and moves."""

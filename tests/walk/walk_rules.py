@@ -15,9 +15,9 @@ from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
 
 # No set-point accelerates a joint more than this [rad/s²]: the hardest of the programs' commands (6 rad/s², the
-# run-up of a CB3 box adds .38 of it) and of their paths near singularities, a stop, and a ramp of the time scaling.
-MOST = 36.0
-_OF_FORCE = 50.0  # what force mode may add
+# run-up of a CB3 box adds .38 of it), a stop, and a ramp of the time scaling; and what a path near a singularity
+# or force mode may add.
+MOST, OF_PATHS, OF_FORCE = 36.0, 60.0, 50.0
 STILL = 150  # cycles of 8 ms, after which a stopped arm stands still
 STUCK = 12.0  # s of robot time without progress in which a program should have got on
 BLOCKED = (153, 156, 157)
@@ -40,6 +40,7 @@ class Rules:
         self._still = round(STILL * 0.008 / self._dt)
         self._stopped_for = self._unpowered_for = 0
         self._progress = None
+        self.n_places = 0  # how often a program has got on
         self._waited = 0.0
         self._placed = self._held_for = 0
         self._count = 0
@@ -77,7 +78,8 @@ class Rules:
         is_on = now.robot_mode == before.robot_mode == RobotMode.RUNNING
         if is_driven and is_on and not self._placed:
             change = np.abs(np.subtract(now.target_qd, before.target_qd)).max() / self._dt
-            most = self._most + (_OF_FORCE if now.control_mode == ControlMode.FORCE else 0.0)
+            most = self._most + (OF_FORCE if now.control_mode == ControlMode.FORCE else 0.0)
+            most += OF_PATHS if self._box.controller.state.motion.move is not None else 0.0
             self._claim(change <= most, f"set-point accelerates with {change:.1f} rad/s²")
             mean = 0.5 * np.add(now.target_qd, before.target_qd) * self._dt
             jump = np.abs(np.subtract(now.target_q, before.target_q) - mean).max()
@@ -139,6 +141,7 @@ class Rules:
             tuple(running.position(thread) for thread in running.threads[:1]),
             state,
         )
+        self.n_places += place != self._progress
         if place != self._progress or held:
             self._progress, self._waited = place, 0.0
         slider = now.target_speed_fraction * (0.25 if now.safety_status == SafetyMode.REDUCED else 1.0)
