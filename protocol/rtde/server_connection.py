@@ -3,7 +3,8 @@
     PC -> robot   V, v, O, I, S, P        every one gets exactly one reply, in order
     PC -> robot   U (input data)          at any time, never a reply
     robot -> PC   U (output data)         after the reply to S, until the reply to P
-    both          M (text)                the robot sends one only to end a connection
+    both          M (text)                the robot's answer to a type that it does not know, and what it
+                                          says before it ends a connection
 
 Call `receive_data`, then `next_event` until it returns None; call `reply` after each `Request`, before the
 next event, because it decides how later bytes are read. `encoder` makes the data packages. Send the bytes
@@ -32,6 +33,7 @@ __all__ = [
     "RtdeServerConnection",
     "ServerEvent",
     "Transition",
+    "UnknownPackage",
     "cycles_per_package",
     "request_limits",
 ]
@@ -63,7 +65,9 @@ TRANSITIONS: Mapping[tuple[RtdeState, type[codec.Request]], Transition] = {
     (_STARTED, codec.Start): Transition(True, _STARTED),
     (_STARTED, codec.Pause): Transition(True, _PAUSED),
 }
-"""Every request in every state. A version that does not exist is refused in both."""
+"""Every request in every state. Refused in both: a version that does not exist, and a start without an output
+recipe, after which nothing flows.
+"""
 
 
 def cycles_per_package(frequency: float | None, rate: int) -> int:
@@ -111,7 +115,14 @@ class InputReceived:
     values: tuple[RtdeValue, ...]
 
 
-ServerEvent = codec.Request | codec.RtdeTextMessage | InputReceived
+@dataclass(frozen=True, slots=True)
+class UnknownPackage:
+    """A package of a type that RTDE does not have."""
+
+    kind: int
+
+
+ServerEvent = codec.Request | codec.RtdeTextMessage | InputReceived | UnknownPackage
 
 
 class RtdeServerConnection:
@@ -195,6 +206,10 @@ class RtdeServerConnection:
             case codec.SetupInputs():
                 reply = self._set_up_inputs(request, in_use, self._known_inputs if has_room else {})
             case codec.Start():
+                # Source: the guide says that a start fails while no outputs are set up; issue 13 of the
+                # maker's Python client. That a refused recipe counts as none is assumed.
+                if self._encoder is None:
+                    accepted, self.state = False, RtdeState.PAUSED
                 reply = codec.StartReply(accepted)
             case codec.Pause():
                 reply = codec.PauseReply(accepted)
@@ -207,6 +222,8 @@ class RtdeServerConnection:
             if kind in (codec.RtdePackageType.DATA_PACKAGE, codec.RtdePackageType.TEXT_MESSAGE):
                 return None  # no answer is expected: the connection need not end
             raise
+        if message is None:
+            return UnknownPackage(kind)
         if isinstance(message, codec.DataPackage):
             recipe = self.input_recipes.get(message.recipe_id or 0)
             if recipe is None:

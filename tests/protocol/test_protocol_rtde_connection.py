@@ -18,6 +18,7 @@ from protocol.rtde.server_connection import (
     TRANSITIONS,
     InputReceived,
     RtdeServerConnection,
+    UnknownPackage,
     cycles_per_package,
     request_limits,
 )
@@ -127,7 +128,9 @@ def test_the_table_has_every_request_in_every_state():
 def test_data_and_text_are_taken_in_every_state_and_never_answered(pair, state):
     pair.ask(M.SetupInputs(("input_int_register_0",)))
     if state is RtdeState.STARTED:
+        pair.ask(M.SetupOutputs(("timestamp",), 125.0))
         pair.ask(M.Start())
+    assert pair.robot.state is state
     data, text = M.DataPackage(struct.pack(">i", 3), 1), M.RtdeTextMessage("hello", "test")
     assert pair.to_robot(encode_message(data, M.Role.PC, 2)) == InputReceived(("input_int_register_0",), (3,))
     assert pair.to_robot(encode_message(text, M.Role.PC, 2)) == text
@@ -142,7 +145,7 @@ def test_a_request_must_be_answered_before_the_next_event(pair):
         pair.robot.next_event()
     data = pair.robot.reply()
     assert pair.robot.next_event() == M.Pause()
-    assert pair.to_pc(data + pair.robot.reply()) == [M.StartReply(True), M.PauseReply(True)]
+    assert pair.to_pc(data + pair.robot.reply()) == [M.StartReply(False), M.PauseReply(True)]
 
 
 def test_a_pipelined_version_request_decides_how_the_next_package_is_read():
@@ -178,9 +181,25 @@ def test_the_second_output_recipe_replaces_the_first(pair):
 def test_an_unknown_output_makes_the_recipe_invalid_as_a_whole(pair):
     reply = pair.ask(M.SetupOutputs(("timestamp", "ft_raw_wrench", "actual_q"), 125.0))
     assert reply == M.SetupOutputsReply(("DOUBLE", "NOT_FOUND", "VECTOR6D"), 0)
-    assert pair.ask(M.Start()) == M.StartReply(True)
-    assert pair.robot.encoder is None
     assert pair.ask(M.SetupOutputs(("timestamp",), 125.0)).recipe_id == 1
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("names", [None, (), ("no_such_variable",), ("timestamp", "ft_raw_wrench")])
+@pytest.mark.parametrize("was_started", [False, True])
+def test_there_is_no_start_without_an_output_recipe(version, names, was_started):
+    pair, frequency = Pair(version), 125.0 if version == 2 else None
+    pair.ask(M.SetupInputs(("input_int_register_0",)))
+    if was_started and names is not None:
+        pair.ask(M.SetupOutputs(("timestamp",), frequency))
+        assert pair.ask(M.Start()) == M.StartReply(True)
+    if names is not None:
+        pair.ask(M.SetupOutputs(names, frequency))
+    assert pair.ask(M.Start()) == M.StartReply(False)
+    assert pair.robot.state is pair.pc.state is RtdeState.PAUSED
+    pair.ask(M.SetupOutputs(("timestamp",), frequency))
+    assert pair.robot.encoder is None
+    assert pair.ask(M.Start()) == M.StartReply(True)
     assert pair.robot.encoder is not None
 
 
@@ -200,8 +219,6 @@ def test_one_variable_in_several_recipes_of_a_connection_is_no_conflict(pair):
 def test_empty_recipes_get_a_reply_and_no_id(pair):
     assert pair.ask(M.SetupInputs(())) == M.SetupInputsReply((), 0)
     assert pair.ask(M.SetupOutputs((), 125.0)) == M.SetupOutputsReply((), 0)
-    pair.ask(M.Start())
-    assert pair.robot.encoder is None
 
 
 def test_recipes_end_with_the_last_id(pair):
@@ -291,13 +308,19 @@ def test_requests_without_what_they_ask_end_the_connection(pair, data):
         b"\0\x08U\2abcd",  # no such recipe
         b"\0\3M",
         b"\0\6M\xffab",
-        b"\0\3X",
-        b"\0\3\0",
     ],
 )
-def test_senseless_data_text_and_types_are_skipped(pair, junk):
+def test_senseless_data_and_text_are_skipped(pair, junk):
     pair.ask(M.SetupInputs(("input_int_register_0",)))
     assert pair.to_robot(junk + pair.pc.send(M.Start())) == M.Start()
+
+
+def test_a_package_of_an_unknown_type_is_an_event(pair):
+    kinds = [kind for kind in range(256) if kind not in set(M.RtdePackageType)]
+    data = b"".join(bytes((0, 5, kind)) + b"ab" for kind in kinds)
+    pair.robot.receive_data(data + pair.pc.send(M.Start()))
+    assert [pair.robot.next_event() for _ in kinds] == [UnknownPackage(kind) for kind in kinds]
+    assert pair.robot.next_event() == M.Start()
 
 
 def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
@@ -345,7 +368,11 @@ def test_the_longest_package_is_taken(pair):
         ([], M.StartReply(True), "nothing was asked"),
         ([], M.DataPackage(bytes(8), 1), "before it had answered"),
         ([M.SetupOutputs(("timestamp",), 1.0)], M.DataPackage(bytes(8), 1), "before it had answered"),
-        ([M.Start()], M.DataPackage(bytes(8), 1), "not set up"),
+        (
+            [M.SetupOutputs(("timestamp",), 1.0), M.Start(), M.SetupOutputs((), 1.0)],
+            M.DataPackage(bytes(8), 1),
+            "not set up",
+        ),
         ([M.SetupOutputs(("timestamp",), 1.0), M.Start()], M.DataPackage(bytes(7), 1), "bytes of values"),
         ([M.SetupOutputs(("timestamp",), 1.0), M.Start()], M.DataPackage(bytes(8), 2), "not set up"),
     ],
@@ -401,4 +428,4 @@ def test_refused_requests_change_nothing_at_the_pc(pair):
 def test_what_cannot_be_sent_is_not_waited_for(pair):
     with pytest.raises(LocalProtocolError):
         pair.pc.send(M.SetupOutputs(("timestamp",)))
-    assert pair.ask(M.Start()) == M.StartReply(True)
+    assert pair.ask(M.Pause()) == M.PauseReply(True)

@@ -15,6 +15,7 @@ from protocol.rtde import codec as M
 from protocol.rtde import server_connection
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.fields import output_fields
+from protocol.rtde.types import TextLevel
 from protocol.ur_types import ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
@@ -244,6 +245,17 @@ def test_an_absurd_size_is_answered_with_a_text_and_the_end(bench):
     assert text.message.startswith("an RTDE package of 18245 bytes")
 
 
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_package_of_an_unknown_type_is_answered_with_a_text_and_the_connection_goes_on(bench, version):
+    client = bench.client() if version == 2 else Client(bench.port)
+    client.say(b"\0\3X\0\3\xff" + client.pc.send(M.Pause()))
+    letter, number, reply = client.events()
+    assert "'X' (88)" in letter.message
+    assert "(255)" in number.message
+    assert letter.level == number.level == TextLevel.WARNING
+    assert reply == M.PauseReply(True)
+
+
 def test_after_the_text_nothing_more_is_read(bench):
     client = bench.client()
     client.close_when_sent = lambda: None  # the text still waits in the outbox
@@ -374,6 +386,14 @@ def client(box):
 def run(box, text):
     with connect(box, "secondary") as sock:
         sock.sendall(text.encode())
+
+
+@pytest.mark.parametrize("head", [b"GET / HTTP/1.1", b"POST /x HTTP/1.1"])
+def test_a_whole_request_over_http_gets_the_text_about_data_that_is_not_rtde(box, head):
+    with connect(box, "rtde") as sock:
+        sock.sendall(head + b"\r\nHost: 127.0.0.1\r\n\r\n")
+        said = sock.makefile("rb").read()
+    assert M.decode_message(said[2], said[3:], M.Role.ROBOT, 1).message.startswith("an RTDE package of")
 
 
 def test_no_cycle_is_lost_in_lockstep(box, client):

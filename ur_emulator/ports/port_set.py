@@ -31,8 +31,9 @@ TOOL_LINE = "tool_line"
 SOFTWARE_OF = {"robotiq": "gripper", "onrobot": "onrobot"}
 # Ports whose numbers need privileges, and what the box lacks without them.
 _PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
-# Ports of web servers.
-_WEB = frozenset({CONTROL, ROBOT_API, SOFTWARE_OF["onrobot"]})
+# Ports that read what a browser sends: web servers, and RTDE, for which its first letters are the size of a
+# package that is too long: it says so and closes.
+_READS_HTTP = frozenset({CONTROL, ROBOT_API, SOFTWARE_OF["onrobot"], "rtde"})
 
 
 class PortSet:
@@ -108,7 +109,7 @@ class PortSet:
             name,
             limits,
             self._spare,
-            speaks_http=name in _WEB,
+            reads_http=name in _READS_HTTP,
         )
 
 
