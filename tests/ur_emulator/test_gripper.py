@@ -5,18 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from box_support import BareBox, FakeConnection
+from e_series_support import ESeriesBench
 
 from protocol.robotiq import Fault, Objects, Status
+from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.things import Thing
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.scene import load_scene
+from ur_emulator.ports.robotiq import RobotiqPort
+from ur_emulator.ports.tool_line import ToolLinePort
 from ur_hil.tools import TOOLS, tools_by_name
 
 PERIOD = 0.008
@@ -438,8 +444,11 @@ def leave(box, client):
     box.wait_until(log=f"{peer} disconnected")
 
 
+STATUS_REQUEST = bytes.fromhex("09 04 07 D0 00 01 30 0F")
+
+
 def test_the_serial_line_has_one_user_at_a_time(box, client):
-    one, three = bytes.fromhex("09 04 07 D0 00 01 30 0F"), bytes.fromhex("09 04 07 D0 00 03 B1 CE")
+    one, three = STATUS_REQUEST, bytes.fromhex("09 04 07 D0 00 03 B1 CE")
     with (
         socket.create_connection((box.host, box.ports.tool_line), timeout=10.0) as first,
         socket.create_connection((box.host, box.ports.tool_line), timeout=10.0) as second,
@@ -456,6 +465,28 @@ def test_the_serial_line_has_one_user_at_a_time(box, client):
         leave(box, first)
         second.sendall(three)
         assert second.recv(100)[:3] == bytes.fromhex("09 04 06")
+
+
+@pytest.mark.parametrize("n_others", [0, 1])
+def test_a_client_of_the_serial_line_may_leave_before_its_answer(n_others):
+    bench, commands = ESeriesBench(version=(5, 25), tools=[HAND]), []
+    bench.tick()  # the gripper has its supply
+    bare = BareBox(E_SERIES.software(SoftwareVersion(5, 25)), bench.controller, commands)
+    port = ToolLinePort(bare, bench.controller.state.grippers, RobotiqPort(bare, []))
+    client = FakeConnection(port)
+    others = [FakeConnection(port) for _ in range(n_others)]
+    client.say(STATUS_REQUEST)
+    client.close()
+    asked = 0
+    while commands:
+        asked += 1
+        taken, commands[:] = list(commands), []
+        bare.steps.publish(bench.tick(1, *taken))
+    assert asked == 2
+    assert client.sent == []
+    for other in others:
+        other.say(STATUS_REQUEST)
+        assert commands
 
 
 def test_people_put_move_and_remove_things(box):
