@@ -280,6 +280,22 @@ def test_things_come_and_go_and_the_arm_stays():
     assert bench.scene.names == ("ball",)
 
 
+@pytest.mark.parametrize("width", [0.085, 0.0])  # closed, the fingers are where the block was put
+def test_a_thing_that_has_moved_stays_when_it_cannot_be_put_again(width):
+    bench = Bench()
+    bench.scene.put(Thing("ball", "sphere", (0.03,), 0.1, 0.5, (0.6, 0.0, 0.9, 0.0, 0.0, 0.0)))
+    bench.scene.move("block", (0.5, 0.5, 0.9, 0.0, 0.0, 0.0))
+    bench.run(0.3, width)
+    before = {name: bench.scene.state(name) for name in bench.scene.names}
+    assert before["block"].twist[2] < -2.0  # they fall
+    with pytest.raises(RefusedError, match="the arm is where it should be"):
+        bench.scene.put(Thing("block", "sphere", (0.2,), 5.0, 0.5, bench.place))
+    assert {name: bench.scene.state(name) for name in bench.scene.names} == before
+    bench.scene.put(Thing("block", "sphere", (0.02,), 0.1, 0.5, (0.5, 0.0, 1.5, 0.0, 0.0, 0.0)))
+    assert bench.scene.state("block").pose == pytest.approx((0.5, 0.0, 1.5, 0.0, 0.0, 0.0))
+    assert bench.scene.state("ball") == before["ball"]
+
+
 # --- tools
 
 
