@@ -110,9 +110,7 @@ class Scene:
             raise RefusedError(f"thing {thing.name}: there are {MOST_THINGS} already, remove one first")
         # Beside the one that it replaces, which may have moved: that stays if this one is refused.
         name = PREFIX if before is not None else PREFIX + thing.name
-        body = self._spec.worldbody.add_body(
-            name=name, pos=thing.pose[:3], quat=quaternion(thing.pose[3:])
-        )
+        body = self._spec.worldbody.add_body(name=name, pos=thing.pose[:3], quat=quaternion(thing.pose[3:]))
         joint = body.add_freejoint(name=name)
         geom = _add_shape(body, thing.shape, thing.size, thing.friction)
         geom.mass = thing.mass
