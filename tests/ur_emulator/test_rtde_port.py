@@ -437,6 +437,26 @@ def test_a_client_that_does_not_read_gets_whole_packages_and_does_not_stop_the_o
         assert min(gaps) == 1
 
 
+@pytest.mark.parametrize(("pace", "times_said"), [("lockstep", 1), ("realtime", 0)])
+def test_in_lockstep_the_log_says_once_that_inputs_have_no_fixed_time(pace, times_said):
+    with ControlBox(pace=pace, port_base=None) as box, connect(box, "rtde") as sock:
+        client = RtdeClient(sock)
+        recipe = client.own("input_int_register_24")
+
+        def said():
+            return sum("writes inputs while a program runs" in entry.text for entry in box.log)
+
+        client.write(recipe, 1)
+        client.ask(M.Pause())
+        assert said() == 0
+        run(box, "def p():\n  while read_input_integer_register(24) < 3:\n    sync()\n  end\nend\n")
+        box.wait_until(program_state="PLAYING")
+        client.write(recipe, 2)
+        client.write(recipe, 3)
+        box.wait_until(program_state="STOPPED")
+        assert said() == times_said
+
+
 def test_in_lockstep_time_waits_for_a_client_that_reads_late(box):
     fields = output_fields(V3_15)
     names = ("output_int_register_24", *[name for name in fields if fields[name].type.count == 6])

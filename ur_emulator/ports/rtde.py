@@ -132,6 +132,7 @@ class _RtdeSession(Session):
                 self._say(f"RTDE has no package of type {chr(kind)!r} ({kind}): skipped", TextLevel.WARNING)
                 return _REQUEST_COST
             case InputReceived(names, values):
+                self._box.note_input(self.connection)
                 while not self._box.takes_commands:
                     yield
                 self._box.submit(WriteInputs(tuple(zip(names, values, strict=True))))
