@@ -8,7 +8,7 @@ from math import hypot
 from typing import Literal
 
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import BoxParts, inform
+from ur_emulator.controller.command import BoxParts, refuse
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.models.robot_model import Vector3, six
@@ -128,8 +128,7 @@ class AddObstacle(CommandOperation):
         try:
             box.plant.obstacles.put(self.name, self.shape, self.size, six(self.pose))
         except RefusedError as refusal:
-            inform(box.state, str(refusal))
-            raise
+            refuse(box.state, str(refusal))
 
 
 def _check_distance(what: str, pose: Sequence[float]) -> None:
@@ -197,8 +196,7 @@ class AddThing(CommandOperation):
         try:
             box.plant.put_thing(thing)
         except RefusedError as refusal:
-            inform(box.state, str(refusal))
-            raise
+            refuse(box.state, str(refusal))
 
 
 class MoveThing(CommandOperation):
