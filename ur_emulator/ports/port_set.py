@@ -168,7 +168,7 @@ def answering_ports(
 ) -> dict[str, Port]:
     """Make the ports that answer requests, by their names in `Ports`: those that the software has."""
     software = box.identity.software
-    ports: dict[str, Port] = {"modbus": ModbusPort(box)}
+    ports: dict[str, Port] = {}
     if software.dashboard:
         ports["dashboard"] = DashboardPort(box, DashboardAnswers(box, player, reports, shut_down))
     if software.has_interpreter:
@@ -193,4 +193,5 @@ def answering_ports(
 
         answers = RobotApiAnswers(box, player, reports, shut_down, host)
         ports[ROBOT_API] = HttpPort(box, answers, BUDGETS.upload_bytes)
+    ports[MODBUS] = ModbusPort(box)  # after the one that matters more where both are missing
     return ports
