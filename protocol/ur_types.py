@@ -184,7 +184,6 @@ class Ports:
 
     Attributes:
         robot_api: Robot API of PolyScope X over HTTP.
-        modbus: Modbus TCP.
         dashboard: commands for programs, power and stops, a line each.
         primary: states and all messages, ten a second; takes scripts.
         secondary: states, ten a second; takes scripts.
@@ -194,13 +193,13 @@ class Ports:
         secondary_ro: as secondary; takes nothing.
         realtime_ro: as realtime; takes nothing.
         interpreter: takes statements for a program in interpreter mode; not on CB3. Source: script manual.
-        tool_line: the serial line at the tool (docs/grippers.md).
+        modbus: Modbus TCP.
         gripper: variables of a Robotiq gripper (docs/grippers.md).
         onrobot: methods of OnRobot grippers (docs/grippers.md).
+        tool_line: the serial line at the tool (docs/grippers.md).
     """
 
     robot_api: int = 80
-    modbus: int = 502
     dashboard: int = 29999
     primary: int = 30001
     secondary: int = 30002
@@ -210,9 +209,10 @@ class Ports:
     secondary_ro: int = 30012
     realtime_ro: int = 30013
     interpreter: int = 30020
-    tool_line: int = 54321
+    modbus: int = 502
     gripper: int = 63352
     onrobot: int = 41414
+    tool_line: int = 54321
 
     @classmethod
     def of(cls, numbers: Mapping[str, int]) -> Ports:

@@ -41,21 +41,6 @@ _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Enough for hundreds of boxes with hundreds of clients, and a number that every system grants.
 WANTED_DESCRIPTORS = 65_536
 
-# Ports of the line that says that a box is ready.
-_SHOWN_PORTS = (
-    "robot_api",
-    "dashboard",
-    "primary",
-    "secondary",
-    "realtime",
-    "rtde",
-    "interpreter",
-    "modbus",
-    "gripper",
-    "onrobot",
-    "tool_line",
-)
-
 app = new_app("An emulated Universal Robots control box.")
 
 
@@ -408,8 +393,9 @@ def raise_descriptor_limit() -> int:
 
 def _ports_line(at: ServedAt) -> str:
     """Name the ports that a user may want to connect to."""
-    numbers = {name: getattr(at.ports, name) for name in _SHOWN_PORTS} | {"control": at.control_port}
-    return ", ".join(f"{name.replace('_', ' ')} {number}" for name, number in numbers.items() if number)
+    numbers = {**dataclasses.asdict(at.ports), "control": at.control_port}
+    shown = {name: number for name, number in numbers.items() if number and not name.endswith("_ro")}
+    return ", ".join(f"{name.replace('_', ' ')} {number}" for name, number in shown.items())
 
 
 def _notices(served: Sequence[ServedAt]) -> Iterator[str]:

@@ -27,47 +27,14 @@ from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [
-    "TRANSITIONS",
     "InputReceived",
     "RequestLimits",
     "RtdeServerConnection",
     "ServerEvent",
-    "Transition",
     "UnknownPackage",
     "cycles_per_package",
     "request_limits",
 ]
-
-
-class Transition(NamedTuple):
-    """The robot's answer to a request: accepted or not, and the state after it."""
-
-    accepted: bool
-    state: RtdeState
-
-
-_PAUSED, _STARTED = RtdeState
-
-TRANSITIONS: Mapping[tuple[RtdeState, type[codec.Request]], Transition] = {
-    (_PAUSED, codec.RequestProtocolVersion): Transition(True, _PAUSED),
-    (_PAUSED, codec.GetControllerVersion): Transition(True, _PAUSED),
-    (_PAUSED, codec.SetupOutputs): Transition(True, _PAUSED),
-    (_PAUSED, codec.SetupInputs): Transition(True, _PAUSED),
-    (_PAUSED, codec.Start): Transition(True, _STARTED),
-    # ur_rtde's I/O interface never starts, but waits for this reply when it ends.
-    (_PAUSED, codec.Pause): Transition(True, _PAUSED),
-    # The layout of what flows cannot change under it.
-    (_STARTED, codec.RequestProtocolVersion): Transition(False, _STARTED),
-    (_STARTED, codec.GetControllerVersion): Transition(True, _STARTED),
-    # Assumed: the guide shows set-ups before S or after P only, but not that others fail.
-    (_STARTED, codec.SetupOutputs): Transition(True, _STARTED),
-    (_STARTED, codec.SetupInputs): Transition(True, _STARTED),
-    (_STARTED, codec.Start): Transition(True, _STARTED),
-    (_STARTED, codec.Pause): Transition(True, _PAUSED),
-}
-"""Every request in every state. Refused in both: a version that does not exist, and a start without an output
-recipe, after which nothing flows.
-"""
 
 
 def cycles_per_package(frequency: float | None, rate: int) -> int:
@@ -191,16 +158,17 @@ class RtdeServerConnection:
         request, self._unanswered = self._unanswered, None
         if request is None:
             raise LocalProtocolError("nothing has been asked: one reply for each request")
-        accepted, self.state = TRANSITIONS[self.state, type(request)]
         version = self.protocol_version
         reply: codec.Reply
         match request:
             case codec.RequestProtocolVersion(wanted):
-                accepted = accepted and wanted in codec.VERSIONS
+                # The layout of what flows cannot change under it.
+                accepted = wanted in codec.VERSIONS and self.state is RtdeState.PAUSED
                 reply = codec.RequestProtocolVersionReply(accepted)
                 self.protocol_version = wanted if accepted else version
             case codec.GetControllerVersion():
                 reply = codec.GetControllerVersionReply(self._software)
+            # Assumed of both: the guide shows them before S or after P only, but not that others fail.
             case codec.SetupOutputs():
                 reply = self._set_up_outputs(request)
             case codec.SetupInputs():
@@ -208,11 +176,12 @@ class RtdeServerConnection:
             case codec.Start():
                 # Source: the guide says that a start fails while no outputs are set up; issue 13 of the
                 # maker's Python client. That a refused recipe counts as none is assumed.
-                if self._encoder is None:
-                    accepted, self.state = False, RtdeState.PAUSED
-                reply = codec.StartReply(accepted)
+                self.state = RtdeState.PAUSED if self._encoder is None else RtdeState.STARTED
+                reply = codec.StartReply(self.state is RtdeState.STARTED)
             case codec.Pause():
-                reply = codec.PauseReply(accepted)
+                # Also without a start: ur_rtde's I/O interface waits for this reply when it ends.
+                self.state = RtdeState.PAUSED
+                reply = codec.PauseReply(True)
         return codec.encode_message(reply, codec.Role.ROBOT, version)
 
     def _read(self, kind: int, payload: bytes) -> ServerEvent | None:
