@@ -308,7 +308,14 @@ def pendant(
     if token is not None:
         os.environ[PAGE_TOKEN_VARIABLE] = token
     options = _window_options(
-        hosts, control_port or (), port_base, port=port, view=view, tool=tool, cell=cell, listen=listen
+        hosts=hosts,
+        control_ports=control_port or (),
+        port_base=port_base,
+        port=port,
+        view=view,
+        tool=tool,
+        cell=cell,
+        listen=listen,
     )
     # A shell has a command in the background ignore it, also after `execv`, but not what was caught.
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -325,28 +332,9 @@ def _check_window() -> None:
 _WINDOW = (sys.executable, "-m", "ur_pendant")
 
 
-def _window_options(
-    hosts: Sequence[str],
-    control_ports: Sequence[int],
-    port_base: int,
-    *,
-    port: int,
-    listen: str,
-    view: bool,
-    tool: str | None = None,
-    cell: Path | None = None,
-) -> str:
-    options = {
-        "hosts": hosts,
-        "control_ports": control_ports,
-        "port_base": port_base,
-        "port": port,
-        "view": view,
-        "tool": tool,
-        "cell": None if cell is None else str(cell),
-        "listen": listen,
-    }
-    return json.dumps(options)
+def _window_options(**options: Any) -> str:
+    """Return the options of `ur_pendant.window.show_robots`, all of them, as its process takes them."""
+    return json.dumps(options, default=str)
 
 
 class _WindowProcess:
@@ -357,13 +345,15 @@ class _WindowProcess:
         command = [*_WINDOW, f"fd:{options}"]
         self._process = subprocess.Popen(command, env={**os.environ, **tokens}, pass_fds=[options])
         os.close(options)
-        self._describe = partial(_window_options, port=port, listen=listen, view=view)
+        self._fixed = {"port": port, "listen": listen, "view": view, "tool": None, "cell": None}
 
     def open(self, served: Sequence[ServedAt]) -> None:
         """Tell it where the boxes are."""
         hosts, controls = [at.host for at in served], [at.control_port for at in served]
+        base = served[0].port_base
+        options = _window_options(hosts=hosts, control_ports=controls, port_base=base, **self._fixed)
         with suppress(OSError):  # it has ended already
-            os.write(self._options, self._describe(hosts, controls, served[0].port_base).encode())
+            os.write(self._options, options.encode())
         os.close(self._options)
 
     def close(self) -> None:

@@ -1,15 +1,15 @@
 """The robot's side of RTDE, port 30004, without I/O.
 
     PC -> robot   V, v, O, I, S, P        every one gets exactly one reply, in order
+    PC -> robot   any other type          the reply is a text (chosen)
     PC -> robot   U (input data)          at any time, never a reply
     robot -> PC   U (output data)         after the reply to S, until the reply to P
-    both          M (text)                the robot's answer to a type that it does not know, and what it
-                                          says before it ends a connection
+    both          M (text)                the robot also sends one to end a connection
 
-Call `receive_data`, then `next_event` until it returns None; call `reply` after each `Request`, before the
-next event, because it decides how later bytes are read. `encoder` makes the data packages. Send the bytes
-that a method returns. After a LocalProtocolError nothing has changed; after a RemoteProtocolError send `text`
-and close the connection.
+Call `receive_data`, then `next_event` until it returns None; call `reply` after each `Request` and
+`UnknownPackage`, before the next event, because it decides how later bytes are read. `encoder` makes the data
+packages. Send the bytes that a method returns. After a LocalProtocolError nothing has changed; after a
+RemoteProtocolError send `text` and close the connection.
 
 Source: UR RTDE guide; where it says nothing, what public clients need, as noted at the place.
 """
@@ -23,7 +23,7 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import codec
 from protocol.rtde.fields import RtdeField
 from protocol.rtde.recipe import Recipe, recipe_of, snapshot_encoder
-from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue
+from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue, TextLevel
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [
@@ -114,7 +114,7 @@ class RtdeServerConnection:
         self._known_outputs = outputs
         self._known_inputs = inputs
         self._buffer = bytearray()
-        self._unanswered: codec.Request | None = None
+        self._unanswered: codec.Request | UnknownPackage | None = None
         self._output_ids = 0
         self._encoder: Callable[[Any], bytes] | None = None
         self.protocol_version = codec.VERSIONS[0]
@@ -159,7 +159,7 @@ class RtdeServerConnection:
         if request is None:
             raise LocalProtocolError("nothing has been asked: one reply for each request")
         version = self.protocol_version
-        reply: codec.Reply
+        reply: codec.Reply | codec.RtdeTextMessage
         match request:
             case codec.RequestProtocolVersion(wanted):
                 # The layout of what flows cannot change under it.
@@ -182,6 +182,9 @@ class RtdeServerConnection:
                 # Also without a start: ur_rtde's I/O interface waits for this reply when it ends.
                 self.state = RtdeState.PAUSED
                 reply = codec.PauseReply(True)
+            case UnknownPackage(kind):
+                text = f"RTDE has no package of type {chr(kind)!r} ({kind}): skipped"
+                reply = codec.RtdeTextMessage(text, "RTDE", TextLevel.WARNING)
         return codec.encode_message(reply, codec.Role.ROBOT, version)
 
     def _read(self, kind: int, payload: bytes) -> ServerEvent | None:
@@ -191,18 +194,16 @@ class RtdeServerConnection:
             if kind in (codec.RtdePackageType.DATA_PACKAGE, codec.RtdePackageType.TEXT_MESSAGE):
                 return None  # no answer is expected: the connection need not end
             raise
-        if message is None:
-            return UnknownPackage(kind)
         if isinstance(message, codec.DataPackage):
             recipe = self.input_recipes.get(message.recipe_id or 0)
             if recipe is None:
                 return None
             values = recipe.decode_leading(message.values)
             return InputReceived(recipe.names[: len(values)], values) if values else None
-        if isinstance(message, codec.Request):
-            self._unanswered = message
+        if isinstance(message, codec.RtdeTextMessage):
             return message
-        return message if isinstance(message, codec.RtdeTextMessage) else None
+        self._unanswered = message if isinstance(message, codec.Request) else UnknownPackage(kind)
+        return self._unanswered
 
     def _set_up_outputs(self, request: codec.SetupOutputs) -> codec.SetupOutputsReply:
         """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""

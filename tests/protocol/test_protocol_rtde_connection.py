@@ -312,12 +312,14 @@ def test_senseless_data_and_text_are_skipped(pair, junk):
     assert pair.to_robot(junk + pair.pc.send(M.Start())) == M.Start()
 
 
-def test_a_package_of_an_unknown_type_is_an_event(pair):
-    kinds = [kind for kind in range(256) if kind not in set(M.RtdePackageType)]
-    data = b"".join(bytes((0, 5, kind)) + b"ab" for kind in kinds)
-    pair.robot.receive_data(data + pair.pc.send(M.Start()))
-    assert [pair.robot.next_event() for _ in kinds] == [UnknownPackage(kind) for kind in kinds]
-    assert pair.robot.next_event() == M.Start()
+def test_a_package_of_an_unknown_type_gets_a_text_in_reply(pair):
+    for kind in set(range(256)) - set(M.RtdePackageType):
+        assert pair.to_robot(bytes((0, 5, kind)) + b"ab" + pair.pc.send(M.Pause())) == UnknownPackage(kind)
+        data = pair.robot.reply()
+        assert pair.robot.next_event() == M.Pause()
+        text, pause = pair.to_pc(data + pair.robot.reply())
+        assert f"({kind})" in text.message
+        assert pause == M.PauseReply(True)
 
 
 def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
@@ -342,7 +344,7 @@ def test_no_bytes_do_more_than_end_the_connection(data, step):
         robot.receive_data(data[start : start + step])
         try:
             while (event := robot.next_event()) is not None:
-                if type(event) in M.REQUESTS:
+                if type(event) in {*M.REQUESTS, UnknownPackage}:
                     reply = robot.reply()
                     assert int.from_bytes(reply[:2], "big") == len(reply)
         except RemoteProtocolError:

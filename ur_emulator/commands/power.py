@@ -49,8 +49,8 @@ class StartFreedrive:
         if not state.operational.allows.allows_freedrive:
             refuse(state, "freedrive refused: the operational mode is AUTOMATIC: choose manual mode")
         if state.mode.mode is not RobotMode.RUNNING or state.safety.is_stopped:
-            where = f"{state.mode.mode.name}, {state.safety.mode.name}"
-            refuse(state, f"freedrive refused: the robot is in {where}: it must be RUNNING, and not stopped")
+            modes = f"{state.mode.mode.name}, {state.safety.mode.name}"
+            refuse(state, f"freedrive refused: the robot must be RUNNING and not stopped, it is in {modes}")
         state.compliance.start_freedrive(by_client=True)
 
 

@@ -97,7 +97,7 @@ class PortSet:
         """
         box, limits, backlog, notice = self._box, self._limits, self._box.backlog, self._lines.write
         if name == CONTROL:
-            limits, backlog, notice = ClientLimits(), set(), _no_line
+            limits, backlog, notice = ClientLimits(), set(), lambda text: None
         return Listener(
             self._loop,
             self._host,
@@ -111,10 +111,6 @@ class PortSet:
             self._spare,
             reads_http=name in _READS_HTTP,
         )
-
-
-def _no_line(text: str) -> None:
-    """Leave out a line."""
 
 
 @dataclass(frozen=True, slots=True)

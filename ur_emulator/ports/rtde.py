@@ -9,12 +9,7 @@ from collections.abc import Callable
 
 from protocol.errors import RemoteProtocolError
 from protocol.rtde.codec import RtdeTextMessage, SetupInputs, SetupOutputs
-from protocol.rtde.server_connection import (
-    InputReceived,
-    RtdeServerConnection,
-    UnknownPackage,
-    cycles_per_package,
-)
+from protocol.rtde.server_connection import InputReceived, RtdeServerConnection, cycles_per_package
 from protocol.rtde.types import TextLevel
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.client_writes import WriteInputs
@@ -122,15 +117,12 @@ class _RtdeSession(Session):
             event = self.protocol.next_event()
         except RemoteProtocolError as problem:
             self.is_lost = True
-            self._say(str(problem), TextLevel.ERROR)
+            self.connection.send(self.protocol.text(RtdeTextMessage(str(problem), SOURCE, TextLevel.ERROR)))
             self.connection.close_when_sent()
             return 0
         match event:
             case None:
                 return 0
-            case UnknownPackage(kind):
-                self._say(f"RTDE has no package of type {chr(kind)!r} ({kind}): skipped", TextLevel.WARNING)
-                return _REQUEST_COST
             case InputReceived(names, values):
                 self._box.note_input(self.connection)
                 while not self._box.takes_commands:
@@ -143,9 +135,6 @@ class _RtdeSession(Session):
                 return _REQUEST_COST
         self._answer(self, event)
         return _RECIPE_COST if isinstance(event, SetupInputs | SetupOutputs) else _REQUEST_COST
-
-    def _say(self, text: str, level: TextLevel) -> None:
-        self.connection.send(self.protocol.text(RtdeTextMessage(text, SOURCE, level)))
 
     def has_room(self, n_variables: int) -> bool:
         """Whether the client may have one more input recipe, of so many variables."""
