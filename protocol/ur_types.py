@@ -88,7 +88,8 @@ class ControlMode(IntEnum):
 class SafetyMode(IntEnum):
     """State of the safety system.
 
-    Source: UR primary/secondary client interface, masterboard data; from 12 on UR client library, e-Series.
+    Source: UR primary/secondary client interface, masterboard data; from 12 on UR client library, e-Series;
+    23 messages of the ROS 2 driver (`ur_dashboard_msgs/SafetyStatus`).
     """
 
     NORMAL = 1
@@ -112,24 +113,11 @@ class SafetyMode(IntEnum):
     PROFISAFE_SAFEGUARD_STOP = 19
     PROFISAFE_EMERGENCY_STOP = 20
     SAFETY_API_SAFEGUARD_STOP = 22
+    IO_PLANE_STOP = 23
 
 
-class SafetyStatus(IntEnum):
-    """Safety mode with two more reasons, since software 3.10 / 5.4. Source: UR RTDE guide."""
-
-    NORMAL = 1
-    REDUCED = 2
-    PROTECTIVE_STOP = 3
-    RECOVERY = 4
-    SAFEGUARD_STOP = 5
-    SYSTEM_EMERGENCY_STOP = 6
-    ROBOT_EMERGENCY_STOP = 7
-    VIOLATION = 8
-    FAULT = 9
-    VALIDATE_JOINT_ID = 10
-    UNDEFINED_SAFETY_MODE = 11
-    AUTOMATIC_MODE_SAFEGUARD_STOP = 12
-    SYSTEM_THREE_POSITION_ENABLING_STOP = 13
+SafetyStatus = SafetyMode
+"""Safety mode that tells safeguard stops apart, since software 3.10 / 5.4. Source: UR RTDE guide."""
 
 
 class ProgramState(IntEnum):
@@ -196,7 +184,6 @@ class Ports:
 
     Attributes:
         robot_api: Robot API of PolyScope X over HTTP.
-        modbus: Modbus TCP.
         dashboard: commands for programs, power and stops, a line each.
         primary: states and all messages, ten a second; takes scripts.
         secondary: states, ten a second; takes scripts.
@@ -206,13 +193,13 @@ class Ports:
         secondary_ro: as secondary; takes nothing.
         realtime_ro: as realtime; takes nothing.
         interpreter: takes statements for a program in interpreter mode; not on CB3. Source: script manual.
-        tool_line: the serial line at the tool (docs/grippers.md).
+        modbus: Modbus TCP.
         gripper: variables of a Robotiq gripper (docs/grippers.md).
         onrobot: methods of OnRobot grippers (docs/grippers.md).
+        tool_line: the serial line at the tool (docs/grippers.md).
     """
 
     robot_api: int = 80
-    modbus: int = 502
     dashboard: int = 29999
     primary: int = 30001
     secondary: int = 30002
@@ -222,9 +209,10 @@ class Ports:
     secondary_ro: int = 30012
     realtime_ro: int = 30013
     interpreter: int = 30020
-    tool_line: int = 54321
+    modbus: int = 502
     gripper: int = 63352
     onrobot: int = 41414
+    tool_line: int = 54321
 
     @classmethod
     def of(cls, numbers: Mapping[str, int]) -> Ports:

@@ -41,21 +41,6 @@ _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Enough for hundreds of boxes with hundreds of clients, and a number that every system grants.
 WANTED_DESCRIPTORS = 65_536
 
-# Ports of the line that says that a box is ready.
-_SHOWN_PORTS = (
-    "robot_api",
-    "dashboard",
-    "primary",
-    "secondary",
-    "realtime",
-    "rtde",
-    "interpreter",
-    "modbus",
-    "gripper",
-    "onrobot",
-    "tool_line",
-)
-
 app = new_app("An emulated Universal Robots control box.")
 
 
@@ -147,6 +132,15 @@ def serve(
         bool, typer.Option("--pendant", help="Open a window on the box in the browser, on port 29980.")
     ] = False,
     pendant_view: Annotated[bool, typer.Option("--pendant-view", help="The same, to look only.")] = False,
+    window_port: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Port of the window; 0 takes a free one.", show_default="29980 + port base"
+        ),
+    ] = None,
+    window_host: Annotated[
+        str, typer.Option(help="Address of this machine that the window is on.")
+    ] = "127.0.0.1",
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
@@ -198,7 +192,9 @@ def serve(
         )
         options = counted_up(boxes, first)
         tokens |= {} if token is None else {TOKEN_VARIABLE: token}
-        window = _WindowProcess(tokens, view=pendant_view) if has_pendant else None
+        if window_port is None:
+            window_port = PENDANT_PORT + port_base
+        window = _WindowProcess(tokens, window_host, window_port, view=pendant_view) if has_pendant else None
         rack = LoopRack(options)
     except EmulatorError as error:
         sys.stderr.write(f"ur-emulator: {error}\n")
@@ -282,7 +278,9 @@ def ctl(
 )
 def pendant(
     hosts: Annotated[list[str], typer.Argument(metavar="HOST...", help="Boxes or real arms.")],
-    port: Annotated[int, typer.Option(help="Port of the window; 0 takes a free one.")] = PENDANT_PORT,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the window; 0 takes a free one.")
+    ] = PENDANT_PORT,
     port_base: Annotated[int, typer.Option(help="Offset of the robots' ports, as given to the box.")] = 0,
     control_port: Annotated[
         list[int] | None,
@@ -310,8 +308,17 @@ def pendant(
     if token is not None:
         os.environ[PAGE_TOKEN_VARIABLE] = token
     options = _window_options(
-        hosts, control_port or (), port_base, port, view=view, tool=tool, cell=cell, listen=listen
+        hosts=hosts,
+        control_ports=control_port or (),
+        port_base=port_base,
+        port=port,
+        view=view,
+        tool=tool,
+        cell=cell,
+        listen=listen,
     )
+    # A shell has a command in the background ignore it, also after `execv`, but not what was caught.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     os.execv(sys.executable, [*_WINDOW, options])
 
 
@@ -325,46 +332,28 @@ def _check_window() -> None:
 _WINDOW = (sys.executable, "-m", "ur_pendant")
 
 
-def _window_options(
-    hosts: Sequence[str],
-    control_ports: Sequence[int],
-    port_base: int,
-    port: int,
-    *,
-    view: bool,
-    tool: str | None = None,
-    cell: Path | None = None,
-    listen: str = "127.0.0.1",
-) -> str:
-    options = {
-        "hosts": hosts,
-        "control_ports": control_ports,
-        "port_base": port_base,
-        "port": port,
-        "view": view,
-        "tool": tool,
-        "cell": None if cell is None else str(cell),
-        "listen": listen,
-    }
-    return json.dumps(options)
+def _window_options(**options: Any) -> str:
+    """Return the options of `ur_pendant.window.show_robots`, all of them, as its process takes them."""
+    return json.dumps(options, default=str)
 
 
 class _WindowProcess:
     """The window on boxes, which loads while they do. It says where it is, or why it is not there."""
 
-    def __init__(self, tokens: Mapping[str, str], *, view: bool) -> None:
+    def __init__(self, tokens: Mapping[str, str], listen: str, port: int, *, view: bool) -> None:
         options, self._options = os.pipe()
         command = [*_WINDOW, f"fd:{options}"]
         self._process = subprocess.Popen(command, env={**os.environ, **tokens}, pass_fds=[options])
         os.close(options)
-        self._view = view
+        self._fixed = {"port": port, "listen": listen, "view": view, "tool": None, "cell": None}
 
     def open(self, served: Sequence[ServedAt]) -> None:
         """Tell it where the boxes are."""
-        base, controls = served[0].port_base, [at.control_port for at in served]
-        hosts, port = [at.host for at in served], PENDANT_PORT + base
+        hosts, controls = [at.host for at in served], [at.control_port for at in served]
+        base = served[0].port_base
+        options = _window_options(hosts=hosts, control_ports=controls, port_base=base, **self._fixed)
         with suppress(OSError):  # it has ended already
-            os.write(self._options, _window_options(hosts, controls, base, port, view=self._view).encode())
+            os.write(self._options, options.encode())
         os.close(self._options)
 
     def close(self) -> None:
@@ -394,17 +383,16 @@ def raise_descriptor_limit() -> int:
 
 def _ports_line(at: ServedAt) -> str:
     """Name the ports that a user may want to connect to."""
-    numbers = {name: getattr(at.ports, name) for name in _SHOWN_PORTS} | {"control": at.control_port}
-    return ", ".join(f"{name.replace('_', ' ')} {number}" for name, number in numbers.items() if number)
+    numbers = {**dataclasses.asdict(at.ports), "control": at.control_port}
+    shown = {name: number for name, number in numbers.items() if number and not name.endswith("_ro")}
+    return ", ".join(f"{name.replace('_', ' ')} {number}" for name, number in shown.items())
 
 
 def _notices(served: Sequence[ServedAt]) -> Iterator[str]:
     """Yield what the user should know before the boxes run."""
-    notices = [notice for at in served for notice in at.notices]
-    if notices:
-        others = f" (the same for {len(notices) - 1} more boxes)" if len(notices) > 1 else ""
-        yield f"{notices[0]}{others}"
-    first = served[0]
+    first, *others = served
+    for notice in first.notices:  # all boxes have the same options
+        yield f"{notice} (the same for {len(others)} more boxes)" if others else notice
     if not is_loopback(first.host):
         yield (
             f"other machines can reach {first.host}: whoever reaches port {first.ports.secondary} "
@@ -431,12 +419,15 @@ def _write_ready_file(path: Path, served: Sequence[ServedAt]) -> None:
         for at in served
     ]
     facts = {**boxes[0], "boxes": boxes}
-    partial = path.with_name(path.name + ".part")
+    part = Path(f"{path}.part")
     try:
-        partial.write_text(json.dumps(facts) + "\n")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+        part.write_text(json.dumps(facts) + "\n")
+        part.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        why = error.strerror
+        raise EmulatorError(f"--ready-file {path} cannot be written ({why}): give another path") from None
 
 
 def main() -> None:

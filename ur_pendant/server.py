@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import http
 import logging
-import os
 import re
 import socket
 from collections.abc import Callable
@@ -78,7 +77,8 @@ def open_server(host: str, port: int, token: str | None, title: str) -> PageServ
         )
     except OSError as error:
         raise WindowError(
-            f"port {port} of {host} cannot be opened ({os.strerror(error.errno or 0)}): give another --port"
+            f"port {port} of {host} cannot be opened ({error.strerror}): give another --port or --listen "
+            "(of `ur-emulator serve`: --window-port or --window-host)"
         ) from None
     serve = websockets.asyncio.server.serve
     pages: set[Any] = set()  # also those that have not said yet how they look at the scene

@@ -80,8 +80,8 @@ def show_recordings(files: Sequence[str], save: str | None, port: int) -> None:
 def _serve(server: PageServer, updates: list[Update]) -> None:
     """Say where the window is, and update it thirty times a second until the process is interrupted."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: `serve` ends its window with it
-    _announce(server)
     with suppress(KeyboardInterrupt):
+        _announce(server)
         while updates:
             begun = time.monotonic()
             with server.atomic():

@@ -48,7 +48,8 @@ same names in three places:
 
 An operation returns after the cycle in which it was applied, with the number of that cycle. Its
 effect may take longer; `wait_until` waits for it. Every operation that changes something is written
-to the log of the box, with the source `Control`.
+to the log of the box, with the source `Control`. What the box does not do in its present state, such as
+`power_on` in an emergency stop, is refused; what holds already, such as the power, is not.
 
 In lockstep, time stands still while the box is not active. An operation still gets its cycle. An
 effect that needs time (a push without duration, a wait for a condition) waits for a program or a

@@ -61,9 +61,9 @@ port, {_OF_ADDRESS} from one address, {BUDGETS.clients} at one box. Further clie
 closed at once, with a line in the log. If a client does not read, whole packages are dropped; on
 ports where every reply counts, the connection is closed instead. The box reads from all clients in
 turn, a piece at a time, and never when a cycle is due, so a client that sends too fast has to wait.
-A connection that begins with an HTTP request is closed, because a web page in a browser could have
-sent it. [security.md](../security.md) measures how well other clients keep their streams under
-attack. [SECURITY.md](../../SECURITY.md) says what each port allows.
+A connection that begins with an HTTP request is closed (by RTDE with a text message), because a web
+page in a browser could have sent it. [security.md](../security.md) measures how well other clients
+keep their streams under attack. [SECURITY.md](../../SECURITY.md) says what each port allows.
 """
 
 _CHOICE = """\

@@ -46,10 +46,12 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
 | `I` | names of inputs | recipe number, a type for each name |
 | `S`, `P` | start, pause | accepted |
 | `U` | recipe number, values of inputs | recipe number (version 2 only), values of outputs |
-| `M` | text | text; only before the box ends a connection |
+| `M` | text | text: to a package of another type, and before the box ends a connection |
 
 * Every request gets exactly one reply, in order; the box sends nothing else before the reply to
-  `S`.
+  `S`. A package of a type that the table does not have is skipped, with a text message.
+* `S` is refused (0) as long as the connection has no output recipe: none was set up, or the last
+  one is void.
 * Rates are the control cycles of a second, 125 on a CB3 and 500 on an e-Series, divided by a whole
   number: a request for 60 gives 62.5. Rates from 1 to all cycles are possible.
 * A connection has one output recipe, the last one, and up to {BUDGETS.rtde_recipes} input recipes with
@@ -61,8 +63,8 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
   value stays. Of a package that is too long or too short, the complete leading values are used.
 * If a client does not read, whole packages are dropped. The names of a recipe have at most
   {MAX_NAMES_SIZE} bytes, a package {_CB3.package}. An e-Series takes longer lists, in packages up to
-  {_E_SERIES.package}, but beyond {MAX_NAMES_SIZE} bytes no name twice. Data that is not RTDE ends the
-  connection, with a text message that gives the reason.
+  {_E_SERIES.package}, but beyond {MAX_NAMES_SIZE} bytes no name twice. Data that is not RTDE, such as
+  a request over HTTP, ends the connection, with a text message that gives the reason.
 * A program may watch that an input is written often enough (`rtde_set_watchdog`), and may take
   `external_force_torque` in place of the estimated force (`enable_external_ft_sensor`).
 """

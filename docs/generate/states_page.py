@@ -165,7 +165,7 @@ _ROBOT = """
 ## Robot mode
 
 `power on` and `brake release` are refused, with a line in the log, while the safety mode cuts the
-power of the joints.
+power of the joints, and in a mode below POWER_OFF. The dashboard replies as ever.
 """
 
 _JOINTS = """

@@ -108,9 +108,9 @@ class RtdeClientConnection:
                 recipe = _recipe_of(names, types)
                 if recipe is not None:
                     self._inputs[recipe_id] = recipe
-            case codec.Start(), codec.StartReply(True):
-                self.state = RtdeState.STARTED
-                self._was_started = True
+            case codec.Start(), codec.StartReply(accepted):
+                self.state = RtdeState.STARTED if accepted else RtdeState.PAUSED
+                self._was_started |= accepted
             case codec.Pause(), codec.PauseReply(True):
                 self.state = RtdeState.PAUSED
 

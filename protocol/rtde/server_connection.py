@@ -1,14 +1,15 @@
 """The robot's side of RTDE, port 30004, without I/O.
 
     PC -> robot   V, v, O, I, S, P        every one gets exactly one reply, in order
+    PC -> robot   any other type          the reply is a text (chosen)
     PC -> robot   U (input data)          at any time, never a reply
     robot -> PC   U (output data)         after the reply to S, until the reply to P
-    both          M (text)                the robot sends one only to end a connection
+    both          M (text)                the robot also sends one to end a connection
 
-Call `receive_data`, then `next_event` until it returns None; call `reply` after each `Request`, before the
-next event, because it decides how later bytes are read. `encoder` makes the data packages. Send the bytes
-that a method returns. After a LocalProtocolError nothing has changed; after a RemoteProtocolError send `text`
-and close the connection.
+Call `receive_data`, then `next_event` until it returns None; call `reply` after each `Request` and
+`UnknownPackage`, before the next event, because it decides how later bytes are read. `encoder` makes the data
+packages. Send the bytes that a method returns. After a LocalProtocolError nothing has changed; after a
+RemoteProtocolError send `text` and close the connection.
 
 Source: UR RTDE guide; where it says nothing, what public clients need, as noted at the place.
 """
@@ -22,48 +23,18 @@ from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.rtde import codec
 from protocol.rtde.fields import RtdeField
 from protocol.rtde.recipe import Recipe, recipe_of, snapshot_encoder
-from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue
+from protocol.rtde.types import IN_USE, NOT_FOUND, RtdeState, RtdeValue, TextLevel
 from protocol.ur_types import SoftwareVersion
 
 __all__ = [
-    "TRANSITIONS",
     "InputReceived",
     "RequestLimits",
     "RtdeServerConnection",
     "ServerEvent",
-    "Transition",
+    "UnknownPackage",
     "cycles_per_package",
     "request_limits",
 ]
-
-
-class Transition(NamedTuple):
-    """The robot's answer to a request: accepted or not, and the state after it."""
-
-    accepted: bool
-    state: RtdeState
-
-
-_PAUSED, _STARTED = RtdeState
-
-TRANSITIONS: Mapping[tuple[RtdeState, type[codec.Request]], Transition] = {
-    (_PAUSED, codec.RequestProtocolVersion): Transition(True, _PAUSED),
-    (_PAUSED, codec.GetControllerVersion): Transition(True, _PAUSED),
-    (_PAUSED, codec.SetupOutputs): Transition(True, _PAUSED),
-    (_PAUSED, codec.SetupInputs): Transition(True, _PAUSED),
-    (_PAUSED, codec.Start): Transition(True, _STARTED),
-    # ur_rtde's I/O interface never starts, but waits for this reply when it ends.
-    (_PAUSED, codec.Pause): Transition(True, _PAUSED),
-    # The layout of what flows cannot change under it.
-    (_STARTED, codec.RequestProtocolVersion): Transition(False, _STARTED),
-    (_STARTED, codec.GetControllerVersion): Transition(True, _STARTED),
-    # Assumed: the guide shows set-ups before S or after P only, but not that others fail.
-    (_STARTED, codec.SetupOutputs): Transition(True, _STARTED),
-    (_STARTED, codec.SetupInputs): Transition(True, _STARTED),
-    (_STARTED, codec.Start): Transition(True, _STARTED),
-    (_STARTED, codec.Pause): Transition(True, _PAUSED),
-}
-"""Every request in every state. A version that does not exist is refused in both."""
 
 
 def cycles_per_package(frequency: float | None, rate: int) -> int:
@@ -111,7 +82,14 @@ class InputReceived:
     values: tuple[RtdeValue, ...]
 
 
-ServerEvent = codec.Request | codec.RtdeTextMessage | InputReceived
+@dataclass(frozen=True, slots=True)
+class UnknownPackage:
+    """A package of a type that RTDE does not have."""
+
+    kind: int
+
+
+ServerEvent = codec.Request | codec.RtdeTextMessage | InputReceived | UnknownPackage
 
 
 class RtdeServerConnection:
@@ -136,7 +114,7 @@ class RtdeServerConnection:
         self._known_outputs = outputs
         self._known_inputs = inputs
         self._buffer = bytearray()
-        self._unanswered: codec.Request | None = None
+        self._unanswered: codec.Request | UnknownPackage | None = None
         self._output_ids = 0
         self._encoder: Callable[[Any], bytes] | None = None
         self.protocol_version = codec.VERSIONS[0]
@@ -180,24 +158,33 @@ class RtdeServerConnection:
         request, self._unanswered = self._unanswered, None
         if request is None:
             raise LocalProtocolError("nothing has been asked: one reply for each request")
-        accepted, self.state = TRANSITIONS[self.state, type(request)]
         version = self.protocol_version
-        reply: codec.Reply
+        reply: codec.Reply | codec.RtdeTextMessage
         match request:
             case codec.RequestProtocolVersion(wanted):
-                accepted = accepted and wanted in codec.VERSIONS
+                # The layout of what flows cannot change under it.
+                accepted = wanted in codec.VERSIONS and self.state is RtdeState.PAUSED
                 reply = codec.RequestProtocolVersionReply(accepted)
                 self.protocol_version = wanted if accepted else version
             case codec.GetControllerVersion():
                 reply = codec.GetControllerVersionReply(self._software)
+            # Assumed of both: the guide shows them before S or after P only, but not that others fail.
             case codec.SetupOutputs():
                 reply = self._set_up_outputs(request)
             case codec.SetupInputs():
                 reply = self._set_up_inputs(request, in_use, self._known_inputs if has_room else {})
             case codec.Start():
-                reply = codec.StartReply(accepted)
+                # Source: the guide says that a start fails while no outputs are set up; issue 13 of the
+                # maker's Python client. That a refused recipe counts as none is assumed.
+                self.state = RtdeState.PAUSED if self._encoder is None else RtdeState.STARTED
+                reply = codec.StartReply(self.state is RtdeState.STARTED)
             case codec.Pause():
-                reply = codec.PauseReply(accepted)
+                # Also without a start: ur_rtde's I/O interface waits for this reply when it ends.
+                self.state = RtdeState.PAUSED
+                reply = codec.PauseReply(True)
+            case UnknownPackage(kind):
+                text = f"RTDE has no package of type {chr(kind)!r} ({kind}): skipped"
+                reply = codec.RtdeTextMessage(text, "RTDE", TextLevel.WARNING)
         return codec.encode_message(reply, codec.Role.ROBOT, version)
 
     def _read(self, kind: int, payload: bytes) -> ServerEvent | None:
@@ -213,10 +200,10 @@ class RtdeServerConnection:
                 return None
             values = recipe.decode_leading(message.values)
             return InputReceived(recipe.names[: len(values)], values) if values else None
-        if isinstance(message, codec.Request):
-            self._unanswered = message
+        if isinstance(message, codec.RtdeTextMessage):
             return message
-        return message if isinstance(message, codec.RtdeTextMessage) else None
+        self._unanswered = message if isinstance(message, codec.Request) else UnknownPackage(kind)
+        return self._unanswered
 
     def _set_up_outputs(self, request: codec.SetupOutputs) -> codec.SetupOutputsReply:
         """Replace the output recipe. One that is refused takes no id, and nothing is sent until the next."""

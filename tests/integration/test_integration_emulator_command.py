@@ -71,14 +71,22 @@ def test_an_address_that_is_not_of_this_machine_is_one_line_and_exit_1(ur_emulat
     check_complaint(ur_emulator_command("serve", "--port-base", free_port_base(), "--host", host), host)
 
 
-def test_a_ready_file_that_cannot_be_written_is_one_line_and_exit_1():
-    check_complaint(serve("--ready-file", "/nowhere/ready.json"), "/nowhere/ready.json")
-
-
-def test_a_ready_file_that_cannot_take_its_place_leaves_no_part(tmp_path):
-    (tmp_path / "ready.json").mkdir()
-    check_complaint(serve("--ready-file", tmp_path / "ready.json"), "ready.json")
-    assert [path.name for path in tmp_path.iterdir()] == ["ready.json"]
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("nowhere/ready.json", "No such file or directory"),
+        ("file/ready.json", "Not a directory"),
+        ("folder", "Is a directory"),
+        (200 * "long" + ".json", "File name too long"),
+    ],
+)
+def test_a_ready_file_that_cannot_be_written_is_named_in_one_line_and_leaves_no_part(tmp_path, name, why):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").touch()
+    check_complaint(
+        serve("--ready-file", tmp_path / name), f"--ready-file {tmp_path / name} cannot be written ({why})"
+    )
+    assert {path.name for path in tmp_path.iterdir()} == {"folder", "file"}
 
 
 def test_an_empty_host_does_not_open_the_box_to_other_machines():
@@ -265,3 +273,31 @@ def test_the_limit_of_descriptors_is_raised_as_far_as_the_system_allows(hard, gi
     )
     expected = given if hard == resource.RLIM_INFINITY else min(given, hard)
     assert json.loads(done.stdout) == [expected, expected, hard]
+
+
+def ignore_interrupts():
+    """As a shell has it for a command in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def test_a_window_in_the_background_of_a_shell_ends_with_an_interrupt():
+    process = start("ur_emulator", "pendant", "127.0.0.1", "--port", 0, preexec_fn=ignore_interrupts)
+    assert process.stdout.readline().startswith("window at http://127.0.0.1:")
+    process.send_signal(signal.SIGINT)
+    done = finish(process)
+    assert (done.code, done.err) == (0, "")
+
+
+def test_a_taken_port_of_the_window_is_one_line_with_the_options_of_serve(ur_emulator_command):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        options = ("--pendant", "--window-host", "127.0.0.1", "--window-port", port)
+        process = start("ur_emulator", "serve", "--port-base", free_port_base(), *options)
+        said = process.stderr.readline()
+        process.terminate()
+        finish(process)
+    assert said.startswith(f"window: port {port} of 127.0.0.1 cannot be opened")
+    known = ur_emulator_command("serve", "--help").out
+    for option in ("--window-port", "--window-host"):
+        assert option in said
+        assert option in known

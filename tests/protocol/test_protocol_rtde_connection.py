@@ -15,9 +15,9 @@ from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import MAX_NAMES_SIZE, encode_message
 from protocol.rtde.fields import input_fields, output_fields
 from protocol.rtde.server_connection import (
-    TRANSITIONS,
     InputReceived,
     RtdeServerConnection,
+    UnknownPackage,
     cycles_per_package,
     request_limits,
 )
@@ -105,29 +105,29 @@ REQUESTS = [
 
 @pytest.mark.parametrize("state", list(RtdeState))
 @pytest.mark.parametrize("request_", REQUESTS)
-def test_every_request_in_every_state_gets_one_reply_and_the_state_of_the_table(pair, state, request_):
+def test_every_request_in_every_state_gets_one_reply(pair, state, request_):
     pair.ask(M.SetupOutputs(("timestamp",), 125.0))
     if state is RtdeState.STARTED:
         pair.ask(M.Start())
     reply = pair.ask(request_)
     assert type(reply) is M.REQUESTS[type(request_)]
-    accepted, after = TRANSITIONS[state, type(request_)]
+    after = {M.Start: RtdeState.STARTED, M.Pause: RtdeState.PAUSED}.get(type(request_), state)
     assert pair.robot.state is pair.pc.state is after
+    if isinstance(request_, M.Start | M.Pause):
+        assert reply.accepted
     if isinstance(request_, M.RequestProtocolVersion):
-        assert reply.accepted == (accepted and request_.version in M.VERSIONS)
+        assert reply.accepted == (state is RtdeState.PAUSED and request_.version in M.VERSIONS)
         assert pair.robot.protocol_version == pair.pc.protocol_version
         assert pair.robot.protocol_version == (request_.version if reply.accepted else 2)
-
-
-def test_the_table_has_every_request_in_every_state():
-    assert set(TRANSITIONS) == {(state, kind) for state in RtdeState for kind in M.REQUESTS}
 
 
 @pytest.mark.parametrize("state", list(RtdeState))
 def test_data_and_text_are_taken_in_every_state_and_never_answered(pair, state):
     pair.ask(M.SetupInputs(("input_int_register_0",)))
     if state is RtdeState.STARTED:
+        pair.ask(M.SetupOutputs(("timestamp",), 125.0))
         pair.ask(M.Start())
+    assert pair.robot.state is state
     data, text = M.DataPackage(struct.pack(">i", 3), 1), M.RtdeTextMessage("hello", "test")
     assert pair.to_robot(encode_message(data, M.Role.PC, 2)) == InputReceived(("input_int_register_0",), (3,))
     assert pair.to_robot(encode_message(text, M.Role.PC, 2)) == text
@@ -142,7 +142,7 @@ def test_a_request_must_be_answered_before_the_next_event(pair):
         pair.robot.next_event()
     data = pair.robot.reply()
     assert pair.robot.next_event() == M.Pause()
-    assert pair.to_pc(data + pair.robot.reply()) == [M.StartReply(True), M.PauseReply(True)]
+    assert pair.to_pc(data + pair.robot.reply()) == [M.StartReply(False), M.PauseReply(True)]
 
 
 def test_a_pipelined_version_request_decides_how_the_next_package_is_read():
@@ -178,9 +178,25 @@ def test_the_second_output_recipe_replaces_the_first(pair):
 def test_an_unknown_output_makes_the_recipe_invalid_as_a_whole(pair):
     reply = pair.ask(M.SetupOutputs(("timestamp", "ft_raw_wrench", "actual_q"), 125.0))
     assert reply == M.SetupOutputsReply(("DOUBLE", "NOT_FOUND", "VECTOR6D"), 0)
-    assert pair.ask(M.Start()) == M.StartReply(True)
-    assert pair.robot.encoder is None
     assert pair.ask(M.SetupOutputs(("timestamp",), 125.0)).recipe_id == 1
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("names", [None, (), ("no_such_variable",), ("timestamp", "ft_raw_wrench")])
+@pytest.mark.parametrize("was_started", [False, True])
+def test_there_is_no_start_without_an_output_recipe(version, names, was_started):
+    pair, frequency = Pair(version), 125.0 if version == 2 else None
+    pair.ask(M.SetupInputs(("input_int_register_0",)))
+    if was_started and names is not None:
+        pair.ask(M.SetupOutputs(("timestamp",), frequency))
+        assert pair.ask(M.Start()) == M.StartReply(True)
+    if names is not None:
+        pair.ask(M.SetupOutputs(names, frequency))
+    assert pair.ask(M.Start()) == M.StartReply(False)
+    assert pair.robot.state is pair.pc.state is RtdeState.PAUSED
+    pair.ask(M.SetupOutputs(("timestamp",), frequency))
+    assert pair.robot.encoder is None
+    assert pair.ask(M.Start()) == M.StartReply(True)
     assert pair.robot.encoder is not None
 
 
@@ -200,8 +216,6 @@ def test_one_variable_in_several_recipes_of_a_connection_is_no_conflict(pair):
 def test_empty_recipes_get_a_reply_and_no_id(pair):
     assert pair.ask(M.SetupInputs(())) == M.SetupInputsReply((), 0)
     assert pair.ask(M.SetupOutputs((), 125.0)) == M.SetupOutputsReply((), 0)
-    pair.ask(M.Start())
-    assert pair.robot.encoder is None
 
 
 def test_recipes_end_with_the_last_id(pair):
@@ -291,13 +305,21 @@ def test_requests_without_what_they_ask_end_the_connection(pair, data):
         b"\0\x08U\2abcd",  # no such recipe
         b"\0\3M",
         b"\0\6M\xffab",
-        b"\0\3X",
-        b"\0\3\0",
     ],
 )
-def test_senseless_data_text_and_types_are_skipped(pair, junk):
+def test_senseless_data_and_text_are_skipped(pair, junk):
     pair.ask(M.SetupInputs(("input_int_register_0",)))
     assert pair.to_robot(junk + pair.pc.send(M.Start())) == M.Start()
+
+
+def test_a_package_of_an_unknown_type_gets_a_text_in_reply(pair):
+    for kind in set(range(256)) - set(M.RtdePackageType):
+        assert pair.to_robot(bytes((0, 5, kind)) + b"ab" + pair.pc.send(M.Pause())) == UnknownPackage(kind)
+        data = pair.robot.reply()
+        assert pair.robot.next_event() == M.Pause()
+        text, pause = pair.to_pc(data + pair.robot.reply())
+        assert f"({kind})" in text.message
+        assert pause == M.PauseReply(True)
 
 
 def test_data_of_the_wrong_size_as_ur_rtde_sends_it(pair):
@@ -322,7 +344,7 @@ def test_no_bytes_do_more_than_end_the_connection(data, step):
         robot.receive_data(data[start : start + step])
         try:
             while (event := robot.next_event()) is not None:
-                if type(event) in M.REQUESTS:
+                if type(event) in {*M.REQUESTS, UnknownPackage}:
                     reply = robot.reply()
                     assert int.from_bytes(reply[:2], "big") == len(reply)
         except RemoteProtocolError:
@@ -345,7 +367,11 @@ def test_the_longest_package_is_taken(pair):
         ([], M.StartReply(True), "nothing was asked"),
         ([], M.DataPackage(bytes(8), 1), "before it had answered"),
         ([M.SetupOutputs(("timestamp",), 1.0)], M.DataPackage(bytes(8), 1), "before it had answered"),
-        ([M.Start()], M.DataPackage(bytes(8), 1), "not set up"),
+        (
+            [M.SetupOutputs(("timestamp",), 1.0), M.Start(), M.SetupOutputs((), 1.0)],
+            M.DataPackage(bytes(8), 1),
+            "not set up",
+        ),
         ([M.SetupOutputs(("timestamp",), 1.0), M.Start()], M.DataPackage(bytes(7), 1), "bytes of values"),
         ([M.SetupOutputs(("timestamp",), 1.0), M.Start()], M.DataPackage(bytes(8), 2), "not set up"),
     ],
@@ -401,4 +427,4 @@ def test_refused_requests_change_nothing_at_the_pc(pair):
 def test_what_cannot_be_sent_is_not_waited_for(pair):
     with pytest.raises(LocalProtocolError):
         pair.pc.send(M.SetupOutputs(("timestamp",)))
-    assert pair.ask(M.Start()) == M.StartReply(True)
+    assert pair.ask(M.Pause()) == M.PauseReply(True)

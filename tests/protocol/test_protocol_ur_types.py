@@ -16,7 +16,6 @@ from protocol.ur_types import (
     RobotMode,
     RobotType,
     SafetyMode,
-    SafetyStatus,
     SoftwareVersion,
 )
 from protocol.wire_record import since
@@ -69,14 +68,14 @@ def test_numbers_of_the_documents():
     assert (RobotMode.NO_CONTROLLER, RobotMode.POWER_OFF, RobotMode.IDLE, RobotMode.RUNNING) == (-1, 3, 5, 7)
     assert (JointMode.POWER_OFF, JointMode.BOOTING, JointMode.RUNNING, JointMode.IDLE) == (239, 247, 253, 255)
     assert (SafetyMode.NORMAL, SafetyMode.PROTECTIVE_STOP, SafetyMode.FAULT) == (1, 3, 9)
+    assert [SafetyMode(number).name for number in (13, 14, 22, 23)] == [
+        "SYSTEM_THREE_POSITION_ENABLING_STOP",
+        "TP_THREE_POSITION_ENABLING_STOP",
+        "SAFETY_API_SAFEGUARD_STOP",
+        "IO_PLANE_STOP",
+    ]
     assert (ProgramState.STOPPED, ProgramState.PLAYING, ProgramState.PAUSED) == (1, 2, 4)
     assert len(JOINT_NAMES) == 6
-
-
-def test_safety_status_begins_as_safety_mode():
-    assert [(status.name, status.value) for status in SafetyStatus] == [
-        (mode.name, mode.value) for mode in SafetyMode
-    ][: len(SafetyStatus)]
 
 
 @pytest.mark.parametrize(

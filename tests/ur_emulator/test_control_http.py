@@ -165,6 +165,19 @@ def test_a_mistake_is_answered_in_one_line_and_the_connection_stays(http, method
     assert http.ask("GET", "/v1/state")[0] == 200
 
 
+def test_what_the_box_does_not_do_is_answered_with_409(box, http):
+    box.emergency_stop()
+    for name in ("power_on", "release_brakes", "protective_stop", "confirm_safety", "resume_program"):
+        status, answer = http.ask("POST", f"/v1/{name}", {})
+        assert status == 409
+        assert list(answer) == ["error"]
+    box.release_emergency_stop()
+    for name, mode in (("power_on", "IDLE"), ("release_brakes", "RUNNING")):
+        assert http.ask("POST", f"/v1/{name}", {})[0] == 200
+        box.wait_until(robot_mode=mode)
+    assert http.ask("POST", "/v1/power_on", {})[0] == 200  # it has its power
+
+
 def test_head_is_refused_without_a_body(http):
     http.send(http.request("HEAD", "/v1/state"))
     assert b"405" in http.stream.readline()

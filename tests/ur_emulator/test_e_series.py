@@ -7,6 +7,7 @@ of its own. The sensor has its zero, its channels and what programs do with it.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from math import hypot
 
 import mujoco
@@ -424,6 +425,34 @@ def test_declaring_a_payload_zeroes_the_sensor_too(declared):
     assert bench.now.actual_tcp_force[2] == pytest.approx(-2.0 * GRAVITY, abs=0.2)
     bench.tick(100)
     assert bench.now.actual_tcp_force == pytest.approx((0.0,) * 6, abs=0.1)
+
+
+CHANGES = [
+    "set_payload(0.5, [0.1, 0, 0])",
+    "set_payload_mass(0.5)",
+    "set_payload_cog([0.1, 0, 0])",
+    "set_tcp(p[0.1, 0, 0, 0, 0, 0])",  # it is where a payload without a place is
+]
+TARGET_CHANGES = [
+    "set_target_payload(0.5, [0, 0, 0])",
+    "set_target_payload(1.5, [0, 0.1, 0], [0, 0, 0, 0, 0, 0], 0.1)",
+]
+
+
+@pytest.mark.parametrize("delay", ["", "sync()", "sleep(0.006)", "sleep(0.016)"])
+@pytest.mark.parametrize(
+    ("make_bench", "changed"),
+    [*product([Bench], CHANGES), *product([ESeriesBench], CHANGES + TARGET_CHANGES)],
+)
+def test_the_zero_is_a_mean_over_measurements_with_the_present_payload(make_bench, changed, delay):
+    bench = make_bench(fidelity="ideal")
+    bench.controller.plant.attach_load(2.0)
+    bench.start(
+        f"def p():\n  set_payload(1.0)\n  sleep(0.4)\n  {changed}\n  {delay}\n  zero_ftsensor()\n"
+        "  sleep(100)\nend\n"
+    )
+    bench.tick(bench.controller.generation.cycles(1.0))
+    assert bench.now.actual_tcp_force == pytest.approx((0.0,) * 6, abs=0.2)
 
 
 def test_the_wrench_is_that_at_the_flange_and_force_mode_still_takes_the_one_at_the_tcp():

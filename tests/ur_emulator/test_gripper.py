@@ -5,18 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from box_support import BareBox, FakeConnection
+from e_series_support import ESeriesBench
 
 from protocol.robotiq import Fault, Objects, Status
+from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.controller.grippers.robotiq import RobotiqGripper
 from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
+from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.models.things import Thing
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.plant import Plant
 from ur_emulator.plant.scene import load_scene
+from ur_emulator.ports.robotiq import RobotiqPort
+from ur_emulator.ports.tool_line import ToolLinePort
 from ur_hil.tools import TOOLS, tools_by_name
 
 PERIOD = 0.008
@@ -274,6 +280,22 @@ def test_things_come_and_go_and_the_arm_stays():
     assert bench.scene.names == ("ball",)
 
 
+@pytest.mark.parametrize("width", [0.085, 0.0])  # closed, the fingers are where the block was put
+def test_a_thing_that_has_moved_stays_when_it_cannot_be_put_again(width):
+    bench = Bench()
+    bench.scene.put(Thing("ball", "sphere", (0.03,), 0.1, 0.5, (0.6, 0.0, 0.9, 0.0, 0.0, 0.0)))
+    bench.scene.move("block", (0.5, 0.5, 0.9, 0.0, 0.0, 0.0))
+    bench.run(0.3, width)
+    before = {name: bench.scene.state(name) for name in bench.scene.names}
+    assert before["block"].twist[2] < -2.0  # they fall
+    with pytest.raises(RefusedError, match="the arm is where it should be"):
+        bench.scene.put(Thing("block", "sphere", (0.2,), 5.0, 0.5, bench.place))
+    assert {name: bench.scene.state(name) for name in bench.scene.names} == before
+    bench.scene.put(Thing("block", "sphere", (0.02,), 0.1, 0.5, (0.5, 0.0, 1.5, 0.0, 0.0, 0.0)))
+    assert bench.scene.state("block").pose == pytest.approx((0.5, 0.0, 1.5, 0.0, 0.0, 0.0))
+    assert bench.scene.state("ball") == before["ball"]
+
+
 # --- tools
 
 
@@ -438,8 +460,11 @@ def leave(box, client):
     box.wait_until(log=f"{peer} disconnected")
 
 
+STATUS_REQUEST = bytes.fromhex("09 04 07 D0 00 01 30 0F")
+
+
 def test_the_serial_line_has_one_user_at_a_time(box, client):
-    one, three = bytes.fromhex("09 04 07 D0 00 01 30 0F"), bytes.fromhex("09 04 07 D0 00 03 B1 CE")
+    one, three = STATUS_REQUEST, bytes.fromhex("09 04 07 D0 00 03 B1 CE")
     with (
         socket.create_connection((box.host, box.ports.tool_line), timeout=10.0) as first,
         socket.create_connection((box.host, box.ports.tool_line), timeout=10.0) as second,
@@ -456,6 +481,28 @@ def test_the_serial_line_has_one_user_at_a_time(box, client):
         leave(box, first)
         second.sendall(three)
         assert second.recv(100)[:3] == bytes.fromhex("09 04 06")
+
+
+@pytest.mark.parametrize("n_others", [0, 1])
+def test_a_client_of_the_serial_line_may_leave_before_its_answer(n_others):
+    bench, commands = ESeriesBench(version=(5, 25), tools=[HAND]), []
+    bench.tick()  # the gripper has its supply
+    bare = BareBox(E_SERIES.software(SoftwareVersion(5, 25)), bench.controller, commands)
+    port = ToolLinePort(bare, bench.controller.state.grippers, RobotiqPort(bare, []))
+    client = FakeConnection(port)
+    others = [FakeConnection(port) for _ in range(n_others)]
+    client.say(STATUS_REQUEST)
+    client.close()
+    asked = 0
+    while commands:
+        asked += 1
+        taken, commands[:] = list(commands), []
+        bare.steps.publish(bench.tick(1, *taken))
+    assert asked == 2
+    assert client.sent == []
+    for other in others:
+        other.say(STATUS_REQUEST)
+        assert commands
 
 
 def test_people_put_move_and_remove_things(box):

@@ -4,6 +4,7 @@ import errno
 import os
 import selectors
 import socket
+import sys
 import threading
 from collections import Counter
 from contextlib import ExitStack, contextmanager
@@ -385,6 +386,28 @@ def test_a_page_in_a_browser_reaches_no_port_that_speaks_no_http(loop, data, is_
         assert len(clients.connections) == is_let_in
         refused = f"is a browser, which dashboard port {port.number} is not for"
         assert any(refused in line for line in notices) is not is_let_in
+    close_all(port, clients)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not say what a client has read")
+@pytest.mark.parametrize("buffer", [4096, 1 << 16, 1 << 20])
+def test_the_box_knows_whether_a_client_has_ever_read(loop, buffer):
+    clients = Clients()
+    port = listen(loop, clients)
+    with socket.socket() as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+        sock.connect(("127.0.0.1", port.number))
+        loop.add(Turns(loop, clients, 1))
+        loop.run()
+        (connection,) = clients.connections
+        while connection.send(bytes(1000)):
+            pass
+        loop.add(Turns(loop, clients, 100))  # the kernels move bytes of packets closer together
+        loop.run()
+        assert not connection.has_read
+        assert sock.recv(1)
+        while not connection.has_read:
+            pass  # what it has confirmed late is counted twice until then
     close_all(port, clients)
 
 

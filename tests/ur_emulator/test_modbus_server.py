@@ -309,12 +309,24 @@ def test_a_box_without_its_modbus_port_serves_all_others_and_says_so(monkeypatch
         assert "--port-base" in box.notices[0]
 
 
-def test_the_command_says_so_in_one_line(monkeypatch, capfd):
+@pytest.mark.parametrize(
+    ("options", "missing"),
+    [
+        ([], ["no Modbus server: port 502"]),
+        (["--robot", "ur5e", "--software", "10.11"], ["no Robot API: port 80", "no Modbus server: port 502"]),
+    ],
+)
+@pytest.mark.parametrize("n", [1, 3])
+def test_the_command_names_each_port_that_is_missing_in_one_line(monkeypatch, capfd, options, missing, n):
     forbid_low_ports(monkeypatch)
     monkeypatch.setattr(rack.LoopRack, "serve_forever", rack.LoopRack.close)
-    assert not cli.app(["serve", "--pace", "lockstep"], standalone_mode=False)
+    boxes = ["--boxes", str(n), "--pace", "lockstep"]
+    assert not cli.app(["serve", *options, *boxes], standalone_mode=False)
     out, err = capfd.readouterr()
-    assert err.startswith("ur-emulator: no Modbus server: port 502 on 127.0.0.1 needs privileges")
-    assert err.count("\n") == 1
+    lines = [line for line in err.splitlines() if "--services" not in line]
+    assert [line.partition(" on 127.0.0.1 needs privileges")[0] for line in lines] == [
+        f"ur-emulator: {one}" for one in missing
+    ]
+    assert all(line.endswith(" (the same for 2 more boxes)") is (n == 3) for line in err.splitlines())
     assert "modbus" not in out
-    assert "ready at" in out
+    assert out.count("ready at") == n

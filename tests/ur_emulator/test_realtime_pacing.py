@@ -10,7 +10,14 @@ from ur_emulator.commands.programs import SetSpeedSlider
 from ur_emulator.commands.safety import TriggerFault
 from ur_emulator.controller.controller import Controller
 from ur_emulator.controller.events import SafetyModeChanged
-from ur_emulator.loop.pacing import HANG_LIMIT, MAX_BACKLOG, READER_LIMIT, LockstepPacer, RealtimePacer
+from ur_emulator.loop.pacing import (
+    FIRST_READ_LIMIT,
+    HANG_LIMIT,
+    MAX_BACKLOG,
+    READER_LIMIT,
+    LockstepPacer,
+    RealtimePacer,
+)
 from ur_emulator.loop.served_box import ServedBox
 from ur_emulator.models.generations import CB3
 from ur_emulator.models.robots import robot_by_name
@@ -24,12 +31,14 @@ class Box:
     is_active: bool = True
     waits_outside: bool = False
     readers_full: bool = False
+    reader_limit: float = READER_LIMIT
     given_up: int = 0
     cycles_behind: int = 0
 
-    def give_up_readers(self):
-        self.given_up += 1
-        self.readers_full = False
+    def give_up_readers(self, waited):
+        if waited >= self.reader_limit:
+            self.given_up += 1
+            self.readers_full = False
 
     def fell_behind(self, n_cycles):
         self.cycles_behind += n_cycles
@@ -160,10 +169,35 @@ def test_lockstep_holds_time_while_a_script_waits_and_lets_go_after_the_hang_lim
     assert pacer.may_tick(let_go + 1.02 * PERIOD, box)
 
 
-def test_lockstep_waits_for_readers_but_not_for_ever():
-    box = Box(readers_full=True)
-    assert wait(LockstepPacer(PERIOD), box, 2 * READER_LIMIT) == pytest.approx(READER_LIMIT, abs=2 * PERIOD)
+@pytest.mark.parametrize("limit", [READER_LIMIT, FIRST_READ_LIMIT])
+def test_lockstep_waits_for_readers_but_not_for_ever(limit):
+    box = Box(readers_full=True, reader_limit=limit)
+    assert wait(LockstepPacer(PERIOD), box, 2 * READER_LIMIT) == pytest.approx(limit, abs=2 * PERIOD)
     assert box.given_up == 1
+
+
+@dataclass(frozen=True)
+class Client:
+    peer: str
+    has_read: bool
+
+
+@pytest.mark.parametrize(
+    ("waited", "given_up"),
+    [
+        (FIRST_READ_LIMIT - 0.1, set()),
+        (FIRST_READ_LIMIT, {"sender"}),
+        (READER_LIMIT - 0.1, {"sender"}),
+        (READER_LIMIT, {"sender", "reader"}),
+    ],
+)
+def test_a_client_that_has_never_read_is_given_up_before_a_reader(waited, given_up):
+    box = served_box()
+    box.backlog = {Client("sender", has_read=False), Client("reader", has_read=True)}
+    box.submit(SetSpeedSlider(0.5))
+    box.give_up_readers(waited)
+    assert {entry.text.partition(" does not read")[0] for entry in box.log.entries} == given_up
+    assert box.readers_full is (len(given_up) < 2)
 
 
 def test_the_limits_count_from_the_beginning_of_each_wait():

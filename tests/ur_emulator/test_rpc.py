@@ -397,6 +397,20 @@ def test_more_calls_at_the_same_time_than_connections_fail(box, monkeypatch):
     assert "2 remote procedures of other handles are being called" in text
 
 
+def test_calls_are_made_again_after_an_error_of_ours(box, monkeypatch):
+    def break_down(reader, data):
+        raise KeyError("broken")
+
+    with procedures(work=lambda: 1) as port:
+        for _ in range(2):
+            with monkeypatch.context() as patch:
+                patch.setattr(module.AnswerReader, "feed", break_down)
+                assert "KeyError" in fail(box, port).text
+            with connect(box, "primary") as sock:
+                send(sock, port, ("textmsg(h.work())",))
+                assert MessageReader(sock).message(TextMessage).text == "1"
+
+
 def test_calls_leave_no_thread_and_no_connection(box):
     before = set(threading.enumerate())
     with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:

@@ -293,6 +293,13 @@ def test_the_lever_of_the_sensor(builtin, sign):
     assert bench.controller.state.force_sense.sensor.mass == 0.5
 
 
+def test_the_zero_is_that_of_the_sensor_that_was_just_enabled():
+    bench = watching("sleep(0.1)\n  ft_rtde_input_enable(True)\n  zero_ftsensor()")
+    for _ in range(60):
+        write(bench, {"external_force_torque": READING})
+    assert bench.now.actual_tcp_force == pytest.approx((0.0,) * 6, abs=1e-3)
+
+
 def test_the_moment_is_given_at_the_tcp():
     bench = sensed("ft_rtde_input_enable(True)\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])")
     moment = np.subtract(READING[3:], np.cross((0, 0, 0.1), READING[:3]))

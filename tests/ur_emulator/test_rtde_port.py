@@ -15,6 +15,7 @@ from protocol.rtde import codec as M
 from protocol.rtde import server_connection
 from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.fields import output_fields
+from protocol.rtde.types import TextLevel
 from protocol.ur_types import ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
@@ -244,6 +245,17 @@ def test_an_absurd_size_is_answered_with_a_text_and_the_end(bench):
     assert text.message.startswith("an RTDE package of 18245 bytes")
 
 
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_package_of_an_unknown_type_is_answered_with_a_text_and_the_connection_goes_on(bench, version):
+    client = bench.client() if version == 2 else Client(bench.port)
+    client.say(b"\0\3X\0\3\xff" + client.pc.send(M.Pause()))
+    letter, number, reply = client.events()
+    assert "'X' (88)" in letter.message
+    assert "(255)" in number.message
+    assert letter.level == number.level == TextLevel.WARNING
+    assert reply == M.PauseReply(True)
+
+
 def test_after_the_text_nothing_more_is_read(bench):
     client = bench.client()
     client.close_when_sent = lambda: None  # the text still waits in the outbox
@@ -376,6 +388,14 @@ def run(box, text):
         sock.sendall(text.encode())
 
 
+@pytest.mark.parametrize("head", [b"GET / HTTP/1.1", b"POST /x HTTP/1.1"])
+def test_a_whole_request_over_http_gets_the_text_about_data_that_is_not_rtde(box, head):
+    with connect(box, "rtde") as sock:
+        sock.sendall(head + b"\r\nHost: 127.0.0.1\r\n\r\n")
+        said = sock.makefile("rb").read()
+    assert M.decode_message(said[2], said[3:], M.Role.ROBOT, 1).message.startswith("an RTDE package of")
+
+
 def test_no_cycle_is_lost_in_lockstep(box, client):
     client.subscribe("timestamp", "output_int_register_24", "runtime_state")
     run(box, COUNT.format(100))
@@ -415,6 +435,26 @@ def test_a_client_that_does_not_read_gets_whole_packages_and_does_not_stop_the_o
         gaps = [round((b - a) / 0.008) for a, b in pairwise(stamps)]
         assert max(gaps) > 1
         assert min(gaps) == 1
+
+
+@pytest.mark.parametrize(("pace", "times_said"), [("lockstep", 1), ("realtime", 0)])
+def test_in_lockstep_the_log_says_once_that_inputs_have_no_fixed_time(pace, times_said):
+    with ControlBox(pace=pace, port_base=None) as box, connect(box, "rtde") as sock:
+        client = RtdeClient(sock)
+        recipe = client.own("input_int_register_24")
+
+        def said():
+            return sum("writes inputs while a program runs" in entry.text for entry in box.log)
+
+        client.write(recipe, 1)
+        client.ask(M.Pause())
+        assert said() == 0
+        run(box, "def p():\n  while read_input_integer_register(24) < 3:\n    sync()\n  end\nend\n")
+        box.wait_until(program_state="PLAYING")
+        client.write(recipe, 2)
+        client.write(recipe, 3)
+        box.wait_until(program_state="STOPPED")
+        assert said() == times_said
 
 
 def test_in_lockstep_time_waits_for_a_client_that_reads_late(box):

@@ -9,8 +9,8 @@ from states_support import BRAKING, ENDLESS, failures, modes, moving, power_up
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.power import PowerOn, ReleaseBrakes, StartFreedrive
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram
+from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
 from ur_emulator.commands.safety import (
     AssignSafetyInput,
     ChangeSafetySettings,
@@ -28,12 +28,14 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
+from ur_emulator.controller.command import Submitted
 from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed
 from ur_emulator.controller.safety.speed_scaling import TOLERANCE
-from ur_emulator.errors import EmulatorError
+from ur_emulator.errors import EmulatorError, RefusedError
 from ur_emulator.models.generations import CB3
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import SpeedJ
+from urscript import compile_program
 
 PRESS, RELEASE = PressEmergencyStop("robot"), ReleaseEmergencyStop()
 OPEN, CLOSE = SafeguardStop(True), SafeguardStop(False)
@@ -406,3 +408,84 @@ def test_a_requested_stop_is_one_whatever_the_robot_mode(mode):
     bench.tick(5)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     assert [e.code for e in bench.events if isinstance(e, ErrorReported)] == [209]
+
+
+# --- what a box does not do it refuses, for every command in every state
+
+POWERED = (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
+GOES = (ProgramState.PLAYING, ProgramState.RESUMING)
+PAUSES = (ProgramState.PAUSED, ProgramState.PAUSING)
+
+
+def has(*causes):
+    return lambda box: any(box.state.safety.has(cause) for cause in causes)
+
+
+# Each command, and what it has done half a second later, or had before.
+EFFECTS = [
+    (PowerOn(), lambda box: box.state.mode.mode in POWERED),
+    (ReleaseBrakes(), lambda box: box.state.mode.mode is RobotMode.RUNNING or box.state.mode.is_changing),
+    (PowerOff(), lambda box: box.state.mode.mode not in POWERED),
+    (StartFreedrive(), lambda box: box.state.compliance.is_in_freedrive),
+    (TriggerProtectiveStop(), has(SafetyMode.PROTECTIVE_STOP)),
+    (UnlockProtectiveStop(), lambda box: not has(SafetyMode.PROTECTIVE_STOP)(box)),
+    (TriggerViolation(), has(SafetyMode.VIOLATION)),
+    (TriggerFault(), has(SafetyMode.FAULT)),
+    (
+        RestartSafety(),
+        lambda box: (
+            not has(SafetyMode.FAULT, SafetyMode.VIOLATION, SafetyMode.PROTECTIVE_STOP)(box)
+            and box.state.mode.mode not in POWERED
+        ),
+    ),
+    (PRESS, has(SafetyMode.ROBOT_EMERGENCY_STOP)),
+    (OPEN, has(SafetyMode.SAFEGUARD_STOP)),
+    (REDUCE, has(SafetyMode.REDUCED)),
+    (ChangeSafetySettings(), lambda box: box.state.mode.mode is RobotMode.CONFIRM_SAFETY),
+    (ConfirmSafety(), lambda box: box.state.mode.mode is RobotMode.POWER_OFF),
+    (StartProgram(compile_program(ENDLESS)), lambda box: box.programs.runtime_state in GOES),
+    (PauseProgram(), lambda box: box.programs.runtime_state in PAUSES),
+    (ResumeProgram(), lambda box: box.programs.runtime_state in GOES),
+    (StopProgram(), lambda box: not box.programs.is_running),
+]
+# How a moving arm gets into each state, and the commands that are refused there.
+SWITCH_ON = [PowerOn, ReleaseBrakes]
+MOVE = [StartFreedrive, StartProgram, ResumeProgram]
+NONE_STANDS = [UnlockProtectiveStop, ConfirmSafety]
+REFUSED = {
+    "plays": ([], [*NONE_STANDS, ResumeProgram]),
+    "paused": ([PauseProgram()], [*NONE_STANDS, PauseProgram]),
+    "stopped": ([StopProgram()], [*NONE_STANDS, PauseProgram, ResumeProgram]),
+    "reduced": ([REDUCE], [*NONE_STANDS, ResumeProgram]),
+    "off": ([PowerOff()], [*NONE_STANDS, PauseProgram, *MOVE]),
+    "on": ([PowerOff(), PowerOn()], [*NONE_STANDS, PauseProgram, *MOVE]),
+    "safeguard": ([OPEN], [*NONE_STANDS, PauseProgram, *MOVE]),
+    "protective": ([TriggerProtectiveStop()], [ConfirmSafety, PauseProgram, *MOVE]),
+    "emergency": ([PRESS], [*NONE_STANDS, *SWITCH_ON, TriggerProtectiveStop, PauseProgram, *MOVE]),
+    "violation": (
+        [TriggerViolation()],
+        [*NONE_STANDS, *SWITCH_ON, TriggerProtectiveStop, PauseProgram, *MOVE],
+    ),
+    "fault": (
+        [TriggerFault()],
+        [*NONE_STANDS, *SWITCH_ON, TriggerProtectiveStop, TriggerViolation, PauseProgram, *MOVE],
+    ),
+    "to confirm": ([ChangeSafetySettings()], [UnlockProtectiveStop, *SWITCH_ON, PauseProgram, *MOVE]),
+}
+
+
+@pytest.mark.parametrize("state", [*REFUSED, "boots"])
+def test_what_a_box_does_not_do_it_refuses(state):
+    boots = [*NONE_STANDS, *SWITCH_ON, ChangeSafetySettings, PauseProgram, *MOVE]
+    way, refused = REFUSED.get(state, ([], boots))
+    for command, has_effect in EFFECTS:
+        bench = Bench(mode=RobotMode.NO_CONTROLLER) if state == "boots" else moving(loaded=True)
+        for step in way:
+            bench.tick(BRAKING, step)
+        outcome = []
+        bench.tick(1, Submitted(command, lambda result, error, outcome=outcome: outcome.append(error)))
+        (error,) = outcome
+        assert isinstance(error, RefusedError) is (type(command) in refused), f"{command}: {error}"
+        if error is None:
+            bench.tick(60)
+            assert has_effect(bench.controller), command

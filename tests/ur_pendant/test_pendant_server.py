@@ -89,8 +89,10 @@ def test_other_addresses_need_a_token_and_a_taken_port_is_an_error(server):
         open_server("127.0.0.1", 0, "a b", "test")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(WindowError, match=f"port {port} of 127.0.0.1 cannot be opened"):
+        with pytest.raises(WindowError, match=f"port {port} of 127.0.0.1 cannot be opened.*in use.*--port "):
             open_server("127.0.0.1", port, None, "test")
+    with pytest.raises(WindowError, match=r"cannot be opened.*--listen.*--window-host"):
+        open_server("192.0.2.1", 0, "token", "test")
 
 
 def test_nobody_can_publish_the_page(server):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from protocol.ur_types import RobotMode
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import BoxParts, inform
+from ur_emulator.controller.command import BoxParts, refuse
 from ur_emulator.controller.events import LogAdded
-from ur_emulator.controller.robot_mode import ModeCommand
+from ur_emulator.controller.robot_mode import TRANSITIONS, ModeCommand
 from ur_emulator.controller.safety.inputs import EnablingAct, ModeSource, OperationalMode
 from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.errors import RefusedError
@@ -44,19 +45,28 @@ class StartFreedrive:
     """Go into freedrive, as `set robotmode freedrive` asks; `set robotmode run` ends it."""
 
     def apply(self, box: BoxParts) -> None:
-        if box.state.operational.allows.allows_freedrive:
-            box.state.compliance.start_freedrive(by_client=True)
-        else:
-            inform(box.state, "freedrive refused: the operational mode is AUTOMATIC: choose manual mode")
+        state = box.state
+        if not state.operational.allows.allows_freedrive:
+            refuse(state, "freedrive refused: the operational mode is AUTOMATIC: choose manual mode")
+        if state.mode.mode is not RobotMode.RUNNING or state.safety.is_stopped:
+            modes = f"{state.mode.mode.name}, {state.safety.mode.name}"
+            refuse(state, f"freedrive refused: the robot must be RUNNING and not stopped, it is in {modes}")
+        state.compliance.start_freedrive(by_client=True)
 
 
 def _give_power(box: BoxParts, command: ModeCommand) -> None:
-    """Power the joints or open their brakes, if the safety mode allows it; clients get a message if not."""
+    """Power the joints or open their brakes, if the safety mode allows it."""
     mode = box.state.safety.mode
-    if ROW[mode].may_have_power:
-        box.state.mode.command(command)
-    else:
-        inform(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].remedy}")
+    if not ROW[mode].may_have_power:
+        refuse(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].remedy}")
+    change_mode(box.state, command)
+
+
+def change_mode(state: ControllerState, command: ModeCommand) -> None:
+    """Change the robot mode; refused in modes in which the command has no effect."""
+    if not state.mode.command(command):
+        possible = " or ".join(mode.name for mode, given in TRANSITIONS if given is command)
+        refuse(state, f"{command.value} refused: the robot is in {state.mode.mode.name}, not in {possible}")
 
 
 # --- An e-Series box: operational mode, enabling device, remote control

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from protocol.primary.messages import RequestedType
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import BoxParts, Result, inform
+from ur_emulator.controller.command import BoxParts, Result, refuse
 from ur_emulator.controller.events import PopupShown, ScriptFailed
 from ur_emulator.controller.pendant import Answer
 from ur_emulator.controller.safety.inputs import SafetyInput
@@ -91,9 +91,7 @@ class ResumeProgram(CommandOperation):
             raise RefusedError(f"there is no program to resume: the program state is {_program_state(box)}")
         obstacle = _why_not_running(box.state)
         if obstacle:
-            text = f"program {box.programs.name} stays paused: {obstacle}"
-            inform(box.state, text)
-            raise RefusedError(text)
+            refuse(box.state, f"program {box.programs.name} stays paused: {obstacle}")
         box.programs.resume()
 
 

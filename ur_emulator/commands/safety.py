@@ -12,7 +12,7 @@ from protocol.primary.messages import ReportLevel
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.commands.power import needs_operational_modes
+from ur_emulator.commands.power import change_mode, needs_operational_modes
 from ur_emulator.controller.command import BoxParts
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.robot_mode import ModeCommand
@@ -72,6 +72,9 @@ class TriggerProtectiveStop(CommandOperation):
     """Stop the arm as a safety function would."""
 
     def apply(self, box: BoxParts) -> None:
+        safety = box.state.safety
+        if not (safety.is_watched or safety.has(SafetyMode.PROTECTIVE_STOP)):
+            raise RefusedError(f"no protective stop: the arm is stopped already, by {safety.mode.name}")
         box.state.requests.protective_stop()
 
 
@@ -93,6 +96,8 @@ class TriggerViolation(CommandOperation):
     text: str = parameter("for log and clients", default="Safety violation requested")
 
     def apply(self, box: BoxParts) -> None:
+        if box.state.safety.has(SafetyMode.FAULT):
+            raise RefusedError("no violation: the safety system has a fault, restart it")
         box.state.events.append(ErrorReported(0, 0, ReportLevel.VIOLATION, self.text))
         box.safety.handle(modes.SafetyEvent.VIOLATION)
 
@@ -154,14 +159,14 @@ class ChangeSafetySettings(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         box.safety.cut_power()
-        box.state.mode.command(ModeCommand.ASK_TO_CONFIRM)
+        change_mode(box.state, ModeCommand.ASK_TO_CONFIRM)
 
 
 class ConfirmSafety(CommandOperation):
     """Confirm the safety settings, as `confirm user safety parameters` does."""
 
     def apply(self, box: BoxParts) -> None:
-        box.state.mode.command(ModeCommand.CONFIRM)
+        change_mode(box.state, ModeCommand.CONFIRM)
 
 
 Button = Literal["teach", "power"]

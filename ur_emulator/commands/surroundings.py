@@ -3,12 +3,12 @@
 No client of a real box can send these; they are for tests and for people at the emulator.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import hypot
 from typing import Literal
 
 from ur_emulator.commands.operation import CommandOperation, parameter
-from ur_emulator.controller.command import BoxParts, inform
+from ur_emulator.controller.command import BoxParts, refuse
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.models.robot_model import Vector3, six
@@ -116,20 +116,28 @@ class AddObstacle(CommandOperation):
     def check_together(self) -> None:
         if not self.name:
             raise ArgumentError("obstacle without a name given: it needs one, to be removed by")
-        wanted = SIZES[self.shape]
-        if len(self.size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in self.size):
-            raise ArgumentError(
-                f"obstacle {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
-                f"numbers ({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
-            )
-        _check_distance(f"obstacle {self.name}", self.pose)
+        _check_body(f"obstacle {self.name}", self.shape, SIZES[self.shape], self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        try:
-            box.plant.obstacles.put(self.name, self.shape, self.size, six(self.pose))
-        except RefusedError as refusal:
-            inform(box.state, str(refusal))
-            raise
+        _put(box, box.plant.obstacles.put, self.name, self.shape, self.size, six(self.pose))
+
+
+def _check_body(
+    what: str, shape: str, wanted: tuple[str, ...], size: Sequence[float], pose: Sequence[float]
+) -> None:
+    if len(size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in size):
+        raise ArgumentError(
+            f"{what}: size {list(size)} given: a {shape} needs {len(wanted)} numbers "
+            f"({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
+        )
+    _check_distance(what, pose)
+
+
+def _put(box: BoxParts, put: Callable[..., None], *body: object) -> None:
+    try:
+        put(*body)
+    except RefusedError as refusal:
+        refuse(box.state, str(refusal))
 
 
 def _check_distance(what: str, pose: Sequence[float]) -> None:
@@ -184,21 +192,11 @@ class AddThing(CommandOperation):
     def check_together(self) -> None:
         if not (self.name and self.name.isprintable() and len(self.name) <= 60):
             raise ArgumentError(f"name {ascii(self.name)[:60]} of a thing given: 1 to 60 printed characters")
-        wanted = THING_SIZES[self.shape]
-        if len(self.size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in self.size):
-            raise ArgumentError(
-                f"thing {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
-                f"numbers ({', '.join(wanted)}), each {SMALLEST:g} to {LARGEST:g} m"
-            )
-        _check_distance(f"thing {self.name}", self.pose)
+        _check_body(f"thing {self.name}", self.shape, THING_SIZES[self.shape], self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
         thing = Thing(self.name, self.shape, tuple(self.size), self.mass, self.friction, six(self.pose))
-        try:
-            box.plant.put_thing(thing)
-        except RefusedError as refusal:
-            inform(box.state, str(refusal))
-            raise
+        _put(box, box.plant.put_thing, thing)
 
 
 class MoveThing(CommandOperation):

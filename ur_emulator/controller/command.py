@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, runtime_checkable
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.controller.events import ErrorReported
+from ur_emulator.errors import RefusedError
 
 if TYPE_CHECKING:
     from ur_emulator.controller.program_runner import ProgramRunner
@@ -62,6 +63,7 @@ class Submitted:
         return result
 
 
-def inform(state: ControllerState, text: str) -> None:
-    """Report to clients and log why something is not done."""
+def refuse(state: ControllerState, text: str) -> NoReturn:
+    """Refuse a command, and report to clients and log why it is not done."""
     state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))
+    raise RefusedError(text)

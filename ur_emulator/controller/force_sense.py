@@ -15,6 +15,7 @@ from itertools import islice
 import numpy as np
 
 from protocol.pose import rotvec_to_matrix
+from ur_emulator.controller.settings import ToolSettings
 from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
 
@@ -63,17 +64,22 @@ _ONSET_SHARE = 0.2
 class ForceSense:
     """The wrench at the flange, in base axes [N, Nm], as measured from cycle to cycle.
 
-    `zero` counts as zero once a program has set it; an external sensor takes the place of the estimate.
+    `zero` counts as zero once a program has set it; an external sensor takes the place of the estimate. The
+    weight of the declared payload is no part of the wrench, so the history holds measurements with the
+    present payload only.
     """
 
-    def __init__(self, generation: RobotGeneration) -> None:
+    def __init__(self, generation: RobotGeneration, tool: ToolSettings) -> None:
         """Begin with an empty history; the generation has the control cycle and says how arms measure."""
+        self._tool, self._payload = tool, tool.payload
         self._sensing = sensing = generation.force_sensing
         self._n_min = generation.cycles(sensing.least_averaging)
         self._n_max = generation.cycles(sensing.most_averaging)
         self._precision = np.repeat(sensing.precision, 3).tolist()
         self._n_payload = generation.cycles(_PAYLOAD_TIME) + self._n_min
-        self._cycles_to_zero = 0
+        # Cycles until there are enough measurements with the present payload and sensor.
+        self._cycles_left = 0
+        self._is_to_zero = False
         self._n_recent, self._n_early = generation.cycles(_RECENT_TIME), generation.cycles(_EARLY_TIME)
         self._history: deque[Vector6] = deque(maxlen=generation.cycles(HISTORY_TIME))
         self.zero: Vector6 | None = None
@@ -81,11 +87,15 @@ class ForceSense:
 
     def measure(self, wrench: Vector6) -> Vector6:
         """Add the measurement of this cycle; return it less the zero."""
-        self._history.appendleft(wrench)
-        if self._cycles_to_zero:
-            self._cycles_to_zero -= 1
-            if not self._cycles_to_zero:
-                self.zero = self._present(0)
+        if not self._knows_payload:
+            self._payload, self._cycles_left = self._tool.payload, self._n_payload
+            self._history.clear()
+        if self._cycles_left <= self._n_min:
+            self._history.appendleft(wrench)
+        if self._cycles_left:
+            self._cycles_left -= 1
+        if self._is_to_zero:
+            self.set_zero(0)
         zero = self.zero
         return wrench if zero is None else six([w - z for w, z in zip(wrench, zero, strict=True)])
 
@@ -93,12 +103,18 @@ class ForceSense:
         """Measure with an external sensor from now on, or with the estimate; the history is cleared."""
         self.sensor = sensor
         self._history.clear()
+        self._cycles_left = self._n_min
         self.zero = None
-        self._cycles_to_zero = 0
+        self._is_to_zero = False
 
     def set_zero(self, still_cycles: int) -> None:
-        """Set the zero to the present wrench, after some cycles of standstill. Source: zero_ftsensor."""
-        self.zero = self._present(still_cycles)
+        """Set the zero to the present wrench, after some cycles of standstill. Source: zero_ftsensor.
+
+        After a change of payload or sensor that is done as soon as the new one has been measured with.
+        """
+        self._is_to_zero = self._cycles_left > 0 or not self._knows_payload
+        if not self._is_to_zero:
+            self.zero = self._present(still_cycles)
 
     def program_started(self, still_cycles: int) -> None:
         """Zero a built-in sensor; argument as in `set_zero`."""
@@ -107,8 +123,7 @@ class ForceSense:
 
     def payload_declared(self) -> None:
         """Zero a built-in sensor as soon as it measures with the new payload."""
-        if self._sensing.has_sensor and self.sensor is None:
-            self._cycles_to_zero = self._n_payload
+        self.program_started(0)
 
     @property
     def refers_to_flange(self) -> bool:
@@ -116,7 +131,12 @@ class ForceSense:
         return self._sensing.has_sensor and self.sensor is None
 
     def residual(self, still_cycles: int) -> Vector6:
-        """Return the present wrench, averaged, less the zero; argument as in `set_zero`."""
+        """Return the present wrench, averaged, less the zero; argument as in `set_zero`.
+
+        Zero as long as there is no measurement with the present payload.
+        """
+        if not (self._history and self._knows_payload):
+            return ZERO6
         zero = ZERO6 if self.zero is None else self.zero
         return six([w - z for w, z in zip(self._present(still_cycles), zero, strict=True)])
 
@@ -157,6 +177,12 @@ class ForceSense:
             if felt[steps] < onset and felt[steps + 1] < onset:
                 return steps
         return len(felt) - 1
+
+    @property
+    def _knows_payload(self) -> bool:
+        """Whether the payload stays the one that was measured with last."""
+        payload = self._tool.payload
+        return not self._tool.is_changing and (payload is self._payload or payload == self._payload)
 
     def _present(self, still_cycles: int) -> Vector6:
         least, most = self._n_min, self._n_max

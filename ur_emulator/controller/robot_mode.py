@@ -30,8 +30,7 @@ class ModeCommand(Enum):
     BRAKE_RELEASE = "brake release"
 
 
-# (mode, command) -> the modes to pass through, the last one to stay in. A pair that is not listed changes
-# nothing.
+# (mode, command) -> the modes to pass through, the last one to stay in. Any other pair changes nothing.
 _TO_RUNNING = (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING)
 TRANSITIONS: dict[tuple[RobotMode, ModeCommand], tuple[RobotMode, ...]] = {
     (RobotMode.POWER_OFF, ModeCommand.POWER_ON): (RobotMode.POWER_ON, RobotMode.IDLE),
@@ -69,6 +68,12 @@ _BY_ROBOT_MODE = {
 
 # Modes in which the joints have power.
 POWERED = frozenset({RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING})
+# Modes in which that holds, or comes, which a command asks for.
+_FULFILLED = {
+    ModeCommand.POWER_ON: POWERED,
+    ModeCommand.BRAKE_RELEASE: frozenset({RobotMode.BACKDRIVE, RobotMode.RUNNING}),
+    ModeCommand.ASK_TO_CONFIRM: frozenset({RobotMode.CONFIRM_SAFETY}),
+}
 
 # What joints that have power report in a safety mode; inferred from the names: 240 was EMERGENCY_STOPPED.
 _BY_SAFETY_MODE = {
@@ -109,11 +114,13 @@ class RobotModeMachine:
         """True while more modes follow."""
         return bool(self._ahead)
 
-    def command(self, command: ModeCommand) -> None:
-        """Start the transition that the table gives for `command`; without one nothing changes."""
+    def command(self, command: ModeCommand) -> bool:
+        """Start the transition that the table gives for `command`; return whether what it asks for comes."""
         modes = TRANSITIONS.get((self.mode, command))
-        if modes is not None:
-            self._enter(modes[0], list(modes[1:]))
+        if modes is None:
+            return self.mode in _FULFILLED.get(command, ())
+        self._enter(modes[0], list(modes[1:]))
+        return True
 
     def step(self) -> None:
         """Advance one cycle."""

@@ -83,6 +83,11 @@ class ToolSettings:
         if self._change is None:
             self.payload = payload
 
+    @property
+    def is_changing(self) -> bool:
+        """The payload is on its way to another one."""
+        return self._change is not None
+
     def step(self) -> None:
         """Advance a change of the payload by a cycle."""
         if self._change is None:

@@ -154,7 +154,7 @@ def make_state(
         modbus=modbus,
         modbus_map=MapMemory(version),
         compliance=Compliance(motion, mode, safety, operational, io_configuration, past),
-        force_sense=ForceSense(clock.generation),
+        force_sense=ForceSense(clock.generation, tool),
         pendant=Pendant(),
         interpreter=InterpreterQueue(),
         error_settings=ErrorSettings(),

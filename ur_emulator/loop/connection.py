@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import selectors
 import socket
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.loop.barrier import Report, guarded
@@ -21,6 +23,7 @@ class BufferedSocket(ABC):
 
     Attributes:
         is_open: bytes can be received, until either side closes.
+        n_taken: how many bytes the kernel has taken.
     """
 
     def __init__(self, loop: EventLoop, outbox_limit: int, read_size: int) -> None:
@@ -36,6 +39,7 @@ class BufferedSocket(ABC):
         self._can_send = False
         self._wants_data = True
         self.is_open = False
+        self.n_taken = 0
 
     def send(self, data: bytes) -> bool:
         """Send what the kernel takes at once, keep the rest for later; all of it or nothing.
@@ -57,6 +61,7 @@ class BufferedSocket(ABC):
         except OSError:
             self._send_failed()
             return False
+        self.n_taken += sent
         if sent < len(data):
             self._outbox += data[sent:]
             self._watch()
@@ -134,6 +139,7 @@ class BufferedSocket(ABC):
         except OSError:
             self._send_failed()
             return
+        self.n_taken += sent
         del self._outbox[:sent]
         if not self._outbox:
             self._watch()
@@ -210,6 +216,12 @@ class Connection(BufferedSocket):
         """False as soon as it is known that the client is gone; what it has sent may still be read."""
         return self._can_send
 
+    @property
+    def has_read(self) -> bool:
+        """False if it is known that the client has not read anything yet."""
+        waiting = None if self._sock is None else _bytes_on_the_way(self._sock)
+        return waiting is None or waiting < self.n_taken
+
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run `call` when this client has its next turn."""
         self._loop.call_soon(call, self.failed)
@@ -280,3 +292,20 @@ class Connection(BufferedSocket):
         self._backlog.discard(self)
         if self._closing:
             self.close()
+
+
+def _bytes_on_the_way(sock: socket.socket) -> int | None:
+    """Return how many bytes that were sent the peer has not read; None where the system does not say.
+
+    Linux lists both ends of a connection within a machine. Source: proc(5).
+    """
+    try:
+        here, there = (
+            f"{int.from_bytes(socket.inet_aton(host), sys.byteorder):08X}:{port:04X}"
+            for host, port in (sock.getsockname(), sock.getpeername())
+        )
+        rows = (row.split(maxsplit=5) for row in Path("/proc/net/tcp").read_text().splitlines())
+        queues = {(row[1], row[2]): row[4].split(":") for row in rows}
+        return int(queues[here, there][0], 16) + int(queues[there, here][1], 16)
+    except (OSError, ValueError, LookupError):
+        return None

@@ -1,7 +1,7 @@
 """A listening port: accepts clients and hands each to the port that it belongs to.
 
-A page in a browser may send a request to any port of its machine, and lines of its choice after the head: on
-a port that does not speak HTTP such a client is closed before anything of it is read.
+A page in a browser may send a request to any port of its machine, and lines of its choice after the head:
+such a client is closed before anything of it is read, unless the port itself takes no harm.
 
 Clients beyond the limits of a box (`ClientLimits`), and those for whom the process has no descriptor left are
 accepted and closed at once, so that they notice it; connected clients are not disturbed. The limits of a real
@@ -144,7 +144,7 @@ class Listener:
         limits: ClientLimits,
         spare: SpareDescriptor | None = None,
         *,
-        speaks_http: bool = False,
+        reads_http: bool = False,
     ) -> None:
         """Listen.
 
@@ -156,7 +156,7 @@ class Listener:
             report: called with an error of ours and what it has ended.
             limits: of the box, for its clients.
             spare: refuses clients when no descriptor is left; without one they wait.
-            speaks_http: requests of browsers are for this port.
+            reads_http: the port answers or refuses requests of browsers itself.
 
         Raises:
             PortPermissionError: this user may not open ports below 1024.
@@ -170,7 +170,7 @@ class Listener:
         self._name = name
         self._limits = limits
         self._spare = spare
-        self._speaks_http = speaks_http
+        self._reads_http = reads_http
         self._refuses = False
         self._paused_until: float | None = None
         self._sock = _listening_socket(host, number)
@@ -228,7 +228,7 @@ class Listener:
                 connection = Connection(
                     self._loop,
                     client,
-                    self._port.received if self._speaks_http else self._begin,
+                    self._port.received if self._reads_http else self._begin,
                     partial(self._closed, address[0]),
                     self._backlog,
                     self._report,

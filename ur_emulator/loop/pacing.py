@@ -21,8 +21,14 @@ MAX_BACKLOG = 0.5  # s
 # so that its own time-out can end the hang.
 HANG_LIMIT = 60.0  # s
 # In lockstep, a client that has not read for this long in real seconds is not waited for any more, unless a
-# script waits for its bytes: many clients send programs and never read.
-READER_LIMIT = 5.0  # s
+# script waits for its bytes; one that has not read anything yet, for the shorter time only: many clients,
+# such as ur_rtde at port 30003, send programs and never read.
+READER_LIMIT, FIRST_READ_LIMIT = 5.0, 0.2  # s
+
+
+def reader_limit(client_has_read: bool) -> float:
+    """Return how long to wait for a client [s]."""
+    return READER_LIMIT if client_has_read else FIRST_READ_LIMIT
 
 
 class Pace(Enum):
@@ -50,8 +56,8 @@ class Situation(Protocol):
         """A client that reads has not taken its frames yet."""
         ...
 
-    def give_up_readers(self) -> None:
-        """Stop waiting for the clients that are behind; they lose frames until they have caught up."""
+    def give_up_readers(self, waited: float) -> None:
+        """Stop waiting for clients after so long [s]; they lose frames until they have caught up."""
         ...
 
     def fell_behind(self, n_cycles: int) -> None:
@@ -147,9 +153,9 @@ class LockstepPacer:
         elif self._outside.spent(now) < HANG_LIMIT or now - self._last_tick < self._period:
             return False  # time stands still: a client that does not read loses nothing
         if situation.readers_full:
-            if not hangs and self._readers.spent(now) < READER_LIMIT:
+            situation.give_up_readers(math.inf if hangs else self._readers.spent(now))
+            if situation.readers_full:
                 return False
-            situation.give_up_readers()
         self._readers.restart()
         self._last_tick = now
         return True

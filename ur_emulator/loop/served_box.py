@@ -26,10 +26,11 @@ from ur_emulator.controller.safety.modes import MOVING_MODES
 from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ControlError, RefusedError
 from ur_emulator.loop.barrier import Failed, describe_error, guarded
+from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.event_loop import EventLoop
 from ur_emulator.loop.listener import Listener
 from ur_emulator.loop.memory import MemoryWatch
-from ur_emulator.loop.pacing import Pacer, RealtimePacer
+from ur_emulator.loop.pacing import Pacer, RealtimePacer, reader_limit
 from ur_emulator.loop.steps import StepRunner, Steps, settle
 from ur_emulator.loop.worker import Ticket
 from ur_emulator.models.robot_generation import Software
@@ -106,6 +107,7 @@ class ServedBox:
         self.log = BoxLog(controller.generation)
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
+        self._has_noted_input = False
         self._publishers: tuple[Publisher, ...] = ()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         # By the name that replaces them, or by something that nothing else has.
@@ -118,9 +120,9 @@ class ServedBox:
         self.newest = 0.0
         self.watch: MemoryWatch | None = None
         self.listeners: tuple[Listener, ...] = ()
-        self.backlog: set[Any] = set()
+        self.backlog: set[Connection] = set()
         self._on_failure = on_failure
-        self._given_up: set[Any] = set()
+        self._given_up: set[Connection] = set()
         self._failing: set[object] = set()
         self._last_frame = -math.inf
         # A cycle is computed and waits for its deadline.
@@ -205,6 +207,16 @@ class ServedBox:
     def notice(self, text: str) -> None:
         """Write a line about a client into the log."""
         self.log.write(self.snapshot.tick, "Client", text)
+
+    def note_input(self, client: Connection) -> None:
+        """Say once that in lockstep an input, for which no program waits, comes at no fixed time."""
+        is_running = self.controller.programs.is_running and not self.waits_outside
+        if self._repeats and is_running and not self._has_noted_input:
+            self._has_noted_input = True
+            self.notice(
+                f"{client.peer} writes inputs while a program runs: in lockstep each run has them at other "
+                'times of the robot; a client that streams by the clock needs pace "realtime"'
+            )
 
     def report(self, what: str, error: Exception) -> None:
         """Write into the log what an error of ours has ended."""
@@ -312,11 +324,12 @@ class ServedBox:
         wants_cycles = bool(self._commands) or self._is_awake or self.controller.is_busy
         return len(self._given_up) < len(self.backlog) and wants_cycles
 
-    def give_up_readers(self) -> None:
-        """Wait no longer for clients that are behind, until they have caught up."""
+    def give_up_readers(self, waited: float) -> None:
+        """Wait no longer for clients that have been behind for too long [s], until they have caught up."""
         for client in self.backlog - self._given_up:
-            self.notice(f"{client.peer} does not read: it is not waited for any more and loses frames")
-        self._given_up = set(self.backlog)
+            if waited >= reader_limit(client.has_read):
+                self.notice(f"{client.peer} does not read: it is not waited for any more and loses frames")
+                self._given_up.add(client)
 
     def fell_behind(self, n_cycles: int) -> None:
         """Write into the log that the box does not keep up with real time."""

@@ -215,9 +215,11 @@ class XmlRpcClient:
         self.close()
 
     def close(self) -> None:
-        """Close everything."""
+        """Close everything; calls may be made anew."""
         for server in (*self._busy, *self._connected):
             server.close()
+        self._busy.clear()
+        self._loop.remove(self)
 
     # --- what the servers report
 

@@ -108,23 +108,24 @@ class Scene:
             raise RefusedError(f"thing {thing.name}: it is one of the scene's file, remove it first")
         if before is None and len(self._things) >= MOST_THINGS:
             raise RefusedError(f"thing {thing.name}: there are {MOST_THINGS} already, remove one first")
-        if before is not None:
-            self.remove(thing.name)
-        body = self._spec.worldbody.add_body(
-            name=PREFIX + thing.name, pos=thing.pose[:3], quat=quaternion(thing.pose[3:])
-        )
-        body.add_freejoint(name=PREFIX + thing.name)
+        # Beside the one that it replaces, which may have moved: that stays if this one is refused.
+        name = PREFIX if before is not None else PREFIX + thing.name
+        body = self._spec.worldbody.add_body(name=name, pos=thing.pose[:3], quat=quaternion(thing.pose[3:]))
+        joint = body.add_freejoint(name=name)
         geom = _add_shape(body, thing.shape, thing.size, thing.friction)
         geom.mass = thing.mass
         geom.solref, geom.solimp, geom.condim = _SOLREF, _SOLIMP, 4
         self._recompile()
-        self._things[thing.name] = thing
         self._collide()
-        if self._touches(thing.name):
-            self.remove(thing.name)
-            if before is not None:
-                self.put(before)
+        if self._touches(name):
+            self._spec.delete(body)
+            self._recompile()
             raise RefusedError(f"thing {thing.name}: the arm is where it should be, move one of them")
+        self.remove(thing.name)
+        if before is not None:
+            body.name = joint.name = PREFIX + thing.name
+            self._recompile()
+        self._things[thing.name] = thing
 
     def remove(self, name: str) -> None:
         """Take a thing away, if it exists."""
@@ -152,7 +153,7 @@ class Scene:
         return ThingState(
             six([*data.qpos[q : q + 3].tolist(), *turn.tolist()]),
             six([*data.qvel[v : v + 3].tolist(), *spin.tolist()]),
-            self._touches(name),
+            self._touches(PREFIX + name),
         )
 
     def _collide(self) -> None:
@@ -161,10 +162,10 @@ class Scene:
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_collision(self._model, self._data)
 
-    def _touches(self, name: str) -> bool:
-        """Whether a thing touches the arm or its tool."""
+    def _touches(self, body: str) -> bool:
+        """Whether the body of a thing touches the arm or its tool."""
         model = self._model
-        thing = model.body(PREFIX + name).id
+        thing = model.body(body).id
         return self._arm_touches(lambda geom: model.body_rootid[model.geom_bodyid[geom]] == thing)
 
     def _arm_touches(self, is_it: Callable[[int], bool]) -> bool:

@@ -31,8 +31,9 @@ TOOL_LINE = "tool_line"
 SOFTWARE_OF = {"robotiq": "gripper", "onrobot": "onrobot"}
 # Ports whose numbers need privileges, and what the box lacks without them.
 _PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
-# Ports of web servers.
-_WEB = frozenset({CONTROL, ROBOT_API, SOFTWARE_OF["onrobot"]})
+# Ports that read what a browser sends: web servers, and RTDE, for which its first letters are the size of a
+# package that is too long: it says so and closes.
+_READS_HTTP = frozenset({CONTROL, ROBOT_API, SOFTWARE_OF["onrobot"], "rtde"})
 
 
 class PortSet:
@@ -96,7 +97,7 @@ class PortSet:
         """
         box, limits, backlog, notice = self._box, self._limits, self._box.backlog, self._lines.write
         if name == CONTROL:
-            limits, backlog, notice = ClientLimits(), set(), _no_line
+            limits, backlog, notice = ClientLimits(), set(), lambda text: None
         return Listener(
             self._loop,
             self._host,
@@ -108,12 +109,8 @@ class PortSet:
             name,
             limits,
             self._spare,
-            speaks_http=name in _WEB,
+            reads_http=name in _READS_HTTP,
         )
-
-
-def _no_line(text: str) -> None:
-    """Leave out a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +164,7 @@ def answering_ports(
 ) -> dict[str, Port]:
     """Make the ports that answer requests, by their names in `Ports`: those that the software has."""
     software = box.identity.software
-    ports: dict[str, Port] = {"modbus": ModbusPort(box)}
+    ports: dict[str, Port] = {}
     if software.dashboard:
         ports["dashboard"] = DashboardPort(box, DashboardAnswers(box, player, reports, shut_down))
     if software.has_interpreter:
@@ -192,4 +189,5 @@ def answering_ports(
 
         answers = RobotApiAnswers(box, player, reports, shut_down, host)
         ports[ROBOT_API] = HttpPort(box, answers, BUDGETS.upload_bytes)
+    ports[MODBUS] = ModbusPort(box)  # after the one that matters more where both are missing
     return ports

@@ -17,7 +17,6 @@ from ur_emulator.controller.clock import clock_time
 from ur_emulator.controller.command import Command
 from ur_emulator.controller.events import LogAdded
 from ur_emulator.controller.safety.inputs import OperationalMode
-from ur_emulator.controller.safety.modes import ROW
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.loop.connection import Connection
 from ur_emulator.loop.served_box import ServedBox
@@ -146,14 +145,11 @@ class ProgramCalls:
 # Source: the maker's API document as the client library's tests quote it.
 _LOCAL = "Not authorized to perform this operation under the current robot control mode."
 _NOT_CLOSED = {"closed": False, "message": "there is no such popup"}
-# Modes from which an action starts, and the effect; in the modes behind it has happened already.
-_POWER: dict[str, tuple[frozenset[RobotMode], frozenset[RobotMode], type[Command]]] = {
-    "POWER_ON": (
-        frozenset({RobotMode.POWER_OFF}),
-        frozenset({RobotMode.IDLE, RobotMode.RUNNING}),
-        PowerOn,
-    ),
-    "BRAKE_RELEASE": (frozenset({RobotMode.IDLE}), frozenset({RobotMode.RUNNING}), ReleaseBrakes),
+# Modes in which an action starts, or has happened already, and the effect.
+_RESTS = frozenset({RobotMode.IDLE, RobotMode.RUNNING})
+_POWER: dict[str, tuple[frozenset[RobotMode], type[Command]]] = {
+    "POWER_ON": (_RESTS | {RobotMode.POWER_OFF}, PowerOn),
+    "BRAKE_RELEASE": (_RESTS, ReleaseBrakes),
 }
 
 
@@ -260,14 +256,9 @@ class RobotApiAnswers:
 
     def _power(self, action: str) -> Steps[HttpAnswer]:
         """Power the arm or open its brakes; answer when that is done."""
-        start, done, command = _POWER[action]
-        safety, snapshot = self._box.controller.state.safety, self._box.snapshot
-        mode = RobotMode(snapshot.robot_mode)
-        if not ROW[safety.mode].may_have_power:
-            raise RefusedError(f"{action} given: the safety mode is {safety.mode.name}")
-        if mode in done:
-            return HttpAnswer(200, {})
-        if mode not in start:
+        possible, command = _POWER[action]
+        mode = RobotMode(self._box.snapshot.robot_mode)
+        if mode not in possible:
             raise RefusedError(f"{action} given: the robot is in {mode.name}")
         yield from self._box.apply(command())
         while self._box.controller.state.mode.is_changing:

@@ -124,6 +124,7 @@ class _RtdeSession(Session):
             case None:
                 return 0
             case InputReceived(names, values):
+                self._box.note_input(self.connection)
                 while not self._box.takes_commands:
                     yield
                 self._box.submit(WriteInputs(tuple(zip(names, values, strict=True))))

@@ -42,7 +42,7 @@ class ToolLinePort(SessionPort["_LineSession"]):
 
     def has_line(self, connection: Connection) -> bool:
         """Whether a client has the line; what others send is lost."""
-        return not self._software.has_clients and next(iter(self._sessions)) is connection
+        return not self._software.has_clients and next(iter(self._sessions), None) is connection
 
     def gripper(self, unit: int) -> _Gripper | None:
         """The gripper that answers to a unit; None: nothing answers."""
