@@ -227,6 +227,12 @@ class Movement:
         """Target points, (n, 3), m. Inner ones of a human-like movement are aimed at, not reached."""
         return self.trajectory.target_points
 
+    @property
+    def knots(self) -> Array:
+        """Times that a plan samples whatever else it does, (n,), s: all samples, or the ends of a closed form."""
+        is_sampled = isinstance(self.trajectory, SampledTrajectory)
+        return self.trajectory.t if is_sampled else np.array((0.0, self.duration))
+
     def motion(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t, s; each (n, 3).
 
