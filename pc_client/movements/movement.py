@@ -229,9 +229,10 @@ class Movement:
 
     @property
     def knots(self) -> Array:
-        """Times that a plan samples whatever else it does, (n,), s: all samples, or the ends of a closed form."""
-        is_sampled = isinstance(self.trajectory, SampledTrajectory)
-        return self.trajectory.t if is_sampled else np.array((0.0, self.duration))
+        """Times that a plan does not miss, (n,), s: those of all samples, or both ends of a closed form."""
+        if isinstance(self.trajectory, SampledTrajectory):
+            return self.trajectory.t
+        return np.array((0.0, self.duration))
 
     def motion(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t, s; each (n, 3).

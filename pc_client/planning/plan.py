@@ -142,8 +142,8 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
     """
     if isinstance(motion, JointTrajectory):
         return _plan_joints(motion, model)
-    if motion.may_be_moved and any(shift := model.description.library_shift):
-        motion = motion.transformed(Similarity(1.0, np.eye(3), np.array(shift)))
+    if motion.may_be_moved and (shift := model.description.library_shift).any():
+        motion = motion.transformed(Similarity(1.0, np.eye(3), shift))
     return Plan(motion, plan_movement(motion, model=model), motion.text)
 
 
