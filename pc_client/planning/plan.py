@@ -27,7 +27,7 @@ from pc_client.planning.joint_path import JointPath, fixed_tcp_rotation, follow_
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits, limits_of
 
-_DEFAULT_DT = 0.004
+DEFAULT_DT = 0.004
 """Time between samples of a plan [s]: half a control cycle; the spline between is then good to < 1 um."""
 
 
@@ -151,7 +151,7 @@ def plan_movement(
     movement: PlannableMovement,
     *,
     model: RobotModel | None = None,
-    dt: float = _DEFAULT_DT,
+    dt: float = DEFAULT_DT,
     limits: PlanLimits | None = None,
     q_branch: ArrayLike | None = None,
 ) -> JointPlan:
@@ -186,7 +186,7 @@ def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> Plan:
     """A clamped cubic spline through joint angles, checked as all plans."""
     limits, name = limits_of(model), trajectory.name
     spline = JointSpline(trajectory.t, trajectory.q)
-    t = _sample_times(name, trajectory.t, _DEFAULT_DT)
+    t = _sample_times(name, trajectory.t, DEFAULT_DT)
     q, qd = spline.sample(t)
     jacobians = np.array([tcp_jacobian(model, posture) for posture in q])
     p = tcp_positions(model, q)
