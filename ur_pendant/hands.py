@@ -238,7 +238,8 @@ class Follower:
         self._thread.join()
 
     def _feed(self) -> None:
-        counter, resting, has_run, last = 2, 0.0, False, ()
+        counter, resting, has_run = 2, 0.0, False
+        last: tuple[float, ...] = ()
         try:
             while True:
                 values = self._stream.receive()  # 30 times a second

@@ -9,7 +9,7 @@ import pytest
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
 from ur_pendant import hands as hands_module
-from ur_pendant.hands import KEYS, Follower, HandError, Hands
+from ur_pendant.hands import KEYS, HandError, Hands
 from ur_pendant.robot import Address, Robot
 
 LIMIT = 20.0  # s, for hangs
@@ -155,10 +155,10 @@ def test_a_long_way_is_gone_to_its_end(followed, monkeypatch):
     """Three seconds are 1.7 rad; here a tenth of it, so that less is waited for."""
     monkeypatch.setattr(hands_module, "_REST", 0.3)
     box, robot, hands = followed
-    begin = np.array(box.state.q)
-    hands.follow(begin + (0.7, 0, 0, 0, 0, 0))
+    goal = np.add(box.state.q, (0.7, 0, 0, 0, 0, 0))
+    hands.follow(goal)
     until(lambda: hands.goal is None, "the end")
-    assert at(box, begin + (0.7, 0, 0, 0, 0, 0))
+    assert at(box, goal)
     assert (robot.values["runtime_state"], rtde_clients(box)) == (1, 1)
 
 
@@ -174,16 +174,16 @@ def test_no_goal_is_lost_while_a_follower_ends(followed, monkeypatch):
         until(lambda k=k: at(box, begin + 0.01 * k), "the goal")
 
 
-def test_a_follower_that_cannot_begin_leaves_nothing_open(followed):
-    box, robot, hands = followed
+def test_a_follower_that_cannot_begin_leaves_nothing_open(followed, monkeypatch):
+    box, _, hands = followed
 
     def refuse(_):
         raise HandError("no program is taken")
 
+    monkeypatch.setattr(hands, "run", refuse)
     with pytest.raises(HandError, match="no program is taken"):
-        Follower(robot, refuse, box.state.q)
+        hands.follow(box.state.q)
     until(lambda: rtde_clients(box) == 1, "the end of its stream")
-    hands.follow(np.array(box.state.q) + 0.05)
 
 
 @pytest.mark.parametrize("software", [{"robot": "ur3", "version": "3.5.0"}, {"robot": "ur5e"}], ids=str)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from math import hypot
 from typing import Literal
 
-from ur_emulator.commands.operation import CommandOperation, parameter
+from ur_emulator.commands.operation import CommandOperation, parameter, within
 from ur_emulator.controller.command import BoxParts, inform
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
@@ -44,12 +44,12 @@ class SetAnalogInput(CommandOperation):
         io = box.state.io
         line = (io.analog_in if self.group == "standard" else io.tool_analog_in)[self.n]
         low, high = ANALOG_RANGE[line.domain]
-        if not low <= self.value <= high:
+        if (value := within(self.value, low, high)) is None:
             raise RefusedError(
                 f"{self.value:g} given for {self.group} analog input {self.n}, which measures {low:g} to "
                 f"{high:g} {'V' if line.domain else 'A'} now"
             )
-        line.value = self.value
+        line.value = value
 
 
 # --- Forces on the flange, and a payload that no program has declared
@@ -116,13 +116,9 @@ class AddObstacle(CommandOperation):
     def check_together(self) -> None:
         if not self.name:
             raise ArgumentError("obstacle without a name given: it needs one, to be removed by")
-        wanted = SIZES[self.shape]
-        if len(self.size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in self.size):
-            raise ArgumentError(
-                f"obstacle {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
-                f"numbers ({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
-            )
-        _check_distance(f"obstacle {self.name}", self.pose)
+        what = f"obstacle {self.name}"
+        _check_size(what, self.shape, self.size, SIZES[self.shape])
+        _check_distance(what, self.pose)
 
     def apply(self, box: BoxParts) -> None:
         try:
@@ -132,8 +128,16 @@ class AddObstacle(CommandOperation):
             raise
 
 
+def _check_size(what: str, shape: str, size: Sequence[float], wanted: Sequence[str]) -> None:
+    if len(size) != len(wanted) or any(within(value, SMALLEST, LARGEST) is None for value in size):
+        raise ArgumentError(
+            f"{what}: size {list(size)} given: a {shape} needs {len(wanted)} "
+            f"numbers ({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
+        )
+
+
 def _check_distance(what: str, pose: Sequence[float]) -> None:
-    if hypot(*pose[:3]) > FARTHEST:
+    if within(hypot(*pose[:3]), high=FARTHEST) is None:
         raise ArgumentError(
             f"{what}: pose {list(pose)} given: six finite numbers x, y, z, rx, ry, rz are needed, at most "
             f"{FARTHEST:g} m away"
@@ -184,13 +188,9 @@ class AddThing(CommandOperation):
     def check_together(self) -> None:
         if not (self.name and self.name.isprintable() and len(self.name) <= 60):
             raise ArgumentError(f"name {ascii(self.name)[:60]} of a thing given: 1 to 60 printed characters")
-        wanted = THING_SIZES[self.shape]
-        if len(self.size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in self.size):
-            raise ArgumentError(
-                f"thing {self.name}: size {list(self.size)} given: a {self.shape} needs {len(wanted)} "
-                f"numbers ({', '.join(wanted)}), each {SMALLEST:g} to {LARGEST:g} m"
-            )
-        _check_distance(f"thing {self.name}", self.pose)
+        what = f"thing {self.name}"
+        _check_size(what, self.shape, self.size, THING_SIZES[self.shape])
+        _check_distance(what, self.pose)
 
     def apply(self, box: BoxParts) -> None:
         thing = Thing(self.name, self.shape, tuple(self.size), self.mass, self.friction, six(self.pose))
