@@ -430,7 +430,12 @@ class Panel:
     def _newest_of(self, kind: str, action: Callable[[], object]) -> Callable[[Any], None]:
         """As `_calling`, by the worker, and of a kind only the newest: a last one is never lost, nor late."""
         call = self._calling(action)
-        return lambda event: self._soon(kind, partial(call, event))
+
+        def ask(event: Any) -> None:
+            if event.client is not None:
+                self._soon(kind, partial(call, event))
+
+        return ask
 
     def _soon(self, kind: str, deed: Callable[[], object]) -> None:
         self._newest[kind] = deed
@@ -505,14 +510,12 @@ class Panel:
         goal, refusal = None, None
         T_tcp_flange = pose_to_T(pose_inv(_numbers(self._robot, "tcp_offset") or (0.0,) * 6))
         while self._way:
-            T = self._way.popleft()
+            T_base_tcp, refusal = self._way.popleft(), None
+            if T_base_tcp is None:
+                self._followed = self._measured("actual_q")
+                continue
             try:
-                self._followed = q = (
-                    self._measured("actual_q")
-                    if T is None
-                    else reached(self._model, T @ T_tcp_flange, self._followed)
-                )
-                goal, refusal = (goal if T is None else q), None
+                self._followed = goal = reached(self._model, T_base_tcp @ T_tcp_flange, self._followed)
             except HandError as error:
                 refusal = error
         if goal is not None:
