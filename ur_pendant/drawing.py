@@ -264,6 +264,12 @@ class RobotDrawing:
         self._camera.position = np.multiply(_SEEN_FROM, model.description.reach)
         return arm
 
+    @property
+    def solids(self) -> list[Any]:
+        """Nodes of the links, base to wrist 3, and of what the flange carries."""
+        carried = [node for (_, is_carried, *_), node in self._shapes.items() if is_carried]
+        return [*(self.arm.links if self.arm is not None else ()), *carried]
+
     def update(self) -> None:
         """Draw what the robot reports now."""
         values, info, state = self._robot.values, self._robot.info, self._robot.state

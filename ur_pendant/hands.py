@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from importlib import resources
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.driver.questions import ask_dashboard
-from pc_client.driver.rtde import RtdeStream
+from pc_client.driver.rtde import RtdeStream, RtdeValues
 from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import ClientError
 from protocol.rtde.types import RtdeValue
@@ -61,11 +62,17 @@ SPEED, ACCELERATION = 0.6, 1.5
 _SILENCE = 0.3
 """The arm stops when no target comes for so long [s]."""
 
+_THERE = 1e-3
+"""A joint whose target is so near its goal has reached it [rad]."""
+
 _REST = 3.0
-"""A program that nobody moves ends after so long [s]: others may want the arm."""
+"""A program that nobody moves ends so long after the arm has reached its goal [s]: others may want it."""
 
 _START = 2.0
 """A program that has not begun after so long [s] does not run: in local control, for example."""
+
+_MOVE = "pendant_move"
+"""The program that moves a box in lockstep."""
 
 _RATE = 30.0
 _UPPER_SINCE = (SoftwareVersion(3, 9), SoftwareVersion(5, 3))
@@ -78,6 +85,7 @@ class Hands:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._follower: Follower | None = None
+        self._moves = False
         self._lock = threading.Lock()
 
     # --- keys of a pendant
@@ -145,7 +153,8 @@ class Hands:
     def follow(self, q: Sequence[float] | Array) -> None:
         """Let the arm go to a posture (6,) [rad] from where it is, until it rests there or a loss.
 
-        A box in lockstep, whose time would run away from a hand, gets a move to each posture.
+        A box in lockstep, whose time would run away from a hand, gets a move to each posture; a posture that
+        comes meanwhile takes the place of the one before.
 
         HandError if no program may run now.
         """
@@ -153,12 +162,14 @@ class Hands:
         goal = tuple(map(float, q))
         with self._lock:
             if self._robot.info is not None and self._robot.info.lockstep:
-                _check_rest(self._robot)
-                self.run(f"movej({list(goal)}, a={ACCELERATION}, v={SPEED})")
-                return
-            if self._follower is None or not self._follower.is_alive:
-                self._follower = Follower(self._robot, self.run)
-            self._follower.goal = goal
+                if not (self._moves and self._robot.program in ("", _MOVE)):
+                    _check_rest(self._robot.values)
+                self.run(f"def {_MOVE}():\n  movej({list(goal)}, a={ACCELERATION}, v={SPEED})\nend")
+                self._moves = True
+            elif self._follower is None or not self._follower.take(goal):
+                if self._follower is not None:
+                    self._follower.join()
+                self._follower = Follower(self._robot, self.run, goal)
 
     @property
     def goal(self) -> Array | None:
@@ -179,27 +190,34 @@ class Hands:
 class Follower:
     """A program in the box that goes to `goal`, and the stream of its targets.
 
-    It ends when nothing has changed for `_REST`, and when its program has ended, as by a stop.
+    It ends when the arm has been at an unchanged goal for `_REST`, and when its program has ended, as by a
+    stop. From then on it takes no goal.
     """
 
-    def __init__(self, robot: Robot, run: Callable[[str], None]) -> None:
+    def __init__(self, robot: Robot, run: Callable[[str], None], goal: tuple[float, ...]) -> None:
         """Begin where the arm is. HandError if no program may run now."""
-        _check_rest(robot)
-        self.goal = _six(robot.values["target_q"])
         assert robot.info is not None
+        self.goal = goal
+        self._lock, self._is_ending = threading.Lock(), False
         address, version = robot.address, robot.info.version
         first = 24 if version >= _UPPER_SINCE[version.major >= 5] else 0
         inputs = [f"input_int_register_{first}", *(f"input_double_register_{first + k}" for k in range(6))]
-        outputs = ("runtime_state",)
-        try:
-            self._stream = RtdeStream(TcpNetwork(), address.host, address.ports.rtde, outputs, _RATE, inputs)
-            # The program must find where the arm is, not the targets of the last time.
-            for counter in (1, 2):
-                self._stream.send((counter, *self.goal))
-                self._stream.receive()
-            run(_program(first))
-        except ClientError as error:
-            raise HandError(str(error)) from None
+        outputs = ("runtime_state", "robot_mode", "target_q")
+        with ExitStack() as failing:
+            try:
+                stream = RtdeStream(TcpNetwork(), address.host, address.ports.rtde, outputs, _RATE, inputs)
+                self._stream = failing.enter_context(stream)
+                values = stream.receive()
+                _check_rest(values)
+                # The program must find where the arm is, not the targets of the last time.
+                for counter in (1, 2):
+                    stream.send((counter, *_six(values["target_q"])))
+                    stream.receive()
+                run(_program(first))
+            except ClientError as error:
+                _check_rest(robot.values)  # as another window, which writes to the inputs: its program runs
+                raise HandError(str(error)) from None
+            failing.pop_all()
         self._thread = threading.Thread(target=self._feed, daemon=True)
         self._thread.start()
 
@@ -208,29 +226,50 @@ class Follower:
         """Whether the program still follows."""
         return self._thread.is_alive()
 
+    def take(self, goal: tuple[float, ...]) -> bool:
+        """Go to another goal; return False if it is too late for one."""
+        with self._lock:
+            if not self._is_ending:
+                self.goal = goal
+            return not self._is_ending
+
+    def join(self) -> None:
+        """Wait for the end."""
+        self._thread.join()
+
     def _feed(self) -> None:
-        counter, resting, has_run, last = 2, 0.0, False, self.goal
+        counter, resting, has_run = 2, 0.0, False
+        last: tuple[float, ...] = ()
         try:
-            while resting < _REST:
+            while True:
                 values = self._stream.receive()  # 30 times a second
                 runs = values["runtime_state"] == ProgramState.PLAYING
-                resting = 0.0 if self.goal != last else resting + 1.0 / _RATE
-                if not runs and (has_run or resting > _START):
-                    return
-                has_run, last, counter = has_run or runs, self.goal, counter + 1
+                with self._lock:
+                    goal = self.goal
+                    is_there = not runs or np.abs(np.subtract(goal, _six(values["target_q"]))).max() < _THERE
+                    resting = resting + 1.0 / _RATE if is_there and goal == last else 0.0
+                    self._is_ending = resting >= _REST if runs else has_run or resting > _START
+                if self._is_ending:
+                    break
+                has_run, last, counter = has_run or runs, goal, counter + 1
                 self._stream.send((counter, *last))
-            self._stream.send((0, *last))
+            self._stream.send((0, *goal))
+            for _ in range(round(_START * _RATE)):  # until the next one may begin
+                if self._stream.receive()["runtime_state"] == ProgramState.STOPPED:
+                    break
         except ClientError:
             pass  # the program ends by itself
         finally:
+            with self._lock:
+                self._is_ending = True
             self._stream.close()
 
 
-def _check_rest(robot: Robot) -> None:
+def _check_rest(values: RtdeValues) -> None:
     """Raise HandError if the arm cannot be moved by hand now."""
-    if robot.values.get("robot_mode") != RobotMode.RUNNING:
+    if values.get("robot_mode") != RobotMode.RUNNING:
         raise HandError("the arm has no power or its brakes are closed: power it on, release the brakes")
-    if robot.values.get("runtime_state") != ProgramState.STOPPED:
+    if values.get("runtime_state") != ProgramState.STOPPED:
         raise HandError("a program runs: stop it before you move the arm")
 
 

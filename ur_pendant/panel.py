@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 from enum import IntEnum
@@ -27,7 +27,7 @@ from pc_client.arrays import Array
 from pc_client.kinematics.model import RobotModel, solve_ik
 from protocol.pose import pose_inv, pose_to_T
 from protocol.ur_types import JOINT_NAMES, ProgramState, RobotMode, SafetyStatus
-from ur_emulator.commands.surroundings import MAX_LEVER, SIZES, THING_SIZES
+from ur_emulator.commands.surroundings import MAX_FORCE, SIZES, THING_SIZES
 from ur_emulator.control_api.box_state import Question
 from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
@@ -100,17 +100,20 @@ _KEYS: Mapping[str, Deed] = {key.label: methodcaller("press", key) for key in KE
 _MODES, _POSITIONS = ("manual", "automatic", "none"), ("released", "pressed", "fully pressed", "none")
 _TROUBLE = {"Protective stop": "protective_stop", "Violation": "trigger_violation", "Fault": "trigger_fault"}
 ROWS: Sequence[tuple[str, int, Mapping[str, Deed]]] = (
+    ("Emergency", 3, {"Emergency stop": _do("emergency_stop"), "Release": _do("release_emergency_stop")}),
     ("Power", 0, {label: _KEYS[label] for label in ("Power on", "Release brakes", "Power off")}),
     ("Program", 0, {label: _KEYS[label] for label in ("Play", "Pause", "Stop", "Close popup")}),
     ("Safety", 0, {label: _KEYS[label] for label in ("Unlock protective stop", "Restart safety")}),
-    ("Emergency", 3, {"Emergency stop": _do("emergency_stop"), "Release": _do("release_emergency_stop")}),
     ("Safeguard", 3, {"Open": _do("safeguard_stop"), "Close": _do("safeguard_stop", active=False)}),
     ("Trouble", 3, {label: _do(operation) for label, operation in _TROUBLE.items()}),
     ("Mode", 5, {mode.capitalize(): _do("set_operational_mode", mode=mode) for mode in _MODES}),
     ("Enabling", 5, {where.capitalize(): _do("enabling_device", position=where) for where in _POSITIONS}),
     ("Control", 5, {"Remote": _do("remote_control"), "Local": _do("remote_control", on=False)}),
 )
-"""Label, first major version of the software that has it (0: also without a control API), and buttons."""
+"""Label, first major version of the software that has it (0: also without a control API), and buttons.
+
+The first row stands above all else, whatever is shown.
+"""
 
 _FREEDRIVE = "def pendant_freedrive():\n  freedrive_mode()\n  while True:\n    sync()\n  end\nend\n"
 FREEDRIVE: Mapping[str, Deed] = {"On": methodcaller("run", _FREEDRIVE), "Off": _KEYS["Stop"]}
@@ -122,7 +125,7 @@ _RELEASED = 0.3  # and for how long it is not, when it has been released [s].
 AHEAD = 0.15  # By how much a button may ask a joint to be ahead of itself [rad].
 _LAG = 0.06  # From a measurement to its effect on the goal [s].
 JUMP = 0.5  # How far a joint may go for a step of a tool that is dragged [rad].
-STIFFNESS, MOST_FORCE = 200.0, 80.0  # Of the spring that pulls at the arm [N/m, N].
+STIFFNESS = 200.0  # Of the spring that pulls at the arm, as hard as a box can be pushed [N/m].
 
 
 def jogged(goal: Array, q: Array, joint: int, step: float, model: RobotModel) -> Array:
@@ -145,7 +148,7 @@ def reached(model: RobotModel, T_base_flange: Array, q: Array) -> Array:
 def pulled(grip: Array, end: Array) -> Array:
     """The force (3,) of a spring from one point to another (3,) [N, m]."""
     force = STIFFNESS * (end - grip)
-    return force * min(1.0, MOST_FORCE / max(float(np.linalg.norm(force)), 1e-9))
+    return force * min(1.0, MAX_FORCE / max(float(np.linalg.norm(force)), 1e-9))
 
 
 # --- text and plots
@@ -196,7 +199,9 @@ class Panel:
         self._server, self._gui, self._robot, self._hands = server, server.gui, robot, hands
         self._drawing, self._container = drawing, container or nullcontext()
         self._worker = ThreadPoolExecutor(1)
-        self._task: Future[Any] = self._worker.submit(int)
+        self._newest: dict[str, Callable[[], object]] = {}
+        self._way: deque[Array | None] = deque()  # of the frame that is dragged; None where it begins
+        self._followed = np.empty(6)
         self._postures = {"upright": np.array((0.0, -pi / 2, 0.0, -pi / 2, 0.0, 0.0))}
         self._told: tuple[object, ...] = ()
         self._told_at = self._refreshed = self._pushed = self._jogging = 0.0
@@ -211,7 +216,7 @@ class Panel:
             self._made_for = wanted
         now = time.monotonic()
         if 0.0 < self._jogging < now - _RELEASED:
-            self._worker.submit(self._release)
+            self._soon("jog", self._release)
         if self._gizmo is not None:
             self._update_nodes(now)
         if now - self._refreshed >= _SLOWLY:
@@ -219,33 +224,33 @@ class Panel:
             for handle, name, show in self._following:
                 if getattr(handle, name) != (value := show(self._robot)):
                     setattr(handle, name, value)
-            self._show_modals()
+            self._show_questions()
+            self._offer_pulls()
             if not self._pause.value and self._server.get_clients():
                 self._draw_chart(now)
 
     def remove(self) -> None:
         """Take everything away."""
         if self._made_for:
-            for handle in (*self._nodes, self._tabs):
+            for handle in (*self._nodes, *self._asked.values(), *self._head, self._tabs):
                 handle.remove()
-            for modal in self._modals.values():
-                modal.close()
-            arm = self._made_for[2]
-            for link in arm.links if arm is self._drawing.arm and arm else ():
-                link.remove_drag_callback(self._on_pull)
+            for node in self._drawing.solids:
+                node.remove_drag_callback(self._on_pull)
         self._made_for = ()
 
     def _make(self, is_held: bool, has_api: bool, arm: ArmDrawing | None) -> None:
         self._following: list[tuple[Any, str, Callable[[Robot], object]]] = []
-        self._modals: dict[Question | str, Any] = {}
+        self._asked: dict[Question | str, Any] = {}
         self._charts: deque[tuple[Any, Any]] = deque()
         self._nodes: list[Any] = []
+        self._pullable: set[str] = set()
         self._gizmo: Any = None
         self._has_api, self._is_dragged, self._placed = has_api, False, np.zeros((4, 4))
-        self._dragged: tuple[Any, Array] | None = None
         self._pull: tuple[Any, Array, Array] | None = None
         gui, arm = self._gui, arm if is_held else None
+        label, _, deeds = ROWS[0]
         with self._container:
+            self._head = [self._row(label, deeds)] if has_api else []
             self._tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("Robot"):
             if not is_held:
@@ -282,7 +287,7 @@ class Panel:
     def _make_keys(self) -> None:
         robot, hands, gui = self._robot, self._hands, self._gui
         major = robot.info.version.major if robot.info is not None and self._has_api else 0
-        for label, since, deeds in ROWS:
+        for label, since, deeds in ROWS[1:]:
             if since <= major:
                 self._row(label, deeds)
         if self._has_api and robot.info is not None and robot.info.lockstep:
@@ -290,9 +295,8 @@ class Panel:
             self._row("Time", {label: methodcaller("let_pass", span) for label, span in spans.items()})
         if self._has_api:
             slider = gui.add_slider("Speed %", 0, 100, 1, 100)
-            call = self._calling(lambda: hands.operate("set_speed", fraction=slider.value / 100))
-            # In the order in which they come.
-            slider.on_update(lambda event: self._worker.submit(call, event))
+            set_speed = partial(hands.operate, "set_speed")
+            slider.on_update(self._newest_of("speed", lambda: set_speed(fraction=slider.value / 100)))
             self._following.append((slider, "value", lambda robot: _speed(robot, slider)))
         if robot.address.ports.dashboard:
             name = gui.add_text("File", "", hint="of a program, in the box's folder")
@@ -314,9 +318,9 @@ class Panel:
             self._texts({f"{name} {span}°": figure})
             for sign, symbol in () if model is None else ((-1, "−"), (1, "+")):
                 button, step = gui.add_button(f"{name} {symbol}"), sign * SPEED / JOG_RATE
-                call = self._calling(partial(self._jog, joint, step))
-                button.on_hold(partial(self._unless_busy, call), callback_hz=JOG_RATE)
-                button.on_click(self._calling(self._release))
+                jog = self._newest_of("jog", partial(self._jog, joint, step))
+                button.on_hold(jog, callback_hz=JOG_RATE)
+                button.on_click(self._newest_of("jog", self._release))
 
     def _make_inputs(self, group: DigitalGroup) -> None:
         """Buttons with a number and a level, which a click changes."""
@@ -377,8 +381,14 @@ class Panel:
         self._nodes += (gizmo, self._arrow)
         self._arm = arm
         gizmo.on_update(self._on_drag)
-        for link in arm.links if self._has_api else ():
-            link.on_drag("left")(self._on_pull)
+
+    def _offer_pulls(self) -> None:
+        """Let people pull at what is there now."""
+        solids = self._drawing.solids if self._has_api and self._gizmo is not None else []
+        for node in solids:
+            if node.name not in self._pullable:
+                node.on_drag("left")(self._on_pull)
+        self._pullable = {node.name for node in solids}
 
     def _texts(self, shows: Mapping[str, Show]) -> None:
         for label, show in shows.items():
@@ -417,9 +427,19 @@ class Panel:
             client.add_notification(title, plain(text), auto_close_seconds=6.0)
         self._told_at = now
 
-    def _unless_busy(self, call: Callable[[Any], None], event: Any) -> None:
-        if self._task.done():
-            self._task = self._worker.submit(call, event)
+    def _newest_of(self, kind: str, action: Callable[[], object]) -> Callable[[Any], None]:
+        """As `_calling`, by the worker, and of a kind only the newest: a last one is never lost, nor late."""
+        call = self._calling(action)
+
+        def ask(event: Any) -> None:
+            if event.client is not None:
+                self._soon(kind, partial(call, event))
+
+        return ask
+
+    def _soon(self, kind: str, deed: Callable[[], object]) -> None:
+        self._newest[kind] = deed
+        self._worker.submit(lambda: self._newest.pop(kind, int)())
 
     def _draw_chart(self, now: float) -> None:
         """Draw the chart whose turn it is."""
@@ -435,26 +455,28 @@ class Panel:
             plot.title = title
         plot.data = columns(samples, signal, now)
 
-    def _show_modals(self) -> None:
+    def _show_questions(self) -> None:
+        """Show popups and questions above the tabs, where they cover nothing."""
         now: set[Question | str] = {*self._robot.popups[:3], *self._robot.questions[:3]}
-        for gone in self._modals.keys() - now:
-            self._modals.pop(gone).close()
-        for new in now - self._modals.keys() if self._has_api else ():
-            self._modals[new] = self._make_modal(new)
+        for gone in self._asked.keys() - now:
+            self._asked.pop(gone).remove()
+        for new in now - self._asked.keys() if self._has_api else ():
+            with self._container:
+                self._asked[new] = self._make_question(new)
 
-    def _make_modal(self, new: Question | str) -> Any:
-        gui, modal = self._gui, self._gui.add_modal("A program says")
-        with modal:
-            gui.add_text(
-                "Text", plain(new.text if isinstance(new, Question) else new), multiline=True, disabled=True
-            )
+    def _make_question(self, new: Question | str) -> Any:
+        gui, text = self._gui, plain(new.text if isinstance(new, Question) else new)
+        with gui.add_folder("A program says", order=self._tabs.order - 0.5) as folder:
+            gui.add_text("Text", text, multiline=True, disabled=True)
             if isinstance(new, Question):
                 kind, answer = new.kind.capitalize(), partial(self._hands.operate, "answer", id=new.id)
                 is_choice, read = kind == "Boolean", _READS.get(kind, str)
                 given = gui.add_dropdown(kind, ("yes", "no")) if is_choice else gui.add_text(kind, "")
                 self._button("Answer", lambda: answer(value=read(given.value)))
             self._row("Program", {label: _KEYS[label] for label in ("Close popup", "Stop")})
-        return modal
+        for client in self._server.get_clients().values():
+            client.add_notification("A program says", text, auto_close_seconds=6.0)
+        return folder
 
     def _measured(self, name: str) -> Array:
         return np.array(_numbers(self._robot, name))
@@ -476,44 +498,57 @@ class Panel:
             self._hands.follow(self._measured("target_q") + qd * (_LAG + np.abs(qd) / (2.0 * ACCELERATION)))
 
     async def _on_drag(self, event: Any) -> None:
-        """Take the pose of the frame that somebody drags; the worker follows."""
+        """Have the arm follow the frame that somebody drags."""
         xyzw = np.roll(event.target.wxyz, -1)
         T: Array = pin.XYZQUATToSE3(np.append(event.target.position, xyzw)).homogeneous
-        if event.phase == "start":
-            self._followed = self._measured("actual_q")
-        self._dragged = None if event.phase == "start" else (event, T)
         self._is_dragged, self._placed = event.phase != "end", T
+        self._way.append(None if event.phase == "start" else T)
+        self._newest_of("drag", self._reach)(event)
 
-    def _reach(self, T_base_tcp: Array) -> None:
-        offset = _numbers(self._robot, "tcp_offset") or (0.0,) * 6
-        self._go(q := reached(self._model, T_base_tcp @ pose_to_T(pose_inv(offset)), self._followed))
-        self._followed = q
+    def _reach(self) -> None:
+        """Go to the last pose of the frame that is in reach; its whole way says with which posture."""
+        goal, refusal = None, None
+        T_tcp_flange = pose_to_T(pose_inv(_numbers(self._robot, "tcp_offset") or (0.0,) * 6))
+        while self._way:
+            T_base_tcp, refusal = self._way.popleft(), None
+            if T_base_tcp is None:
+                self._followed = self._measured("actual_q")
+                continue
+            try:
+                self._followed = goal = reached(self._model, T_base_tcp @ T_tcp_flange, self._followed)
+            except HandError as error:
+                refusal = error
+        if goal is not None:
+            self._go(goal)
+        if refusal is not None:
+            raise refusal
 
     async def _on_pull(self, event: Any) -> None:
-        """Take where somebody pulls at a link: on the flange, or as far from it as the box can be pushed."""
-        flange, start = self._arm.T_base_flange, np.array(event.start_position)
-        grip = (start - self._drawing.root.position - flange[:3, 3]) @ flange[:3, :3]
-        grip *= min(1.0, MAX_LEVER / max(float(np.linalg.norm(grip)), 1e-9))
-        end = flange[:3, :3] @ grip + flange[:3, 3] + event.end_position - start
-        self._pull = None if event.phase == "end" else (event, grip, end)
+        """Take where somebody pulls at what the flange carries; a box is pushed nowhere else."""
+        if event.target.name in {link.name for link in self._arm.links[:-1]}:
+            if event.phase == "start":
+                self._tell(
+                    event.client, "Not done", "pull at the last link or at the tool: a box is pushed there"
+                )
+            return
+        flange, base = self._arm.T_base_flange, self._drawing.root.position
+        grip = (np.array(event.start_position) - base - flange[:3, 3]) @ flange[:3, :3]
+        self._pull = None if event.phase == "end" else (event, grip, np.array(event.end_position) - base)
 
     def _update_nodes(self, now: float) -> None:
-        gizmo, arrow, T = self._gizmo, self._arrow, self._drawing.T_base_tcp
+        gizmo, arrow, T, pull = self._gizmo, self._arrow, self._drawing.T_base_tcp, self._pull
         mode, program = (self._robot.values.get(name) for name in ("robot_mode", "runtime_state"))
         is_free = program == ProgramState.STOPPED or self._hands.goal is not None  # no program has the arm
         gizmo.visible = self._can_drag.value and mode == RobotMode.RUNNING and is_free
-        arrow.visible = self._pull is not None
-        if self._dragged is not None and self._task.done():
-            (event, wanted), self._dragged = self._dragged, None
-            self._unless_busy(self._calling(partial(self._reach, wanted)), event)
+        arrow.visible = pull is not None
         if gizmo.visible and not self._is_dragged and np.abs(T - self._placed).max() > 1e-5:
             self._placed = T
             gizmo.position, gizmo.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
-        if self._pull is not None:
-            (event, grip, end), flange = self._pull, self._arm.T_base_flange
+        if pull is not None:
+            (event, grip, end), flange = pull, self._arm.T_base_flange
             point = flange[:3, :3] @ grip + flange[:3, 3]
             force = pulled(point, end)
             arrow.points = np.array([[point, point + force / STIFFNESS]])
             if now - self._pushed >= _SLOWLY:
                 self._pushed, given = now, {"force": force.tolist(), "point": grip.tolist(), "duration": 0.3}
-                self._unless_busy(self._calling(partial(self._hands.operate, "push", **given)), event)
+                self._newest_of("push", partial(self._hands.operate, "push", **given))(event)

@@ -227,6 +227,13 @@ class Movement:
         """Target points, (n, 3), m. Inner ones of a human-like movement are aimed at, not reached."""
         return self.trajectory.target_points
 
+    @property
+    def knots(self) -> Array:
+        """Times that a plan does not miss, (n,), s: those of all samples, or both ends of a closed form."""
+        if isinstance(self.trajectory, SampledTrajectory):
+            return self.trajectory.t
+        return np.array((0.0, self.duration))
+
     def motion(self, t: ArrayLike) -> Motion:
         """Position, velocity and acceleration at the times t, s; each (n, 3).
 

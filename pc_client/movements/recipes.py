@@ -57,7 +57,7 @@ def fit_movement(movement: Movement, box: Box = UR3_BOX, *, max_speed: float | N
     path = movement.sample(t).p
     rotations = (about_z(math.radians(0.5 * step)) for step in range(360))
     rotation, scale = max(
-        ((R, _largest_scale(path @ R.T, box)) for R in rotations), key=lambda found: found[1]
+        ((R, largest_scale(path @ R.T, box.size)) for R in rotations), key=lambda found: found[1]
     )
     if not math.isfinite(scale):
         raise MovementError(
@@ -70,9 +70,10 @@ def fit_movement(movement: Movement, box: Box = UR3_BOX, *, max_speed: float | N
     return Fit(fitted.stretched(stretch) if stretch > 1.0 else fitted, similarity, stretch)
 
 
-def _largest_scale(path: Array, box: Box) -> float:
+def largest_scale(path: Array, room: Array) -> float:
+    """The largest scale at which a path (n, 3) has no more than the room (3,); inf for one point."""
     extent = np.ptp(path.T.copy(), axis=1)  # six times as quick as along the columns
-    scales = (room / need for room, need in zip(box.size, extent, strict=True) if need > 1e-12)
+    scales = (free / need for free, need in zip(room, extent, strict=True) if need > 1e-12)
     return float(min(scales, default=math.inf))
 
 

@@ -61,23 +61,7 @@ class SampledTrajectory:
     _rotations: RotationSpline | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        t, points = read_only(self.t), read_only(self.points)
-        if t.ndim != 1 or points.shape != (len(t), 3):
-            raise MovementError(
-                f"samples with t {t.shape} and points {points.shape}: give n times and n points of x, y, z"
-            )
-        if len(t) < MIN_SAMPLES:
-            raise MovementError(f"{len(t)} samples: a movement needs at least {MIN_SAMPLES}")
-        for index, row in enumerate(np.column_stack((points, t)).tolist()):
-            if not all(map(math.isfinite, row)):
-                raise MovementError(f"sample {index} is x, y, z, t = {row}: give finite numbers")
-        stalled = np.flatnonzero(np.diff(t) <= 0.0)
-        if len(stalled):
-            index = int(stalled[0]) + 1
-            raise MovementError(
-                f"sample {index} is at t = {t[index]} s after {t[index - 1]} s: times must increase"
-            )
-        t = read_only(t - t[0])
+        t, points = _checked(self.t, self.points, 3, "points of x, y, z in m")
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "points", points)
         turns = self.orientations
@@ -156,24 +140,12 @@ class JointTrajectory:
     name: str = "joints"
 
     def __post_init__(self) -> None:
-        t, q = read_only(self.t), read_only(self.q)
         check_name(self.name)
-        if t.ndim != 1 or q.shape != (len(t), 6):
-            raise MovementError(
-                f"{self.name}: t {t.shape} and q {q.shape}: give n times and n rows of six angles in rad"
-            )
-        if len(t) < MIN_SAMPLES:
-            raise MovementError(f"{self.name}: {len(t)} samples; give at least {MIN_SAMPLES}")
-        bad = np.flatnonzero(~(np.isfinite(t) & np.isfinite(q).all(axis=1)))
-        if len(bad):
-            raise MovementError(f"{self.name}: sample {bad[0]} is not finite; give finite numbers")
-        stalled = np.flatnonzero(np.diff(t) <= 0.0)
-        if len(stalled):
-            k = int(stalled[0]) + 1
-            raise MovementError(
-                f"{self.name}: sample {k} is at t = {t[k]:g} s after {t[k - 1]:g} s: times must increase"
-            )
-        object.__setattr__(self, "t", read_only(t - t[0]))
+        try:
+            t, q = _checked(self.t, self.q, 6, "rows of six angles in rad")
+        except MovementError as error:
+            raise MovementError(f"{self.name}: {error}") from None
+        object.__setattr__(self, "t", t)
         object.__setattr__(self, "q", q)
         check_duration(self.duration, self.name)
 
@@ -181,6 +153,25 @@ class JointTrajectory:
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.t[-1])
+
+
+def _checked(t: Array, rows: Array, width: int, what: str) -> tuple[Array, Array]:
+    """Times that begin at 0, and what is given for each; MovementError if they make no sense."""
+    t, rows = read_only(t), read_only(rows)
+    if t.ndim != 1 or rows.shape != (len(t), width):
+        raise MovementError(f"samples with t {t.shape} and values {rows.shape}: give n times and n {what}")
+    if len(t) < MIN_SAMPLES:
+        raise MovementError(f"{len(t)} samples: a movement needs at least {MIN_SAMPLES}")
+    for index, row in enumerate(np.column_stack((t, rows)).tolist()):
+        if not all(map(math.isfinite, row)):
+            raise MovementError(f"sample {index} is not finite, t and values {row}: give finite numbers")
+    stalled = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(stalled):
+        index = int(stalled[0]) + 1
+        raise MovementError(
+            f"sample {index} is at t = {t[index]} s after {t[index - 1]} s: times must increase"
+        )
+    return read_only(t - t[0]), rows
 
 
 def _check_turning(t: Array, turns: Rotation) -> None:

@@ -6,50 +6,52 @@ product of a row (1, u, u², u³) with a 4 x 12 block. It knows joints only as c
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from pc_client.arrays import Array
+from pc_client.arrays import Array, read_only
 from pc_client.errors import PlanningError
 
 
 class JointSpline:
-    """Cubic spline through joint angles at equal time steps, at rest at both ends.
+    """Cubic spline through joint angles over time, at rest at both ends.
 
     Source: paper section III, "3rd degree spline interpolators" giving joint positions and velocities.
 
     Args:
-        duration: time of the last knot; the first is at 0 [s].
-        q: (n, 6) joint angles at the knots, n >= 2 [rad].
+        t: (n,) times of the knots [s], increasing from 0, n >= 2.
+        q: (n, 6) joint angles at the knots [rad].
 
     Raises:
-        PlanningError: no positive duration, fewer than two knots, or values that are not finite.
+        PlanningError: fewer than two knots, times that do not increase from 0, or values that are not finite.
     """
 
-    def __init__(self, duration: float, q: ArrayLike) -> None:
-        knots = np.array(q, dtype=np.float64)
-        if not (duration > 0.0 and np.isfinite(duration)):
-            raise PlanningError(f"a joint spline needs a positive duration in s, not {duration!r}")
-        if knots.ndim != 2 or len(knots) < 2:
-            raise PlanningError(f"a joint spline needs knots of shape (n >= 2, joints), not {knots.shape}")
+    def __init__(self, t: ArrayLike, q: ArrayLike) -> None:
+        times, knots = read_only(t), read_only(q)
+        if knots.ndim != 2 or len(knots) < 2 or times.shape != (len(knots),):
+            raise PlanningError(
+                "a joint spline needs times (n,) and knots of shape (n >= 2, joints), not"
+                f" {times.shape} and {knots.shape}"
+            )
+        if times[0] != 0.0 or not (np.diff(times) > 0.0).all() or not np.isfinite(times[-1]):
+            raise PlanningError("the times of a joint spline must be finite and increase from 0 s")
         bad = np.argwhere(~np.isfinite(knots))
         if bad.size:
             sample, joint = (int(index) for index in bad[0])
             raise PlanningError(f"knot {sample} of a joint spline is not finite", sample=sample, joint=joint)
-        knots.setflags(write=False)
-        self.duration = float(duration)
+        self.t_knots = times
         self.q_knots = knots
-        self._intervals = len(knots) - 1
-        self._step = self.duration / self._intervals
-        self._rate = self._intervals / self.duration
+        self.duration = float(times[-1])
+        self._starts: list[float] = times[:-1].tolist()  # bisect finds a number faster among Python's own
         # scipy's c is (4, intervals, joints), highest power first, in u = time since the interval's start.
-        c3, c2, c1, c0 = CubicSpline(np.linspace(0.0, self.duration, len(knots)), knots, bc_type="clamped").c
+        c3, c2, c1, c0 = CubicSpline(times, knots, bc_type="clamped").c
         q_rows = np.stack((c0, c1, c2, c3), axis=1)
         qd_rows = np.stack((c1, 2.0 * c2, 3.0 * c3, np.zeros_like(c3)), axis=1)
         self._coefficients: Array = np.ascontiguousarray(np.concatenate((q_rows, qd_rows), axis=2))
-        rest = np.zeros(knots.shape[1])
-        rest.setflags(write=False)
+        rest = read_only(np.zeros(knots.shape[1]))
         self._at_start = (knots[0], rest)
         self._at_end = (knots[-1], rest)
 
@@ -59,10 +61,8 @@ class JointSpline:
             return self._at_start
         if t >= self.duration:
             return self._at_end
-        i = int(t * self._rate)
-        if i >= self._intervals:  # t one rounding error before the end
-            i -= 1
-        u = t - i * self._step
+        i = bisect_right(self._starts, t) - 1
+        u = t - self._starts[i]
         uu = u * u
         row: Array = np.array((1.0, u, uu, uu * u)).dot(self._coefficients[i])
         n = len(row) >> 1
@@ -93,11 +93,11 @@ class JointSpline:
 
     def shifted(self, offset: ArrayLike) -> JointSpline:
         """Return the same motion with `offset` (6,) [rad] added to every joint angle, e.g. whole turns."""
-        return JointSpline(self.duration, self.q_knots + np.asarray(offset, dtype=np.float64))
+        return JointSpline(self.t_knots, self.q_knots + np.asarray(offset, dtype=np.float64))
 
     def _locate(self, t: ArrayLike) -> tuple[Array, NDArray[np.intp], Array]:
         """Return times (n,), the interval of each, and the time since that interval's start."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
         inside = np.clip(times, 0.0, self.duration)
-        i = np.minimum((inside * self._rate).astype(np.intp), self._intervals - 1)
-        return times, i, inside - i * self._step
+        i = np.searchsorted(self.t_knots[:-1], inside, side="right") - 1
+        return times, i, inside - self.t_knots[i]

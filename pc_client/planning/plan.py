@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import ceil
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from pc_client.arrays import Array
 from pc_client.errors import PlanningError
@@ -22,7 +19,7 @@ from pc_client.kinematics.model import (
     tcp_positions,
 )
 from pc_client.movements.movement import Movement
-from pc_client.movements.samples import JointTrajectory, SampledTrajectory
+from pc_client.movements.samples import JointTrajectory
 from pc_client.movements.trajectory import Similarity
 from pc_client.planning import checks
 from pc_client.planning.checks import CartesianSamples, PlanReport, check_motion, check_samples
@@ -30,12 +27,8 @@ from pc_client.planning.joint_path import JointPath, fixed_tcp_rotation, follow_
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PathNames, PlanLimits, limits_of
 
-_DEFAULT_DT = 0.004
+DEFAULT_DT = 0.004
 """Time between samples of a plan [s]: half a control cycle; the spline between is then good to < 1 um."""
-
-
-_Rotations = Callable[[Array], Array | None]
-"""R_base_tcp (n, 3, 3) at times (n,) [s]; None: fixed."""
 
 
 Motion = Movement | JointTrajectory
@@ -43,7 +36,7 @@ Motion = Movement | JointTrajectory
 
 
 class PlannableMovement(Protocol):
-    """What planning needs of a movement; a `Movement` is one."""
+    """What planning needs of a movement; a `Movement` is one, whose samples and orientations count too."""
 
     @property
     def name(self) -> str:
@@ -148,87 +141,89 @@ def make_plan(motion: Motion, model: RobotModel) -> Plan:
         PlanningError: the arm cannot do it.
     """
     if isinstance(motion, JointTrajectory):
-        joints = _plan_joints(motion, model)
-        trajectory = SampledTrajectory(joints.t, joints.p)
-        return Plan(Movement(motion.name, trajectory, np.array([trajectory.duration])), joints, "")
-    if motion.may_be_moved and any(shift := model.description.library_shift):
-        motion = motion.transformed(Similarity(1.0, np.eye(3), np.array(shift)))
-    return Plan(motion, plan_movement(motion, model=model, rotations=motion.rotations), motion.text)
+        return _plan_joints(motion, model)
+    if motion.may_be_moved and (shift := model.description.library_shift).any():
+        motion = motion.transformed(Similarity(1.0, np.eye(3), shift))
+    return Plan(motion, plan_movement(motion, model=model), motion.text)
 
 
 def plan_movement(
     movement: PlannableMovement,
     *,
     model: RobotModel | None = None,
-    dt: float = _DEFAULT_DT,
+    dt: float = DEFAULT_DT,
     limits: PlanLimits | None = None,
     q_branch: ArrayLike | None = None,
-    rotations: _Rotations | None = None,
 ) -> JointPlan:
     """Plan a movement of the TCP.
 
     Args:
         model: nominal arm; a UR3 by default.
-        dt: wanted time between samples [s]; shortened a little to make the duration a whole number of steps.
+        dt: longest time between samples [s]; a little less where the duration is no whole number of steps, or
+            the time between two samples of a movement that is given as samples.
         limits: what the plan must keep; by default what belongs to the arm.
         q_branch: (6,) posture whose IK branch is followed [rad]; the arm's preferred one by default.
-        rotations: gives R_base_tcp (n, 3, 3) at times (n,) [s], or None for the experiment's fixed one, as
-            no function does.
 
     Raises:
         PlanningError: the movement cannot be done; names the sample, its time and point, and the joint.
     """
     arm = robot_model() if model is None else model
     limits = limits_of(arm) if limits is None else limits
-    samples = _sample(movement, dt)
+    knots = movement.knots if isinstance(movement, Movement) else np.array((0.0, movement.duration))
+    samples = _sample(movement, _sample_times(movement.name, knots, dt))
     names = PathNames(movement.name, samples.t, samples.p)
     tcp_speed = check_samples(names, samples, limits)
-    turned = None if rotations is None else rotations(samples.t)
+    turned = movement.rotations(samples.t) if isinstance(movement, Movement) else None
     path = follow_path(
         arm, names, fixed_tcp_rotation() if turned is None else turned, q_branch=q_branch, limits=limits
     )
-    spline = JointSpline(float(samples.t[-1]), path.q)
+    spline = JointSpline(samples.t, path.q)
     report = check_motion(arm, names, samples, tcp_speed, path, spline, limits)
     return JointPlan(movement.name, _frozen(samples.t), _frozen(samples.p), _frozen(path.q), spline, report)
 
 
-def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> JointPlan:
+def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> Plan:
     """A clamped cubic spline through joint angles, checked as all plans."""
-    limits, duration = limits_of(model), trajectory.duration
-    steps = max(2, ceil(duration / _DEFAULT_DT - 1e-9))
-    t = np.linspace(0.0, duration, steps + 1)
-    q = np.asarray(CubicSpline(trajectory.t, trajectory.q, bc_type="clamped")(t), dtype=np.float64)
-    spline = JointSpline(duration, q)
+    limits, name = limits_of(model), trajectory.name
+    spline = JointSpline(trajectory.t, trajectory.q)
+    t = _sample_times(name, trajectory.t, DEFAULT_DT)
     q, qd = spline.sample(t)
     jacobians = np.array([tcp_jacobian(model, posture) for posture in q])
     p = tcp_positions(model, q)
     v = np.einsum("nij,nj->ni", jacobians[:, :3], qd)
-    between = tcp_positions(model, spline.sample(0.5 * (t[1:] + t[:-1]))[0])
-    samples = CartesianSamples(t, p, v, between)
-    names = PathNames(trajectory.name, t, p)
+    movement = Movement.from_samples(t, p, name=name)
+    samples = CartesianSamples(t, p, v, movement.sample(0.5 * (t[1:] + t[:-1])).p)
+    names = PathNames(name, t, p)
     exact = np.zeros(len(t))
     path = JointPath(q, exact, exact, measure_singularity(jacobians))
     report = check_motion(model, names, samples, check_samples(names, samples, limits), path, spline, limits)
-    return JointPlan(trajectory.name, _frozen(t), _frozen(p), _frozen(q), spline, report)
+    return Plan(movement, JointPlan(name, _frozen(t), _frozen(p), _frozen(q), spline, report), "")
 
 
-def _sample(movement: PlannableMovement, dt: float) -> CartesianSamples:
-    """Sample a movement on a grid and half way between, and check the shapes."""
-    duration = float(movement.duration)
+def _sample_times(name: str, knots: Array, dt: float) -> Array:
+    """The times of knots (n,) [s], and equal steps of at most `dt` between each two of them."""
+    duration = float(knots[-1])
     if not (np.isfinite(duration) and duration > 0.0):
-        raise PlanningError(f"{movement.name}: a movement needs a positive duration in s, not {duration!r}")
+        raise PlanningError(f"{name}: a movement needs a positive duration in s, not {duration!r}")
     if not (np.isfinite(dt) and dt > 0.0):
-        raise PlanningError(f"{movement.name}: the time between samples must be positive in s, not {dt!r}")
-    steps = max(2, ceil(duration / dt - 1e-9))
+        raise PlanningError(f"{name}: the time between samples must be positive in s, not {dt!r}")
+    spans = np.diff(knots)
+    steps = np.ceil(spans / min(dt, 0.5 * duration) - 1e-9).clip(1).astype(int)
+    step = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
+    return np.append(np.repeat(knots[:-1], steps) + step * np.repeat(spans / steps, steps), duration)
+
+
+def _sample(movement: PlannableMovement, t: Array) -> CartesianSamples:
+    """Sample a movement at times (n,) [s] and half way between, and check the shapes."""
     # One call for the samples and the points between them: every second one is a sample.
-    t = np.linspace(0.0, duration, 2 * steps + 1)
-    p, v = (np.asarray(values, dtype=np.float64) for values in movement.sample(t))
-    if p.shape != (len(t), 3) or v.shape != (len(t), 3):
+    times = np.insert(t, np.arange(1, len(t)), 0.5 * (t[1:] + t[:-1]))
+    p, v = (np.asarray(values, dtype=np.float64) for values in movement.sample(times))
+    if p.shape != (len(times), 3) or v.shape != (len(times), 3):
         raise PlanningError(
-            f"{movement.name}: sample(t) of {len(t)} times must give two arrays of shape ({len(t)}, 3),"
-            f" not {p.shape} and {v.shape}"
+            f"{movement.name}: sample(t) of {len(times)} times must give two arrays of shape"
+            f" ({len(times)}, 3), not {p.shape} and {v.shape}"
         )
-    return CartesianSamples(t[::2].copy(), p[::2].copy(), v[::2].copy(), p[1::2].copy())
+    return CartesianSamples(t, p[::2].copy(), v[::2].copy(), p[1::2].copy())
 
 
 def _frozen(values: Array) -> Array:

@@ -11,9 +11,12 @@ written 25 times a second, whatever the control cycle, so that a file grows litt
     /tcp_pose            reported TCP pose in `base`
     /desired_tcp_pose    the reference's position, with the orientation of ref_q, in `base`
 
-Names, origins and axes are those of the arm's URDF. In example-robot-data its meshes are addresses that only
-an installation with the same package resolves, and its limits are wrong (see `kinematics.arms`), so the URDF
-made here has cylinders and the client's own limits. It has no masses and no torques.
+Joints are those of the arm's URDF. In example-robot-data its meshes are addresses that only an installation
+with the same package resolves, and its limits are wrong (see `kinematics.arms`), so the URDF made here has
+cylinders and the client's own limits. It has no masses and no torques.
+
+Pinocchio computes the poses. `mcap_ros2` would encode the messages in four times the time: it asks for each
+field of each message, where one `Struct` packs a message whose texts and counts stay the same.
 
 Frames: `base_link` is the root, `base` is UR's frame (`base_link` turned by pi about z), `tool0` the flange.
 Quaternions are (x, y, z, w).
@@ -23,56 +26,31 @@ Source of the messages: ROS 2 common_interfaces, geometry2 (fields only); OMG CD
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, isfinite, sin
+from itertools import pairwise
+from math import hypot, isfinite
 from struct import Struct
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+import pinocchio as pin
 from mcap.writer import Writer
-from scipy.spatial.transform import Rotation
 
 from pc_client.arrays import Array
 from pc_client.kinematics.arms import RobotDescription
 
-Three = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+_LINKS = (
+    *("base_link", "shoulder_link", "upper_arm_link", "forearm_link"),
+    *("wrist_1_link", "wrist_2_link", "wrist_3_link"),
+)
+"""The links that carry a body; each turns against the one before."""
 
-_LEFT_OUT = ("world", "ee_link")
-"""Links of the source that hold no body and that nothing here refers to."""
+_FIXED = (("base_link", "base"), ("wrist_3_link", "tool0"))
+"""Frames without a body, and what they are fixed to."""
 
 _THICKNESS = 0.05
 """Radius of a tube over the reach of the arm. A choice: it looks like the real arms."""
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    """A joint between two links.
-
-    Attributes:
-        name: as ROS drivers of UR arms call it, e.g. `shoulder_pan_joint`.
-        parent: the link that it is fixed to.
-        origin: where the child's frame begins, in the parent's frame [m].
-        rpy: roll, pitch, yaw of the child's frame against the parent's at angle 0 [rad].
-        rotation: the same as a quaternion.
-        axis: that it turns about, in the child's frame; None of a fixed one.
-    """
-
-    name: str
-    parent: str
-    child: str
-    origin: Three
-    rpy: Three
-    rotation: Quaternion
-    axis: Three | None
-
-    def rotation_at(self, angle: float) -> Quaternion:
-        """Rotation of the child's frame against the parent's at an angle [rad]."""
-        if self.axis is None:
-            return self.rotation
-        x, y, z = self.axis
-        s = sin(angle / 2.0)
-        return multiply(self.rotation, (s * x, s * y, s * z, cos(angle / 2.0)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,129 +59,78 @@ class ArmTree:
 
     Attributes:
         name: of the arm, e.g. `ur3`.
-        moving: the six joints that turn, base to wrist 3.
-        fixed: `base_link` to `base`, and `wrist_3_link` to `tool0`.
+        model: of Pinocchio; its root is `base_link`.
         urdf: the same as a URDF, with simple bodies.
     """
 
     name: str
-    moving: tuple[Joint, ...]
-    fixed: tuple[Joint, ...]
+    model: Any
     urdf: str
-
-    def flange_rotation(self, q: Iterable[float]) -> Quaternion:
-        """Rotation of `tool0` in `base` at joint angles (6,) [rad]; the quaternion with w >= 0."""
-        base, flange = self.fixed
-        x, y, z, w = base.rotation
-        rotation = (-x, -y, -z, w)
-        for joint, angle in zip(self.moving, q, strict=True):
-            rotation = multiply(rotation, joint.rotation_at(angle))
-        x, y, z, w = multiply(rotation, flange.rotation)
-        return (x, y, z, w) if w >= 0.0 else (-x, -y, -z, -w)
-
-
-def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The rotation b followed by the rotation a."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
 
 
 def arm_tree(description: RobotDescription) -> ArmTree:
     """Read the tree of an arm; PlanningError if example-robot-data is not installed."""
-    source = ElementTree.fromstring(description.urdf)
-    joints = [_joint(element) for element in source.findall("joint")]
-    joints = [joint for joint in joints if not {joint.parent, joint.child} & set(_LEFT_OUT)]
-    moving = tuple(joint for joint in joints if joint.axis is not None)
-    fixed = tuple(joint for joint in joints if joint.axis is None)
-    return ArmTree(description.name, moving, fixed, _urdf(description, moving, fixed))
+    source = description.urdf
+    return ArmTree(description.name, pin.buildModelFromXML(source), _urdf(description, source))
 
 
-def _link(joint: Element, end: str) -> str:
-    return str(joint.find(end).get("link"))  # type: ignore[union-attr]
-
-
-def _joint(element: Element) -> Joint:
-    origin, axis = element.find("origin"), element.find("axis")
-    assert origin is not None
-    rpy = _numbers(origin.get("rpy"))
-    x, y, z, w = Rotation.from_euler("xyz", rpy).as_quat().tolist()
-    return Joint(
-        str(element.get("name")),
-        _link(element, "parent"),
-        _link(element, "child"),
-        _numbers(origin.get("xyz")),
-        rpy,
-        (x, y, z, w),
-        None if element.get("type") == "fixed" or axis is None else _numbers(axis.get("xyz")),
-    )
-
-
-def _numbers(text: str | None) -> Three:
-    x, y, z = map(float, str(text).split())
-    return (x, y, z)
-
-
-def _urdf(description: RobotDescription, moving: Sequence[Joint], fixed: Sequence[Joint]) -> str:
-    radius = _THICKNESS * description.reach
+def _urdf(description: RobotDescription, source: str) -> str:
+    """The joints of a URDF with bodies and limits of our own."""
+    radius, limits = _THICKNESS * description.reach, description.limits
     robot = Element("robot", name=description.name)
-    links = {"base_link": SubElement(robot, "link", name="base_link")}
-    for joint in (*moving, *fixed):
-        links[joint.child] = SubElement(robot, "link", name=joint.child)
-    for k, joint in enumerate((*moving, *fixed)):
-        element = SubElement(
-            robot, "joint", name=joint.name, type="fixed" if joint.axis is None else "revolute"
-        )
-        SubElement(element, "parent", link=joint.parent)
-        SubElement(element, "child", link=joint.child)
-        SubElement(element, "origin", xyz=_text(joint.origin), rpy=_text(joint.rpy))
-        if joint.axis is None:
-            if joint.child == "tool0":
-                _tubes(links[joint.parent], joint.origin, radius)
+    names = (*_LINKS, *(child for _, child in _FIXED))
+    links = {name: SubElement(robot, "link", name=name) for name in names}
+    for joint in ElementTree.fromstring(source).findall("joint"):
+        parent, child, origin = (_part(joint, tag) for tag in ("parent", "child", "origin"))
+        before, link = (links.get(str(end.get("link"))) for end in (parent, child))
+        if before is None or link is None:  # `world` and `ee_link` hold no body, and nothing refers to them
             continue
-        SubElement(element, "axis", xyz=_text(joint.axis))
-        limits = description.limits
-        bounds = {"lower": limits.q_min[k], "upper": limits.q_max[k], "velocity": limits.qd_max[k]}
-        # URDF demands an effort, and 0 says that none is given.
-        SubElement(element, "limit", {name: f"{x:.6g}" for name, x in bounds.items()} | {"effort": "0"})
-        _tubes(links[joint.parent], joint.origin, radius)
-        _cylinder(links[joint.child], (0.0, 0.0, 0.0), np.array(joint.axis), 2.6 * radius, 1.2 * radius, True)
+        element = SubElement(robot, "joint", name=str(joint.get("name")), type=str(joint.get("type")))
+        element.extend((parent, child, origin))
+        _add_tubes(before, _numbers(origin), radius)
+        if joint.get("type") != "fixed":
+            axis, k = _part(joint, "axis"), names.index(str(link.get("name"))) - 1
+            bounds = {"lower": limits.q_min[k], "upper": limits.q_max[k], "velocity": limits.qd_max[k]}
+            element.append(axis)
+            # URDF demands an effort, and 0 says that none is given.
+            SubElement(element, "limit", {name: f"{x:.6g}" for name, x in bounds.items()} | {"effort": "0"})
+            along = int(np.abs(_numbers(axis)).argmax())
+            _add_cylinder(link, np.zeros(3), along, 2.6 * radius, 1.2 * radius, is_joint=True)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode") + "\n"
 
 
-def _tubes(link: Element, end: Three, radius: float) -> None:
-    """A tube along each axis, z first, from the frame of a link to the frame of the next one."""
+def _part(joint: Element, tag: str) -> Element:
+    part = joint.find(tag)
+    assert part is not None
+    return part
+
+
+def _numbers(part: Element) -> Array:
+    return np.array(str(part.get("xyz")).split(), dtype=np.float64)
+
+
+def _add_tubes(link: Element, end: Array, radius: float) -> None:
+    """Add a tube along each axis, z first, from the frame of a link to the frame of the next one."""
     corner = np.zeros(3)
     for axis in (2, 1, 0):
         if abs(end[axis]) > 1e-9:
-            step = np.zeros(3)
-            step[axis] = end[axis]
-            _cylinder(link, tuple(corner + step / 2), step, abs(end[axis]), radius, False)
+            step = end * (np.arange(3) == axis)
+            _add_cylinder(link, corner + step / 2, axis, abs(end[axis]), radius, is_joint=False)
             corner += step
 
 
-def _cylinder(
-    link: Element, centre: Sequence[float], along: np.ndarray, length: float, radius: float, is_joint: bool
+def _add_cylinder(
+    link: Element, centre: Array, axis: int, length: float, radius: float, *, is_joint: bool
 ) -> None:
-    rpy = {0: (0.0, np.pi / 2, 0.0), 1: (np.pi / 2, 0.0, 0.0), 2: (0.0, 0.0, 0.0)}[
-        int(np.abs(along).argmax())
-    ]
+    xyz = " ".join(f"{round(number, 9) + 0.0:.10g}" for number in centre)
+    rpy = ("0 1.570796327 0", "1.570796327 0 0", "0 0 0")[axis]
     visual = SubElement(link, "visual")
-    SubElement(visual, "origin", xyz=_text(centre), rpy=_text(rpy))
+    SubElement(visual, "origin", xyz=xyz, rpy=rpy)
     geometry = SubElement(visual, "geometry")
     SubElement(geometry, "cylinder", length=f"{length:.6g}", radius=f"{radius:.6g}")
     material = SubElement(visual, "material", name="joint" if is_joint else "tube")
     SubElement(material, "color", rgba="0.35 0.55 0.75 1" if is_joint else "0.75 0.77 0.8 1")
-
-
-def _text(numbers: Sequence[float]) -> str:
-    return " ".join(f"{round(number, 9) + 0.0:.10g}" for number in numbers)
 
 
 CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
@@ -255,19 +182,17 @@ def text(value: str) -> tuple[Value, ...]:
     return len(data), data
 
 
-def _cdr_layout(values: Sequence[Value]) -> Struct:
-    """How a message with values of these types and lengths lies in CDR; packs the head and the values."""
-    code, size = "<4s", 0
-    for value in values:
-        if isinstance(value, bytes):
-            letter, width, alignment = f"{len(value)}s", len(value), 1
-        else:
-            letter, width = ("d", 8) if isinstance(value, float) else ("I", 4)
-            alignment = width
-        gap = -size % alignment
-        code += f"{gap}x{letter}"
-        size += gap + width
-    return Struct(code)
+def _ends(parent: str, child: str) -> tuple[Value, ...]:
+    return (*text(parent), *text(child))
+
+
+def _layout(values: Sequence[Value]) -> Struct:
+    """How a message with values of these types and lengths lies behind the head of CDR.
+
+    There, as in C, a number begins at a multiple of its size.
+    """
+    letters = (f"{len(v)}s" if isinstance(v, bytes) else "d" if isinstance(v, float) else "I" for v in values)
+    return Struct("".join(letters))
 
 
 PERIOD = 0.04
@@ -286,42 +211,29 @@ _LATCHED = """\
   avoid_ros_namespace_conventions: false
 """
 
-_BASE, _ACTUAL_TCP, _DESIRED_TCP = text("base"), text("actual_tcp"), text("desired_tcp")
+_TOPICS = {
+    "/robot_description": (TEXT, {"offered_qos_profiles": _LATCHED}),
+    "/tf_static": (_TRANSFORMS, {"offered_qos_profiles": _LATCHED}),
+    "/tf": (_TRANSFORMS, {}),
+    "/joint_states": (_JOINT_STATE, {}),
+    "/tcp_pose": (POSE, {}),
+    "/desired_tcp_pose": (POSE, {}),
+}
 
-
-class _Publisher:
-    """Writes the messages of one topic; the texts in them and their counts stay the same.
-
-    A latched topic has one message only.
-    """
-
-    def __init__(
-        self, writer: Writer, topic: str, message: str, schema_id: int, *, is_latched: bool = False
-    ) -> None:
-        self._writer = writer
-        self._layout: Struct | None = None
-        self._n_written = 0
-        metadata = {"offered_qos_profiles": _LATCHED} if is_latched else {}
-        self._channel = writer.register_channel(topic, "cdr", schema_id, metadata)
-
-    def write(self, log_time: int, values: Sequence[Value]) -> None:
-        """Write a message."""
-        if self._layout is None:
-            self._layout = _cdr_layout(values)
-        data = self._layout.pack(CDR_LITTLE_ENDIAN, *values)
-        self._writer.add_message(self._channel, log_time, data, log_time, self._n_written)
-        self._n_written += 1
+_BASE = text("base")
+_ACTUAL_TCP, _DESIRED_TCP = _ends("base", "actual_tcp"), _ends("base", "desired_tcp")
+_MOVING_ENDS = [_ends(*ends) for ends in pairwise(_LINKS)]
 
 
 class ArmView:
     """Writes the view of one recording; the columns are the names of the numbers of a frame, in order."""
 
     def __init__(self, arm: ArmTree, writer: Writer, columns: Sequence[str], cycle_time: float) -> None:
-        self._arm = arm
+        self._arm, self._data = arm, arm.model.createData()
+        self._base, self._flange = (arm.model.getFrameId(child) for _, child in _FIXED)
         self._writer = writer
         self._every = max(1, round(PERIOD / cycle_time))
-        self._names = [part for joint in arm.moving for part in text(joint.name)]
-        self._ends = [_ends(joint) for joint in arm.moving]
+        self._names = [part for name in list(arm.model.names)[1:] for part in text(name)]
         self._q, self._qd, self._pose = (
             slice(columns.index(name), columns.index(name) + 6)
             for name in ("actual_q", "actual_qd", "actual_TCP_pose")
@@ -330,16 +242,12 @@ class ArmView:
             message: writer.register_schema(message, "ros2msg", definition(message).encode())
             for message in (TEXT, _TRANSFORMS, _JOINT_STATE, POSE)
         }
-
-        def publisher(topic: str, message: str, *, is_latched: bool = False) -> _Publisher:
-            return _Publisher(writer, topic, message, schemas[message], is_latched=is_latched)
-
-        self._description = publisher("/robot_description", TEXT, is_latched=True)
-        self._static = publisher("/tf_static", _TRANSFORMS, is_latched=True)
-        self._transforms = publisher("/tf", _TRANSFORMS)
-        self._joints = publisher("/joint_states", _JOINT_STATE)
-        self._tcp = publisher("/tcp_pose", POSE)
-        self._desired_tcp = publisher("/desired_tcp_pose", POSE)
+        self._channels = {
+            topic: writer.register_channel(topic, "cdr", schemas[message], metadata)
+            for topic, (message, metadata) in _TOPICS.items()
+        }
+        self._layouts: dict[str, Struct] = {}
+        self._n_shown = 0
 
     def show(
         self, row: int, log_time: int, frame: Array, ref_q: Iterable[float], ref_p: Iterable[float]
@@ -353,43 +261,45 @@ class ArmView:
             ref_q: (6,) desired joint angles [rad].
             ref_p: (3,) desired TCP position in `base` [m].
         """
+        stamp = divmod(log_time, 10**9)
         if row == 0:
-            self._begin(log_time)
+            self._begin(log_time, stamp)
         if row % self._every:
             return
-        q, qd, pose = (frame[part].tolist() for part in (self._q, self._qd, self._pose))
-        if not all(map(isfinite, (*q, *pose, hypot(*pose[3:])))):
+        q, qd, (*p, rx, ry, rz) = (frame[part].tolist() for part in (self._q, self._qd, self._pose))
+        if not all(map(isfinite, (*q, *p, hypot(rx, ry, rz)))):
             return
-        stamp = divmod(log_time, 10**9)
-        tcp = (*pose[:3], *_quaternion(*pose[3:]))
-        desired = (*ref_p, *self._arm.flange_rotation(ref_q))
-        values: list[Value] = [len(self._arm.moving) + 2]
-        for joint, ends, angle in zip(self._arm.moving, self._ends, q, strict=True):
-            values += [*stamp, *ends, *joint.origin, *joint.rotation_at(angle)]
-        values += [*stamp, *_BASE, *_ACTUAL_TCP, *tcp, *stamp, *_BASE, *_DESIRED_TCP, *desired]
-        self._transforms.write(log_time, values)
-        self._joints.write(log_time, [*stamp, *text(""), 6, *self._names, 6, *q, 6, *qd, 0])
-        self._tcp.write(log_time, [*stamp, *_BASE, *tcp])
-        self._desired_tcp.write(log_time, [*stamp, *_BASE, *desired])
+        model, data = self._arm.model, self._data
+        tcp = pin.SE3ToXYZQUATtuple(pin.SE3(pin.exp3(np.array((rx, ry, rz))), np.array(p)))
+        pin.framesForwardKinematics(model, data, np.fromiter(ref_q, np.float64, 6))
+        T_base_flange = data.oMf[self._base].actInv(data.oMf[self._flange])
+        desired = (*ref_p, *pin.SE3ToXYZQUATtuple(T_base_flange)[3:])
+        pin.forwardKinematics(model, data, frame[self._q])
+        values: list[Value] = [len(_MOVING_ENDS) + 2]
+        for joint, ends in enumerate(_MOVING_ENDS, 1):
+            values += [*stamp, *ends, *pin.SE3ToXYZQUATtuple(data.liMi[joint])]
+        values += [*stamp, *_ACTUAL_TCP, *tcp, *stamp, *_DESIRED_TCP, *desired]
+        self._write("/tf", log_time, values)
+        self._write("/joint_states", log_time, [*stamp, *text(""), 6, *self._names, 6, *q, 6, *qd, 0])
+        self._write("/tcp_pose", log_time, [*stamp, *_BASE, *tcp])
+        self._write("/desired_tcp_pose", log_time, [*stamp, *_BASE, *desired])
+        self._n_shown += 1
 
-    def _begin(self, log_time: int) -> None:
+    def _begin(self, log_time: int, stamp: tuple[int, int]) -> None:
         """Write what is written once."""
-        urdf = self._arm.urdf
+        urdf, frames = self._arm.urdf, self._arm.model.frames
         self._writer.add_attachment(
             log_time, log_time, f"{self._arm.name}.urdf", "application/xml", urdf.encode()
         )
-        self._description.write(log_time, text(urdf))
-        values: list[Value] = [len(self._arm.fixed)]
-        for joint in self._arm.fixed:
-            values += [*divmod(log_time, 10**9), *_ends(joint), *joint.origin, *joint.rotation]
-        self._static.write(log_time, values)
+        self._write("/robot_description", log_time, text(urdf))
+        values: list[Value] = [len(_FIXED)]
+        for ends, frame in zip(_FIXED, (self._base, self._flange), strict=True):
+            values += [*stamp, *_ends(*ends), *pin.SE3ToXYZQUATtuple(frames[frame].placement)]
+        self._write("/tf_static", log_time, values)
 
-
-def _ends(joint: Joint) -> tuple[Value, ...]:
-    return (*text(joint.parent), *text(joint.child))
-
-
-def _quaternion(x: float, y: float, z: float) -> Quaternion:
-    angle = hypot(x, y, z)
-    scale = sin(angle / 2.0) / angle if angle else 0.5
-    return (x * scale, y * scale, z * scale, cos(angle / 2.0))
+    def _write(self, topic: str, log_time: int, values: Sequence[Value]) -> None:
+        """Write a message; the texts in those of one topic and their counts stay the same."""
+        if (layout := self._layouts.get(topic)) is None:
+            layout = self._layouts[topic] = _layout(values)
+        data = CDR_LITTLE_ENDIAN + layout.pack(*values)
+        self._writer.add_message(self._channels[topic], log_time, data, log_time, self._n_shown)

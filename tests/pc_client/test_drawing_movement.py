@@ -20,7 +20,6 @@ from pc_client.studies.drawing.drawing import (
     TAIL,
     factor_needed,
     join,
-    least_factor,
     least_gaps,
     make_drawing,
     spatial,
@@ -300,14 +299,6 @@ def test_out_of_reach_is_planning_s_refusal_in_one_line():
         make_drawing(one_part(), "far", ARM, PlacementOptions(box=far))
     assert str(caught.value).startswith("far: ")
     assert "\n" not in str(caught.value)
-
-
-def test_what_is_refused_at_any_speed_is_refused(large):
-    far = large.movement.transformed(
-        type(large.placement.similarity)(1.0, np.eye(3), np.array([0.4, 0.0, 0.0]))
-    )
-    with pytest.raises(PlanningError):
-        least_factor(far.stretched, 1.0, ARM)
 
 
 def test_the_movement_is_one_file_that_runs_again(large, tmp_path):

@@ -39,7 +39,7 @@ from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke, leg_leng
 from pc_client.movements.trajectory import Similarity
 from pc_client.movements.uniform import SETBACK
 from pc_client.movements.variability import HUMAN_STROKE, PUBLISHED, VariabilityRanges, duplicate
-from pc_client.planning.plan import make_plan
+from pc_client.planning.plan import make_plan, plan_movement
 
 HUMAN = load_movement("arcs/lognorm_5_1")
 
@@ -257,10 +257,22 @@ def test_a_stroke_of_the_arcs_ends_where_the_speed_is_least(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("arm", [name for name in ROBOTS if name != "ur10"])
-def test_every_other_arm_can_do_one_that_comes_near_the_base(arm: str) -> None:
-    planned = make_plan(load_movement("lognorm_4_1"), robot_model(arm)).movement
-    assert ROBOTS[arm].working_box.contains(planned.target_points, 0.025)  # a UR5 does it where a UR3 does
+@pytest.mark.parametrize("arm", ROBOTS)
+def test_every_arm_can_do_the_library_in_its_own_box(arm: str) -> None:
+    model, box = robot_model(arm), ROBOTS[arm].working_box
+    planned = make_plan(load_movement("lognorm_4_1"), model).movement
+    shift = planned.target_points[0] - load_movement("lognorm_4_1").target_points[0]
+    for name in PAPER:
+        moved = load_movement(name).transformed(Similarity(1.0, np.eye(3), shift))
+        assert box.contains(moved.target_points, 1e-9)
+        plan_movement(moved, model=model, dt=0.02)
+
+
+@pytest.mark.parametrize("low", [(0.2, -0.5, 0.1), (0.25, 0.1, 0.0), (0.3, -1.0, 0.3)])
+def test_the_library_goes_to_any_box_that_is_large_enough(low: tuple[float, float, float]) -> None:
+    box = Box(low, (low[0] + 0.15, low[1] + 0.4, low[2] + 0.2))
+    shift = replace(ROBOTS["ur3"], working_box=box).library_shift
+    np.testing.assert_allclose(np.add(UR3_BOX.low, shift), low, atol=1e-12)
 
 
 def test_a_movement_of_a_user_stays_where_it_is() -> None:

@@ -11,53 +11,59 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from planning_paths import INSIDE_THE_BOX, Arc, Spoiled, StraightStrokes
+from scipy.spatial.transform import Rotation
 
 from pc_client.errors import PlanningError
 from pc_client.kinematics.model import RobotModel, robot_model
+from pc_client.movements.movement import Movement
+from pc_client.movements.samples import JointTrajectory
 from pc_client.planning.joint_path import fixed_tcp_rotation, rotation_from_rpy
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import limits_of
-from pc_client.planning.plan import plan_movement
+from pc_client.planning.plan import make_plan, plan_movement
 
-KNOTS = st.integers(2, 30).flatmap(lambda n: arrays(np.float64, (n, 6), elements=st.floats(-6, 6, width=32)))
-DURATIONS = st.floats(0.01, 60.0)
+ANGLES = st.floats(-6, 6, width=32)
+KNOTS = st.integers(2, 30).flatmap(
+    lambda n: st.tuples(
+        arrays(np.float64, n - 1, elements=st.floats(0.01, 2.0)), arrays(np.float64, (n, 6), elements=ANGLES)
+    ).map(lambda drawn: (np.append(0.0, np.cumsum(drawn[0])), drawn[1]))
+)
+"""Times, seldom in equal steps, and joint angles."""
 
 
-@given(KNOTS, DURATIONS)
-def test_it_passes_through_its_knots_and_rests_at_both_ends(knots, duration):
-    spline = JointSpline(duration, knots)
-    q, qd = spline.sample(np.linspace(0.0, duration, len(knots)))
-    np.testing.assert_allclose(q, knots, rtol=0, atol=1e-9)
+@given(KNOTS)
+def test_it_passes_through_its_knots_and_rests_at_both_ends(knots):
+    q, qd = JointSpline(*knots).sample(knots[0])
+    np.testing.assert_allclose(q, knots[1], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(qd[[0, -1]], 0.0)
 
 
-@given(KNOTS, DURATIONS)
-def test_position_velocity_and_acceleration_are_continuous_at_knots(knots, duration):
-    spline = JointSpline(duration, knots)
-    h = duration / (len(knots) - 1)
-    t = np.linspace(0.0, duration, len(knots))[1:-1]
+@given(KNOTS)
+def test_position_velocity_and_acceleration_are_continuous_at_knots(knots):
+    spline, t = JointSpline(*knots), knots[0][1:-1]
+    h = float(np.diff(knots[0]).min())
     eps = 1e-7 * h
-    scale = max(1.0, float(np.abs(knots).max())) * 30
+    scale = max(1.0, float(np.abs(knots[1]).max())) * 30
     (q_a, qd_a), (q_b, qd_b) = spline.sample(t - eps), spline.sample(t + eps)
     np.testing.assert_allclose(q_a, q_b, rtol=0, atol=1e-5 * scale)
     np.testing.assert_allclose(qd_a, qd_b, rtol=0, atol=1e-5 * scale / h)
     np.testing.assert_allclose(spline.qdd(t - eps), spline.qdd(t + eps), rtol=0, atol=1e-5 * scale / h**2)
 
 
-@given(KNOTS, DURATIONS, st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
-def test_one_time_and_many_times_give_the_same(knots, duration, fractions):
-    spline = JointSpline(duration, knots)
-    t = np.array(fractions) * duration
+@given(KNOTS, st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
+def test_one_time_and_many_times_give_the_same(knots, fractions):
+    spline = JointSpline(*knots)
+    t = np.append(np.array(fractions) * spline.duration, knots[0])
     q, qd = spline.sample(t)
     for k, t_k in enumerate(t.tolist()):
         q_at, qd_at = spline.at(t_k)
         np.testing.assert_allclose(q_at, q[k], rtol=1e-13, atol=1e-12)
-        np.testing.assert_allclose(qd_at, qd[k], rtol=1e-12, atol=1e-11 / duration * len(knots))
+        np.testing.assert_allclose(qd_at, qd[k], rtol=1e-12, atol=1e-9)
 
 
 def test_velocity_and_acceleration_are_the_derivatives():
     rng = np.random.default_rng(6)
-    spline = JointSpline(4.0, np.cumsum(rng.normal(0, 0.1, (101, 6)), axis=0))
+    spline = JointSpline(np.linspace(0.0, 4.0, 101), np.cumsum(rng.normal(0, 0.1, (101, 6)), axis=0))
     t, h = rng.uniform(0.1, 3.9, 200), 1e-6
     np.testing.assert_allclose(
         spline.sample(t)[1], (spline.sample(t + h)[0] - spline.sample(t - h)[0]) / (2 * h), atol=1e-6
@@ -70,7 +76,7 @@ def test_velocity_and_acceleration_are_the_derivatives():
 def test_it_is_exact_for_a_cubic_that_rests_at_both_ends():
     t = np.linspace(0.0, 2.0, 21)
     cubic = t**2 * (3.0 - t)  # derivative 3 t (2 - t) vanishes at 0 and 2
-    spline = JointSpline(2.0, np.outer(cubic, np.arange(1.0, 7.0)))
+    spline = JointSpline(t, np.outer(cubic, np.arange(1.0, 7.0)))
     q, qd = spline.at(0.7331)
     np.testing.assert_allclose(q, 0.7331**2 * (3 - 0.7331) * np.arange(1.0, 7.0), rtol=1e-12)
     np.testing.assert_allclose(qd, 3 * 0.7331 * (2 - 0.7331) * np.arange(1.0, 7.0), rtol=1e-12)
@@ -82,34 +88,37 @@ def test_it_is_exact_for_a_cubic_that_rests_at_both_ends():
 )
 def test_outside_it_rests_at_its_first_and_its_last_knot(t, knot):
     knots = np.random.default_rng(7).normal(size=(5, 6))
-    q, qd = JointSpline(1.0, knots).at(t)
+    q, qd = JointSpline(np.linspace(0.0, 1.0, 5), knots).at(t)
     np.testing.assert_array_equal(q, knots[knot])
     np.testing.assert_array_equal(qd, 0.0)
 
 
-@given(DURATIONS, st.integers(2, 3000))
+@given(st.floats(0.01, 60.0), st.integers(2, 3000))
 def test_the_last_moment_before_the_end_is_inside(duration, n):
     knots = np.linspace(0.0, 1.0, n)[:, None] * np.ones(6)
-    q, qd = JointSpline(duration, knots).at(float(np.nextafter(duration, 0.0)))
+    q, qd = JointSpline(np.linspace(0.0, duration, n), knots).at(float(np.nextafter(duration, 0.0)))
     np.testing.assert_allclose(q, 1.0, atol=1e-9)
     np.testing.assert_allclose(qd, 0.0, atol=1e-5 / duration)
 
 
+NINE = np.linspace(0.0, 1.0, 9)
+
+
 def test_acceleration_outside_is_zero():
-    spline = JointSpline(1.0, np.random.default_rng(8).normal(size=(9, 6)))
+    spline = JointSpline(NINE, np.random.default_rng(8).normal(size=(9, 6)))
     np.testing.assert_array_equal(spline.qdd([-0.1, 1.1]), 0.0)
     assert np.abs(spline.qdd([0.0, 1.0])).min() > 0.0
 
 
 def test_what_is_handed_out_at_the_ends_cannot_be_spoiled():
-    spline = JointSpline(1.0, np.zeros((3, 6)))
+    spline = JointSpline([0.0, 0.5, 1.0], np.zeros((3, 6)))
     for values in (*spline.at(-1.0), *spline.at(2.0)):
         with pytest.raises(ValueError, match="read-only"):
             values[0] = 1.0
 
 
 def test_a_shift_moves_positions_and_nothing_else():
-    spline = JointSpline(1.0, np.random.default_rng(9).normal(size=(9, 6)))
+    spline = JointSpline(NINE, np.random.default_rng(9).normal(size=(9, 6)))
     offset = 2 * np.pi * np.array((1, 0, -1, 0, 0, 1))
     t = np.linspace(0, 1, 50)
     (q, qd), (q_shifted, qd_shifted) = spline.sample(t), spline.shifted(offset).sample(t)
@@ -117,23 +126,25 @@ def test_a_shift_moves_positions_and_nothing_else():
     np.testing.assert_allclose(qd_shifted, qd, atol=1e-10)
 
 
-@pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf])
-def test_a_duration_that_is_none_is_refused(duration):
-    with pytest.raises(PlanningError, match="positive duration"):
-        JointSpline(duration, np.zeros((3, 6)))
+@pytest.mark.parametrize(
+    "t", [(0, 1, 1), (0, 2, 1), (0, 1, np.nan), (0, 1, np.inf), (1, 2, 3), (-1, 0, 1), (np.nan, 1, 2)]
+)
+def test_times_that_are_none_are_refused(t):
+    with pytest.raises(PlanningError, match="increase from 0"):
+        JointSpline(t, np.zeros((3, 6)))
 
 
-@pytest.mark.parametrize("shape", [(1, 6), (6,), (0, 6)])
-def test_too_few_knots_are_refused(shape):
+@pytest.mark.parametrize("shape", [(1, 6), (6,), (0, 6), (2, 6)])
+def test_too_few_knots_or_times_are_refused(shape):
     with pytest.raises(PlanningError, match="knots of shape"):
-        JointSpline(1.0, np.zeros(shape))
+        JointSpline(np.arange(1.0 if shape[0] == 1 else 3.0), np.zeros(shape))
 
 
 def test_a_knot_that_is_no_number_is_named_with_its_joint():
     knots = np.zeros((5, 6))
     knots[3, 2] = np.nan
     with pytest.raises(PlanningError) as caught:
-        JointSpline(1.0, knots)
+        JointSpline(np.arange(5.0), knots)
     assert (caught.value.sample, caught.value.joint) == (3, 2)
 
 
@@ -194,6 +205,49 @@ def test_samples_lie_on_a_whole_number_of_steps():
     assert steps.max() <= 0.004 + 1e-12
     np.testing.assert_allclose(steps, steps[0], rtol=1e-9)
     assert plan.t[-1] == plan.duration == 1.2345
+
+
+SAMPLED = np.sort(np.append(np.random.default_rng(11).uniform(0.0, 2.0, 300), [0.0, 2.0]))
+"""Times of samples that no grid has."""
+REST_TO_REST = 0.5 * (1.0 - np.cos(0.5 * np.pi * SAMPLED))
+
+
+def test_a_plan_goes_through_all_samples_of_joint_angles():
+    steps = np.random.default_rng(12).normal(0.0, 1e-9, (len(SAMPLED), 6))
+    q = np.array(UR3.description.q_branch) + np.outer(REST_TO_REST, [0.2, 0.05, -0.1, 0.1, 0.0, 0.3]) + steps
+    plan = make_plan(JointTrajectory(SAMPLED, q), UR3)
+    np.testing.assert_allclose(plan.joints.spline.sample(SAMPLED)[0], q, rtol=0, atol=1e-14)
+    assert np.isin(SAMPLED, plan.joints.t).all()
+    assert np.diff(plan.joints.t).max() <= 0.004 + 1e-12
+    between = 0.5 * (plan.joints.t[1:] + plan.joints.t[:-1])
+    reached = np.array([dh_pose(q)[:3, 3] for q in plan.joints.spline.sample(between)[0]])
+    apart = np.linalg.norm(plan.movement.sample(between).p - reached, axis=1).max()
+    assert plan.joints.report.interpolation_error.value == pytest.approx(apart, rel=1e-3)
+
+
+def test_a_plan_goes_through_all_samples_of_the_tcp_and_turns_with_them():
+    wobble = np.random.default_rng(13).normal(0.0, 1e-9, (len(SAMPLED), 3))
+    p = np.array(INSIDE_THE_BOX[0]) + np.outer(REST_TO_REST, [0.05, 0.1, 0.1]) + wobble
+    turns = Rotation.from_rotvec(np.outer(REST_TO_REST, [0.0, 0.0, 0.2]) + wobble)
+    turns = turns * Rotation.from_matrix(fixed_tcp_rotation())
+    plan = plan_movement(Movement.from_samples(SAMPLED, p, turns.as_quat()), model=UR3)
+    reached = [dh_pose(q) for q in plan.spline.sample(SAMPLED)[0]]
+    np.testing.assert_allclose([T[:3, 3] for T in reached], p, rtol=0, atol=2e-9)
+    np.testing.assert_allclose([T[:3, :3] for T in reached], turns.as_matrix(), rtol=0, atol=4e-9)
+
+
+@pytest.mark.parametrize("frequency", [250.0, 500.0, 125.0])
+def test_a_vibration_between_the_usual_samples_is_seen(frequency):
+    """At each whole number of periods, and half way between, it is 0."""
+    t = np.linspace(0.0, 2.0, 4001)
+    way, bell = 0.5 * (1.0 - np.cos(0.5 * np.pi * t)), 0.5 * (1.0 - np.cos(np.pi * t))
+    vibration = (bell * np.sin(2.0 * np.pi * frequency * t))[:, None]
+    begin, turn = np.array(UR3.description.q_branch), np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.3])
+    joints = JointTrajectory(t, begin + np.outer(way, turn) + 3e-4 * vibration)
+    p = np.array(INSIDE_THE_BOX[0]) + np.outer(way, [0.05, 0.1, 0.1]) + 2e-5 * vibration
+    for motion in joints, Movement.from_samples(t, p):
+        with pytest.raises(PlanningError, match="acceleration"):
+            make_plan(motion, UR3)
 
 
 def test_the_joint_speed_limit_names_the_fast_joint_where_it_is_fastest():

@@ -5,17 +5,30 @@ import socket
 import threading
 import time
 from dataclasses import replace
+from math import hypot
 from pathlib import Path
 
 import pytest
 from box_support import TIMEOUT, Bench, inside
 from control_support import control_box
+from hypothesis import given
+from hypothesis import strategies as st
 
 from protocol.pose import pose_to_T
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.commands.programs import AnswerRequest, StopProgram
-from ur_emulator.commands.surroundings import Push, RemoveObstacle, SetAnalogInput, SetDigitalInput
+from ur_emulator.commands.surroundings import (
+    FARTHEST,
+    MAX_FORCE,
+    MAX_LEVER,
+    SMALLEST,
+    AddObstacle,
+    Push,
+    RemoveObstacle,
+    SetAnalogInput,
+    SetDigitalInput,
+)
 from ur_emulator.errors import (
     ArgumentError,
     ControlError,
@@ -210,6 +223,23 @@ def test_a_push_lasts_as_long_as_it_was_given(cycles):
 def test_an_absurd_duration_is_refused(duration):
     with pytest.raises(ArgumentError, match=r"duration .* given: allowed is 0 to 600 s"):
         Push((1.0, 0.0, 0.0), duration=duration)
+
+
+DIRECTIONS = st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: hypot(*v) > 1e-3)
+
+
+@given(DIRECTIONS, DIRECTIONS)
+def test_what_rounding_puts_beyond_a_bound_is_on_it(force, point):
+    """A vector that is made as long as allowed is often a hair longer."""
+    push = [MAX_FORCE * x / hypot(*force) for x in force]
+    lever = [MAX_LEVER * x / hypot(*point) for x in point]
+    Push(push, point=lever)
+    AddObstacle(
+        "ball", "sphere", (0.1 + 0.2 - 0.3 + SMALLEST,), [FARTHEST * x / hypot(*force) for x in force] + lever
+    )
+    with pytest.raises(ArgumentError, match=r"force .* together at most 250 N"):
+        Push([1.0001 * x for x in push])
+    assert Push(push, duration=600.0 * (1.0 + 1e-15)).duration == 600.0
 
 
 def test_a_strong_push_is_a_protective_stop_that_can_be_unlocked(box):

@@ -8,6 +8,7 @@ import pytest
 
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
+from ur_pendant import hands as hands_module
 from ur_pendant.hands import KEYS, HandError, Hands
 from ur_pendant.robot import Address, Robot
 
@@ -107,11 +108,15 @@ def test_time_in_lockstep_passes_by_steps(box, robot):
     assert before < box.state.tick <= before + 3
 
 
-def test_a_box_in_lockstep_moves_to_each_posture(box, robot):
-    goal = np.add(box.state.q, (0.2, 0.1, -0.1, 0.0, 0.1, 0.3))
-    Hands(robot).follow(goal)
-    state = box.wait_until(program_state="STOPPED", steady=True, time=box.state.time + 0.1)
-    assert state.q == pytest.approx(goal, abs=1e-3)
+def at(box, q):
+    return np.abs(np.subtract(box.state.q, q)).max() < 5e-3
+
+
+def test_a_box_in_lockstep_goes_to_the_last_posture(box, robot):
+    hands, begin = Hands(robot), np.array(box.state.q)
+    for k in range(1, 6):
+        hands.follow(begin + 0.1 * k)
+    until(lambda: at(box, begin + 0.5), "the last posture")
 
 
 @pytest.mark.parametrize("why", ["view only", "real arm", "unknown"])
@@ -130,6 +135,55 @@ def test_a_robot_that_is_not_simulated_takes_nothing(robot, why):
     ):
         with pytest.raises(HandError, match="only shows the robot"):
             do()
+
+
+@pytest.fixture
+def followed():
+    """Hands on a box that keeps real time, in which a follower counts how long nothing has come; and its robot."""
+    with ControlBox("ur5e", port_base=None, control_port=0, seed=7) as box:
+        robot = Robot(address_of(box))
+        until(lambda: robot.values and robot.state is not None, "the robot")
+        yield box, robot, Hands(robot)
+        robot.close()
+
+
+def rtde_clients(box):
+    return sum(client.partition(" at ")[2].startswith("rtde") for client in box.state.clients)
+
+
+def test_a_long_way_is_gone_to_its_end(followed, monkeypatch):
+    """Three seconds are 1.7 rad; here a tenth of it, so that less is waited for."""
+    monkeypatch.setattr(hands_module, "_REST", 0.3)
+    box, robot, hands = followed
+    goal = np.add(box.state.q, (0.7, 0, 0, 0, 0, 0))
+    hands.follow(goal)
+    until(lambda: hands.goal is None, "the end")
+    assert at(box, goal)
+    assert (robot.values["runtime_state"], rtde_clients(box)) == (1, 1)
+
+
+def test_no_goal_is_lost_while_a_follower_ends(followed, monkeypatch):
+    monkeypatch.setattr(hands_module, "_REST", 0.1)
+    box, _, hands = followed
+    begin = np.array(box.state.q)
+    hands.follow(begin)
+    for k in range(1, 5):
+        follower = hands._follower
+        until(lambda follower=follower: follower._is_ending, "the end of the one before")
+        hands.follow(begin + 0.01 * k)
+        until(lambda k=k: at(box, begin + 0.01 * k), "the goal")
+
+
+def test_a_follower_that_cannot_begin_leaves_nothing_open(followed, monkeypatch):
+    box, _, hands = followed
+
+    def refuse(_):
+        raise HandError("no program is taken")
+
+    monkeypatch.setattr(hands, "run", refuse)
+    with pytest.raises(HandError, match="no program is taken"):
+        hands.follow(box.state.q)
+    until(lambda: rtde_clients(box) == 1, "the end of its stream")
 
 
 @pytest.mark.parametrize("software", [{"robot": "ur3", "version": "3.5.0"}, {"robot": "ur5e"}], ids=str)

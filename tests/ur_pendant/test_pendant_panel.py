@@ -3,10 +3,12 @@
 import asyncio
 from collections import deque
 from dataclasses import replace
+from threading import Event
 from time import sleep
 from types import SimpleNamespace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import viser
 from hypothesis import given
@@ -17,8 +19,11 @@ from pc_client.kinematics.model import robot_model, tcp_pose
 from protocol.pose import pose_to_T
 from protocol.ur_types import Ports, ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
+from ur_emulator.commands.surroundings import MAX_FORCE
 from ur_emulator.control_api.box_state import BoxState, Question, ThingNow
 from ur_emulator.control_api.operations import make
+from ur_emulator.errors import ArgumentError
+from ur_emulator.models.things import BodyShape
 from ur_pendant import hands
 from ur_pendant.drawing import RobotDrawing
 from ur_pendant.hands import HandError
@@ -27,7 +32,6 @@ from ur_pendant.panel import (
     FREEDRIVE,
     JUMP,
     LINES,
-    MOST_FORCE,
     ROWS,
     STIFFNESS,
     Panel,
@@ -63,7 +67,10 @@ class Hands:
         return f"{key.label} done"
 
     def operate(self, operation, **arguments):
-        make(operation, arguments)  # as the box takes it
+        try:
+            make(operation, arguments)  # as the box takes it
+        except ArgumentError as error:
+            raise HandError(str(error)) from None
         return self._do(operation, arguments)
 
     def tell_dashboard(self, line):
@@ -360,6 +367,11 @@ def test_popups_and_questions_until_they_are_gone(window):
     assert "many" in window.client.told[-1][1]
     robot.questions, robot.popups = (), ("look",)
     window.update()
+    assert not window.server.gui._modal_handle_from_uuid  # which would cover the panel
+    emergency = window.control("Emergency")
+    text = window.control("Text")
+    container = window.server.gui._container_handle_from_uuid[text._impl.parent_container_id]
+    assert emergency.order < container.order < window.panel._tabs.order
     row = window.controls()[-1]
     row._impl.value = "Close popup"
     row._impl.update_cb[0](window.event(row))
@@ -367,7 +379,6 @@ def test_popups_and_questions_until_they_are_gone(window):
     robot.popups = ()
     window.update()
     assert "Text" not in window.labels()
-    assert not window.panel._modals
 
 
 # --- moving
@@ -477,9 +488,28 @@ def test_no_pose_is_reached_by_a_jump_or_beyond_a_limit():
         reached(MODEL, tcp_pose(MODEL, at_limit + 0.05 * np.eye(6)[5]), at_limit)
 
 
-def pull(window, phase, start, end):
+def test_the_last_pose_of_a_drag_is_reached_however_busy_the_worker_is(window):
+    """Poses come faster than the arm is told; each lies too far from the first to be reached from there."""
+    gizmo, posture = window.panel._gizmo, np.array(Q)
+    tcp = pose_to_T(window.robot.values["tcp_offset"])
+    is_busy = Event()
+    window.panel._worker.submit(is_busy.wait)
+    for step in range(9):
+        T = tcp_pose(MODEL, posture + 0.2 * step * np.eye(6)[0]) @ tcp
+        phase = "start" if step == 0 else "end" if step == 8 else "update"
+        gizmo._impl.position, gizmo._impl.wxyz = T[:3, 3], np.roll(pin.Quaternion(T[:3, :3]).coeffs(), 1)
+        asyncio.run(window.panel._on_drag(window.event(gizmo, phase=phase)))
+    asyncio.run(window.panel._on_drag(window.event(gizmo, phase="start")))  # and it is taken again at once
+    window.update()
+    is_busy.set()
+    window.work()
+    assert [what[0] for what in window.hands.done] == ["follow"]
+    assert window.hands.goal == pytest.approx(posture + 1.6 * np.eye(6)[0], abs=1e-4)
+
+
+def pull(window, phase, start, end, link=-1):
     event = window.event(
-        window.drawing.arm.links[-1], phase=phase, start_position=tuple(start), end_position=tuple(end)
+        window.drawing.arm.links[link], phase=phase, start_position=tuple(start), end_position=tuple(end)
     )
     asyncio.run(window.panel._on_pull(event))
     window.panel._pushed = 0.0
@@ -489,25 +519,53 @@ def pull(window, phase, start, end):
 
 def test_the_arm_is_pushed_where_the_mouse_takes_it(window):
     flange = window.drawing.arm.T_base_flange
-    pull(window, "start", flange[:3, 3], flange[:3, 3] + (0.0, 0.1, 0.0))
+    at = flange[:3, 3] + flange[:3, :3] @ (0.02, -0.03, 0.1)
+    pull(window, "start", at, np.add(at, (0.0, 0.1, 0.0)))
     (name, given), arrow = window.hands.done.pop(), window.panel._arrow
     assert name == "push"
-    assert given["force"] == pytest.approx((0.0, 20.0, 0.0))
+    assert given["force"] == pytest.approx((0.0, 0.1 * STIFFNESS, 0.0))
     assert given["duration"] == 0.3
-    assert given["point"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert given["point"] == pytest.approx((0.02, -0.03, 0.1), abs=1e-9)
     assert arrow.visible
-    pull(window, "update", (0.0, 0.0, 0.0), (9.0, 0.0, 0.0))  # at the foot, from which the flange is far
-    given = window.hands.done.pop()[1]
-    assert np.linalg.norm(given["point"]) == pytest.approx(0.3)
-    assert given["force"] == pytest.approx((80.0, 0.0, 0.0))
-    pull(window, "end", (0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
+    pull(window, "update", at, np.add(at, (9.0, 0.0, 0.0)))
+    assert window.hands.done.pop()[1]["force"] == pytest.approx((MAX_FORCE, 0.0, 0.0))
+    pull(window, "end", at, np.add(at, (9.0, 0.0, 0.0)))
     assert window.hands.done == []
     assert not arrow.visible
 
 
+def test_what_cannot_be_pushed_is_not_pushed_elsewhere(window):
+    pull(window, "start", (0.0, 0.0, 0.1), (0.5, 0.0, 0.1), link=2)
+    assert window.client.told.pop()[1] == "pull at the last link or at the tool: a box is pushed there"
+    assert not window.panel._arrow.visible
+    pull(window, "start", (0.0, 0.0, 0.0), (9.0, 0.0, 0.0))  # at the end of a tool that is as long
+    assert "at most 0.3 m" in window.client.told.pop()[1]
+    assert window.hands.done == []
+
+
+@given(st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: np.linalg.norm(v) > 1e-3))
+def test_the_box_takes_the_hardest_pull_in_any_direction(way):
+    make("push", {"force": pulled(np.zeros(3), 99.0 * np.array(way)).tolist()})
+
+
+def test_the_tool_is_pulled_at_too(window):
+    tool = BodyShape("hand", True, "box", (0.1, 0.1, 0.1), ZEROS)
+    wall = BodyShape("wall", False, "box", (0.1, 0.1, 0.1), ZEROS)
+    window.robot.state = a_state(shapes=(tool, wall))
+    window.update()
+    hand, wall = (
+        next(node for (name, *_), node in window.drawing._shapes.items() if name == one)
+        for one in ("hand", "wall")
+    )
+    assert (hand._has_any_drag_callbacks(), wall._has_any_drag_callbacks()) == (True, False)
+    window.robot.is_held = False
+    window.update()
+    assert not hand._has_any_drag_callbacks()
+
+
 def test_a_spring_pulls_with_so_much_at_most():
     assert pulled(np.zeros(3), np.array((0.1, 0.0, 0.0))) == pytest.approx((0.1 * STIFFNESS, 0.0, 0.0))
-    assert np.linalg.norm(pulled(np.zeros(3), np.array((3.0, 4.0, 0.0)))) == pytest.approx(MOST_FORCE)
+    assert np.linalg.norm(pulled(np.zeros(3), np.array((3.0, 4.0, 0.0)))) == pytest.approx(MAX_FORCE)
 
 
 # --- values and plots

@@ -58,6 +58,8 @@ class Kind(Enum):
 _KINDS = {float: Kind.NUMBER, int: Kind.INTEGER, bool: Kind.BOOLEAN, str: Kind.TEXT}
 # Characters of a text such as a log line or a popup, and of a program.
 _LENGTHS = {Kind.TEXT: 1000, Kind.SCRIPT: 500_000}
+# How far computing puts a number that lies on a bound beyond it, as a share of the bound; or in its unit.
+_ROUNDING = 1e-9
 _COUNTS = {(3, 3): "three", (6, 6): "six", (0, 3): "up to three"}
 
 
@@ -155,9 +157,9 @@ class Parameter:
             case Kind.BOOLEAN:
                 return bool(value) if value in (True, False) and isinstance(value, int) else None
             case Kind.INTEGER:
-                return value if isinstance(value, int) and self._is_in_range(value) else None
+                return value if isinstance(value, int) and self._number(value) is not None else None
             case Kind.NUMBER:
-                return float(value) if self._is_in_range(value) else None
+                return self._number(value)
             case Kind.CHOICE:
                 return value if isinstance(value, str) and value in self.choices else None
             case Kind.TEXT | Kind.SCRIPT:
@@ -170,9 +172,9 @@ class Parameter:
             case Kind.OBJECT:
                 return dict(value) if isinstance(value, Mapping) and _is_json(value) else None
 
-    def _is_in_range(self, value: Any) -> bool:
+    def _number(self, value: Any) -> float | None:
         low, high = -inf if self.low is None else self.low, inf if self.high is None else self.high
-        return _is_number(value) and low <= value <= high
+        return within(float(value), low, high) if _is_number(value) else None
 
     def _vector(self, value: Any) -> tuple[float, ...] | None:
         if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
@@ -182,7 +184,17 @@ class Parameter:
         if not (least <= len(numbers) <= most and all(map(_is_number, numbers))):
             return None
         vector = tuple(map(float, numbers))
-        return vector if self.high is None or hypot(*vector) <= self.high else None
+        fits = self.high is None or within(hypot(*vector), high=self.high) is not None
+        return vector if fits else None
+
+
+def within(value: float, low: float = -inf, high: float = inf) -> float | None:
+    """Return a number between two bounds, None for one outside.
+
+    One that is outside by no more than what it was computed with may have added is taken for the bound.
+    """
+    bounded = min(max(value, low), high)
+    return bounded if abs(value - bounded) <= _ROUNDING * max(1.0, abs(bounded)) else None
 
 
 def parameter(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from math import hypot
 from typing import Literal
 
-from ur_emulator.commands.operation import CommandOperation, parameter
+from ur_emulator.commands.operation import CommandOperation, parameter, within
 from ur_emulator.controller.command import BoxParts, refuse
 from ur_emulator.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.errors import ArgumentError, RefusedError
@@ -44,12 +44,12 @@ class SetAnalogInput(CommandOperation):
         io = box.state.io
         line = (io.analog_in if self.group == "standard" else io.tool_analog_in)[self.n]
         low, high = ANALOG_RANGE[line.domain]
-        if not low <= self.value <= high:
+        if (value := within(self.value, low, high)) is None:
             raise RefusedError(
                 f"{self.value:g} given for {self.group} analog input {self.n}, which measures {low:g} to "
                 f"{high:g} {'V' if line.domain else 'A'} now"
             )
-        line.value = self.value
+        line.value = value
 
 
 # --- Forces on the flange, and a payload that no program has declared
@@ -125,7 +125,7 @@ class AddObstacle(CommandOperation):
 def _check_body(
     what: str, shape: str, wanted: tuple[str, ...], size: Sequence[float], pose: Sequence[float]
 ) -> None:
-    if len(size) != len(wanted) or not all(SMALLEST <= value <= LARGEST for value in size):
+    if len(size) != len(wanted) or any(within(value, SMALLEST, LARGEST) is None for value in size):
         raise ArgumentError(
             f"{what}: size {list(size)} given: a {shape} needs {len(wanted)} numbers "
             f"({', '.join(wanted) or 'none'}), each {SMALLEST:g} to {LARGEST:g} m"
@@ -141,7 +141,7 @@ def _put(box: BoxParts, put: Callable[..., None], *body: object) -> None:
 
 
 def _check_distance(what: str, pose: Sequence[float]) -> None:
-    if hypot(*pose[:3]) > FARTHEST:
+    if within(hypot(*pose[:3]), high=FARTHEST) is None:
         raise ArgumentError(
             f"{what}: pose {list(pose)} given: six finite numbers x, y, z, rx, ry, rz are needed, at most "
             f"{FARTHEST:g} m away"

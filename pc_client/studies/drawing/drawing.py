@@ -18,13 +18,13 @@ may move while its neighbour is drawn.
 One factor says how slow the whole must be. Slowed down by a factor a, on the same path, joint speeds fall by
 a and joint accelerations by a^2; so one plan gives the factor that each moment needs. Marks come first: they
 are what is drawn. A pen-up move that would need a larger factor than they do gets more time instead, and the
-marks behind it come later. The factor itself is found by bisection, by the checks of planning.
+marks behind it come later.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -37,14 +37,14 @@ from scipy.special import ndtri
 
 from pc_client.arm import Arm
 from pc_client.arrays import Array, read_only
-from pc_client.errors import MovementError, PlanningError, RecordingError
+from pc_client.errors import MovementError, RecordingError
 from pc_client.kinematics.model import RobotModel
 from pc_client.movements.lognormal import TwoSidedTiming
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal, Stroke
 from pc_client.movements.trajectory import Motion
 from pc_client.planning.limits import limits_of
-from pc_client.planning.plan import PlannableMovement, plan_movement
+from pc_client.planning.plan import DEFAULT_DT, plan_movement
 from pc_client.studies.drawing.placement import Mark, Placement, PlacementOptions, inverse, marks_of, place
 from pc_client.studies.extraction.extract import Extraction, extract
 from pc_client.studies.extraction.pen import PenRecording, on_one_axis, ordered_part, read_recording
@@ -179,18 +179,12 @@ def make_drawing(
     placement = place(marks, drawn, options, flat=flat)
     on_arm = [mark.transformed(placement.similarity) for mark in marks]
     size = placement.similarity.scale * float(np.ptp(drawn, axis=0).max())
-    joined = _paced(name, on_arm, least_gaps(on_arm, size), placement.lift, arm)
-    guess = float(factor_needed(name, joined, arm)[1].max())
-    facts = _facts(extraction, placement, joined)
-
-    def slowed(factor: float) -> Movement:
-        trajectory = joined.trajectory.stretched(factor)
-        return Movement(
-            name, trajectory, _between_slow_moments(trajectory), {**facts, "slower_than_the_hand": factor}
-        )
-
-    factor = slower * least_factor(slowed, guess, arm)
-    return Drawing(extraction, marks, placement, joined, factor, slowed(factor))
+    joined, need = _paced(name, on_arm, least_gaps(on_arm, size), placement.lift, arm)
+    factor = slower * max(1.0, need * (1.0 + ACCURACY))
+    trajectory = joined.trajectory.stretched(factor)
+    facts = {**_facts(extraction, placement, joined), "slower_than_the_hand": factor}
+    movement = Movement(name, trajectory, _between_slow_moments(trajectory), facts)
+    return Drawing(extraction, marks, placement, joined, factor, movement)
 
 
 def spatial(p: Array) -> Array:
@@ -323,33 +317,15 @@ def _pen_up_height() -> float:
     return float((up - down).max())
 
 
-#: Relative accuracy of the factor.
+#: By how much the factor is larger than the need, which other samples of the same path show a little less.
 ACCURACY = 1e-3
 #: Pen-up moves with this time, s of the hand, hold nothing up.
 _WIDE_GAP_S = 3.0
 #: A pen-up move that is too fast gets this much more time at least and at most, per attempt.
 _LONGER = (1.03, 1.5)
 _ATTEMPTS = 40
-#: Speed, m/s, at which a path is planned first: far from any limit, so that its samples lie close.
-_EASY_SPEED = 0.3
-
-
-class StretchedMovement:
-    """A trajectory in the form that planning takes, `factor` times as slow."""
-
-    def __init__(self, name: str, joined: Joined, factor: float = 1.0) -> None:
-        self.name = name
-        self._trajectory = joined.trajectory.stretched(factor)
-
-    @property
-    def duration(self) -> float:
-        """[s]."""
-        return self._trajectory.duration
-
-    def sample(self, t: Array, /) -> tuple[Array, Array]:
-        """Return positions (n, 3) [m] and velocities (n, 3) [m/s] at times (n,)."""
-        motion = self._trajectory.evaluate(t)
-        return motion.p, motion.v
+#: Most way, m, between two samples of a path.
+_STEP = 0.0012
 
 
 def factor_needed(name: str, joined: Joined, arm: RobotModel) -> tuple[Array, Array]:
@@ -361,20 +337,23 @@ def factor_needed(name: str, joined: Joined, arm: RobotModel) -> tuple[Array, Ar
     Raises:
         PlanningError: the path itself cannot be done, at any speed.
     """
-    t = np.linspace(0.0, joined.trajectory.duration, 2001)
-    easy = max(1.0, float(np.linalg.norm(joined.trajectory.evaluate(t).v, axis=1).max()) / _EASY_SPEED)
+    movement = Movement(name, joined.trajectory, np.array([joined.trajectory.duration]))
+    fastest = float(movement.speed(np.linspace(0.0, movement.duration, 2001)).max())
     limits = limits_of(arm)
     no_speeds = replace(limits, speed_fraction=1e6, qdd_max=(1e9,) * 6, tcp_speed_max=1e6, rest_speed_max=1e6)
-    plan = plan_movement(StretchedMovement(name, joined, easy), model=arm, limits=no_speeds)
+    plan = plan_movement(movement, model=arm, dt=min(DEFAULT_DT, _STEP / fastest), limits=no_speeds)
     qd = np.abs(plan.spline.sample(plan.t)[1]) / (limits.speed_fraction * np.array(arm.limits.qd_max))
     qdd = np.abs(plan.spline.qdd(plan.t)) / np.array(limits.qdd_max)
-    tcp = np.linalg.norm(joined.trajectory.stretched(easy).evaluate(plan.t).v, axis=1) / limits.tcp_speed_max
+    tcp = movement.speed(plan.t) / limits.tcp_speed_max
+    tcp[[0, -1]] *= limits.tcp_speed_max / limits.rest_speed_max
     need = np.maximum(np.maximum(qd.max(axis=1), np.sqrt(qdd.max(axis=1))), tcp)
-    return plan.t / easy, easy * need
+    return plan.t, need
 
 
-def _paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: RobotModel) -> Joined:
-    """Join marks with pen-up moves that ask no more of the arm than the marks do.
+def _paced(
+    name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: RobotModel
+) -> tuple[Joined, float]:
+    """Join marks with pen-up moves that ask no more of the arm than the marks do; return the factor, too.
 
     Args:
         marks: in order of time, m, base frame.
@@ -397,37 +376,4 @@ def _paced(name: str, marks: Sequence[Mark], gaps: Array, lift: Array, arm: Robo
         if not late.any():
             break
         gaps[late] *= np.clip(worst[late] / allowed, *_LONGER)
-    return joined
-
-
-def least_factor(make: Callable[[float], PlannableMovement], guess: float, arm: RobotModel) -> float:
-    """The least factor, at least 1, at which planning accepts a movement; looked for from a guess on.
-
-    Raises:
-        PlanningError: it is refused although it is slow; the message is planning's.
-    """
-
-    def is_accepted(factor: float) -> bool:
-        try:
-            plan_movement(make(factor), model=arm)
-        except PlanningError:
-            return False
-        return True
-
-    high, step = max(1.0, guess), ACCURACY
-    while not is_accepted(high):
-        if high > 2.0 * max(1.0, guess):
-            plan_movement(make(high), model=arm)  # raises, and says what is wrong
-        step *= 2.0
-        high *= 1.0 + step
-    low, step = high, ACCURACY
-    while low > 1.0:
-        step *= 2.0
-        low = max(1.0, high * (1.0 - step))
-        if not is_accepted(low):
-            break
-        high = low
-    while high > 1.0 and high / low > 1.0 + ACCURACY:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if is_accepted(middle) else (middle, high)
-    return high
+    return joined, float(need.max())

@@ -27,6 +27,7 @@ from scipy.optimize import bisect
 from pc_client.arrays import Array, read_only
 from pc_client.errors import MovementError
 from pc_client.kinematics.arms import UR3_BOX, Box
+from pc_client.movements.recipes import largest_scale
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 from pc_client.movements.trajectory import Similarity, about_z
 from pc_client.studies.extraction.extract import Extraction
@@ -235,7 +236,7 @@ def place(marks: Sequence[Mark], drawn: Array, options: PlacementOptions, *, fla
     else:
         angles = [options.rotation]
     rotations = [(angle, frame @ about_z(sense * angle)) for angle in angles]
-    scales = [_largest_scale(path @ R.T, lift, options.box) for _, R in rotations]
+    scales = [largest_scale(path @ R.T, options.box.size - np.abs(lift)) for _, R in rotations]
     best = int(np.argmax(scales))
     angle, R = rotations[best]
     wanted = math.inf if options.size is None else options.size / extent
@@ -251,9 +252,3 @@ def inverse(similarity: Similarity) -> Similarity:
     """The similarity that undoes another."""
     back = similarity.R.T
     return Similarity(1.0 / similarity.scale, back, -(back @ similarity.shift) / similarity.scale)
-
-
-def _largest_scale(path: Array, lift: Array, box: Box) -> float:
-    room, need = box.size - np.abs(lift), np.ptp(path, axis=0)
-    wide = need > 1e-12 * need.max()
-    return float((room[wide] / need[wide]).min())
