@@ -14,9 +14,9 @@ from protocol.primary.messages import KeyMessage, ReportLevel, TextMessage
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.commands.power import PowerOff
-from ur_emulator.commands.programs import ClosePopup, PauseProgram, ResumeProgram, StopProgram
-from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
+from ur_emulator.commands.programs import ClosePopup, PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
+from ur_emulator.commands.safety import SafeguardStop, TriggerProtectiveStop, UnlockProtectiveStop
 from ur_emulator.controller.events import (
     ErrorReported,
     ProgramPaused,
@@ -25,6 +25,7 @@ from ur_emulator.controller.events import (
     ProgramStopped,
     SafetyModeChanged,
 )
+from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.ports.primary.robot_state import state_records
 
 COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_integer_register(0, n)\n    sync()\n  end\nend\n"
@@ -283,6 +284,123 @@ def at_work(bench):
 def stopped(at_work):
     at_work.tick(80, TRIGGER)
     return at_work
+
+
+FORCE = "force_mode(get_target_tcp_pose(), [0,0,1,0,0,0], [0,0,5,0,0,0], 2, [.1,.1,.05,.2,.2,.2])"
+BELT = "encoder_enable_set_tick_count(0, 0)\n  track_conveyor_linear(p[0,1,0,0,0,0], 1000)"
+
+
+@pytest.mark.parametrize("guided", [False, True], ids=["protective stop", "hand"])
+@pytest.mark.parametrize(
+    "lines",
+    [
+        "speedj([0.5,0,0,0,0,0], 1, 0.3)\n  stopj(0.5)",
+        "speedl(p[0,0.1,0,0,0,0], 0.2, 0.3)\n  stopl(0.1)",
+        f"speedj([0.5,0,0,0,0,0], 1, 0.6)\n  movej({GOAL}, a=2, v=1)",
+        "speedj([0.8,0,0,0,0,0], 0.8)",
+        f"{FORCE}\n  speedj([0.8,0,0,0,0,0], 0.8)",
+        f"{BELT}\n  speedl(p[0,0.1,0,0,0,0], 0.1)",
+        f"{FORCE}\n  movel(pose_add(get_target_tcp_pose(), p[0,0.1,0,0,0,0]), v=0.1)",
+        f"{BELT}\n  sleep(0.4)\n  stop_conveyor_tracking(0.2)",
+    ],
+    ids=[
+        "stopj",
+        "stopl",
+        "stop before a move",
+        "speedj",
+        "force",
+        "conveyor",
+        "force, move",
+        "conveyor, stop",
+    ],
+)
+@pytest.mark.parametrize("after", [40, 85])
+def test_no_instruction_waits_for_ever_for_an_arm_that_was_taken_from_it(lines, guided, after):
+    bench = Bench()
+    bench.start(f'def p():\n  {lines}\n  textmsg("on")\nend\n', loaded=True)
+    bench.tick(after)
+    if guided:
+        bench.tick(60, StartFreedrive())
+        bench.tick(1, ReleaseBrakes())
+    else:
+        bench.tick(80, TRIGGER)
+        bench.tick(1, UNLOCK, RESUME)
+    bench.tick(600)
+    assert bench.texts == ["on"]
+    assert bench.now.runtime_state == ProgramState.STOPPED
+    assert at_rest(bench)
+
+
+@pytest.mark.parametrize("generation", [CB3, E_SERIES])
+@pytest.mark.parametrize(
+    "begin",
+    ["freedrive_mode()", f"freedrive_mode()\n  sync()\n  {FORCE}"],
+    ids=["freedrive", "into force mode"],
+)
+@pytest.mark.parametrize(
+    "lines",
+    [
+        f"movej({GOAL})",
+        "movel(pose_add(get_target_tcp_pose(), p[0,0.05,0,0,0,0]))",
+        f"stopj(3)\n  movej({GOAL})",
+        f"speedj([0,0,0,0,0,0.5], 4)\n  movej({GOAL})",
+    ],
+    ids=["movej", "movel", "stopj", "speedj"],
+)
+def test_a_motion_right_after_freedrive_is_executed(lines, begin, generation):
+    bench = Bench(generation=generation)
+    end = "end_freedrive_mode()" if begin == "freedrive_mode()" else "end_force_mode()"
+    before = bench.now.target_q
+    assert bench.run(f'def p():\n  {begin}\n  {end}\n  {lines}\n  textmsg("done")\nend\n') == ["done"]
+    assert np.abs(np.subtract(bench.now.target_q, before)).max() > 0.05
+    if "movej" in lines:
+        assert bench.now.target_q == pytest.approx(GOAL, abs=1e-6)
+
+
+def test_a_freedrive_for_no_time_leaves_nothing_for_the_next():
+    """A wrong payload that it began with."""
+    bench = Bench()
+    bench.controller.plant.attach_load(3.0)
+    bench.run(
+        "def p():\n  sleep(1)\n  freedrive_mode()\n  end_freedrive_mode()\n  set_payload(3, [0,0,0])\nend\n"
+    )
+    bench.run("def p():\n  sleep(1)\n  freedrive_mode()\n  sleep(0.2)\n  end_freedrive_mode()\nend\n")
+    assert not [e for e in bench.events if isinstance(e, ErrorReported)]
+
+
+def test_an_arm_that_is_paused_at_slider_0_stays_where_it_is(at_work):
+    at_work.tick(100, SetSpeedSlider(0.0))
+    q = at_work.now.target_q
+    at_work.tick(1, PAUSE)
+    at_work.tick(1, SetSpeedSlider(1.0))
+    while at_work.now.runtime_state != ProgramState.PAUSED:
+        at_work.tick()
+    held = at_work.now.target_q
+    at_work.tick(100)
+    assert at_work.now.target_q == held
+    assert np.abs(np.subtract(held, q)).max() < 0.1
+    at_work.tick(400, RESUME)
+    assert at_work.texts == ["there"]
+
+
+@pytest.mark.parametrize("stop", ["pause", "safeguard", "protective stop"])
+@pytest.mark.parametrize("cycles", [1, 2, 4])
+def test_a_stream_that_goes_on_before_the_arm_rests_has_no_step_in_its_speed(stop, cycles):
+    bench = Bench(fidelity="ideal")
+    bench.start("def s():\n  while True:\n    speedj([1.5,0,0,0,0,0], 3, 0.008)\n  end\nend\n", loaded=True)
+    bench.tick(80)
+    begin, end, most = {
+        "pause": ([PAUSE], [RESUME], 4.0),
+        "safeguard": ([SafeguardStop(True)], [SafeguardStop(False)], 20.0),
+        "protective stop": ([TRIGGER], [UNLOCK, RESUME], 20.0),
+    }[stop]
+    for _ in range(3):
+        bench.tick(cycles, *begin)
+        bench.tick(cycles, *end)
+    bench.tick(100)
+    qd = np.array([s.target_qd[0] for s in bench.snapshots])
+    assert qd[-1] == pytest.approx(1.5)
+    assert np.abs(np.diff(qd)).max() <= most * 0.008 * (1 + 1e-9)
 
 
 def test_the_program_is_paused_and_the_arm_rests(stopped):

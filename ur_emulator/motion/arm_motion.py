@@ -216,7 +216,7 @@ class ArmMotion:
         if self._time.paused or (self.owner is not None and self.owner is not owner):
             raise OwnershipError
         if before is not None:
-            if self.state is ArmState.STREAMING and isinstance(before.generator, Streamed):
+            if isinstance(before.generator, Streamed):
                 before.generator.when_replaced(generator)
             before.fate = Fate.TAKEN
         self._command = command = Command(owner, generator, self.path.q)
@@ -224,7 +224,7 @@ class ArmMotion:
         if kind is Kind.STOP:
             self._ramp = generator
         elif kind is Kind.TORQUE:
-            self._chain.clear()
+            self._drop_overlays()
         if self._begins_program:
             self._begins_program = False
             if kind is Kind.MOVE:
@@ -260,7 +260,7 @@ class ArmMotion:
         if time.paused:
             return
         time.paused = self._is_special = True
-        speed = max(map(abs, self.path.qd))
+        speed = max(map(abs, self.target.qd))
         time.slowing = max(PAUSE_RATE, deceleration * time.factor / speed if speed > 0.0 else 0.0)
         if isinstance(generator, Streamed):
             self._go(Event.PAUSE, StopJ(deceleration) if deceleration else generator.when_paused())
@@ -400,8 +400,6 @@ class ArmMotion:
         if command is not None and row.fate is not None:
             if row.fate is Fate.SUSPENDED and command.fate is Fate.ACTIVE:
                 command.left_at, command.is_renewed = self.path.q, False
-                if isinstance(command.generator, Streamed):
-                    command.generator.scale = 0.0
             command.fate = row.fate
             if command.is_over:
                 self._command = None
@@ -453,7 +451,7 @@ class ArmMotion:
             )
         self.path = path
         if self._is_special:
-            self._displace(before, dt, rate)
+            self._displace(before, dt, advance, rate)
         elif self.state is not _BY_HAND:
             self.target = path
         return self.target
@@ -470,10 +468,12 @@ class ArmMotion:
             elif rate == 0.0 and self._time.paused:
                 self._go(Event.STAND)
             return self.path
+        is_renewed = False
         if command is not None and isinstance(stream := command.generator, Streamed):
-            goes_on = command.is_renewed and not self._time.paused and stream.fits(self.path, scale)
-            command.is_renewed = False
-            if goes_on:
+            if self.state is _BRAKING and stream.scale != scale:
+                stream.scale = 0.0  # a stop is not scaled: its speed is that of the scaling in force
+            is_renewed, command.is_renewed = command.is_renewed and not self._time.paused, False
+            if is_renewed and stream.fits(self.path, scale):
                 self._go(Event.RENEWED)
                 return stream.step(self.path, dt, scale)
             self._go(Event.LOST, stream.when_lost())
@@ -481,7 +481,9 @@ class ArmMotion:
         if self.braking is not None and isinstance(ramp, StopJ):
             ramp.allowed = self.braking(self.path)
         self.path = ramp.step(self.path, dt, scale)
-        if ramp.done:
+        if ramp.done and is_renewed:
+            self._go(Event.RENEWED)
+        elif ramp.done:
             self._arrive()
         return self.path
 
@@ -501,14 +503,14 @@ class ArmMotion:
         command.is_renewed = False
         return path
 
-    def _displace(self, before: JointTarget, dt: float, rate: float) -> None:
+    def _displace(self, before: JointTarget, dt: float, advance: float, rate: float) -> None:
         """Compute the target beside overlays, or in time that is not normal."""
         path = self.path
         if self.state is _BY_HAND:
             pass
         elif not self._overlays:
             self.target = path
-        elif rate > 0.0 or any(path.qd):
+        elif advance > 0.0 or rate > 0.0 or any(path.qd):
             self.target = self._chain.displace(path, before, dt, rate)
             if self._may_settle():
                 self._drop_overlays()

@@ -230,8 +230,8 @@ class ForceMode:
         axes = self.frame.turn(place, [displacement / dt for displacement in along_path])
         rotation = np.eye(6) if axes is None else _block_diagonal(axes)
         chosen = np.zeros(6, dtype=bool) if axes is None else self._chosen
-        # The program's motion along compliant axes, turned by the displacement, is cancelled. The tool goes on
-        # with its speed where axes begin or cease to be compliant.
+        # The program's motion along compliant axes, turned by the displacement, is cancelled. Where axes
+        # begin or cease to be compliant the tool keeps its speed.
         displacement = np.array(along_path)
         displacement[3:] = rotvec_to_matrix(self._shift[3:]) @ displacement[3:]
         if self._path_pose is not None:

@@ -115,14 +115,10 @@ class Streamed:
     def fits(self, target: JointTarget, scale: float) -> bool:
         """Return whether the stream can go on from a target.
 
-        A stream that begins at a lowered speed scaling begins with a speed that it can have there. Faster
-        joints are braked first: a ramp in scaled time would be much longer.
+        An arm that moves by itself at a lowered speed scaling must rest first: in scaled time it would need
+        much longer to come to the speed of the stream.
         """
-        return self.scale > 0.0 or scale >= 1.0 or self._speed_share(target) <= scale * (1.0 + 1e-9)
-
-    def _speed_share(self, target: JointTarget) -> float:
-        """Return the speed of a target as a share of the greatest of this stream."""
-        raise NotImplementedError
+        return self.scale > 0.0 or scale >= 1.0 or not any(target.qd)
 
     def when_replaced(self, by: Generator) -> None:
         """Hand over to the generator that replaces this one."""
@@ -175,16 +171,9 @@ class SpeedJ(Streamed):
             qd = six([scale * v for v in after.qd])
         return target.continued(qd, dt)
 
-    def _speed_share(self, target: JointTarget) -> float:
-        return _share(max(map(abs, target.qd)), max(map(abs, self.qd)))
-
     def when_lost(self) -> Generator:
         """Stop with the acceleration of the last command."""
         return StopJ(self.a)
-
-
-def _share(speed: float, most: float) -> float:
-    return 0.0 if speed <= 0.0 else inf if most <= 0.0 else speed / most
 
 
 class StopJ:
@@ -254,9 +243,6 @@ class ServoJ(Streamed):
             six([scale * w for w in after]),
             six([(scale * w - v) / dt for v, w in zip(target.qd, after, strict=True)]),
         )
-
-    def _speed_share(self, target: JointTarget) -> float:
-        return max(map(_share, map(abs, target.qd), self._qd_max))
 
     def when_lost(self) -> Generator:
         """Stop."""
@@ -356,10 +342,6 @@ class SpeedL(Streamed):
         if isinstance(by, SpeedL | StopL) and by.course.tool == self.course.tool:
             by.course = self.course
 
-    def _speed_share(self, target: JointTarget) -> float:
-        now, most = self.course.twist_at(target), self._twist
-        return max(_share(hypot(*now[:3]), hypot(*most[:3])), _share(hypot(*now[3:]), hypot(*most[3:])))
-
     def when_lost(self) -> Generator:
         """Stop with the accelerations of the last command."""
         return self._stop(self._a, self._a_rot)
@@ -427,12 +409,13 @@ class DirectTorque(Streamed):
         self.command = command
         self._measure = measure
 
-    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Return the measured arm; speed scaling has no effect."""
-        return self._measure()
+    def fits(self, target: JointTarget, scale: float) -> bool:
+        """Return True: speed scaling has no effect."""
+        return True
 
-    def _speed_share(self, target: JointTarget) -> float:
-        return 0.0
+    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
+        """Return the measured arm."""
+        return self._measure()
 
     def when_lost(self) -> Generator:
         """Hold the position where the arm comes to rest."""

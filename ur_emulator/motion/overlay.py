@@ -125,6 +125,8 @@ class OverlayChain:
         if still:
             self._step_speed = ZERO6
             return JointTarget(q)
+        if not any(before.qd):
+            self._step_speed = ZERO6  # after a pause
         # Speed at the end of the cycle from those of this one and the last: exact for a constant
         # acceleration.
         speed = six([(b - a) / dt for a, b in zip(before.q, q, strict=True)])
