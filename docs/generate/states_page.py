@@ -31,6 +31,9 @@ from ur_emulator.controller.safety.inputs import TRANSITIONS as ENABLING_TRANSIT
 from ur_emulator.controller.safety.modes import EVENTS, MODES, after, mode_of
 from ur_emulator.controller.snapshot import safety_status_bits
 from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.motion.generators import Kind
+from ur_emulator.motion.ownership import TABLE as ARM_ROWS
+from ur_emulator.motion.ownership import ArmState, Row
 
 
 class ProgramTransition(NamedTuple):
@@ -70,8 +73,8 @@ PROGRAM_TRANSITIONS: tuple[ProgramTransition, ...] = (
 _HEAD = """\
 # States of the box
 
-Made from `ur_emulator/controller/safety/modes.py`, `robot_mode.py` and
-`docs/generate/states_page.py` by `make docs`.
+Made from `ur_emulator/controller/safety/modes.py`, `robot_mode.py`,
+`ur_emulator/motion/ownership.py` and `docs/generate/states_page.py` by `make docs`.
 Letters: D documented, O observed, I inferred, C chosen; see [fidelity.md](fidelity.md).
 
 Commands are those of `ur_emulator.commands`; `ControlBox.submit` takes them.
@@ -181,6 +184,13 @@ A program is started or resumed only while the robot is RUNNING and in NORMAL, R
 otherwise a runtime exception on port 30001 gives the reason and the remedy. A protective stop ends
 a program that came through a socket, and closes the program's sockets. It pauses a program that was
 loaded and played; that one stays paused after the stop is unlocked.
+"""
+
+_ARM = """
+## Motion of the arm
+
+One script thread at most has the arm. Its instruction returns when its command has come to its end or
+has lost the arm. In a pause no thread gets it; events that are not listed change nothing.
 """
 
 
@@ -307,8 +317,18 @@ def render() -> str:
         *_table(("robot mode", "joints", "overridden by safety modes"), _joint_rows()),
         _PROGRAM,
         *_diagram((row.state.name, row.then.name, row.event) for row in PROGRAM_TRANSITIONS),
+        _ARM,
+        *_table(("state", "the arm"), ((state.name, state.value) for state in ArmState)),
+        "",
+        *_table(("when", "in", "with", "then", "the command", "source"), map(_arm_row, ARM_ROWS)),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _arm_row(row: Row) -> tuple[str, ...]:
+    states = "any state" if len(row.states) == len(ArmState) else ", ".join(s.name for s in row.states)
+    kinds = "" if len(row.kinds) > len(Kind) else ", ".join(k.value if k else "no command" for k in row.kinds)
+    return row.event.value, states, kinds, row.after.name, row.fate.value if row.fate else "", row.why
 
 
 def _ranked(modes: Iterable[SafetyMode]) -> list[SafetyMode]:

@@ -505,6 +505,38 @@ def test_in_lockstep_time_passes_until_the_time_that_is_waited_for(box):
     assert box.state.tick == begin.tick + 125
 
 
+@pytest.mark.parametrize(
+    ("lines", "operation", "arguments"),
+    [
+        ('popup("x", blocking=True)', "close_popups", {}),
+        ('x = request_integer_from_primary_client("n?")', "answer", {"value": 3}),
+    ],
+    ids=["popup", "question"],
+)
+def test_who_waits_for_a_time_does_not_wait_for_the_operator(box, lines, operation, arguments):
+    begin = box.state.time
+    box.at(begin + 1.0, operation, arguments)
+    box.run_program(f"def p():\n  {lines}\nend\n")
+    now = box.wait_until(time=begin + 2.0)
+    assert now.program_state == "STOPPED"
+    assert now.time == pytest.approx(begin + 2.0)
+
+
+def test_a_popup_of_one_thread_does_not_stop_the_time_of_the_others(box):
+    """A move of another thread ends; then time stands until somebody closes the popup."""
+    goal = [0.6, -1.7, -2.0, -0.1, 1.2, 1.5]
+    box.run_program(
+        f'def p():\n  thread t():\n    movej({goal}, a=3, v=2)\n    textmsg("moved")\n  end\n'
+        '  h = run t()\n  popup("x", blocking=True)\nend\n'
+    )
+    now = box.wait_until(log="moved")
+    assert now.target_q == pytest.approx(goal)
+    assert box.state.tick == box.state.tick
+    assert box.state.popups == ("x",)
+    box.close_popups()
+    box.wait_until(program_state="STOPPED")
+
+
 def test_an_operation_acts_in_the_cycle_of_its_time(box):
     now = box.state
     level = {"group": "standard", "n": 3, "level": True}

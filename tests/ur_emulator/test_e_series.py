@@ -19,7 +19,10 @@ from compliance_support import push, reported, truth
 from e_series_support import ESeriesBench, program
 from plant_support import target
 
+from protocol.ur_types import SafetyMode
+from ur_emulator.commands.safety import UnlockProtectiveStop
 from ur_emulator.controller.arm_in_space import ArmInSpace
+from ur_emulator.controller.safety.limit_checks import clamping_gap
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import NOMINAL
 from ur_emulator.models.e_series_arms import UR5E, UR10E
@@ -61,6 +64,33 @@ def asked(*lines, robot="ur5e"):
     bench.run(program(f"set_tcp(p{list(TCP)})", *lines))
     assert not bench.errors
     return bench
+
+
+# A posture of a UR5e with 5.8 that a user reports, C403A0.
+CLAMPED = np.radians([136.46, 4.19, 63.94, 98.65, -133.19, -10.6]).tolist()
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "ur5"])
+def test_the_arm_is_stopped_before_it_clamps_a_hand_and_can_leave_the_place(robot):
+    bench = (
+        ESeriesBench(robot=robot, fidelity="exact")
+        if robot == "ur5e"
+        else Bench(robot=robot, fidelity="exact")
+    )
+    away = [*CLAMPED[:4], -1.57, 0.0]
+    bench.run(program(f"movej({away})"))
+    bench.run(program(f"movej({CLAMPED})"))
+    if robot == "ur5":
+        assert reported(bench) == []
+        assert bench.now.target_q == pytest.approx(CLAMPED)
+        return
+    assert reported(bench) == [(403, 0)]
+    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert 0.0 < clamping_gap(bench.controller.state.robot, bench.now.target_q) < 0.028
+    bench.tick(1, UnlockProtectiveStop())
+    bench.run(program(f"movej({away})"))
+    assert bench.now.target_q == pytest.approx(away)
+    assert reported(bench) == [(403, 0)]
 
 
 def test_jacobian():

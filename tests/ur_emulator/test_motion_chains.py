@@ -40,7 +40,7 @@ V, A = 0.25, 1.2
 LONGEST = 60.0
 
 LIMITS = limits_of(ARM.robot)
-CHECK = SetpointCheck(ARM.robot.stop_deceleration, DT)
+CHECK = SetpointCheck(ARM.robot, DT)
 
 
 def straight(goal, **limits):

@@ -334,7 +334,7 @@ def test_no_instruction_waits_for_ever_for_an_arm_that_was_taken_from_it(lines, 
 @pytest.mark.parametrize("generation", [CB3, E_SERIES])
 @pytest.mark.parametrize(
     "begin",
-    ["freedrive_mode()", f"freedrive_mode()\n  sync()\n  {FORCE}"],
+    ["freedrive_mode()\n  sleep(0.1)", f"freedrive_mode()\n  sync()\n  {FORCE}"],
     ids=["freedrive", "into force mode"],
 )
 @pytest.mark.parametrize(
@@ -349,7 +349,7 @@ def test_no_instruction_waits_for_ever_for_an_arm_that_was_taken_from_it(lines, 
 )
 def test_a_motion_right_after_freedrive_is_executed(lines, begin, generation):
     bench = Bench(generation=generation)
-    end = "end_freedrive_mode()" if begin == "freedrive_mode()" else "end_force_mode()"
+    end = "end_freedrive_mode()" if "force" not in begin else "end_force_mode()"
     before = bench.now.target_q
     assert bench.run(f'def p():\n  {begin}\n  {end}\n  {lines}\n  textmsg("done")\nend\n') == ["done"]
     assert np.abs(np.subtract(bench.now.target_q, before)).max() > 0.05
@@ -364,7 +364,7 @@ def test_a_freedrive_for_no_time_leaves_nothing_for_the_next():
     bench.run(
         "def p():\n  sleep(1)\n  freedrive_mode()\n  end_freedrive_mode()\n  set_payload(3, [0,0,0])\nend\n"
     )
-    bench.run("def p():\n  sleep(1)\n  freedrive_mode()\n  sleep(0.2)\n  end_freedrive_mode()\nend\n")
+    bench.tick(50, StartFreedrive())
     assert not [e for e in bench.events if isinstance(e, ErrorReported)]
 
 

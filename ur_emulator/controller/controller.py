@@ -55,11 +55,13 @@ _UNIT_TIME = 50e-6
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
-def make_snapshot(state: ControllerState, programs: ProgramRunner, sensed: PlantState) -> Snapshot:
+def make_snapshot(
+    state: ControllerState, programs: ProgramRunner, sensed: PlantState, control: ControlMode
+) -> Snapshot:
     """Return everything that any port may publish of this cycle.
 
     The target is the one with which the cycle began: target and measurements are of the same moment.
-    `sensed` is the state of the arm as `Plant.report` gives it.
+    `sensed` is the state of the arm as `Plant.report` gives it, `control` how it was driven.
     """
     target = state.past.target
     arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
@@ -77,7 +79,7 @@ def make_snapshot(state: ControllerState, programs: ProgramRunner, sensed: Plant
         force_at_flange=state.force_sense.refers_to_flange,
     )
     mode, safety_mode = state.mode.mode, state.safety.mode
-    speed, tool, io, compliance = state.speed, state.tool, state.io, state.compliance
+    speed, tool, io = state.speed, state.tool, state.io
     payload, own_time = tool.payload, clock.generation.execution_time
     analog, euromap = io.analog, io.euromap
     return Snapshot(
@@ -95,8 +97,8 @@ def make_snapshot(state: ControllerState, programs: ProgramRunner, sensed: Plant
         runtime_state=int(programs.runtime_state),
         program_name=programs.name,
         script_control_line=programs.line if programs.reports_line else 0,
-        control_mode=int(compliance.mode),
-        is_guided_by_input=compliance.by_input,
+        control_mode=int(control),
+        is_guided_by_input=state.compliance.by_input,
         buttons=state.pendant.buttons,
         payload=payload.mass,
         payload_cog=payload.cog,
@@ -161,7 +163,7 @@ class Controller:
         if self.plant.touches(q):
             raise ModelError(f"{robot.name}: at home_q the arm would touch itself or the table; give another")
         self.plant.reset(q)
-        self._setpoints = SetpointCheck(robot.stop_deceleration, self.period_s)
+        self._setpoints = SetpointCheck(robot, self.period_s)
         self._mode = mode
         self._saturated_s = 0.0
         holding = generation.limits.holding_deviation
@@ -255,7 +257,7 @@ class Controller:
             self.programs.pause()
         was_active = was_active or (control is _BY_HAND and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
-        snapshot = make_snapshot(state, self.programs, self.plant.report(state.past.sensed))
+        snapshot = make_snapshot(state, self.programs, self.plant.report(state.past.sensed), control)
         # What has stopped the arm may have dropped its target.
         target = state.motion.target
         state.past.add(snapshot, target, sensed, is_still=not control and not any(target.qd))

@@ -151,6 +151,7 @@ E_SERIES = RobotGeneration(
         recovery=ArmLimits(tool_speed=0.25, force=100.0, power=80.0, momentum=10.0),
         manual=ArmLimits(tool_speed=0.25),  # chosen: reduced speed of ISO 10218-1
         has_programs_in_recovery=False,  # UR5e hardware manual 2022
+        clamping_distance=0.028,  # the maker by a user of a UR5e, 5.8; of CB3 arms no report was found
         # Chosen; UR10e manual: the software adjusts accelerations to mass, centre and inertia of the payload.
         brakes_within_torque=True,
     ),

@@ -47,6 +47,8 @@ class SafetyLimits:
         acceleration: largest joint acceleration that the configuration data announce [rad/s^2].
         reduced, recovery, manual: in these modes, where the generation has them.
         has_programs_in_recovery: programs run in recovery mode.
+        clamping_distance: distance of forearm and flange at which the arm is stopped, so that no hand is
+            clamped [m]; 0: it is not watched.
         brakes_within_torque: a stop brakes no harder than the drives can with the declared payload.
     """
 
@@ -59,4 +61,5 @@ class SafetyLimits:
     recovery: ArmLimits
     manual: ArmLimits
     has_programs_in_recovery: bool
+    clamping_distance: float = 0.0
     brakes_within_torque: bool

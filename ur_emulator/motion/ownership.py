@@ -4,7 +4,6 @@ A thread that moves the arm gets a `Command`, and learns from it what became of 
 changes it, by the rows of `TABLE`. What happens in a state that has no row for it changes nothing.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -151,8 +150,3 @@ TABLE: tuple[Row, ...] = (
 TRANSITIONS: dict[tuple[ArmState, Event, Kind | None], Row] = {
     (state, row.event, kind): row for row in TABLE for state in row.states for kind in row.kinds
 }
-
-
-def rows_of(state: ArmState) -> Iterable[Row]:
-    """Return the rows of a state, in the order of the table."""
-    return (row for row in TABLE if state in row.states)

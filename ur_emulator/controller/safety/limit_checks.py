@@ -7,7 +7,7 @@ chosen (docs/fidelity.md).
 """
 
 from dataclasses import dataclass
-from math import hypot
+from math import cos, hypot, sin
 from operator import sub
 
 from protocol.primary.messages import ReportLevel
@@ -47,8 +47,9 @@ class SetpointCheck:
     the arm comes to rest within them. A joint outside its range, because something pushed it, may move back.
     """
 
-    def __init__(self, stop_deceleration: float, period_s: float) -> None:
-        self._stop_deceleration = stop_deceleration
+    def __init__(self, robot: RobotModel, period_s: float) -> None:
+        self._robot = robot
+        self._stop_deceleration = stop_deceleration = robot.stop_deceleration
         self._period_s = period_s
         self._braking = 0.5 / stop_deceleration
         self._limits: ConfiguredLimits | None = None
@@ -58,6 +59,11 @@ class SetpointCheck:
         self, limits: ConfiguredLimits, before: JointTarget, target: JointTarget
     ) -> Violation | None:
         """Return what is wrong with the set-point `target`, which follows `before`; None: nothing."""
+        least = self._robot.generation.limits.clamping_distance
+        if least and target.q[3:5] != before.q[3:5]:
+            gap = clamping_gap(self._robot, target.q)
+            if gap < least and gap < clamping_gap(self._robot, before.q):
+                return CLAMPING
         if limits is not self._limits:
             # Below these no joint can exceed its own limit: most set-points need no check joint by joint.
             self._limits = limits
@@ -91,6 +97,26 @@ class SetpointCheck:
                     f"limits {low:.3f} to {high:.3f}",
                 )
         return None
+
+
+# Of the cylinder around the forearm and of the sphere around the flange that no hand may come between [m].
+# Source of radii, distance and code: the maker by a user of a UR5e.
+_CLAMPING_RADIUS = 0.0375
+CLAMPING = _stop(403, 0, "Protective Stop: Danger of clamping between the Robot's lower arm and tool")
+
+
+def clamping_gap(robot: RobotModel, q: Vector6) -> float:
+    """Return the distance of the cylinder around the forearm and the sphere around the flange [m].
+
+    Both in the frame of the forearm, in which wrists 1 and 2 move the flange. Chosen: the axis of the
+    cylinder is that of the housing.
+    """
+    _, _, elbow, wrist_1, wrist_2, wrist_3 = robot.dh
+    c4, s4, c5, s5 = cos(q[3]), sin(q[3]), cos(q[4]), sin(q[4])
+    x = wrist_2.d * s4 - wrist_3.d * s5 * c4
+    y = -wrist_2.d * c4 - wrist_3.d * s5 * s4
+    z = wrist_1.d + wrist_3.d * c5 - robot.outline.forearm[0]
+    return hypot(x - min(max(x, 0.0), -elbow.a), y, z) - 2.0 * _CLAMPING_RADIUS
 
 
 # The arm cannot go where a tool path leads. The real code is not known: 204 is that of other set-points.
