@@ -13,11 +13,12 @@ from states_support import check_wires
 from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.controller.events import ErrorReported
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
+from ur_emulator.motion.ownership import ArmState
 
 # No set-point accelerates a joint more than this [rad/s²]: the hardest of the programs' commands (6 rad/s², the
-# run-up of a CB3 box adds .38 of it), a stop, and a ramp of the time scaling; and what a path near a singularity
-# or force mode may add.
-MOST, OF_PATHS, OF_FORCE = 36.0, 60.0, 50.0
+# run-up of a CB3 box adds .38 of it), a stop, and a ramp of the time scaling; and what may be added by a path near a
+# singularity, and by force mode, in which a servoj that starts at the target of the joints is away from its path.
+MOST, OF_PATHS, OF_FORCE = 36.0, 500.0, 110.0
 STILL = 150  # cycles of 8 ms, after which a stopped arm stands still
 STUCK = 12.0  # s of robot time without progress in which a program should have got on
 BLOCKED = (153, 156, 157)
@@ -140,6 +141,7 @@ class Rules:
             controller.state.registers.outputs.integers[COUNTER],
             tuple(running.position(thread) for thread in running.threads[:1]),
             state,
+            controller.state.motion.path.q if controller.state.motion.state is ArmState.MOVING else None,
         )
         self.n_places += place != self._progress
         if place != self._progress or held:
