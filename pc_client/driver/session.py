@@ -327,7 +327,7 @@ def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:
         wait_until(watchdog.has_ended, robot.frames, robot.network, REST_TIMEOUT, complaint)
         if not watchdog.is_stopped(wait_for_rest(robot.frames, robot.network)):
             _end_paused_program(robot)
-    except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
+    except (Exception, KeyboardInterrupt):  # nothing, and no second Ctrl-C, keeps us from the next method
         return False
     return True
 

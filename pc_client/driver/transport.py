@@ -94,12 +94,16 @@ class TcpTransport:
 
     A robot that answers within a fraction of a millisecond, as an emulated one in lockstep, is polled:
     a blocking wait would take longer than the answer. `EagerWait` measures whether polling helps.
+
+    Attributes:
+        peer_address: the other end's address.
     """
 
-    def __init__(self, connected: socket.socket, name: str) -> None:
+    def __init__(self, connected: socket.socket, peer_address: str, name: str) -> None:
         connected.setblocking(False)
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connected
+        self.peer_address = peer_address
         self._name = name
         self._eager = EagerWait()
 
@@ -108,20 +112,21 @@ class TcpTransport:
         """Our end's address, as the other end sees it."""
         return str(self._socket.getsockname()[0])
 
-    @property
-    def peer_address(self) -> str:
-        """The other end's address."""
-        return str(self._socket.getpeername()[0])
-
     def send(self, data: bytes) -> None:
-        """Send everything; DriverError if the connection is gone, or the peer takes nothing any more."""
+        """Send everything; DriverError if the connection is gone, or the peer takes nothing any more.
+
+        The connection is closed then: what came next would be read as the rest of what was cut.
+        """
+        left = memoryview(data)
         try:
-            sent = self._socket.send(data)
-            while sent < len(data):
-                sent += self._send_later(data[sent:])
-        except BlockingIOError:
-            self.send(data[self._send_later(data) :])
-        except OSError as error:
+            while left:
+                try:
+                    left = left[self._socket.send(left) :]
+                except BlockingIOError as full:
+                    if not select.select((), (self._socket,), (), _SEND_TIMEOUT)[1]:
+                        raise OSError(f"the other end took nothing for {_SEND_TIMEOUT:g} s") from full
+        except (OSError, ValueError) as error:
+            self.close()
             raise DriverError(f"{self._name}: cannot send, {_reason(error)}") from error
 
     def receive(self, timeout: float) -> bytes | None:
@@ -149,18 +154,12 @@ class TcpTransport:
             return receive(_RECEIVE_SIZE)
         except BlockingIOError:
             return None
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise DriverError(f"{self._name}: {_reason(error)}") from error
 
     def close(self) -> None:
         """Close; harmless when closed."""
         self._socket.close()
-
-    def _send_later(self, data: bytes) -> int:
-        """Wait until the peer takes something; returns how many bytes it took."""
-        if not select.select((), (self._socket,), (), _SEND_TIMEOUT)[1]:
-            raise TimeoutError
-        return self._socket.send(data)
 
 
 class EagerWait:
@@ -200,13 +199,15 @@ class TcpListener:
         return int(self._socket.getsockname()[1])
 
     def accept(self, timeout: float) -> TcpTransport | None:
-        """The next caller, or None when there was no call for `timeout` seconds."""
+        """The next caller, or None when there was no call for `timeout` seconds; DriverError if it cannot."""
         self._socket.settimeout(timeout)
         try:
             connected, address = self._socket.accept()
-        except (TimeoutError, BlockingIOError):
+            return TcpTransport(connected, address[0], f"reverse connection from {address[0]}")
+        except (TimeoutError, BlockingIOError, ConnectionError):  # nobody, or one that has gone again
             return None
-        return TcpTransport(connected, f"reverse connection from {address[0]}")
+        except OSError as error:
+            raise DriverError(f"port {self.port} takes no calls: {_reason(error)}") from error
 
     def close(self) -> None:
         """Close; harmless when closed."""
@@ -220,6 +221,7 @@ class TcpNetwork:
         """Connect; DriverError for an unknown name, no answer, or a connection that is refused."""
         try:
             connected = socket.create_connection((host, port), timeout)
+            return TcpTransport(connected, connected.getpeername()[0], f"{host}:{port}")
         except UnicodeError as error:  # of the codec for host names
             raise UnknownHostError(f"{host[:60]!r} is no host name or address") from error
         except socket.gaierror as error:
@@ -229,7 +231,6 @@ class TcpNetwork:
             raise UnknownHostError(f"{host} cannot be looked up: {remedy}") from error
         except OSError as error:
             raise DriverError(f"{host}:{port} {_reason(error)}") from error
-        return TcpTransport(connected, f"{host}:{port}")
 
     def listen(self, address: str, port: int) -> TcpListener:
         """Listen on a port of one of our own addresses; 0: any free one.
@@ -258,12 +259,14 @@ class TcpNetwork:
         return time.perf_counter()  # on Windows, time.monotonic may have steps of 16 ms
 
 
-def _reason(error: OSError) -> str:
+def _reason(error: OSError | ValueError) -> str:
     """Say in a few words what went wrong and what to look at."""
     if isinstance(error, TimeoutError):
         return "does not answer: check the address, the cable and that the robot is switched on"
     if isinstance(error, ConnectionRefusedError):
         return "refuses the connection: is the control box up, and is --port-base right?"
+    if not isinstance(error, OSError):  # of a socket that is closed
+        return str(error)
     if error.errno in NO_ROUTE:
         return "cannot be reached, there is no route to it: check the address and this computer's network"
     if error.errno == errno.EADDRINUSE:

@@ -321,6 +321,29 @@ def test_when_the_stop_word_does_not_help_a_stop_program_is_sent():
     assert robot.at_rest
 
 
+@pytest.mark.parametrize(
+    "error", [TimeoutError, OSError(9, "bad"), ValueError("closed"), DriverError("gone")]
+)
+def test_whatever_a_socket_raises_the_other_way_to_stop_is_tried_and_a_person_is_told(error):
+    """First only the way back fails; then the second way as well."""
+    for fails, n_notes in ((("reverse",), 0), (("reverse", "secondary"), 1)):
+        robot = FakeRobot(lockstep=False)
+        take = robot.took
+
+        def took(pipe, data, robot=robot, take=take, fails=fails):
+            if robot.tick >= 1040 and pipe.kind in fails:
+                raise error
+            take(pipe, data)
+
+        robot.took = took
+        with pytest.raises(type(error) if isinstance(error, Exception) else error) as caught:
+            stream(robot)
+        notes = getattr(caught.value, "__notes__", [])
+        assert len(notes) == n_notes
+        assert all("PRESS THE EMERGENCY STOP" in note for note in notes)
+        assert robot.at_rest == (not n_notes)
+
+
 def test_a_row_sink_that_fails_ends_the_run():
     def sink(frame, step):
         if step.t > 0.1:
