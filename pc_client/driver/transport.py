@@ -1,4 +1,4 @@
-"""The network as the driver sees it: a few methods, so that tests can put a robot in memory behind them.
+"""The network as the driver sees it: a few methods. Tests put a robot in memory in the place of `TcpNetwork`.
 
 No protocol here: bytes in, bytes out, and every failure is a DriverError that names address and port.
 """
@@ -9,7 +9,6 @@ import re
 import select
 import socket
 import time
-from typing import Protocol
 
 from pc_client.errors import DriverError, UnknownHostError
 
@@ -35,54 +34,6 @@ _HOST_AND_PORT = re.compile(r"\[.*\]:\d+|[^:]*:\d+")
 
 _SEND_TIMEOUT = 5.0
 """A peer that takes nothing for this long [s] is gone."""
-
-
-class Transport(Protocol):
-    """One connected byte stream."""
-
-    @property
-    def local_address(self) -> str:
-        """Our end's address, as the other end sees it."""
-
-    @property
-    def peer_address(self) -> str:
-        """The other end's address."""
-
-    def send(self, data: bytes) -> None:
-        """Send everything. Raises DriverError when the connection is gone."""
-
-    def receive(self, timeout: float) -> bytes | None:
-        """Bytes that arrived, b"" at the end of the stream, None when nothing came for `timeout` seconds."""
-
-    def close(self) -> None:
-        """Close; harmless when closed."""
-
-
-class Listener(Protocol):
-    """Waits for the robot to dial us."""
-
-    @property
-    def port(self) -> int:
-        """The TCP port that is open."""
-
-    def accept(self, timeout: float) -> Transport | None:
-        """The next caller, or None when there was no call for `timeout` seconds."""
-
-    def close(self) -> None:
-        """Close; harmless when closed."""
-
-
-class Network(Protocol):
-    """Makes connections and measures the time that passes while waiting for them."""
-
-    def connect(self, host: str, port: int, timeout: float) -> Transport:
-        """Connect. Raises DriverError."""
-
-    def listen(self, address: str, port: int) -> Listener:
-        """Listen on a port of one of our own addresses; 0: any free one. Raises DriverError."""
-
-    def now(self) -> float:
-        """Seconds of a monotonic clock."""
 
 
 class PortTakenError(DriverError):
@@ -115,7 +66,7 @@ class TcpTransport:
     def send(self, data: bytes) -> None:
         """Send everything; DriverError if the connection is gone, or the peer takes nothing any more.
 
-        The connection is closed then: what came next would be read as the rest of what was cut.
+        The connection is closed then: the next message would be read as the rest of the one that was cut.
         """
         left = memoryview(data)
         try:
