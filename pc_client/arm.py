@@ -7,13 +7,14 @@ connection is open. Before an arm moves that is not known to be simulated, a per
 
 from __future__ import annotations
 
+import reprlib
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from types import TracebackType, UnionType
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,26 +22,38 @@ from numpy.typing import ArrayLike
 from pc_client.analysis.run import Run, Signals
 from pc_client.arrays import Array
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
+from pc_client.control.reference import RunRecipe
 from pc_client.control.tracker import ControlLaw
 from pc_client.driver.gripper import Gripper
 from pc_client.driver.report import RobotInfo, RobotReport, read_report
 from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
-from pc_client.driver.watchdog import conditions_text
-from pc_client.errors import ClientError, ControllerError, DriverError, PlanningError
+from pc_client.driver.velocity_stream import StreamLog, StreamReport
+from pc_client.driver.watchdog import conditions_text, require
+from pc_client.errors import LOG, ClientError, ControllerError, DriverError, PlanningError, printable
+from pc_client.experiment.checks import guarded
 from pc_client.experiment.experiment import Experiment, check_folder, experiment_text, scratch_folder
-from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw
-from pc_client.experiment.preflight import model_of, preflight, require
-from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, Observer, run_approach
+from pc_client.experiment.law_stream import (
+    ACCELERATION,
+    LawStep,
+    LawStream,
+    VelocityLaw,
+    check_law,
+    rehearse,
+)
+from pc_client.experiment.preflight import changes, model_of, preflight
+from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, run_approach
 from pc_client.kinematics.model import RobotModel, nearest_posture, robot_model, tcp_pose
 from pc_client.kinematics.tool import gripper_model, surroundings
+from pc_client.movements.movement import Movement
+from pc_client.movements.samples import JointTrajectory
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.plan import Motion, Plan, make_plan
 from protocol.pose import T_to_pose, pose_to_T
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
-from ur_hil.cell import Cell, Three
-from ur_hil.records import checked
+from ur_hil.cell import Cell, Point, Three
+from ur_hil.records import checked, number, whole
 from ur_hil.tools import ToolModel
 
 Confirm = Callable[[str], bool]
@@ -48,16 +61,16 @@ Confirm = Callable[[str], bool]
 
 QUESTION = "The arm is going to move. Is the space around it free, and the emergency stop at hand?"
 _NO_TERMINAL = (
-    "there is no terminal to ask at whether the arm may move: run this at one, or give "
-    "connect(..., confirm=lambda text: True) after a person has checked the arm"
+    "there is no terminal to ask at whether the arm may move: run this at one, or give --yes (in Python: "
+    "connect(..., confirm=lambda text: True)) after a person has checked the arm"
 )
 
 
-def _ask_at_terminal(text: str) -> bool:
+def ask_at_terminal(text: str) -> bool:
     """Show the description of a motion and ask; ClientError if there is no terminal to ask at."""
     if sys.stdin is None or sys.stdin.closed:
         raise ClientError(_NO_TERMINAL)
-    print(text)
+    print(printable(text))
     try:
         return input(f"{QUESTION} [y/N]: ").strip().lower() in ("y", "yes")
     except EOFError:
@@ -71,7 +84,7 @@ def connect(
     cell: Cell | str | Path | None = None,
     tool: str | None = None,
     reverse_port: int | None = None,
-    confirm: Confirm = _ask_at_terminal,
+    confirm: Confirm = ask_at_terminal,
 ) -> Arm:
     """Read the state of a robot and compare it with the model of its arm. Nothing moves.
 
@@ -87,6 +100,9 @@ def connect(
     Raises:
         ClientError: the robot does not answer, does not report its type, or does not meet a condition.
     """
+    check_law(confirm, "confirm", "a function of (text)", 1)
+    if reverse_port is not None:
+        checked(whole(0, 65535), reverse_port, "reverse_port", ClientError)
     around, hand = surroundings(cell, tool), None if tool is None else gripper_model(tool)
     numbers = ports or Ports.standard()
     report = read_report(TcpNetwork(), host, numbers)
@@ -175,12 +191,14 @@ class Arm:
             centre_of_gravity: in the flange frame [m].
 
         Raises:
-            ClientError: the robot does not take it, or the answer was no.
+            ClientError: the robot does not take it, the answer was no, or these are no mass and centre.
         """
-        self._ask(lambda: f"the payload of the arm at {self._host} becomes {mass:g} kg")
+        mass = checked(number(0.0, 100.0, "kg"), mass, "mass", ClientError)
+        centre: Point = checked(cast(Any, Point), centre_of_gravity, "centre_of_gravity", ClientError)
+        self._ask(f"the payload of the arm at {self._host} becomes {mass:g} kg")
         with self._session() as driver:
-            driver.set_payload(mass, centre_of_gravity)
-        tool = replace(self.model.cell.tool, mass=mass, centre_of_gravity=centre_of_gravity)
+            driver.set_payload(mass, centre)
+        tool = replace(self.model.cell.tool, mass=mass, centre_of_gravity=centre)
         self.model = replace(self.model, cell=replace(self.model.cell, tool=tool))
 
     def frame(self) -> RealtimeFrame:
@@ -241,14 +259,15 @@ class Arm:
         Args:
             plan: made by `plan`, or a motion that is planned first.
             controller: the velocity controller, or a function of yours: it gets each frame and the reference
-                at its time (`q`, `qd_feedforward`, `qd_array`, `p`, `v`) and returns (6,) joint velocities
-                [rad/s]. Checks, guard of the tool, recording and SNR are those of the other controllers.
+                at its time (`t`, `q_array`, `qd_feedforward`, `qd_array`, `p`, `v`) and returns (6,) joint
+                velocities [rad/s]. Before anything moves it is called once, with a made-up frame. Checks,
+                guard of the tool, recording and SNR are those of the other controllers.
             out: folder of the recording; None: it is not kept, unless the run is given up: then the error
                 names the file, in the temporary folder of the system.
             overwrite: replace a simulated recording of the same name in it; without, it is refused.
 
         Raises:
-            ClientError: a check failed or the robot stopped; the arm rests.
+            ClientError: an argument makes no sense, a check failed or the robot stopped; the arm rests.
         """
         return self.repeat(plan, 1, controller, out=out, overwrite=overwrite)[0]
 
@@ -265,8 +284,9 @@ class Arm:
 
         Arguments and errors are those of `run`.
         """
+        _need(plan, Plan | Movement | JointTrajectory, "plan", "a Plan, a Movement or a JointTrajectory")
         made = plan if isinstance(plan, Plan) else make_plan(plan, self.model)
-        with scratch_folder() if out is None else nullcontext(Path(out)) as folder:
+        with scratch_folder() if out is None else nullcontext(out) as folder:
             report = self.experiment([made], times, controller, folder, overwrite=overwrite)
             return tuple(Run.from_file(path) for path in report.paths)
 
@@ -275,8 +295,7 @@ class Arm:
         plans: Sequence[Plan],
         repeat: int,
         controller: Controller | ControlLaw,
-        out: Path,
-        observer: Observer | None = None,
+        out: str | Path,
         *,
         overwrite: bool = False,
     ) -> ExperimentReport:
@@ -287,7 +306,6 @@ class Arm:
             repeat: runs of each, at least 1.
             controller: the same for all runs.
             out: folder of the recordings.
-            observer: gets the progress.
             overwrite: as of `run`.
 
         Raises:
@@ -296,12 +314,27 @@ class Arm:
         """
         law, config = None, controller
         if not isinstance(config, Controller):
+            check_law(config, "controller", "a Controller or a function of (frame, reference)", 2)
             law, config = config, controller_of_law(getattr(config, "__name__", type(config).__name__))
-        wanted = Experiment(self.model, tuple(plans), repeat, out, overwrite)
+        _need(plans, Sequence, "plans", "a list of Plans")
+        for plan in plans:
+            _need(plan, Plan, "plan", "a Plan")
+        _need(repeat, int | np.integer, "times", "a whole number from 1")
+        _need(out, str | Path, "out", "a folder")
+        _need(overwrite, bool, "overwrite", "True or False")
+        wanted = Experiment(self.model, tuple(plans), repeat, Path(out), overwrite)
         check_folder(wanted)
-        self.confirm(wanted)
-        with self._session() as driver:
-            return ExperimentRunner(driver, wanted, config, observer, law).run()
+        if law is not None:
+            report = self._report_now()
+            recipe = RunRecipe.first(config, report.info.period)
+            with self._fingers(law, is_rehearsal=True):
+                rehearse(law, recipe, plans[0], report.frame, self.model)
+        predicted = config if law is None else None
+        with (
+            self._session(lambda report: self.describe(wanted, predicted, report)) as driver,
+            self._fingers(law),
+        ):
+            return ExperimentRunner(driver, wanted, config, law).run()
 
     def approach(self, plan: Plan) -> Plan:
         """Move slowly to the start of a plan, on a checked path.
@@ -312,8 +345,9 @@ class Arm:
         Raises:
             ClientError: there is no clear path, a check failed or the robot stopped; the arm rests.
         """
-        self.confirm(Experiment(self.model, (plan,), 1, Path()))
-        with self._session() as driver:
+        _need(plan, Plan, "plan", "a Plan")
+        wanted = Experiment(self.model, (plan,), 1, Path())
+        with self._session(lambda report: self.describe(wanted, None, report)) as driver:
             require(preflight(driver.report(), self.model))
             approach = plan_approach(plan.joints, driver.actual_q(), model=self.model)
             run_approach(driver, approach, self.model)
@@ -334,56 +368,103 @@ class Arm:
                 robot stopped; the arm rests.
         """
         value = checked(FIELDS["speedj_acceleration"], acceleration, "acceleration", ControllerError)
+        check_law(law, "law", "a function of (frame)", 1)
         source = LawStream(law, self.model)
         top = np.degrees(max(source.qd_max))
-        self._ask(lambda: f"a velocity law drives the arm at {self._host}, joints up to {top:.0f} deg/s")
-        rows: list[tuple[float, np.ndarray, np.ndarray, np.ndarray, list[float]]] = []
+        what = "the arm" if self._gripper is None else "arm and fingers"
+        text = f"a velocity law drives {what} at {self._host}, joints up to {top:.0f} deg/s"
+        log: StreamLog[LawStep] = StreamLog()
 
-        def keep(frame: RealtimeFrame, step: LawStep) -> None:
-            pose = frame.actual_tcp_pose
-            rows.append((frame.timestamp, frame.actual_q, frame.actual_qd, pose, step.qd_cmd))
+        def signals(stream: StreamReport) -> Signals:
+            t, q, qd, pose, command = log.columns("timestamp", "actual_q", "actual_qd", "actual_tcp_pose")
+            return Signals(t - t[0], q, qd, pose, command, driver.info.source, stream)
 
-        with self._session() as driver:
+        with scratch_folder() as folder, self._session(lambda report: text) as driver:
             require(preflight(driver.report(), self.model))
-            driver.stream(source, keep, acceleration=value)
-        if not rows:
+            try:
+                with self._fingers(law):
+                    stream = driver.stream(source, log, acceleration=value)
+            except BaseException as error:
+                if log.frames:
+                    path = folder / "stream.parquet"
+                    signals(StreamReport()).to_frame().write_parquet(path)
+                    error.add_note(f"recorded until then: {path}")
+                raise
+        if not log.frames:
             raise ClientError("the velocity law ended before its first velocity: there are no signals")
-        t, q, qd, pose, command = (np.array(column, dtype=np.float64) for column in zip(*rows, strict=True))
-        return Signals(t - t[0], q, qd, pose, command, driver.info.source)
+        if stream.trouble:
+            LOG.warning(stream.trouble)
+        return signals(stream)
 
     def confirm(self, wanted: Experiment) -> None:
         """Ask whether an arm that is not known to be simulated may do an experiment; nothing moves.
 
         Raises:
-            ClientError: the answer was no, there is no terminal, or no clear path to the start.
+            ClientError: as `describe`; or the answer was no, or there is no terminal.
         """
-        self._ask(lambda: self.describe(wanted))
+        self._session(lambda report: self.describe(wanted, None, report)).close()
 
-    def describe(self, wanted: Experiment) -> str:
+    def describe(
+        self, wanted: Experiment, controller: Controller | None = None, report: RobotReport | None = None
+    ) -> str:
         """Describe an experiment for the people beside the arm: conditions, plan, approach; nothing moves.
 
+        Args:
+            controller: what is expected of it is described, too.
+            report: of the robot; by default as it is now.
+
         Raises:
-            ClientError: there is no clear path to the start.
+            ClientError: the robot is not as it must be, there is no clear path to the start, or the
+                controller would leave the path.
         """
-        report = self._report_now()
+        report = self._report_now() if report is None else report
+        conditions = preflight(report, self.model)
+        require(conditions)
         approach = plan_approach(wanted.planned[0].joints, report.frame.actual_q, model=self.model)
-        conditions = conditions_text(preflight(report, self.model))
-        texts = (f"robot at {self._host}: {report.info}", conditions, experiment_text(wanted))
+        recipe = controller and RunRecipe.first(controller, report.info.period)
+        found = [guarded(plan.joints, recipe, self.model)[1] for plan in wanted.planned if recipe]
+        texts = [
+            f"robot at {self._host}: {report.info}",
+            conditions_text(conditions),
+            experiment_text(wanted),
+        ]
+        if expected := [one for one in found if one]:
+            texts.append(f"  expected SNR    at best {min(one.snr_db for one in expected):.1f} dB")
+        texts += [one.doubt for one in expected if one.doubt]
         return "\n".join((*texts, approach_text(approach)))
+
+    def _fingers(self, law: object, *, is_rehearsal: bool = False) -> AbstractContextManager[None]:
+        """What a gripper needs while a law drives the arm."""
+        if law is None or self._gripper is None:
+            return nullcontext()
+        return self._gripper.beside_law(is_rehearsal=is_rehearsal)
 
     def _report_now(self) -> RobotReport:
         report = read_report(TcpNetwork(), self._host, self._ports)
         self._check_same(report.info)
         return report
 
-    def _session(self) -> UrDriver:
-        driver = UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
-        try:
-            self._check_same(driver.info)
-        except DriverError:
+    def _session(self, describe: Callable[[RobotReport], str] | None = None) -> UrDriver:
+        """Open a session, after a yes to what is described; a robot that has changed meanwhile is shown anew.
+
+        Nobody is asked about a robot that reports itself as simulated.
+        """
+        before = ""
+        while True:
+            shown = None
+            if describe is not None and self.simulated is not True:
+                shown = self._report_now()
+                self._ask(before + describe(shown))
+            driver = UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
+            try:
+                self._check_same(driver.info)
+                if not (changed := shown and changes(shown, driver.report(), self.model)):
+                    return driver
+            except BaseException:
+                driver.close()
+                raise
             driver.close()
-            raise
-        return driver
+            before = f"it is not as it was shown: {changed}; so once more:\n"
 
     def _check_same(self, now: RobotInfo) -> None:
         """Refuse another robot than that of `connect`, or one of another origin."""
@@ -394,12 +475,18 @@ class Arm:
 
     def _ask_for_fingers(self, text: str) -> None:
         self._report_now()  # it is the robot of `connect`
-        self._ask(lambda: text)
+        self._ask(text)
 
-    def _ask(self, text: Callable[[], str]) -> None:
-        """Ask whether an arm may move, unless it reports itself as simulated."""
-        if self.simulated is not True and not self._confirm(text()):
+    def _ask(self, text: str) -> None:
+        """Ask for a yes, unless the robot reports itself as simulated."""
+        if self.simulated is not True and not self._confirm(text):
             raise ClientError("the arm was not moved: the answer was no")
+
+
+def _need(value: object, kind: type | UnionType, what: str, allowed: str) -> None:
+    """Refuse an argument of another kind before anything moves."""
+    if not isinstance(value, kind):
+        raise ClientError(f"{what}: {reprlib.repr(value)}; give {allowed}")
 
 
 def _sixes(values: ArrayLike, what: str) -> Array:

@@ -1,5 +1,13 @@
 """What can go wrong on the PC side. Each message is one line: what was given, what is allowed, what to do."""
 
+import logging
+
+LOG = logging.getLogger("pc_client")
+"""How far an experiment is (debug, info), and warnings: on standard error where nobody sets up logging."""
+
+RECORDED = "%s: recorded"
+"""The step that ends a run."""
+
 
 class ClientError(Exception):
     """Root of all errors that a user of the PC client may meet."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from pc_client.analysis import measures
 from pc_client.arrays import Array
+from pc_client.driver.velocity_stream import StreamReport
 from pc_client.errors import RecordingError
 from pc_client.recording.provenance import Provenance, Source, origin_of
 from pc_client.recording.recording import Recording, flat_columns, load_recording, split_columns, table_of
@@ -42,6 +43,8 @@ class Signals:
         tcp_pose: (n, 6) reported TCP pose: position [m] and rotation vector [rad], base frame.
         qd_cmd: (n, 6) commanded joint velocities [rad/s].
         source: robot, software, serial and simulated, by name.
+        stream: commands sent, late and lost frames, stops of the arm, time for a command. Of a recording in
+            lockstep, where time waits for the client, it has no times.
     """
 
     t: Array
@@ -50,6 +53,7 @@ class Signals:
     tcp_pose: Array
     qd_cmd: Array
     source: Source
+    stream: StreamReport
 
     @property
     def simulated(self) -> bool | None:
@@ -118,7 +122,10 @@ class Run(Signals):
             recording.column(name)[track.new_rows]
             for name in ("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "cmd_qd")
         )
-        return cls(t - track.t_begin, q, qd, pose, command, recording.provenance.source, recording, track)
+        whose, summary = recording.provenance, recording.summary
+        known = {name: summary[name] for name in StreamReport.__slots__ if name in summary}
+        stream = StreamReport(**{"period": whose.cycle_time_s, **known})
+        return cls(t - track.t_begin, q, qd, pose, command, whose.source, stream, recording, track)
 
     def __repr__(self) -> str:
         whose = self.recording.provenance
@@ -132,6 +139,17 @@ class Run(Signals):
     def aborted(self) -> str:
         """Why the run did not come to its end; empty for a whole one."""
         return self.recording.aborted
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was not as it should be, one line each."""
+        return tuple(self.recording.summary.get("warnings", ()))
+
+    @property
+    def expected_snr(self) -> float | None:
+        """The SNR that loop and controller allow at best, as predicted before [dB]; None of a law."""
+        value: float | None = self.recording.summary.get("expected_snr_db")
+        return value
 
     @cached_property
     def measured(self) -> MeasuredRun:

@@ -26,8 +26,8 @@ def doctor(
     """Say what answers on which port, how even frames come, and whether the robot is as it must be."""
     from pc_client.driver.report import probe
     from pc_client.driver.transport import TcpNetwork
-    from pc_client.driver.watchdog import conditions_text
-    from pc_client.experiment.preflight import model_of, preflight, refusal
+    from pc_client.driver.watchdog import conditions_text, refusal
+    from pc_client.experiment.preflight import model_of, preflight
 
     around = surroundings(cell, tool)
     found = probe(TcpNetwork(), robot, ports_of(port_base), seconds)

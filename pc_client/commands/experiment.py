@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pc_client.commands import options
-from pc_client.commands.options import console, reach, say, show_report
-from pc_client.errors import InterruptedByUserError
+from pc_client.commands.options import console, progress_bar, reach, say, show_report
+from pc_client.errors import LOG, RECORDED, InterruptedByUserError
 
 if TYPE_CHECKING:
     from pc_client.analysis.run import MeasuredRun
@@ -56,9 +58,9 @@ def run(
 
 
 def _run(movements: Sequence[str], robot: str, out: Path, repeat: int, settings: options.RunSettings) -> None:
-    from pc_client.experiment.experiment import load_movements
+    from pc_client.movements.movement import load_motion
 
-    execute(load_movements(movements), robot, out, repeat, settings)
+    execute([load_motion(name) for name in movements], robot, out, repeat, settings)
     show_report(out)
 
 
@@ -75,7 +77,6 @@ def execute(
     """
     from pc_client.arm import QUESTION, plan
     from pc_client.experiment.experiment import Experiment, check_folder
-    from pc_client.experiment.progress import Progress
     from pc_client.results.pages import require_report_libraries
 
     require_report_libraries()
@@ -85,19 +86,18 @@ def execute(
     if settings.dry_run:
         wanted = Experiment(arm.model, tuple(plans), repeat, out, settings.overwrite)
         check_folder(wanted)
-        say(arm.describe(wanted))
+        say(arm.describe(wanted, settings.controller))
         say(f"{QUESTION}\ndry run: not asked, nothing moved")
         raise typer.Exit
     try:
-        with Progress(console, repeat * len(plans)) as progress:
-            report = arm.experiment(
-                plans, repeat, settings.controller, out, progress, overwrite=settings.overwrite
-            )
+        with _shown(repeat * len(plans)):
+            report = arm.experiment(plans, repeat, settings.controller, out, overwrite=settings.overwrite)
     except KeyboardInterrupt as interrupt:
-        doubts = "; ".join(getattr(interrupt, "__notes__", ())) or "the arm rests"
-        raise InterruptedByUserError(
-            f"interrupted; {doubts}; recordings finished so far are in {out}"
-        ) from interrupt
+        told = getattr(interrupt, "__notes__", [])
+        if not told or told[0].startswith("recorded"):  # no doubt of the driver
+            told = ["the arm rests", *told]
+        said = "; ".join(("interrupted", *told, f"recordings finished so far are in {out}"))
+        raise InterruptedByUserError(said) from interrupt
     robot_time = sum(stream.robot_time for stream in report.streams)
     wall_time = sum(stream.wall_time for stream in report.streams)
     late = sum(stream.late_frames for stream in report.streams)
@@ -109,6 +109,35 @@ def execute(
     )
     for remark in report.remarks:
         say(remark)
+
+
+@contextmanager
+def _shown(n_runs: int) -> Iterator[None]:
+    """Show the log of an experiment: steps beside a bar, which begins after the question, the rest above."""
+    from rich.progress import TimeElapsedColumn
+
+    bar = progress_bar("{task.description}", TimeElapsedColumn(), live=False)
+    task = bar.add_task("", total=n_runs)
+
+    def show(record: logging.LogRecord) -> bool:
+        if record.levelno > logging.DEBUG:
+            bar.start()
+            say(record.getMessage())
+        elif record.msg == RECORDED:
+            bar.advance(task)
+        else:
+            bar.update(task, description=record.getMessage())
+        bar.refresh()
+        return False  # nobody else shows it
+
+    LOG.addFilter(show)
+    LOG.setLevel(logging.DEBUG)
+    try:
+        yield
+    finally:
+        LOG.removeFilter(show)
+        LOG.setLevel(logging.NOTSET)
+        bar.stop()
 
 
 def read_runs(folder: Path) -> list[MeasuredRun]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -14,7 +13,7 @@ import typer
 from rich.console import Console
 
 from pc_client.control.controller import DEFAULT, Controller, load_controller
-from pc_client.errors import ClientError, ControllerError, printable
+from pc_client.errors import ControllerError, printable
 from pc_client.kinematics.tool import surroundings
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
@@ -119,12 +118,15 @@ def say(text: str) -> None:
     console.print(printable(text), markup=False, soft_wrap=True)
 
 
-def progress_bar(text: str, time: ProgressColumn) -> Progress:
-    """A bar with a text, a count and a time, which is gone when all is done."""
+def progress_bar(text: str, time: ProgressColumn, *, live: bool = True) -> Progress:
+    """A bar with a text, a count and a time, which is gone when all is done.
+
+    One that is not live is drawn when it is refreshed: no thread takes the interpreter from a control loop.
+    """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (TextColumn(text), BarColumn(), MofNCompleteColumn(), time)
-    return Progress(*columns, console=console, transient=True)
+    return Progress(*columns, console=console, transient=True, auto_refresh=live)
 
 
 def show_report(folder: Path, *, include_aborted: bool = False) -> Report:
@@ -227,19 +229,7 @@ def reach(robot: str, ports: Ports, cell: Cell, reverse_port: int | None = None,
     Raises:
         ClientError: it does not answer, does not report which arm it is, or is not as it must be.
     """
-    from pc_client.arm import connect
+    from pc_client.arm import ask_at_terminal, connect
 
-    confirm = (lambda text: True) if yes else _ask
+    confirm = (lambda text: True) if yes else ask_at_terminal
     return connect(robot, ports, cell=cell, reverse_port=reverse_port, confirm=confirm)
-
-
-def _ask(text: str) -> bool:
-    """Show what is going to happen, and ask; typer.Abort for no, ClientError without a terminal."""
-    from pc_client.arm import QUESTION
-
-    say(text)
-    if sys.stdin is None or sys.stdin.closed:
-        raise ClientError(
-            "there is no terminal to ask at whether the arm may move: run this at one, or give --yes"
-        )
-    return typer.confirm(QUESTION, abort=True)

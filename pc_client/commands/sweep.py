@@ -72,7 +72,8 @@ def sweep(
         with runner as run, closing(work.run(run)) as outcomes:
             _work(outcomes, plan.n_cases, store.n_settled, live=arm is None)
     except KeyboardInterrupt as interrupt:
-        doubts = "".join(f"; {note}" for note in getattr(interrupt, "__notes__", ()))
+        told = getattr(interrupt, "__notes__", ())
+        doubts = "".join(f"; {note}" for note in told if not note.startswith("recorded"))  # that is gone
         raise InterruptedByUserError(
             f"interrupted{doubts}; {store.n_settled} of {plan.n_cases} cases are kept in {store.path}, "
             "the same command goes on from there"
@@ -96,12 +97,11 @@ def _work(outcomes: Iterator[Outcome], n_cases: int, n_settled: int, *, live: bo
         live: True: the clock ticks. False: redrawn when a case is done; the thread that lets it tick would
             take the interpreter from a control loop in this process.
     """
-    from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
+    from rich.progress import TimeElapsedColumn
 
     counts: Counter[str] = Counter()
     n_runs = 0
-    columns = (*Progress.get_default_columns(), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, console=console, auto_refresh=live, transient=True)
+    bar = options.progress_bar("{task.description}", TimeElapsedColumn(), live=live)
     task = bar.add_task("running", total=n_cases, completed=n_settled)
     try:
         with bar:

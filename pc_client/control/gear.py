@@ -16,7 +16,6 @@ A joint follows its reference when the motor is sent to q_ref - e(q_ref).
 """
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log, pi
 from typing import NamedTuple
@@ -25,7 +24,6 @@ import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.control.loop import LoopModel, velocity_response
-from pc_client.control.reference import JointReference
 
 ORDERS = np.arange(30, 331)
 """Whole numbers, because the error repeats with each turn of the joint. Once and twice a motor turn, of
@@ -161,19 +159,9 @@ class GearModel:
         slope: Array = (self.orders * (self.sines * cos - self.cosines * sin)).sum(axis=0)
         return error, slope
 
-
-class MotorReference:
-    """What the motors have to do so that the joints with these gears follow a reference."""
-
-    def __init__(self, joints: JointReference, gear: GearModel) -> None:
-        self._joints = joints
-        self._gear = gear
-        self.duration = joints.duration
-
-    def at(self, t: float) -> tuple[Sequence[float] | Array, Sequence[float] | Array]:
-        """Positions (6,) [rad] and velocities (6,) [rad/s] of the motors, counted at the joints."""
-        q, qd = (np.asarray(x, dtype=np.float64) for x in self._joints.at(t))
-        error, slope = self._gear.error(q)
+    def motors(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Positions [rad] and velocities [rad/s] of the motors for those of the joints, (6,) each."""
+        error, slope = self.error(q)
         return q - error, qd * (1.0 - slope)
 
 

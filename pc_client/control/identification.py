@@ -11,7 +11,6 @@ cubic in the displacement of each joint takes it up, and with it any error of sc
 
 from collections.abc import Sequence
 from math import cos, pi, sin
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -81,14 +80,7 @@ _WORST_RESIDUAL = 0.25
 """Share of the commanded motion that may stay unexplained before the estimate is refused."""
 
 
-class DelayEstimate(NamedTuple):
-    """An identified loop delay [s], and the rms of what the delayed commands do not explain [rad]."""
-
-    delay: float
-    residual: float
-
-
-def estimate_delay(t: Array, qd_cmd: Array, q: Array, period: float) -> DelayEstimate:
+def estimate_delay(t: Array, qd_cmd: Array, q: Array, period: float) -> LoopModel:
     """Find the delay T that best explains q(t) = q0 + integral of qd_cmd up to t - T, over all joints.
 
     The estimate is finer than a cycle, as the integral is a continuous function of time.
@@ -135,7 +127,7 @@ def estimate_delay(t: Array, qd_cmd: Array, q: Array, period: float) -> DelayEst
             f"{residual:.1e} rad rms, allowed is {_WORST_RESIDUAL:.0%} of {motion:.1e} rad; "
             "is another program moving it, or is it blocked?"
         )
-    return DelayEstimate(max(delay, 0.0), residual)
+    return LoopModel.of_delay(max(delay, 0.0), residual)
 
 
 _LONGEST_LAG = 0.06

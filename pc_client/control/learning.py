@@ -23,12 +23,13 @@ Systems 26(3), 2006: the Q-filter and model inversion; differencing and bounds a
 
 from dataclasses import dataclass, replace
 from math import pi, sin
-from typing import NamedTuple
 
 import numpy as np
 
 from pc_client.arrays import Array
-from pc_client.control.loop import SAMPLING_TIME, LoopModel, frequency_response, sensitivity
+from pc_client.control.controller import Controller
+from pc_client.control.loop import SAMPLING_TIME, frequency_response, sensitivity
+from pc_client.control.reference import LEAD, SETTLE, RunRecipe
 
 _WORST_MISMATCH = 0.5
 """Largest |1 - P / P_model| at the cut-off: at least half of what repeats is gone after each run."""
@@ -64,20 +65,13 @@ class LearningFilter:
         return 0.5 * (1.0 + np.cos(pi * x))
 
 
-def design_filter(
-    loop: LoopModel, period: float, *, learning_gain: float, gain_p: float, gain_i: float
-) -> LearningFilter:
-    """Choose Q for an identified loop.
-
-    Args:
-        period: control cycle [s].
-        learning_gain: 0..1.
-        gain_p: of the feedback [1/s].
-        gain_i: of the feedback [1/s2].
+def design_filter(recipe: RunRecipe) -> LearningFilter:
+    """Choose Q for the identified loop and the controller of a recipe.
 
     Returns:
         The filter; `contraction` of 1 or more means that this loop must not learn.
     """
+    loop, period, own = recipe.loop, recipe.period, recipe.controller
     hertz = np.linspace(0.0, 0.5 / period, 501)[1:-1]
     model = frequency_response(loop, period, hertz)
     ratios = [frequency_response(real, period, hertz) / model for real in loop.corners()]
@@ -90,7 +84,11 @@ def design_filter(
     unchecked = LearningFilter(cut_off, "loop" if by_loop < by_noise else "noise", 1.0, 1.0)
     weight = unchecked.weight(hertz)
     factors = [
-        np.abs(weight * (1.0 - learning_gain * ratio) * sensitivity(real, gain_p, gain_i, period, hertz))
+        np.abs(
+            weight
+            * (1.0 - own.learning_gain * ratio)
+            * sensitivity(real, own.gain_p, own.gain_i, period, hertz)
+        )
         for real, ratio in zip(loop.corners(), ratios, strict=True)
     ]
     density = 1.0 - np.cos(2.0 * pi * hertz * max(SAMPLING_TIME, period))
@@ -130,36 +128,25 @@ class RunSignals:
     added: Array
 
 
-class LearningBounds(NamedTuple):
-    """What a learned command may reach, whatever was measured: speed [rad/s] and its change [rad/s2]."""
-
-    speed: float
-    acceleration: float
+_QUIET = 0.5 * LEAD, 0.5 * SETTLE
 
 
 def learn(
-    run: RunSignals,
-    loop: LoopModel,
-    weight: LearningFilter,
-    gain: float,
-    bounds: LearningBounds,
-    quiet: tuple[float, float],
-    period: float,
+    run: RunSignals, recipe: RunRecipe, weight: LearningFilter, quiet: tuple[float, float] = _QUIET
 ) -> Array:
     """Compute what to add to the feed-forward of the next run.
 
     Args:
         run: the last run, complete and without gaps.
+        recipe: of that run: its loop, and how much its controller may learn.
         weight: Q.
-        gain: of learning, 0..1.
         quiet: stretches at the beginning and at the end of the run in which nothing is added, since the arm
             rests there [s].
-        period: control cycle [s].
 
     Returns:
         (n, 6) velocities [rad/s], for the same frames of the next run.
     """
-    n = len(run.error)
+    n, period = len(run.error), recipe.period
     slope = np.diff(run.error, axis=0, prepend=run.error[:1]) / period
     # Room for the loop's response, so that the end of the run does not come round to its beginning.
     n_padded = 1 << (n + 128).bit_length()
@@ -168,11 +155,11 @@ def learn(
     used = weight.weight(hertz)
     inverse = np.zeros(len(hertz), dtype=np.complex128)
     passes = used > 0.0
-    inverse[passes] = gain / frequency_response(loop, period, hertz[passes])
+    inverse[passes] = recipe.controller.learning_gain / frequency_response(recipe.loop, period, hertz[passes])
     spectrum = np.fft.rfft(run.added, n_padded, axis=0)
     spectrum += inverse[:, None] * np.fft.rfft(slope, n_padded, axis=0)
     learned = np.fft.irfft(used[:, None] * spectrum, n_padded, axis=0)[:n]
-    return bounded(learned * _fade(n, quiet, period)[:, None], bounds, period)
+    return bounded(learned * _fade(n, quiet, period)[:, None], recipe.controller, period)
 
 
 def learnable_power(run: RunSignals, weight: LearningFilter, period: float) -> float:
@@ -183,10 +170,10 @@ def learnable_power(run: RunSignals, weight: LearningFilter, period: float) -> f
     return float(np.mean(np.square(kept)))
 
 
-def bounded(learned: Array, bounds: LearningBounds, period: float) -> Array:
-    """Keep a learned command (n, 6) within its bounds; it begins at 0."""
-    step = bounds.acceleration * period
-    wanted = np.clip(learned, -bounds.speed, bounds.speed)
+def bounded(learned: Array, config: Controller, period: float) -> Array:
+    """Keep a learned command (n, 6) within the bounds of a controller, whatever was measured; from 0 on."""
+    step = config.learning_acceleration * period
+    wanted = np.clip(learned, -config.learning_speed, config.learning_speed)
     kept = np.zeros_like(wanted)
     last = np.zeros(wanted.shape[1])
     for k, row in enumerate(wanted):

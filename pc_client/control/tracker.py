@@ -22,8 +22,8 @@ import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.control.controller import Controller
-from pc_client.control.loop import NO_LAG, LoopModel
-from pc_client.control.reference import ReferencePoint, ReferenceTable
+from pc_client.control.loop import NO_LAG
+from pc_client.control.reference import ReferencePoint, ReferenceTable, RunRecipe
 from pc_client.errors import DriverError
 from pc_client.kinematics.model import RobotModel, check_flange, tcp_pose
 from pc_client.recording.rows import Phase
@@ -287,7 +287,8 @@ class Tracker:
         point = reference.at(t)
         self._guard.check(t, q)
         if self._law is None or frame is None:
-            command = step_pi(self._config, self.qd_max, self._state, point.q, point.qd_feedforward, q, dt)
+            feedforward = point.qd_feedforward.tolist()
+            command = step_pi(self._config, self.qd_max, self._state, point.q, feedforward, q, dt)
         else:
             command = self._state.qd_cmd = six_velocities(self._law(frame, point))
         return TrackerStep(t, self._phase(t), point, command, t >= self._end)
@@ -318,27 +319,28 @@ def six_velocities(qd: Sequence[float] | Array) -> list[float]:
     return given
 
 
-def predict_run(reference: ReferenceTable, config: Controller, model: RobotModel, loop: LoopModel) -> Array:
-    """Where the joints go, (n, 6) [rad], when the controller follows a reference on an ideal arm.
+def predict_run(recipe: RunRecipe, reference: ReferenceTable, model: RobotModel) -> Array:
+    """Where the joints go, (n, 6) [rad], when the controller follows its reference on an ideal arm.
 
     Beside the loop's dead time and lag the robot's `speedj` counts: all joints change their velocities
     together, the leading one with the acceleration of the controller. The cycles are those from
     `reference.lead` before the movement to `settle` after it.
     """
-    period, lead = reference.period, reference.lead
+    own, loop, period, lead = recipe.controller, recipe.loop, recipe.period, reference.lead
     n = round((lead + reference.duration + reference.settle) / period) + 1
-    qd_max = [limit * config.speed_share for limit in model.limits.qd_max]
+    qd_max = [limit * own.speed_share for limit in model.limits.qd_max]
     whole, part = divmod(loop.dead_time / period, 1.0)
     still = np.zeros(6)
     sent = deque([still] * (int(whole) + 2), maxlen=int(whole) + 2)
-    most = config.speedj_acceleration * period
+    most = own.speedj_acceleration * period
     left = exp(-period / loop.lag) if loop.lag > NO_LAG else 0.0
     state, ramp, qd = PiState(), still, still
     q = np.zeros((n, 6))
-    q[0] = reference.at(-lead).q
+    q[0] = reference.at(-lead).q_array
     for k in range(n - 1):
         point = reference.at(k * period - lead)
-        command = step_pi(config, qd_max, state, point.q, point.qd_feedforward, q[k].tolist(), period)
+        feedforward, actual = point.qd_feedforward.tolist(), q[k].tolist()
+        command = step_pi(own, qd_max, state, point.q, feedforward, actual, period)
         sent.append(np.array(command))
         change = (1.0 - part) * sent[1] + part * sent[0] - ramp
         ramp = ramp + change * min(1.0, most / max(float(np.abs(change).max()), 1e-12))

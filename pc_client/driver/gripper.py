@@ -1,12 +1,15 @@
 """A Robotiq gripper, reached by port 63352 of its robot: moves the fingers and waits for them.
 
 A motion has begun when PRE is its target: OBJ is 0 no later, and until then that of the motion before. A
-connection lasts for one call, so that others reach the gripper. Source: reference `grippers.md` 1.3 and 1.5.
+connection lasts for one call, so that others reach the gripper; that of a law as long as it drives the arm.
+Source: reference `grippers.md` 1.3 and 1.5.
 """
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from threading import get_ident
 
 from pc_client.driver.transport import TcpNetwork, TcpTransport
 from pc_client.errors import ClientError, DriverError
@@ -34,6 +37,8 @@ class Gripper:
         self._host, self._port = host, port
         self._ask = ask
         self._force, self._speed = 0, 255
+        self._law_thread, self._is_rehearsal = 0, False
+        self._law_port: _Port | DriverError  # the second prevents commands
 
     @property
     def width(self) -> float:
@@ -73,25 +78,61 @@ class Gripper:
         value = checked(number(0.0, self._model.stroke, "m"), width, "width", ClientError)
         self._move(self._model.count_of(value), f"move to {1e3 * value:.1f} mm")
 
+    @contextmanager
+    def beside_law(self, *, is_rehearsal: bool = False) -> Iterator[None]:
+        """While a law drives the arm from this thread: its commands are sent, and it waits for nothing.
+
+        Nobody is asked: who lets the law move the arm is told of the fingers. In a rehearsal nothing is sent.
+        What prevents commands is raised when the law gives one.
+
+        Raises:
+            DriverError: on leaving, the gripper reports a fault, or has not taken a command.
+        """
+        with ExitStack() as until_then:
+            try:
+                self._law_port = port = until_then.enter_context(self._connected())
+                if not port.is_active():
+                    raise DriverError(f"the {self._model.title} is not active: open it before the law runs")
+            except DriverError as error:
+                self._law_port = error
+            self._law_thread, self._is_rehearsal = get_ident(), is_rehearsal
+            try:
+                yield
+            finally:
+                self._law_thread = 0
+            if isinstance(self._law_port, _Port):
+                self._law_port.check()
+
     def _move(self, position: int, how: str) -> None:
         model = self._model
         force, slowest = model.force_of(self._force), model.stroke / model.speed[0]
-        self._ask(
-            f"the fingers of the {model.title} at {self._host} {how}, pressing with up to {force:.0f} N"
-        )
+        target = {"POS": position, "SPE": self._speed, "FOR": self._force, "GTO": 1}
+        if not self._law_thread:
+            self._ask(
+                f"the fingers of the {model.title} at {self._host} {how}, pressing with up to {force:.0f} N"
+            )
         with self._connected() as port:
-            if port.get("STA") != Status.ACTIVE or port.get("FLT") > Fault.NOT_ACTIVATED:
+            if self._law_thread == get_ident():
+                if not self._is_rehearsal:
+                    port.post(Set(tuple(target.items())))
+                return
+            if not port.is_active():
                 port.set(ACT=0, ATR=0, GTO=0)
                 port.wait("reset", lambda: port.get("ACT") == port.get("STA") == 0)
                 port.set(ACT=1)
                 port.wait("activation", lambda: port.get("STA") == Status.ACTIVE, _ACTIVATION_TIMEOUT)
-            port.set(POS=position, SPE=self._speed, FOR=self._force, GTO=1)
+            port.set(**target)
             port.wait("start", lambda: port.get("PRE") == position and port.get("GTO") == 1)
             port.wait("motion", lambda: port.get("OBJ") != Objects.MOVING, slowest + _TIMEOUT)
             port.check()
 
     @contextmanager
     def _connected(self) -> Iterator["_Port"]:
+        if self._law_thread == get_ident():
+            if isinstance(self._law_port, DriverError):
+                raise self._law_port
+            yield self._law_port
+            return
         if not self._port:
             raise DriverError(f"no gripper: its port at {self._host} is 0; give its number in `ports`")
         try:
@@ -113,6 +154,11 @@ class _Port:
         self._transport = transport
         self._title = title
         self._inbox = bytearray()
+        self._asked: deque[Get | Set] = deque()  # whose answers have not been taken
+
+    def is_active(self) -> bool:
+        """The fingers can be moved at once."""
+        return self.get("STA") == Status.ACTIVE and self.get("FLT") <= Fault.NOT_ACTIVATED
 
     def get(self, name: str) -> int:
         """The number of a variable; DriverError without power."""
@@ -142,15 +188,24 @@ class _Port:
                 f"the {self._title} reports fault {fault} ({name}): the next motion activates it"
             )
 
-    def _exchange(self, request: Get | Set) -> int | str:
+    def post(self, request: Get | Set) -> None:
+        """Send a request; its answer is taken before that of the next one."""
         self._transport.send(encode_request(request))
+        self._asked.append(request)
+        self._inbox += self._transport.receive(0.0) or b""
+
+    def _exchange(self, request: Get | Set) -> int | str:
+        self.post(request)
         waited = Patience()
-        while (answer := take_answer(self._inbox, request)) is None:
+        while True:
+            while (answer := take_answer(self._inbox, self._asked[0])) is not None:
+                self._asked.popleft()
+                if not self._asked:
+                    return answer
             data = self._transport.receive(LONGEST_STEP)
             if data == b"" or waited.spent(time.monotonic()) > _TIMEOUT:
                 raise DriverError(f"the software of the {self._title} does not answer: restart it")
             self._inbox += data or b""
-        return answer
 
 
 def _share(name: str, value: float, ends: tuple[float, float], unit: str) -> int:

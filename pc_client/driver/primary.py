@@ -9,8 +9,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
 
-from pc_client.driver.transport import MOST_WAITING, Network, Transport
-from pc_client.driver.watchdog import software
+from pc_client.driver.transport import MOST_WAITING, TcpNetwork, TcpTransport
+from pc_client.driver.watchdog import require, software
 from pc_client.errors import DriverError, RobotStoppedError
 from protocol.errors import RemoteProtocolError
 from protocol.frame_buffer import FrameBuffer
@@ -63,7 +63,7 @@ class PackageStream:
         variables: globals of the program that runs or was the last, by name; for people.
     """
 
-    def __init__(self, transport: Transport, network: Network, name: str) -> None:
+    def __init__(self, transport: TcpTransport, network: TcpNetwork, name: str) -> None:
         self._transport = transport
         self._network = network
         self._name = name
@@ -86,7 +86,7 @@ class PackageStream:
         if self.version is None:
             raise DriverError(f"the {self._name} port says nothing about its version: is this a control box?")
         if self.version < OLDEST:
-            raise DriverError(software(self.version).complaint)
+            require((software(self.version),))
         return self.version
 
     def wait_for_configuration(self) -> ConfigurationData | None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pc_client.driver.rtde import RtdeStream
-from pc_client.driver.transport import Network, Transport
+from pc_client.driver.transport import TcpNetwork, TcpTransport
 from pc_client.errors import DriverError
 from protocol.rtde.types import RtdeValue
 from protocol.ur_types import SoftwareVersion
@@ -29,7 +29,7 @@ LONGEST_LINE = 4096
 _GREETING = "Universal Robots Dashboard Server"
 
 
-def ask_dashboard(network: Network, host: str, port: int, questions: tuple[str, ...]) -> dict[str, str]:
+def ask_dashboard(network: TcpNetwork, host: str, port: int, questions: tuple[str, ...]) -> dict[str, str]:
     """Ask what the dashboard server knows by commands that only ask, e.g. `get serial number`.
 
     The answers that came are returned; none when there is no dashboard server.
@@ -69,7 +69,7 @@ class _NoLineError(DriverError):
 class _Lines:
     """Cuts a connection's bytes into lines."""
 
-    def __init__(self, connection: Transport, network: Network) -> None:
+    def __init__(self, connection: TcpTransport, network: TcpNetwork) -> None:
         self._connection = connection
         self._network = network
         self._pending = b""
@@ -109,7 +109,7 @@ class RtdeAnswer:
     values: Mapping[str, RtdeValue]
 
 
-def ask_rtde(network: Network, host: str, port: int, names: tuple[str, ...]) -> RtdeAnswer | None:
+def ask_rtde(network: TcpNetwork, host: str, port: int, names: tuple[str, ...]) -> RtdeAnswer | None:
     """Ask for the software and for output variables; None when there is no RTDE at the port.
 
     Variables that the software does not know are left out.

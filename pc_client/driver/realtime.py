@@ -12,7 +12,7 @@ robot's time waits for its clients they are longer, since it may wait for anothe
 from collections.abc import Callable
 from typing import NamedTuple
 
-from pc_client.driver.transport import MOST_WAITING, Network, Transport
+from pc_client.driver.transport import MOST_WAITING, TcpNetwork, TcpTransport
 from pc_client.driver.watchdog import is_at_rest
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
@@ -63,7 +63,7 @@ class RealtimeClient:
         last_stamp: newest time stamp seen [s], or None before the first frame.
     """
 
-    def __init__(self, transport: Transport, network: Network, *, time_waits: bool) -> None:
+    def __init__(self, transport: TcpTransport, network: TcpNetwork, *, time_waits: bool) -> None:
         self._transport = transport
         self._network = network
         self._buffer = FrameBuffer(MAX_FRAME_SIZE)
@@ -101,10 +101,7 @@ class RealtimeClient:
             DriverError: no such frame in time, the stream ended, it is no such stream, or time runs back.
         """
         data = self._transport.receive(_STEP)
-        try:
-            return self._take(data) or self._receive_slowly(data)  # usually it is exactly one frame
-        except RemoteProtocolError as error:
-            raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
+        return self._take(data) or self._receive_slowly(data)  # usually it is exactly one frame
 
     def patience(self, timeout: float) -> float:
         """How long to wait for what a robot whose time runs by itself does within `timeout` [s]."""
@@ -121,11 +118,7 @@ class RealtimeClient:
                     f"the realtime port floods us: more than {MOST_WAITING >> 20} MiB at once; a robot sends "
                     "150 kB a second: restart it, or look what else answers there"
                 )
-            try:
-                arrival = self._take(data)
-            except RemoteProtocolError as error:
-                raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
-            if arrival is None:
+            if (arrival := self._take(data)) is None:
                 continue
             if taken is not None:
                 taken.new.extend(arrival.new)
@@ -156,11 +149,14 @@ class RealtimeClient:
         """The frames that are whole now; None if none is, or none is new of a robot whose time runs."""
         if not data:
             return None
-        self._buffer.feed(data)
-        first = self._buffer.next_frame()
-        if first is None:
-            return None
-        arrival = self._sort(first)
+        try:
+            self._buffer.feed(data)
+            first = self._buffer.next_frame()
+            if first is None:
+                return None
+            arrival = self._sort(first)
+        except RemoteProtocolError as error:
+            raise DriverError(f"the realtime port sends no realtime frames: {error}") from error
         if arrival.new or self.time_waits:
             return arrival
         self._n_repeated = arrival.n_heartbeats
@@ -206,7 +202,7 @@ _REST_TIME = 0.5
 def wait_until(
     condition: Callable[[RealtimeFrame], bool],
     frames: RealtimeClient,
-    network: Network,
+    network: TcpNetwork,
     timeout: float,
     complaint: str,
     check: Callable[[RealtimeFrame], None] | None = None,
@@ -232,7 +228,7 @@ def wait_until(
             raise DriverError(complaint)
 
 
-def wait_for_rest(frames: RealtimeClient, network: Network) -> RealtimeFrame:
+def wait_for_rest(frames: RealtimeClient, network: TcpNetwork) -> RealtimeFrame:
     """Wait until the arm has been at rest for a while, or rests while time itself stands still; its state.
 
     Raises:

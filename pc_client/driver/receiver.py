@@ -11,7 +11,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from pc_client.driver.transport import Listener, Network, PortTakenError, Transport
+from pc_client.driver.transport import PortTakenError, TcpListener, TcpNetwork, TcpTransport
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.velocity_stream import HELLO_SIZE, check_hello
@@ -119,7 +119,7 @@ class ReverseServer:
         DriverError: the port is taken, or may not be used.
     """
 
-    def __init__(self, network: Network, address: str, robot_address: str, port: int | None) -> None:
+    def __init__(self, network: TcpNetwork, address: str, robot_address: str, port: int | None) -> None:
         self._network = network
         self.address = address
         self._robot_address = robot_address
@@ -141,7 +141,7 @@ class ReverseServer:
             "program: look who else calls, or give another --reverse-port"
         )
 
-    def accept_program(self, meanwhile: Callable[[], None], timeout: float = DIAL_TIMEOUT) -> Transport:
+    def accept_program(self, meanwhile: Callable[[], None], timeout: float = DIAL_TIMEOUT) -> TcpTransport:
         """Wait for the program's call and its hello.
 
         Args:
@@ -181,7 +181,7 @@ class ReverseServer:
         """Close the listening port."""
         self._listener.close()
 
-    def _read_hello(self, caller: Transport, meanwhile: Callable[[], None], timeout: float) -> None:
+    def _read_hello(self, caller: TcpTransport, meanwhile: Callable[[], None], timeout: float) -> None:
         waited = Patience()
         received = b""
         while len(received) < HELLO_SIZE:
@@ -204,7 +204,7 @@ def _is_loopback(address: str) -> bool:
     return address.startswith("127.")
 
 
-def _listen(network: Network, address: str, port: int | None) -> Listener:
+def _listen(network: TcpNetwork, address: str, port: int | None) -> TcpListener:
     try:
         return network.listen(address, REVERSE_PORT if port is None else port)
     except PortTakenError:

@@ -14,7 +14,7 @@ import numpy as np
 from pc_client.driver.primary import PackageStream
 from pc_client.driver.questions import RtdeAnswer, ask_dashboard, ask_rtde
 from pc_client.driver.realtime import RealtimeClient
-from pc_client.driver.transport import NO_ROUTE, Network
+from pc_client.driver.transport import NO_ROUTE, TcpNetwork
 from pc_client.errors import DriverError, UnknownHostError
 from pc_client.recording.provenance import Source, origin_of, source_of
 from protocol import ur_types
@@ -96,7 +96,7 @@ class RobotReport:
     Attributes:
         configured: the arm by the configuration data of port 30001, e.g. `UR3` or `UR5e`.
         frame: its state on port 30003.
-        slider: speed slider, 0 to 1, from port 30001.
+        mode: speed slider and control mode, from port 30001.
         tcp_offset: (6,) pose of the TCP in the flange frame [m, rad], from port 30001.
         rtde: software, joints, TCP pose and (since 3.11) payload on port 30004; None without RTDE.
         calibration: name of the arm's calibration in the maker's drivers, from port 30001.
@@ -107,7 +107,7 @@ class RobotReport:
     info: RobotInfo
     configured: str | None
     frame: RealtimeFrame
-    slider: float | None
+    mode: RobotModeData | None
     tcp_offset: tuple[float, ...] | None
     rtde: RtdeAnswer | None
     calibration: str | None
@@ -146,7 +146,7 @@ class StatePorts:
     frames: RealtimeClient
 
     def __init__(
-        self, network: Network, host: str, ports: Ports, *, timeout: float = _CONNECT_TIMEOUT
+        self, network: TcpNetwork, host: str, ports: Ports, *, timeout: float = _CONNECT_TIMEOUT
     ) -> None:
         self.network = network
         self.host = host
@@ -225,17 +225,17 @@ class StatePorts:
         cartesian = self.primary.newest(CartesianInfo)
         kinematics = self.primary.newest(KinematicsInfo)
         answers = self._ask_dashboard(_REMOTE, _MODE) if self.info.version.major == 5 else {}
-        mode = answers.get(_MODE, "").upper()
+        operational = answers.get(_MODE, "").upper()
         return RobotReport(
             info=self.info,
             configured=self.configured,
             frame=frame,
-            slider=self.slider,
+            mode=self.primary.newest(RobotModeData),
             tcp_offset=None if cartesian is None else cartesian.tcp_offset,
             rtde=ask_rtde(self.network, self.host, self.ports.rtde, _ASKED),
             calibration=None if kinematics is None else kinematics.calibration,
             remote_control=_ANSWERS.get(answers.get(_REMOTE, "").lower()),
-            operational_mode=mode if mode in _OPERATIONAL_MODES else None,
+            operational_mode=operational if operational in _OPERATIONAL_MODES else None,
         )
 
     @property
@@ -245,12 +245,6 @@ class StatePorts:
         if configuration is None:
             return None
         return _configured_arm(configuration, self.info.version) or f"type {configuration.robot_type}"
-
-    @property
-    def slider(self) -> float | None:
-        """The speed slider, 0 to 1, as the primary port was last polled; None when it was not reported."""
-        mode = self.primary.newest(RobotModeData)
-        return None if mode is None else mode.target_speed_fraction
 
     def _ask_dashboard(self, *questions: str) -> dict[str, str]:
         return ask_dashboard(self.network, self.host, self.ports.dashboard, questions)
@@ -262,7 +256,7 @@ class StatePorts:
         return stream
 
 
-def read_report(network: Network, host: str, ports: Ports) -> RobotReport:
+def read_report(network: TcpNetwork, host: str, ports: Ports) -> RobotReport:
     """Ask a robot, on connections of its own.
 
     Raises:
@@ -313,7 +307,7 @@ class Diagnosis:
     obstacle: str
 
 
-def probe(network: Network, host: str, ports: Ports, seconds: float) -> Diagnosis:
+def probe(network: TcpNetwork, host: str, ports: Ports, seconds: float) -> Diagnosis:
     """Look at everything that a session would need.
 
     Args:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Self
 
-from pc_client.driver.transport import Network
+from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import DriverError
 from protocol.errors import RemoteProtocolError
 from protocol.rtde import codec
@@ -48,7 +48,7 @@ class RtdeStream:
 
     def __init__(
         self,
-        network: Network,
+        network: TcpNetwork,
         host: str,
         port: int,
         outputs: Sequence[str],

@@ -16,9 +16,10 @@ from pc_client.driver.primary import PackageStream, raise_on_error
 from pc_client.driver.realtime import REST_TIMEOUT, wait_for_rest, wait_until
 from pc_client.driver.receiver import DIAL_TIMEOUT, STOP_DECELERATION, ReverseServer, receiver_script
 from pc_client.driver.report import UNKNOWN, RobotReport, StatePorts
-from pc_client.driver.transport import Network, TcpNetwork, Transport
+from pc_client.driver.transport import TcpNetwork, TcpTransport
 from pc_client.driver.velocity_stream import CommandSource, RowSink, S, StreamReport, VelocityStream
 from pc_client.errors import DriverError, RobotStoppedError, full_message
+from protocol.primary.layout import RobotModeData
 from protocol.primary.messages import ErrorCodeMessage, TextMessage
 from protocol.realtime.layout import RealtimeFrame
 from protocol.ur_types import Ports
@@ -55,7 +56,7 @@ class UrDriver:
         ports: Ports | None = None,
         *,
         reverse_port: int | None = None,
-        network: Network | None = None,
+        network: TcpNetwork | None = None,
     ) -> None:
         self._robot = robot = _SessionPorts(network or TcpNetwork(), host, ports or Ports.standard())
         self._watch = _ProgramWatch(robot)
@@ -124,7 +125,7 @@ class UrDriver:
             self._raise_safety_stop(error)
             raise
 
-    def stop(self, reverse: Transport | None) -> None:
+    def stop(self, reverse: TcpTransport | None) -> None:
         """Bring the arm to rest, by every available method.
 
         Args:
@@ -155,12 +156,12 @@ class UrDriver:
 
         Raises:
             RobotStoppedError: safety mode or robot mode forbids it.
-            DriverError: a program is running, the speed slider was moved, or the ports name different arms.
+            DriverError: a program is running, the speed slider was moved, the arm is guided by hand, or the
+                ports name different arms.
         """
         robot, model = self._robot, self.info.model
         frame = robot.read_frame()
         watchdog.check_safety(frame)
-        watchdog.check_idle(frame)
         robot.primary.poll()
         configured = robot.configured
         if configured is not None and model not in (UNKNOWN, configured):
@@ -168,7 +169,9 @@ class UrDriver:
                 f"the robot's arm is {model} (dashboard), {configured} (port 30001), must be one of them; "
                 "look which arm it is, and set it so in the installation"
             )
-        watchdog.check_slider(robot.slider)
+        mode = robot.primary.newest(RobotModeData)
+        conditions = watchdog.program_state(frame), watchdog.speed_slider(mode), watchdog.control_mode(mode)
+        watchdog.require(conditions)
         return frame
 
     def _stream_and_stop(
@@ -177,7 +180,7 @@ class UrDriver:
         """Run the receiver program for one stream; any exception, Ctrl-C included, stops the arm."""
         robot, watch, period = self._robot, self._watch, self.info.period
         server, frames = robot.server, robot.frames
-        reverse: Transport | None = None
+        reverse: TcpTransport | None = None
         self._in_motion = True
         try:
             watch.start(
@@ -227,7 +230,7 @@ class _SessionPorts(StatePorts):
     scripts: PackageStream
     server: ReverseServer
 
-    def __init__(self, network: Network, host: str, ports: Ports) -> None:
+    def __init__(self, network: TcpNetwork, host: str, ports: Ports) -> None:
         super().__init__(network, host, ports, timeout=_CONNECT_TIMEOUT)
 
     def open(self, reverse_port: int | None) -> None:
@@ -236,8 +239,7 @@ class _SessionPorts(StatePorts):
         Raises:
             DriverError: a port does not answer, or the robot's software is not one that we drive.
         """
-        if not (condition := watchdog.software(self.identify().version)).holds:
-            raise DriverError(condition.complaint)
+        watchdog.require((watchdog.software(self.identify().version),))
         self.scripts = self._open_packages(self.ports.secondary, "secondary")
         self.open_frames()
         frames = self.frames
@@ -295,7 +297,7 @@ class _ProgramWatch:
                 self._last_text = message.text
             self._is_read_only |= isinstance(message, ErrorCodeMessage) and message.code == _READ_ONLY
         raise_on_error(messages, self._program)
-        watchdog.check_slider(self._robot.slider)
+        watchdog.require((watchdog.speed_slider(self._robot.primary.newest(RobotModeData)),))
 
     def look_after(self) -> None:
         """Read everything that has come, while waiting for something else; at least one frame comes."""
@@ -327,7 +329,7 @@ def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:
         wait_until(watchdog.has_ended, robot.frames, robot.network, REST_TIMEOUT, complaint)
         if not watchdog.is_stopped(wait_for_rest(robot.frames, robot.network)):
             _end_paused_program(robot)
-    except (DriverError, KeyboardInterrupt):  # a second Ctrl-C must not keep us from stopping the arm
+    except (Exception, KeyboardInterrupt):  # nothing, and no second Ctrl-C, keeps us from the next method
         return False
     return True
 

@@ -1,4 +1,4 @@
-"""The network as the driver sees it: a few methods, so that tests can put a robot in memory behind them.
+"""The network as the driver sees it: a few methods. Tests put a robot in memory in the place of `TcpNetwork`.
 
 No protocol here: bytes in, bytes out, and every failure is a DriverError that names address and port.
 """
@@ -9,7 +9,6 @@ import re
 import select
 import socket
 import time
-from typing import Protocol
 
 from pc_client.errors import DriverError, UnknownHostError
 
@@ -37,54 +36,6 @@ _SEND_TIMEOUT = 5.0
 """A peer that takes nothing for this long [s] is gone."""
 
 
-class Transport(Protocol):
-    """One connected byte stream."""
-
-    @property
-    def local_address(self) -> str:
-        """Our end's address, as the other end sees it."""
-
-    @property
-    def peer_address(self) -> str:
-        """The other end's address."""
-
-    def send(self, data: bytes) -> None:
-        """Send everything. Raises DriverError when the connection is gone."""
-
-    def receive(self, timeout: float) -> bytes | None:
-        """Bytes that arrived, b"" at the end of the stream, None when nothing came for `timeout` seconds."""
-
-    def close(self) -> None:
-        """Close; harmless when closed."""
-
-
-class Listener(Protocol):
-    """Waits for the robot to dial us."""
-
-    @property
-    def port(self) -> int:
-        """The TCP port that is open."""
-
-    def accept(self, timeout: float) -> Transport | None:
-        """The next caller, or None when there was no call for `timeout` seconds."""
-
-    def close(self) -> None:
-        """Close; harmless when closed."""
-
-
-class Network(Protocol):
-    """Makes connections and measures the time that passes while waiting for them."""
-
-    def connect(self, host: str, port: int, timeout: float) -> Transport:
-        """Connect. Raises DriverError."""
-
-    def listen(self, address: str, port: int) -> Listener:
-        """Listen on a port of one of our own addresses; 0: any free one. Raises DriverError."""
-
-    def now(self) -> float:
-        """Seconds of a monotonic clock."""
-
-
 class PortTakenError(DriverError):
     """Another program listens on the port."""
 
@@ -94,12 +45,16 @@ class TcpTransport:
 
     A robot that answers within a fraction of a millisecond, as an emulated one in lockstep, is polled:
     a blocking wait would take longer than the answer. `EagerWait` measures whether polling helps.
+
+    Attributes:
+        peer_address: the other end's address.
     """
 
-    def __init__(self, connected: socket.socket, name: str) -> None:
+    def __init__(self, connected: socket.socket, peer_address: str, name: str) -> None:
         connected.setblocking(False)
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = connected
+        self.peer_address = peer_address
         self._name = name
         self._eager = EagerWait()
 
@@ -108,20 +63,21 @@ class TcpTransport:
         """Our end's address, as the other end sees it."""
         return str(self._socket.getsockname()[0])
 
-    @property
-    def peer_address(self) -> str:
-        """The other end's address."""
-        return str(self._socket.getpeername()[0])
-
     def send(self, data: bytes) -> None:
-        """Send everything; DriverError if the connection is gone, or the peer takes nothing any more."""
+        """Send everything; DriverError if the connection is gone, or the peer takes nothing any more.
+
+        The connection is closed then: the next message would be read as the rest of the one that was cut.
+        """
+        left = memoryview(data)
         try:
-            sent = self._socket.send(data)
-            while sent < len(data):
-                sent += self._send_later(data[sent:])
-        except BlockingIOError:
-            self.send(data[self._send_later(data) :])
-        except OSError as error:
+            while left:
+                try:
+                    left = left[self._socket.send(left) :]
+                except BlockingIOError as full:
+                    if not select.select((), (self._socket,), (), _SEND_TIMEOUT)[1]:
+                        raise OSError(f"the other end took nothing for {_SEND_TIMEOUT:g} s") from full
+        except (OSError, ValueError) as error:
+            self.close()
             raise DriverError(f"{self._name}: cannot send, {_reason(error)}") from error
 
     def receive(self, timeout: float) -> bytes | None:
@@ -149,18 +105,12 @@ class TcpTransport:
             return receive(_RECEIVE_SIZE)
         except BlockingIOError:
             return None
-        except OSError as error:
+        except (OSError, ValueError) as error:
             raise DriverError(f"{self._name}: {_reason(error)}") from error
 
     def close(self) -> None:
         """Close; harmless when closed."""
         self._socket.close()
-
-    def _send_later(self, data: bytes) -> int:
-        """Wait until the peer takes something; returns how many bytes it took."""
-        if not select.select((), (self._socket,), (), _SEND_TIMEOUT)[1]:
-            raise TimeoutError
-        return self._socket.send(data)
 
 
 class EagerWait:
@@ -200,13 +150,15 @@ class TcpListener:
         return int(self._socket.getsockname()[1])
 
     def accept(self, timeout: float) -> TcpTransport | None:
-        """The next caller, or None when there was no call for `timeout` seconds."""
+        """The next caller, or None when there was no call for `timeout` seconds; DriverError if it cannot."""
         self._socket.settimeout(timeout)
         try:
             connected, address = self._socket.accept()
-        except (TimeoutError, BlockingIOError):
+            return TcpTransport(connected, address[0], f"reverse connection from {address[0]}")
+        except (TimeoutError, BlockingIOError, ConnectionError):  # nobody, or one that has gone again
             return None
-        return TcpTransport(connected, f"reverse connection from {address[0]}")
+        except OSError as error:
+            raise DriverError(f"port {self.port} takes no calls: {_reason(error)}") from error
 
     def close(self) -> None:
         """Close; harmless when closed."""
@@ -220,6 +172,7 @@ class TcpNetwork:
         """Connect; DriverError for an unknown name, no answer, or a connection that is refused."""
         try:
             connected = socket.create_connection((host, port), timeout)
+            return TcpTransport(connected, connected.getpeername()[0], f"{host}:{port}")
         except UnicodeError as error:  # of the codec for host names
             raise UnknownHostError(f"{host[:60]!r} is no host name or address") from error
         except socket.gaierror as error:
@@ -229,7 +182,6 @@ class TcpNetwork:
             raise UnknownHostError(f"{host} cannot be looked up: {remedy}") from error
         except OSError as error:
             raise DriverError(f"{host}:{port} {_reason(error)}") from error
-        return TcpTransport(connected, f"{host}:{port}")
 
     def listen(self, address: str, port: int) -> TcpListener:
         """Listen on a port of one of our own addresses; 0: any free one.
@@ -258,12 +210,14 @@ class TcpNetwork:
         return time.perf_counter()  # on Windows, time.monotonic may have steps of 16 ms
 
 
-def _reason(error: OSError) -> str:
+def _reason(error: OSError | ValueError) -> str:
     """Say in a few words what went wrong and what to look at."""
     if isinstance(error, TimeoutError):
         return "does not answer: check the address, the cable and that the robot is switched on"
     if isinstance(error, ConnectionRefusedError):
         return "refuses the connection: is the control box up, and is --port-base right?"
+    if not isinstance(error, OSError):  # of a socket that is closed
+        return str(error)
     if error.errno in NO_ROUTE:
         return "cannot be reached, there is no route to it: check the address and this computer's network"
     if error.errno == errno.EADDRINUSE:

@@ -9,12 +9,15 @@ before it.
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
 
+import numpy as np
+
+from pc_client.arrays import Array
 from pc_client.driver.realtime import RealtimeClient
-from pc_client.driver.receiver import READ_TIMEOUT
-from pc_client.driver.transport import Network, Transport
+from pc_client.driver.receiver import MISSED_ALLOWED, READ_TIMEOUT
+from pc_client.driver.transport import TcpNetwork, TcpTransport
 from pc_client.driver.watchdog import check_angles, check_streaming, is_at_full_speed
 from pc_client.errors import DriverError
 from protocol.realtime.layout import RealtimeFrame
@@ -72,25 +75,91 @@ _SHORTEST_GAP = 0.1
 """Time stamps are at least this share of a cycle apart; rows of a run are as many as its time allows."""
 
 
+_MOST_STOPS, _STOPS_WITHIN = 10, 5.0
+"""An arm that stops and goes on so often within this time [s] follows nothing; a busy computer has a few."""
+
+_MOST_LATE = 0.05
+"""Share of frames without a command of their own beyond which a person is told."""
+
+
 @dataclass(slots=True)
 class StreamReport:
     """What happened on the wire during one run.
 
     Attributes:
+        period: control cycle [s].
         n_commands: commands sent, the stop word not counted.
         late_frames: new frames that got no command of their own because a newer one was already there.
         lost_frames: cycles whose frame never came.
-        heartbeats: frames that repeated a time stamp.
+        stops: robot times [s] when its program had begun to stop the arm, because no command came.
         robot_time: [s] from the first to the last frame, by the robot's stamps.
         wall_time: [s] of the same by our clock.
+        computing_time: [s] of it in which commands were computed.
+        slowest_command: longest time for one [s].
     """
 
+    period: float = 0.008
     n_commands: int = 0
     late_frames: int = 0
     lost_frames: int = 0
-    heartbeats: int = 0
+    stops: list[float] = field(default_factory=list)
     robot_time: float = 0.0
     wall_time: float = 0.0
+    computing_time: float = 0.0
+    slowest_command: float = 0.0
+
+    @property
+    def trouble(self) -> str:
+        """One line about commands that came late; empty when hardly any did."""
+        without = self.late_frames + self.lost_frames
+        if not self.stops and without <= _MOST_LATE * (self.n_commands + without):
+            return ""
+        mean, most = self.computing_time / max(self.n_commands, 1), self.slowest_command
+        is_slow = mean > self.period or most > MISSED_ALLOWED
+        return (
+            f"the arm stopped and went on {len(self.stops)} times; beside {self.n_commands} commands "
+            f"{self.late_frames} frames came late, {self.lost_frames} never; a command took "
+            f"{1e3 * mean:.1f} ms to compute, at most {1e3 * most:.0f}, a cycle is {1e3 * self.period:g} ms: "
+            + ("make the law faster" if is_slow else "give this computer less to do, or look at the network")
+        )
+
+    def check_silence(self, answered: float, newest: float) -> None:
+        """Refuse to go on when the robot had no command for too long, or too often for long.
+
+        The time stamps are those of the last frame that was answered and of the newest one [s].
+        """
+        silence = newest - answered
+        if silence > READ_TIMEOUT:
+            why = "this computer or the network stood still"
+            if self.slowest_command > READ_TIMEOUT:
+                why = f"the controller or law took {self.slowest_command:.2f} s to compute one, or {why}"
+            raise DriverError(
+                f"the robot had no command for {silence:.2f} s, allowed is {READ_TIMEOUT} s: "
+                f"{why}; the robot's program has stopped the arm"
+            )
+        if silence > (round(MISSED_ALLOWED / self.period) + 1.5) * self.period:
+            self.stops.append(newest)
+            recent = self.stops[-_MOST_STOPS:]
+            if len(recent) == _MOST_STOPS and newest - recent[0] < _STOPS_WITHIN:
+                raise DriverError(self.trouble)
+
+
+class StreamLog(Generic[S]):
+    """A row sink that keeps all rows."""
+
+    def __init__(self) -> None:
+        self.frames: list[RealtimeFrame] = []
+        self.steps: list[S] = []
+
+    def __call__(self, frame: RealtimeFrame, step: S) -> None:
+        """Take a row."""
+        self.frames.append(frame)
+        self.steps.append(step)
+
+    def columns(self, *names: str) -> list[Array]:
+        """Columns of the frames by their names, (n,) or (n, 6), and the commands (n, 6) [rad/s]."""
+        rows = [[getattr(frame, name) for frame in self.frames] for name in names]
+        return [np.array(row, dtype=np.float64) for row in (*rows, [step.qd_cmd for step in self.steps])]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +174,8 @@ class VelocityStream:
     """
 
     frames: RealtimeClient
-    reverse: Transport
-    network: Network
+    reverse: TcpTransport
+    network: TcpNetwork
     period: float
     housekeeping: Callable[[], None]
 
@@ -120,16 +189,20 @@ class VelocityStream:
             RobotStoppedError: safety stop, or the program ended.
             DriverError: silence of either side, closed sockets, a command that is not safe to send.
         """
-        report = StreamReport()
+        report = StreamReport(self.period)
         each = round(_HOUSEKEEPING / self.period)
-        frame = self._wait_for_trigger(report)
-        began = self.network.now()
+        frame = self._wait_for_trigger()
+        now = self.network.now
+        began = now()
         receive, send, limits = self.frames.receive, self.reverse.send, source.qd_max
         first_stamp = last_stamp = frame.timestamp
         while True:
             stamp = frame.timestamp
             check_streaming(frame)
+            asked = now()
             step = source.answer(frame)
+            report.computing_time += (spent := now() - asked)
+            report.slowest_command = max(report.slowest_command, spent)
             if step.finished:
                 break
             if report.n_commands % each == 0:
@@ -138,7 +211,7 @@ class VelocityStream:
             try:
                 send(encode_velocity(VelocityMode.VELOCITY, step.qd_cmd))
             except DriverError:
-                self._check_waiting(stamp)  # what the robot reports is more precise than a lost connection
+                self._check_waiting(stamp, report)  # more precise than a lost connection
                 raise
             on_row(frame, step)
             report.n_commands += 1
@@ -147,10 +220,8 @@ class VelocityStream:
 
             arrival = receive()
             new = arrival.new
-            if arrival.n_heartbeats:
-                report.heartbeats += arrival.n_heartbeats
-                if not new:
-                    new = self._wait_for_new(report)
+            if not new:
+                new = self._wait_for_new()
             if len(new) > 1 and (waiting := self.frames.drain()) is not None:
                 new = new + waiting.new
             last_stamp = self._count_gaps(new, last_stamp, report)
@@ -160,13 +231,13 @@ class VelocityStream:
                     check_angles(late)
                     on_row(late, source.observe(late.timestamp))
             frame = new[-1]
-            _check_silence(stamp, last_stamp)
+            report.check_silence(stamp, last_stamp)
         send(encode_velocity(VelocityMode.STOP_PROGRAM))  # the program ramps the arm down and ends
         report.robot_time = last_stamp - first_stamp
-        report.wall_time = self.network.now() - began
+        report.wall_time = now() - began
         return report
 
-    def _wait_for_trigger(self, report: StreamReport) -> RealtimeFrame:
+    def _wait_for_trigger(self) -> RealtimeFrame:
         """Find the frame that the first command answers.
 
         After its hello the program waits for a command. A robot whose time waits too repeats its last frame:
@@ -178,7 +249,6 @@ class VelocityStream:
         n_new, longest = 0, round(_LONGEST_RISE / self.period)
         while True:
             arrival = self.frames.receive()
-            report.heartbeats += arrival.n_heartbeats
             n_new += len(arrival.new)
             stands_still = self.frames.time_waits and arrival.stands_still
             if stands_still or n_new >= _FRAMES_BEFORE_START:
@@ -186,12 +256,11 @@ class VelocityStream:
                     return arrival.latest
                 self.reverse.send(encode_velocity(VelocityMode.HOLD))
 
-    def _wait_for_new(self, report: StreamReport) -> list[RealtimeFrame]:
+    def _wait_for_new(self) -> list[RealtimeFrame]:
         """Skip heartbeats until time goes on."""
         waited, longest = Patience(), self.frames.patience(READ_TIMEOUT)
         while True:
             arrival = self.frames.receive()
-            report.heartbeats += arrival.n_heartbeats
             if arrival.new:
                 return arrival.new
             check_streaming(arrival.latest)
@@ -200,11 +269,11 @@ class VelocityStream:
                     f"the robot's time has stood still for {longest:g} s although it has a command"
                 )
 
-    def _check_waiting(self, answered: float) -> None:
+    def _check_waiting(self, answered: float, report: StreamReport) -> None:
         """Look for the reason of a broken connection in the frames that wait; raise it if there is one."""
         waiting = self.frames.drain()
         if waiting is not None:
-            _check_silence(answered, waiting.latest.timestamp)
+            report.check_silence(answered, waiting.latest.timestamp)
             check_streaming(waiting.latest)
 
     def _count_gaps(self, new: list[RealtimeFrame], last_stamp: float, report: StreamReport) -> float:
@@ -221,18 +290,6 @@ class VelocityStream:
                 report.lost_frames += round(gap / self.period) - 1
             last_stamp = stamp
         return last_stamp
-
-
-def _check_silence(answered: float, newest: float) -> None:
-    """Refuse to go on when the robot had no command for so long that its program has ended.
-
-    The time stamps are those of the last frame that was answered and of the newest one [s].
-    """
-    if newest - answered > READ_TIMEOUT:
-        raise DriverError(
-            f"the robot had no command for {newest - answered:.2f} s, allowed is {READ_TIMEOUT} s: "
-            "this computer or the network stood still; the robot's program has stopped the arm"
-        )
 
 
 @contextmanager

@@ -5,10 +5,12 @@ A `Condition` is one thing that a robot must fulfil: what it reports, what is ne
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import IntEnum
 
 from pc_client.errors import DriverError, RobotStoppedError
+from protocol.primary.layout import RobotModeData
 from protocol.realtime.layout import RealtimeFrame
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +134,21 @@ def program_state(frame: RealtimeFrame) -> Condition:
     return Condition("program", state, "STOPPED", "stop it before streaming", is_stopped(frame))
 
 
-def speed_slider(fraction: float | None) -> Condition:
-    """The speed slider stands at its end; `fraction` of full speed, None when it is not reported."""
-    reported, holds = ("", None) if fraction is None else (_percent(fraction), fraction >= _FULL_SPEED)
+def control_mode(mode: RobotModeData | None) -> Condition:
+    """The arm holds its position: nobody guides it by hand, and no force or torque drives it."""
+    reported, holds = "", None
+    if mode is not None:
+        reported, holds = _name(ControlMode, mode.control_mode), mode.control_mode == ControlMode.POSITION
+    remedy = "end freedrive (TEACH), force or torque control before streaming"
+    return Condition("control mode", reported, "POSITION", remedy, holds)
+
+
+def speed_slider(mode: RobotModeData | None) -> Condition:
+    """The speed slider stands at its end."""
+    reported, holds = "", None
+    if mode is not None:
+        reported = _percent(mode.target_speed_fraction)
+        holds = mode.target_speed_fraction >= _FULL_SPEED  # NaN is not
     remedy = "set it to 100 % on the pendant and leave it there"
     return Condition("speed slider", reported, "100 %", remedy, holds)
 
@@ -147,23 +161,20 @@ def speed_scaling(frame: RealtimeFrame) -> Condition:
     return Condition("speed scaling", _percent(scaling), "100 %", remedy, holds)
 
 
+def refusal(conditions: Iterable[Condition]) -> str:
+    """The line that refuses a robot: the first condition that fails; empty when none does."""
+    return next((condition.complaint for condition in conditions if condition.holds is False), "")
+
+
+def require(conditions: Iterable[Condition], error: type[DriverError] = DriverError) -> None:
+    """Raise an error for the first condition that a robot fails: what is, what must be, what to do."""
+    if complaint := refusal(conditions):
+        raise error(complaint)
+
+
 def check_safety(frame: RealtimeFrame) -> None:
-    """Raise RobotStoppedError if safety mode or robot mode forbids motion; it says which and what to do."""
-    for condition in (safety_mode(frame), robot_mode(frame)):
-        if not condition.holds:
-            raise RobotStoppedError(condition.complaint)
-
-
-def check_idle(frame: RealtimeFrame) -> None:
-    """Raise DriverError for a robot on which a program of somebody else runs or stands paused."""
-    if not (condition := program_state(frame)).holds:
-        raise DriverError(condition.complaint)
-
-
-def check_slider(fraction: float | None) -> None:
-    """Raise DriverError if the speed slider is reported and does not stand at 100 %."""
-    if fraction is not None and not fraction >= _FULL_SPEED:  # NaN fails too
-        raise DriverError(speed_slider(fraction).complaint)
+    """Raise RobotStoppedError if safety mode or robot mode forbids motion."""
+    require((safety_mode(frame), robot_mode(frame)), RobotStoppedError)
 
 
 def check_angles(frame: RealtimeFrame) -> None:
@@ -214,7 +225,7 @@ def is_at_rest(frame: RealtimeFrame) -> bool:
     return all(-REST_SPEED < qd < REST_SPEED for qd in frame.actual_qd.tolist())
 
 
-def _name(kind: type[SafetyMode] | type[RobotMode] | type[ProgramState], value: float) -> str:
+def _name(kind: type[IntEnum], value: float) -> str:
     try:
         return kind(int(value)).name
     except (ValueError, OverflowError):

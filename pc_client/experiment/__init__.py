@@ -6,7 +6,6 @@
     identification  the loop of this session, and the margins on it
     repetitions     what runs of one movement hand on, and when it may be used
     runner          approach, stream, record, for every movement and repetition
-    progress        shows on the terminal how far an experiment is
     law_stream      a velocity law of a user on the arm
 
 It uses the driver only as a session; it opens no socket and reads no clock itself.

@@ -7,20 +7,23 @@ than its tolerances allow is refused.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from pc_client.analysis.measures import snr_db, speed
 from pc_client.arrays import Array
 from pc_client.control.controller import CONTROLLERS, DEFAULT, Controller
-from pc_client.control.loop import LEAST_GAIN_MARGIN, SAMPLING_TIME, LoopModel, loop_margins
-from pc_client.control.reference import JointReference, ReferenceTable
+from pc_client.control.loop import LEAST_GAIN_MARGIN, SAMPLING_TIME, loop_margins
+from pc_client.control.reference import LEAD, JointReference, ReferenceTable, RunRecipe
 from pc_client.control.tracker import ToolGuard, predict_run
 from pc_client.driver.receiver import STOP_DECELERATION
 from pc_client.errors import DriverError
 from pc_client.kinematics.clearance import ClearanceModel, clearance_model
-from pc_client.kinematics.model import RobotModel
+from pc_client.kinematics.model import RobotModel, tcp_positions
+from pc_client.planning.joint_spline import JointSpline
 from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
 from protocol.ur_types import JOINT_NAMES
@@ -71,23 +74,15 @@ def way_to_rest(model: RobotModel, q: Array, qd: Array) -> Array:
     return postures
 
 
-def broken_limit(
-    plan: JointPlan,
-    commands: Array,
-    learned: Array | None,
-    model: RobotModel,
-    config: Controller,
-    period: float,
-) -> str:
+def broken_limit(plan: JointPlan, commands: Array, recipe: RunRecipe, model: RobotModel) -> str:
     """Name the first limit that a whole run of commands breaks; empty when all limits are kept.
 
     Args:
         plan: where the run begins, and the limits.
         commands: (n, 6) feed-forward of all cycles [rad/s].
-        learned: (m, 6) the part of it that was learned from the run before [rad/s], or None.
-        config: its shares of the limits.
-        period: control cycle [s].
+        recipe: what of it was learned, and the controller's shares of the limits.
     """
+    config, period, learned = recipe.controller, recipe.period, recipe.learned
     limits = plan.report.limits
     q_sent = plan.start_q + np.cumsum(commands, axis=0) * period
     acceleration = np.abs(np.diff(commands, axis=0)) / period
@@ -103,12 +98,6 @@ def broken_limit(
     return posture_complaint(clearance_model(model), limits, q_sent)
 
 
-LEAD = 0.2
-"""Time at rest before a movement, position loop closed [s]: takes up what the approach left."""
-
-SETTLE = 0.3
-"""Time at rest after it, position loop closed [s]."""
-
 _PATH_MARGIN, _ANGLE_MARGIN = 0.005, 0.035
 """What the guard allows beside the prediction [m, rad]: gears, friction and encoders come to .4 mm on the
 worst emulated arms, a push of 200 N at the flange to more than the margin."""
@@ -116,108 +105,119 @@ worst emulated arms, a push of 200 N at the flange to more than the margin."""
 _RESERVE = 1.2
 """Factor between a prediction and what must be allowed: no run ends because the prediction is not exact."""
 
+_LEAST_SNR = 15.0
+"""A person is warned below this [dB], a hair under the worst of the paper's Table I (15.96)."""
+
+_MOST_SNR = 45.0
+"""No arm comes to more [dB]: encoders and gears are not in a prediction."""
+
 _SLOWER = (1.1, 1.2, 1.3, 1.5, 2.0, 3.0, 5.0)
 """Factors of duration that a refusal may name."""
 
 
-def shortest_loop(period: float) -> LoopModel:
-    """The shortest loop of a robot: one cycle [s] until a command acts, one until the feedback shows it."""
-    return LoopModel.of_delay(2.0 * period, 0.0)
+class Prediction(NamedTuple):
+    """What the loop makes of a movement on an ideal arm.
 
-
-def guarded(
-    plan: JointPlan, config: Controller, model: RobotModel, loop: LoopModel, period: float
-) -> Controller:
-    """The controller with the tolerances of one movement: what the loop predicts, and a margin.
-
-    Its own tolerances are the largest that are allowed. The loop is the identified one, or the shortest.
-
-    Raises:
-        DriverError: the prediction is beyond the tolerances, or leads too near to floor, arm or cell.
+    Attributes:
+        q: (n, 6) where the joints go [rad].
+        distance: how far the tool is off its path at most [m].
+        angle: likewise its orientation [rad].
+        snr_db: Eq. 10, at most `_MOST_SNR`.
+        doubt: one line, if that is little: why, and what would do.
     """
-    if not loop_margins(loop, config.gain_p, config.gain_i, period).gain >= LEAST_GAIN_MARGIN:
-        return config  # `identify` refuses such a controller, with its margin
-    predicted = _predict(plan.spline, config, model, loop, period)
-    complaint = ""
-    if not predicted.fits(config):
-        complaint = (
-            f"allowed is {1e3 * config.path_tolerance:g} mm (path_tolerance) and "
-            f"{math.degrees(config.angle_tolerance):.1f} deg (angle_tolerance), a sixth of it kept in reserve"
-        )
-    elif predicted.distance > _PATH_MARGIN:  # below it the clearances of the plan have room
-        complaint = posture_complaint(clearance_model(model), plan.report.limits, predicted.q)
-    if complaint:
-        raise DriverError(
-            f"{plan.name}: the controller {config.title!r} would lead the tool "
-            f"{1e3 * predicted.distance:.1f} mm and {math.degrees(predicted.angle):.1f} deg off its path, "
-            f"{complaint}: {_remedy(plan, config, model, loop, period)}"
-        )
-    return replace(
-        config,
-        path_tolerance=min(predicted.distance + _PATH_MARGIN, config.path_tolerance),
-        angle_tolerance=min(predicted.angle + _ANGLE_MARGIN, config.angle_tolerance),
-    )
-
-
-class _Prediction(NamedTuple):
-    """Where the joints go, (n, 6) [rad], and how far the tool is off its path at most [m, rad]."""
 
     q: Array
     distance: float
     angle: float
+    snr_db: float
+    doubt: str = ""
 
     def fits(self, config: Controller) -> bool:
         """Whether the tolerances of a controller allow this."""
         path, angle = config.path_tolerance, config.angle_tolerance
         return _RESERVE * self.distance <= path and _RESERVE * self.angle <= angle
 
-
-class _Slower(NamedTuple):
-    """A joint reference that takes `factor` times as long."""
-
-    reference: JointReference
-    factor: float
-
-    @property
-    def duration(self) -> float:
-        return self.factor * self.reference.duration
-
-    def at(self, t: float) -> tuple[Array, Array]:
-        q, qd = self.reference.at(t / self.factor)
-        return np.asarray(q), np.asarray(qd) / self.factor
+    def follows(self, config: Controller) -> bool:
+        """Whether it also follows the speed of the movement."""
+        return self.fits(config) and self.snr_db >= _LEAST_SNR
 
 
-def _predict(
-    joints: JointReference, config: Controller, model: RobotModel, loop: LoopModel, period: float
-) -> _Prediction:
-    lookahead = loop.dead_time if config.compensates_lag else loop.delay
-    table = ReferenceTable(
-        joints,
-        period=period,
-        lead=LEAD,
-        settle=SETTLE,
-        lookahead=lookahead if config.uses_preview else None,
-        lag=loop.lag if config.compensates_lag else 0.0,
+def guarded(plan: JointPlan, recipe: RunRecipe, model: RobotModel) -> tuple[RunRecipe, Prediction | None]:
+    """The recipe with the tolerances of one movement, and what the loop makes of it.
+
+    The tolerances are the prediction and a margin, at most those of the controller. Of one that would
+    oscillate there is no prediction.
+
+    Raises:
+        DriverError: the prediction is beyond the tolerances, or leads too near to floor, arm or cell.
+    """
+    own = recipe.controller
+    if not loop_margins(recipe.loop, own.gain_p, own.gain_i, recipe.period).gain >= LEAST_GAIN_MARGIN:
+        return recipe, None  # `identify` refuses such a controller, with its margin
+    predicted = predict(plan.spline, recipe, model)
+    complaint = ""
+    if not predicted.fits(own):
+        complaint = (
+            f"allowed is {1e3 * own.path_tolerance:g} mm (path_tolerance) and "
+            f"{math.degrees(own.angle_tolerance):.1f} deg (angle_tolerance), a sixth of it kept in reserve"
+        )
+    elif predicted.distance > _PATH_MARGIN:  # below it the clearances of the plan have room
+        complaint = posture_complaint(clearance_model(model), plan.report.limits, predicted.q)
+    if complaint:
+        raise DriverError(
+            f"{plan.name}: the controller {own.title!r} would lead the tool "
+            f"{1e3 * predicted.distance:.1f} mm and {math.degrees(predicted.angle):.1f} deg off its path, "
+            f"{complaint}: {_remedy(plan, recipe, model, Prediction.fits)}"
+        )
+    if not predicted.follows(own):
+        doubt = (
+            f"{plan.name}: the controller {own.title!r} is expected to reach an SNR of "
+            f"{predicted.snr_db:.1f} dB at best on a loop of {1e3 * recipe.loop.delay:.0f} ms, "
+            f"one that follows has {_LEAST_SNR:g} dB or more "
+            f"(speedj_acceleration is {own.speedj_acceleration:g} rad/s2, the plan has "
+            f"{plan.report.qdd_peak.max():.1f}): {_remedy(plan, recipe, model, Prediction.follows)}"
+        )
+        predicted = predicted._replace(doubt=doubt)
+    tight = replace(
+        own,
+        path_tolerance=min(predicted.distance + _PATH_MARGIN, own.path_tolerance),
+        angle_tolerance=min(predicted.angle + _ANGLE_MARGIN, own.angle_tolerance),
     )
+    return replace(recipe, controller=tight), predicted
+
+
+def predict(joints: JointReference, recipe: RunRecipe, model: RobotModel) -> Prediction:
+    """Predict a run of a joint motion by the recipe."""
+    table = ReferenceTable(joints, recipe)
+    config, period = recipe.controller, recipe.period
     guard = ToolGuard(table, model, config.path_tolerance, config.angle_tolerance)
-    q = predict_run(table, config, model, loop)
-    sampled = range(0, len(q), round(SAMPLING_TIME / period))
-    off = np.array([guard.deviation(k * period - LEAD, q[k].tolist()) for k in sampled])
+    q = predict_run(recipe, table, model)
+    cycles = np.arange(0, len(q), round(SAMPLING_TIME / period))
+    t = (cycles * period - LEAD).astype(np.float64)
+    off = np.array([guard.deviation(at, q[k].tolist()) for at, k in zip(t, cycles, strict=True)])
     distance, angle = off.max(axis=0).tolist()
-    return _Prediction(q, distance, angle)
+    moving = (t > -0.5e-6) & (t < joints.duration + 0.5e-6)
+    reference: Array = np.array([table.at(at).q_array for at in t[moving]])
+    speeds = (speed(t[moving], tcp_positions(model, postures)) for postures in (reference, q[cycles[moving]]))
+    return Prediction(q, distance, angle, min(snr_db(*speeds), _MOST_SNR))
 
 
-def _remedy(plan: JointPlan, config: Controller, model: RobotModel, loop: LoopModel, period: float) -> str:
+def _remedy(
+    plan: JointPlan,
+    recipe: RunRecipe,
+    model: RobotModel,
+    will_do: Callable[[Prediction, Controller], bool],
+) -> str:
     """What would do: more time for the movement, or the default controller."""
-    slower = (
-        factor
-        for factor in _SLOWER
-        if _predict(_Slower(plan.spline, factor), config, model, loop, period).fits(config)
-    )
-    other = CONTROLLERS[DEFAULT]
+
+    def does(joints: JointReference, config: Controller) -> bool:
+        return will_do(predict(joints, replace(recipe, controller=config), model), config)
+
+    own, other = recipe.controller, CONTROLLERS[DEFAULT]
     ways = []
+    slower = (x for x in _SLOWER if does(JointSpline(x * plan.duration, plan.spline.q_knots), own))
     if factor := next(slower, None):
         ways.append(f"give the movement {factor:g} times its duration")
-    if config.name != other.name and _predict(plan.spline, other, model, loop, period).fits(other):
+    if own.name != other.name and does(plan.spline, other):
         ways.append(f"use the controller {other.name!r}")
     return " or ".join(ways) or "give the movement more time or less size"

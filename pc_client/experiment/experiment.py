@@ -5,7 +5,7 @@ All that can be refused is refused here, before the arm moves: plans for another
 
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,11 @@ import numpy as np
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel
-from pc_client.movements.movement import load_motion
 from pc_client.planning.checks import PlanReport
-from pc_client.planning.plan import Motion, Plan
+from pc_client.planning.plan import Plan
 from pc_client.recording.recording import load_recording
 from protocol.ur_types import JOINT_NAMES
+from ur_hil.cell import Cell
 
 _SHORTEST_HEAD = 1024
 """A recording that is shorter [bytes] has no rows."""
@@ -44,8 +44,9 @@ class Experiment:
     overwrite: bool = False
 
     def __post_init__(self) -> None:
-        if self.repeat < 1:
-            raise ClientError(f"{self.repeat} runs of each movement is nothing to do; give at least one")
+        if self.repeat < 1 or not self.planned:
+            n = len(self.planned)
+            raise ClientError(f"{self.repeat} runs of {n} movements is nothing to do; give at least one")
         names = [plan.movement.name for plan in self.planned]
         for name, plan in zip(names, self.planned, strict=True):
             if names.count(name) > 1:
@@ -55,9 +56,8 @@ class Experiment:
             report = plan.joints.report
             if report.robot != self.model.name or report.cell != self.model.cell:
                 raise ClientError(
-                    f"{name} was planned for a {ROBOTS[report.robot].title} ({report.cell.summary}), "
-                    f"this arm is a {self.model.title} ({self.model.cell.summary}): "
-                    "plan it for this arm"
+                    f"{name} was planned for a {_with_load(ROBOTS[report.robot].title, report.cell)}, "
+                    f"this arm is a {_with_load(self.model.title, self.model.cell)}: plan it for this arm"
                 )
 
     def recording_path(self, planned: Plan, repetition: int) -> Path:
@@ -65,16 +65,11 @@ class Experiment:
         return self.out / f"{planned.movement.name}_r{repetition}.mcap"
 
 
-def load_movements(sources: Sequence[str | Path]) -> list[Motion]:
-    """Load movements of one experiment, by their names in the library or their files.
-
-    Raises:
-        MovementError: a movement is unknown or makes no sense.
-        ClientError: none is given.
-    """
-    if not sources:
-        raise ClientError("no movement is given; name at least one")
-    return [load_motion(source) for source in sources]
+def _with_load(title: str, cell: Cell) -> str:
+    """An arm, what it carries and what stands around it, for people."""
+    centre = ", ".join(f"{1e3 * x:g}" for x in cell.tool.centre_of_gravity)
+    load = f"payload {cell.tool.mass:g} kg at ({centre}) mm"
+    return f"{title}, {load}, {cell.tool.tcp_text} ({cell.summary})"
 
 
 def check_folder(experiment: Experiment) -> list[Path]:
@@ -104,7 +99,7 @@ def check_folder(experiment: Experiment) -> list[Path]:
             )
         for path in old:
             _refuse_to_lose(path, experiment.overwrite)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise _unusable(experiment, error) from error
     return old
 
@@ -120,7 +115,8 @@ def clear_folder(experiment: Experiment) -> None:
         experiment.out.mkdir(parents=True, exist_ok=True)
         for path in old:
             path.unlink()
-    except OSError as error:
+        tempfile.TemporaryFile(dir=experiment.out).close()  # refused here, or when the arm has moved
+    except (OSError, ValueError) as error:
         raise _unusable(experiment, error) from error
 
 
@@ -137,13 +133,14 @@ def scratch_folder() -> Iterator[Path]:
         if not any(folder.iterdir()):
             folder.rmdir()
         elif not any(str(folder) in note for note in getattr(error, "__notes__", ())):
-            error.add_note(f"recordings of the runs before: {folder}")
+            error.add_note(f"recorded until then: {folder}")
         raise
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def _unusable(experiment: Experiment, error: OSError) -> RecordingError:
-    return RecordingError(f"cannot use the folder {experiment.out}: {error.strerror or error}")
+def _unusable(experiment: Experiment, error: OSError | ValueError) -> RecordingError:
+    why = getattr(error, "strerror", None) or error
+    return RecordingError(f"cannot use the folder {str(experiment.out)!r}: {why}")
 
 
 def _refuse_to_lose(path: Path, overwrite: bool) -> None:

@@ -14,15 +14,15 @@ from pc_client.control.controller import Controller
 from pc_client.control.identification import BRISK_PULSE, PULSE, Excitation, estimate_delay, identify_loop
 from pc_client.control.learning import LearningFilter, design_filter
 from pc_client.control.loop import LEAST_GAIN_MARGIN, LoopMargins, LoopModel, loop_margins
-from pc_client.control.reference import ReferenceTable
+from pc_client.control.reference import ReferenceTable, RunRecipe
 from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.session import UrDriver
+from pc_client.driver.velocity_stream import StreamLog
 from pc_client.errors import DriverError, GainMarginError
 from pc_client.experiment.checks import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import limits_of
-from protocol.realtime.layout import RealtimeFrame
 
 _LEAD, _SETTLE = 0.1, 0.3
 
@@ -38,15 +38,32 @@ class Identification:
     """What is known of the loop, and what the controller uses of it.
 
     Attributes:
-        delay: dead time and lag as one [s].
         loop: dead time and lag apart, for a controller that uses them; else the delay alone.
         learning: the filter of a controller with ILC; None without.
     """
 
-    delay: float
     loop: LoopModel
     margins: LoopMargins
     learning: LearningFilter | None
+
+    @property
+    def delay(self) -> float:
+        """Dead time and lag as one [s]."""
+        return self.loop.delay
+
+    def __str__(self) -> str:
+        """What the loop is, and how far from oscillating."""
+        margins, learning = self.margins, self.learning
+        known = (
+            f"loop delay: {self.delay * 1e3:.1f} ms; gain margin {margins.gain:.1f}, phase margin "
+            f"{margins.phase_deg:.0f} deg, delay margin {margins.delay * 1e3:.0f} ms"
+        )
+        if learning is None:
+            return known
+        return (
+            f"{known}\nlearning: {self.loop}; up to {learning.cut_off:.0f} Hz (set by the "
+            f"{learning.limited_by}), contraction {learning.contraction:.2f}"
+        )
 
     def facts(self) -> Mapping[str, float | str]:
         """Return what belongs into provenance and report, by name; what was not identified is absent."""
@@ -88,36 +105,31 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> Identif
     q_start = driver.actual_q()
     check_excitation(q_start, config, model)
     # Feed-forward alone, its mean over each cycle: the integral of the commands ends exactly where it began.
-    open_loop = replace(config, name="excitation", gain_p=0.0, gain_i=0.0)
+    open_loop = replace(
+        config, name="excitation", gain_p=0.0, gain_i=0.0, uses_preview=True, compensates_lag=False
+    )
     excitation = _excitation(q_start, config)
-    table = ReferenceTable(excitation, period=period, lead=_LEAD, settle=_SETTLE, lookahead=0.0)
-    rows: list[tuple[float, list[float], list[float]]] = []
-
-    def collect(frame: RealtimeFrame, step: TrackerStep) -> None:
-        rows.append((frame.timestamp, step.qd_cmd, frame.actual_q.tolist()))
-
-    report = driver.stream(Tracker(table, open_loop, model), collect, acceleration=config.speedj_acceleration)
-    t, qd_cmd, q = map(np.array, zip(*rows, strict=True))
+    at_once = RunRecipe(open_loop, LoopModel.of_delay(0.0, 0.0), period)
+    table = ReferenceTable(excitation, at_once, lead=_LEAD, settle=_SETTLE)
+    log: StreamLog[TrackerStep] = StreamLog()
+    report = driver.stream(Tracker(table, open_loop, model), log, acceleration=config.speedj_acceleration)
+    t, q, qd_cmd = log.columns("timestamp", "actual_q")
     try:
-        estimate = estimate_delay(t, qd_cmd, q, period)
+        loop = (identify_loop if _needs_lag(config) else estimate_delay)(t, qd_cmd, q, period)
         _check_return(driver.actual_q() - q_start)
     except DriverError as error:
         if late := report.late_frames + report.lost_frames:
             error.add_note(f"{late} of {len(t)} commands came late: is the computer or network too busy?")
         raise
-    if _needs_lag(config):
-        loop = identify_loop(t, qd_cmd, q, period)
-    else:
-        loop = LoopModel.of_delay(estimate.delay, estimate.residual)
     margins = loop_margins(loop, config.gain_p, config.gain_i, period)
     if not margins.gain >= LEAST_GAIN_MARGIN:
         raise GainMarginError(
-            f"with a loop delay of {estimate.delay * 1e3:.0f} ms the controller {config.title!r} has a gain "
+            f"with a loop delay of {loop.delay * 1e3:.0f} ms the controller {config.title!r} has a gain "
             f"margin of {margins.gain:.2f}, needed is {LEAST_GAIN_MARGIN}: give it smaller gains",
             margin=margins.gain,
-            delay=estimate.delay,
+            delay=loop.delay,
         )
-    return Identification(estimate.delay, loop, margins, learning_filter(config, loop, period))
+    return Identification(loop, margins, learning_filter(RunRecipe(config, loop, period)))
 
 
 def check_excitation(q_start: Array, config: Controller, model: RobotModel) -> None:
@@ -154,20 +166,19 @@ def _check_return(drift: Array) -> None:
         )
 
 
-def learning_filter(config: Controller, loop: LoopModel, period: float) -> LearningFilter | None:
+def learning_filter(recipe: RunRecipe) -> LearningFilter | None:
     """The filter of a controller with ILC.
 
     Raises:
         DriverError: learning would not converge for every loop within the spread of the identified one.
     """
-    if not config.uses_ilc:
+    if not recipe.controller.uses_ilc:
         return None
-    gains = {"gain_p": config.gain_p, "gain_i": config.gain_i}
-    learning = design_filter(loop, period, learning_gain=config.learning_gain, **gains)
+    learning = design_filter(recipe)
     if not learning.contraction < 1.0:
         raise DriverError(
             f"learning would not converge: from run to run an error may grow by {learning.contraction:.2f}, "
-            f"allowed is less than 1; single joints differ too much from the loop ({loop}): use "
+            f"allowed is less than 1; single joints differ too much from the loop ({recipe.loop}): use "
             "--controller preview"
         )
     return learning

@@ -1,21 +1,28 @@
-"""A velocity law of a user on the arm: six velocities for each frame, under the watchdog of every motion.
+"""Laws of users. Each is checked before the arm moves; one without a plan is checked while it moves, too.
 
-Such a motion has no plan. So before a velocity is sent, the way on which the arm would come to rest if it
-were stopped now is held against joint ranges and clearances, as a plan's postures are.
+A motion by a velocity law has no plan. So before a velocity is sent, the way on which the arm would come to
+rest if it were stopped now is held against joint ranges and clearances, as a plan's postures are.
 """
 
+import reprlib
+import time
 from collections.abc import Callable, Sequence
+from inspect import signature
 from typing import NamedTuple
 
 import numpy as np
 
 from pc_client.arrays import Array
-from pc_client.control.tracker import six_velocities
-from pc_client.errors import DriverError
+from pc_client.control.reference import ReferenceTable, RunRecipe
+from pc_client.control.tracker import ControlLaw, Tracker, six_velocities
+from pc_client.driver.velocity_stream import check_command
+from pc_client.errors import LOG, ClientError, ControllerError, DriverError, one_line
 from pc_client.experiment.checks import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
-from pc_client.kinematics.model import RobotModel, check_flange
+from pc_client.kinematics.model import RobotModel, check_flange, tcp_pose
 from pc_client.planning.limits import limits_of
+from pc_client.planning.plan import Plan
+from protocol.pose import T_to_pose
 from protocol.realtime.layout import RealtimeFrame
 
 VelocityLaw = Callable[[RealtimeFrame], Sequence[float] | Array | None]
@@ -28,6 +35,46 @@ _SPEED_SHARE = 0.95
 """Of the joint speed limits that a law may use, as the controllers do."""
 
 _REST = [0.0] * 6
+
+
+def check_law(law: object, what: str, allowed: str, n_arguments: int) -> None:
+    """Raise ControllerError for what is no function of so many arguments; it is not called."""
+    try:
+        signature(law).bind(*range(n_arguments))  # type: ignore[arg-type]  # it says what cannot be called
+    except (TypeError, ValueError) as error:
+        raise ControllerError(f"{what}: {reprlib.repr(law)}, {error}; give {allowed}") from error
+
+
+def rehearse(law: ControlLaw, recipe: RunRecipe, plan: Plan, frame: RealtimeFrame, model: RobotModel) -> None:
+    """Ask a law for the first command of a plan, before anything moves, and warn if it is slow.
+
+    Args:
+        recipe: of the run.
+        frame: of the robot, wherever it stands; the law gets one of the arm at rest at the start.
+
+    Raises:
+        ClientError: it fails, or gives no six velocities within the limits.
+    """
+    own, q, values = recipe.controller, plan.joints.start_q, frame.values.copy()
+    still = {"q": q, "qd": 0.0 * q, "tcp_pose": np.array(T_to_pose(tcp_pose(model, q)))}
+    for name, six in still.items():
+        for whose in ("target", "actual"):
+            values[frame.layout.slices[f"{whose}_{name}"]] = six
+    values.setflags(write=False)
+    tracker = Tracker(ReferenceTable(plan.joints.spline, recipe, plan.movement), own, model, law)
+    began = time.perf_counter()
+    try:
+        step = tracker.answer(type(frame)(values))
+    except ClientError:
+        raise
+    except Exception as error:
+        what = f"{type(error).__name__}: {one_line(error)}"
+        raise ControllerError(f"{own.title} fails before anything has moved: {what}") from error
+    spent = time.perf_counter() - began
+    check_command(step.qd_cmd, tracker.qd_max)
+    if spent > recipe.period:
+        slow = "%s took %.1f ms for its first command, a cycle is %g ms: frames may come late"
+        LOG.warning(slow, own.title, 1e3 * spent, 1e3 * recipe.period)
 
 
 class LawStep(NamedTuple):

@@ -12,7 +12,6 @@ import numpy as np
 from pc_client.driver import watchdog
 from pc_client.driver.report import UNKNOWN, RobotReport
 from pc_client.driver.watchdog import Condition
-from pc_client.errors import DriverError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import ROTATION_TOLERANCE, RobotModel, flange_difference, robot_model
 from protocol.ur_types import JOINT_NAMES
@@ -29,6 +28,12 @@ _PAYLOAD_TOLERANCE = 0.05
 
 _CENTRE_TOLERANCE = 0.02
 """Of its centre of gravity [m]: as good as the pendant's own estimation is. A choice: docs/fidelity.md."""
+
+_SAME_POSTURE = 2e-3
+"""An arm is where it was shown if no joint has moved further [rad]: 3 mm at the tool of the longest arm."""
+
+_MEASURED = ("flange pose", "joint angles", "RTDE")
+"""Conditions whose report says where the arm stands, or has noise in it."""
 
 Check = Callable[[RobotReport, RobotModel | None], Condition]
 """Holds one thing that a robot reports against what is needed."""
@@ -47,15 +52,18 @@ def preflight(report: RobotReport, model: RobotModel | None) -> tuple[Condition,
     return generation, *(condition(report, model) for condition in conditions)
 
 
-def refusal(conditions: Sequence[Condition]) -> str:
-    """The line that refuses a robot: the first condition that fails; empty when none does."""
-    return next((condition.complaint for condition in conditions if condition.holds is False), "")
-
-
-def require(conditions: Sequence[Condition]) -> None:
-    """Raise DriverError for the first condition that a robot fails."""
-    if complaint := refusal(conditions):
-        raise DriverError(complaint)
+def changes(shown: RobotReport, now: RobotReport, model: RobotModel) -> str:
+    """What of posture, modes, tool and program is not as it was shown, in one phrase; empty: nothing."""
+    moved = np.abs(now.frame.actual_q - shown.frame.actual_q)
+    joint = int(moved.argmax())
+    if not moved[joint] <= _SAME_POSTURE:
+        return f"the arm was moved, its {JOINT_NAMES[joint]} by {np.degrees(moved[joint]):.1f} deg"
+    pairs = zip(preflight(shown, model), preflight(now, model), strict=True)
+    return ", ".join(
+        f"{then.name} was {then.reported or 'not reported'}, is {condition.reported or 'not reported'}"
+        for then, condition in pairs
+        if then.reported != condition.reported and then.name not in _MEASURED
+    )
 
 
 def model_of(report: RobotReport, cell: Cell) -> RobotModel | None:
@@ -194,7 +202,8 @@ CONDITIONS: tuple[Check, ...] = (
     lambda report, model: watchdog.safety_mode(report.frame),
     lambda report, model: watchdog.robot_mode(report.frame),
     lambda report, model: watchdog.program_state(report.frame),
-    lambda report, model: watchdog.speed_slider(report.slider),
+    lambda report, model: watchdog.control_mode(report.mode),
+    lambda report, model: watchdog.speed_slider(report.mode),
     lambda report, model: watchdog.speed_scaling(report.frame),
     tcp_offset,
     _forward_kinematics,

@@ -5,26 +5,26 @@ what is recorded until then stays readable.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
 from pc_client.control.controller import APPROACH, Controller
-from pc_client.control.gear import GearObserver, MotorReference
-from pc_client.control.loop import LoopModel
-from pc_client.control.reference import ReferenceTable
+from pc_client.control.gear import GearObserver
+from pc_client.control.reference import ReferenceTable, RunRecipe
 from pc_client.control.tracker import ControlLaw, Tracker, TrackerStep
-from pc_client.driver.report import RobotInfo
 from pc_client.driver.session import UrDriver
-from pc_client.driver.velocity_stream import StreamReport
-from pc_client.errors import DriverError
-from pc_client.experiment.checks import LEAD, SETTLE, guarded, shortest_loop
+from pc_client.driver.velocity_stream import StreamLog, StreamReport
+from pc_client.driver.watchdog import require
+from pc_client.errors import LOG, RECORDED, DriverError
+from pc_client.experiment.checks import Prediction, guarded
 from pc_client.experiment.experiment import Experiment, clear_folder
 from pc_client.experiment.identification import Identification, check_excitation, identify
-from pc_client.experiment.preflight import preflight, require
-from pc_client.experiment.repetitions import Repetitions, RunLog
+from pc_client.experiment.preflight import preflight
+from pc_client.experiment.repetitions import Repetitions
 from pc_client.kinematics.model import RobotModel
 from pc_client.planning.approach import Approach, plan_approach
 from pc_client.planning.plan import JointPlan, Plan
@@ -44,23 +44,12 @@ _NO_MOVE = 1e-4
 """An approach shorter than this [rad] is not run."""
 
 
-class Observer:
-    """Gets the progress of an experiment; this one ignores it. Its methods raise nothing."""
+_COUNTS = ("n_commands", "late_frames", "lost_frames", "stops", "robot_time")
+_TIMES = ("wall_time", "computing_time", "slowest_command")
+"""What a recording has of its stream; times only in real time: equal runs in lockstep give equal bytes."""
 
-    def connected(self, info: RobotInfo) -> None:
-        """A session is open."""
 
-    def approaching(self, approach: Approach) -> None:
-        """The arm begins to move to the start of a movement."""
-
-    def identified(self, found: Identification) -> None:
-        """The loop is known."""
-
-    def running(self, name: str, repetition: int) -> None:
-        """A run begins."""
-
-    def finished(self, name: str, repetition: int, path: Path, report: StreamReport) -> None:
-        """A run is recorded."""
+_Guarded = tuple[RunRecipe, Prediction | None]
 
 
 @dataclass(slots=True)
@@ -69,7 +58,7 @@ class ExperimentReport:
 
     Attributes:
         delay: the identified loop and its margins.
-        remarks: one line for each run in which nothing could be learned or used.
+        remarks: one line for each warning, and for each run in which nothing could be learned or used.
     """
 
     delay: Identification
@@ -91,14 +80,12 @@ class ExperimentRunner:
         driver: UrDriver,
         experiment: Experiment,
         config: Controller,
-        observer: Observer | None = None,
         law: ControlLaw | None = None,
     ) -> None:
         self._law = law
         self._driver = driver
         self._experiment = experiment
         self._config = config
-        self._observer = Observer() if observer is None else observer
         self._arm = arm_tree(experiment.model.description)
         self._signals = [(column.name, column.count, column.unit) for column in driver.layout.columns]
 
@@ -113,32 +100,34 @@ class ExperimentRunner:
         # The loop is identified where the first run begins; that run needs no further approach.
         first = self._plan_approach(experiment.planned[0].joints)
         check_excitation(first.plan.start_q, self._config, experiment.model)
-        self._guarded(shortest_loop(driver.info.period))
+        before = self._guarded(RunRecipe.first(self._config, driver.info.period))
         clear_folder(experiment)
-        self._observer.connected(driver.info)
+        LOG.info("robot: %s", driver.info)
         there: JointPlan | None = self._approach(first)
         found = identify(driver, self._config, experiment.model)
-        self._observer.identified(found)
-        configs = self._guarded(found.loop)
+        LOG.info("%s", found)
         report = ExperimentReport(found)
-        pace = "lockstep" if driver.info.lockstep else "realtime"
         gears = GearObserver(found.loop, driver.info.period)
-        for planned, config in zip(experiment.planned, configs, strict=True):
+        recipes = self._guarded(RunRecipe(self._config, found.loop, driver.info.period), before)
+        for planned, (recipe, expected) in zip(experiment.planned, recipes, strict=True):
             name = planned.movement.name
-            period = driver.info.period
-            repetitions = Repetitions(self._config, found.loop, found.learning, experiment.model, period)
+            repetitions = Repetitions(recipe, found.learning, experiment.model)
             for repetition in range(1, experiment.repeat + 1):
                 plan = self._approach(self._plan_approach(planned.joints)) if there is None else there
                 there = None
                 if self._config.compensates_gear:
                     repetitions.renew(gears.model)
-                self._observer.running(name, repetition)
+                LOG.debug("%s, run %d", name, repetition)
                 path = experiment.recording_path(planned, repetition)
-                provenance = self._provenance(planned, repetition, found, pace)
-                stream = self._record(path, planned, plan, config, provenance, found, repetitions, gears)
+                provenance = self._provenance(planned, repetition, found)
+                stream = self._record(path, planned, plan, provenance, expected, repetitions, gears)
                 report.paths.append(path)
                 report.streams.append(stream)
-                self._observer.finished(name, repetition, path, stream)
+                LOG.debug(RECORDED, path)
+                if stream.trouble:
+                    repetitions.remarks.append(f"run {repetition}: {stream.trouble}")
+                    LOG.warning("%s: %s", name, repetitions.remarks[-1])
+            report.remarks += [expected.doubt] if expected and expected.doubt else []
             report.remarks += [f"{name}: {remark}" for remark in repetitions.remarks]
         return report
 
@@ -147,54 +136,39 @@ class ExperimentRunner:
 
     def _approach(self, approach: Approach) -> JointPlan:
         """Move slowly to the start of a plan; returns it in the turns where the arm is."""
-        self._observer.approaching(approach)
+        LOG.debug("%s: to the start", approach.plan.name)
         run_approach(self._driver, approach, self._experiment.model)
         return approach.plan
 
-    def _guarded(self, loop: LoopModel) -> list[Controller]:
-        """The controller with the tolerances of each movement on a loop; refuses what is beyond them.
+    def _guarded(self, recipe: RunRecipe, told: Sequence[_Guarded] = ()) -> list[_Guarded]:
+        """The recipe of each movement and its prediction; warns of what was not told before.
 
-        What a user's law makes of a movement is not known: its tolerances stay.
+        What a user's law makes of a movement is not known: the tolerances of its controller stay.
         """
+        plans, model = [one.joints for one in self._experiment.planned], self._experiment.model
         if self._law is not None:
-            return [self._config] * len(self._experiment.planned)
-        model, period = self._experiment.model, self._driver.info.period
-        return [guarded(one.joints, self._config, model, loop, period) for one in self._experiment.planned]
-
-    def _table(
-        self, planned: Plan, plan: JointPlan, found: Identification, repetitions: Repetitions
-    ) -> ReferenceTable:
-        """The reference of one run, with the feed-forward that the controller makes of it."""
-        config = self._config
-        lookahead = found.loop.dead_time if config.compensates_lag else found.delay
-        return ReferenceTable(
-            plan.spline,
-            period=self._driver.info.period,
-            lead=LEAD,
-            settle=SETTLE,
-            lookahead=lookahead if config.uses_preview else None,
-            motors=None if repetitions.gear is None else MotorReference(plan.spline, repetitions.gear),
-            lag=found.loop.lag if config.compensates_lag else 0.0,
-            learned=repetitions.learned,
-            tcp=planned.movement,
-        )
+            return [(recipe, None)] * len(plans)
+        found = [guarded(plan, recipe, model) for plan in plans]
+        for (_, now), (_, then) in zip_longest(found, told, fillvalue=(recipe, None)):
+            if now and now.doubt and not (then and then.doubt):
+                LOG.warning(now.doubt)
+        return found
 
     def _record(
         self,
         path: Path,
         planned: Plan,
         plan: JointPlan,
-        config: Controller,
         provenance: Provenance,
-        found: Identification,
+        expected: Prediction | None,
         repetitions: Repetitions,
         gears: GearObserver,
     ) -> StreamReport:
         """Stream one run into one file; the repetitions and the gears learn from it."""
-        table = self._table(planned, plan, found, repetitions)
-        if not repetitions.may_use(plan, table):
-            table = self._table(planned, plan, found, repetitions)
-        log = RunLog() if config.uses_ilc or config.compensates_gear else None
+        table, recipe = repetitions.table(plan, planned.movement), repetitions.recipe
+        config = recipe.controller
+        learns = config.uses_ilc or config.compensates_gear
+        log: StreamLog[TrackerStep] | None = StreamLog() if learns else None
         now = time.time_ns if provenance.pace == "realtime" else None
         with Recorder(path, provenance, self._signals, arm=self._arm, now=now) as recorder:
             stream = self._driver.stream(
@@ -202,23 +176,27 @@ class ExperimentRunner:
                 _row_sink(recorder, log),
                 acceleration=config.speedj_acceleration,
             )
+            told = [line for line in (expected and expected.doubt, stream.trouble) if line]
             recorder.close(
                 {
-                    "late_frames": stream.late_frames,
-                    "lost_frames": stream.lost_frames,
-                    "n_commands": stream.n_commands,
+                    **{
+                        name: getattr(stream, name) for name in (_COUNTS if now is None else _COUNTS + _TIMES)
+                    },
+                    "expected_snr_db": expected and expected.snr_db,
+                    "warnings": told,
                     "learned_from": repetitions.learned_from,
-                    "gear_waves": 0 if repetitions.gear is None else repetitions.gear.n_waves,
+                    "gear_waves": 0 if recipe.gear is None else recipe.gear.n_waves,
                 }
             )
         if log is not None:
             # Waves are a mean over thousands of frames: a command that came late is no harm, a gap is.
             if not stream.lost_frames:
-                gears.take(log.qd_cmd, log.q)
-            repetitions.take(provenance.repetition, log, stream, LEAD, SETTLE)
+                q, qd_cmd = log.columns("actual_q")
+                gears.take(qd_cmd, q)
+            repetitions.take(provenance.repetition, log, stream)
         return stream
 
-    def _provenance(self, planned: Plan, repetition: int, found: Identification, pace: str) -> Provenance:
+    def _provenance(self, planned: Plan, repetition: int, found: Identification) -> Provenance:
         info, movement = self._driver.info, planned.movement
         points = tuple((float(x), float(y), float(z)) for x, y, z in movement.target_points)
         return Provenance(
@@ -231,7 +209,7 @@ class ExperimentRunner:
             serial=info.serial,
             simulated=info.simulated,
             seed=info.seed,
-            pace=pace,
+            pace="lockstep" if info.lockstep else "realtime",
             client_version=tool_version(),
             cycle_time_s=info.period,
             identified_delay_s=found.delay,
@@ -243,7 +221,9 @@ class ExperimentRunner:
         )
 
 
-def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame, TrackerStep], None]:
+def _row_sink(
+    recorder: Recorder, log: StreamLog[TrackerStep] | None
+) -> Callable[[RealtimeFrame, TrackerStep], None]:
     """A function that records a row, keeps it for learning, and ends the run when the disk fails."""
     append = recorder.append
 
@@ -253,7 +233,7 @@ def _row_sink(recorder: Recorder, log: RunLog | None) -> Callable[[RealtimeFrame
         if (error := recorder.error) is not None:
             raise error
         if log is not None:
-            log.append(frame, step)
+            log(frame, step)
 
     return record
 
@@ -268,7 +248,8 @@ def run_approach(driver: UrDriver, approach: Approach, model: RobotModel) -> Non
     goal = approach.waypoints[-1]
     if np.abs(approach.waypoints - approach.q_from).max() < _NO_MOVE:
         return
-    table = ReferenceTable(approach.motion, period=driver.info.period, lead=0.0, settle=_SETTLE)
+    recipe = RunRecipe.first(APPROACH, driver.info.period)
+    table = ReferenceTable(approach.motion, recipe, lead=0.0, settle=_SETTLE)
     tracker = Tracker(table, APPROACH, model)
     driver.stream(tracker, lambda frame, step: None, acceleration=APPROACH.speedj_acceleration)
     error = float(np.abs(driver.actual_q() - goal).max())

@@ -307,8 +307,7 @@ class Recorder:
             return
         try:
             self.close({"aborted": f"{type(error).__name__}: {one_line(error)}".removesuffix(": ")})
-            if isinstance(error, Exception):  # of Ctrl-C the caller says what is kept
-                error.add_note(f"recorded until then: {self.path}")
+            error.add_note(f"recorded until then: {self.path}")
         except RecordingError as lost:
             error.add_note(str(lost))  # the error that ended the run stays the one that is raised
 

@@ -27,9 +27,10 @@ from pc_client.driver.questions import LONGEST_LINE, ask_dashboard, ask_rtde
 from pc_client.driver.realtime import RealtimeClient
 from pc_client.driver.receiver import ReverseServer
 from pc_client.driver.session import UrDriver
+from pc_client.driver.watchdog import refusal
 from pc_client.errors import DriverError, one_line
 from pc_client.experiment.identification import identify
-from pc_client.experiment.preflight import model_of, preflight, refusal
+from pc_client.experiment.preflight import model_of, preflight
 from pc_client.kinematics.model import robot_model
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.messages import TextMessage, encode_message

@@ -23,9 +23,10 @@ from wire_story import MODBUS, Story  # noqa: E402
 
 from pc_client.control.controller import CONTROLLERS  # noqa: E402
 from pc_client.driver.session import UrDriver  # noqa: E402
-from pc_client.experiment.experiment import Experiment, load_movements  # noqa: E402
+from pc_client.experiment.experiment import Experiment  # noqa: E402
 from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
 from pc_client.kinematics.model import robot_model  # noqa: E402
+from pc_client.movements.movement import load_motion  # noqa: E402
 from pc_client.planning.plan import make_plan  # noqa: E402
 from protocol.primary.messages import encode_message  # noqa: E402
 from protocol.realtime.layout import layout_for_version  # noqa: E402
@@ -107,7 +108,7 @@ def demo():
             ControlBox(pace="lockstep", seed=7, port_base=None) as box,
         ):
             model = robot_model("ur3")
-            plans = tuple(make_plan(movement, model) for movement in load_movements(DEMO))
+            plans = tuple(make_plan(load_motion(name), model) for name in DEMO)
             experiment = Experiment(model, plans, 2, Path(folder))
             with UrDriver(box.host, box.ports) as driver:
                 ExperimentRunner(driver, experiment, CONTROLLERS[controller]).run()

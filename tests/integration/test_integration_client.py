@@ -31,6 +31,7 @@ from integration_support import (
 import pc_client as ur
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop import LoopModel
+from pc_client.control.reference import RunRecipe
 from pc_client.driver import report
 from pc_client.driver.report import read_report
 from pc_client.driver.session import UrDriver
@@ -276,11 +277,39 @@ QUICK = [(0.30, -0.06, 0.30), (0.30, 0.06, 0.35)]
 """Own points .13 m apart: in 1.5 s more acceleration than the published controller lets `speedj` use."""
 
 
-def test_the_published_controller_runs_a_quick_movement_as_the_loop_predicts(lockstep_box):
-    arm = ur.connect(lockstep_box.host, lockstep_box.ports)
-    run = arm.run(ur.Movement.through(QUICK, durations=[1.5]), ur.Controller.paper())
+@pytest.mark.parametrize("duration", [1.5, 1.2])
+def test_the_published_controller_runs_a_quick_movement_as_the_loop_predicts_and_says_so(
+    lockstep_box, caplog, monkeypatch, duration
+):
+    monkeypatch.setattr(report, "_is_simulated", lambda *told: None)
+    shown = []
+
+    def yes(text):
+        shown.append(text)
+        return True
+
+    arm = ur.connect(lockstep_box.host, lockstep_box.ports, confirm=yes)
+    q = arm.frame().actual_q
+
+    def before_it_moves(record):
+        np.testing.assert_allclose(arm.frame().actual_q, q, atol=1e-3)
+        return True
+
+    plan = ur.plan(ur.Movement.through(QUICK, durations=[duration]), arm)
+    with caplog.filtering(before_it_moves):
+        run = arm.run(plan, ur.Controller.paper())
     off = np.linalg.norm(run.tcp_pose[:, None, :3] - run.ref_tcp_position[None], axis=2).min(axis=1)
     assert 0.02 < off.max() < ur.Controller.paper().path_tolerance
+    assert run.expected_snr == pytest.approx(run.snr, abs=0.5)
+    (known,), (first,) = run.warnings, caplog.messages
+    assert first in shown[0]
+    for line, expected in ((first, r"\d\.\d"), (known, f"{run.expected_snr:.1f}")):
+        assert re.search(
+            rf"^through: the controller 'paper' .* an SNR of {expected} dB at best .*'preview'$", line
+        )
+    good = arm.run(plan, ur.Controller.preview())
+    assert (good.warnings, len(caplog.messages)) == ((), 1)
+    assert good.expected_snr == 45.0  # encoders and gears set the limit
 
 
 def test_a_predicted_way_too_near_to_a_wall_is_refused():
@@ -295,9 +324,9 @@ def test_a_predicted_way_too_near_to_a_wall_is_refused():
     plan, far = planned(0.5)
     y = 0.5 - clearance_model(far).along(plan.joints.q).cell.least.min() + 0.021
     plan, near = planned(y)
-    guarded(plan.joints, CONTROLLERS["preview"], near, loop, 0.008)
+    guarded(plan.joints, RunRecipe(CONTROLLERS["preview"], loop, PERIOD), near)
     with pytest.raises(DriverError, match=r"off its path, .* of wall 'window', at least 20 mm"):
-        guarded(plan.joints, CONTROLLERS["paper"], near, loop, 0.008)
+        guarded(plan.joints, RunRecipe(CONTROLLERS["paper"], loop, PERIOD), near)
 
 
 def test_what_a_user_does_not_allow_is_refused_before_anything_moves(lockstep_box):

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import polars
 import pytest
 from scipy.spatial.transform import Rotation
 
 import pc_client as ur
 from pc_client.driver import report
+from pc_client.experiment import law_stream
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.planning.joint_path import fixed_tcp_rotation
 from pc_client.planning.limits import limits_of
+from pc_client.recording.recording import load_recording
 from ur_emulator import ControlBox
 
 POINTS = [(0.30, -0.10, 0.30), (0.30, 0.05, 0.35)]
@@ -208,17 +214,145 @@ def test_a_control_law_of_the_user_runs_a_plan_like_the_other_controllers(arm, t
     assert run.snr > 20.0
 
 
+def test_a_control_law_that_does_not_follow_ends_at_rest(arm):
+    with pytest.raises(ur.ClientError, match="off its path"):
+        arm.run(ur.Movement.through(POINTS, durations=[2.5]), lambda frame, reference: np.zeros(6))
+    assert np.abs(arm.frame().actual_qd).max() < 0.01
+
+
+class Law:
+    def __init__(self, *numbers):
+        self.numbers = numbers
+
+    def __call__(self, frame, reference):
+        return self.numbers
+
+
+MOVE = ur.Movement.through(POINTS, durations=[2.5])
+LOAD = (0.0, 0.0, 0.05)
+
+
 @pytest.mark.parametrize(
-    ("law", "complaint"),
+    ("call", "said"),
     [
-        (lambda frame, reference: None, "gave None: give six finite velocities"),
-        (lambda frame, reference: np.zeros(6), "off its path"),
+        *(
+            (lambda arm, c=c: arm.run(MOVE, c), "controller: .*; give a Controller or a function of")
+            for c in ("preview", 5, None, ur.Controller, ur.Controller.paper, lambda frame: None, {})
+        ),
+        (lambda arm: arm.run(MOVE, Law), "six finite velocities"),
+        *(
+            (lambda arm, law=law: arm.run(MOVE, law), "six finite velocities")
+            for law in (
+                Law(),
+                Law(1, 2, 3),
+                Law(*[np.nan] * 6),
+                Law(*["a"] * 6),
+                lambda frame, reference: None,
+            )
+        ),
+        (lambda arm: arm.run(MOVE, Law(9, 0, 0, 0, 0, 0)), "not safe to send"),
+        (
+            lambda arm: arm.run(MOVE, lambda frame, reference: 1 / 0),
+            "before anything has moved: ZeroDivisionError",
+        ),
+        (lambda arm: arm.run(MOVE, lambda frame, reference: frame.nothing), "has no 'nothing'"),
+        (
+            lambda arm: arm.run(MOVE, lambda frame, reference: reference.qd_feedforward.__iadd__(1.0)),
+            "ValueError: output array is read-only",
+        ),
+        *(
+            (lambda arm, plan=plan: arm.run(plan), "plan: .*; give a Plan, a Movement")
+            for plan in (None, "lognorm_4_1", 5, [MOVE], ur.Movement)
+        ),
+        *((lambda arm, plan=plan: arm.approach(plan), "plan: .*; give a Plan") for plan in (None, MOVE, "x")),
+        *(
+            (lambda arm, n=n: arm.repeat(MOVE, n), "nothing to do|times: .*; give a whole number")
+            for n in (0, -1, 2.5, "3", None)
+        ),
+        *(
+            (lambda arm, out=out: arm.run(MOVE, out=out), "out: .*; give a folder|cannot use the folder")
+            for out in (5, b"x", "/proc/nothing", "a\0b", "/dev/null")
+        ),
+        (lambda arm: arm.run(MOVE, overwrite="no"), "overwrite: 'no'; give True or False"),
+        (lambda arm: arm.experiment([MOVE], 1, ur.Controller.paper(), Path("x")), "plan: .*; give a Plan"),
+        (lambda arm: arm.experiment([], 1, ur.Controller.paper(), Path("x")), "nothing to do"),
+        (lambda arm: arm.experiment(None, 1, ur.Controller.paper(), Path("x")), "plans: None; give a list"),
+        *(
+            (lambda arm, law=law: arm.stream(law), "law: .*; give a function of")
+            for law in (None, [0] * 6, 5, lambda: None, lambda frame, reference: None)
+        ),
+        *(
+            (lambda arm, a=a: arm.stream(still, acceleration=a), "acceleration: .*; give a number from")
+            for a in (0.0, np.nan, 1e6, "5", None, True)
+        ),
+        *(
+            (lambda arm, mass=mass: arm.set_payload(mass, LOAD), "mass: .*; give a number")
+            for mass in (-1.0, np.nan, "1", None)
+        ),
+        *(
+            (lambda arm, c=c: arm.set_payload(0.0, c), "centre_of_gravity: ")
+            for c in (None, 5, (0.0, 0.0), (0.0, 0.0, np.inf), "abc")
+        ),
     ],
 )
-def test_a_control_law_that_does_not_follow_ends_at_rest(arm, law, complaint):
-    with pytest.raises(ur.ClientError, match=complaint):
-        arm.run(ur.Movement.through(POINTS, durations=[2.5]), law)
-    assert np.abs(arm.frame().actual_qd).max() < 0.01
+def test_what_makes_no_sense_is_refused_in_one_line_before_anything_moves(
+    arm, call, said, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    before = arm.frame()
+    with pytest.raises(ur.ClientError, match=said) as caught:
+        call(arm)
+    assert "\n" not in str(caught.value)
+    after = arm.frame()
+    assert (after.timestamp, after.actual_q.tolist()) == (before.timestamp, before.actual_q.tolist())
+
+
+def test_a_control_law_is_called_once_before_anything_moves_as_if_the_arm_rested_at_the_start(
+    arm, caplog, monkeypatch
+):
+    before, calls = arm.frame(), []
+
+    def law(frame, reference):
+        calls.append((frame, reference))
+        return reference.qd_feedforward
+
+    plan = ur.plan(MOVE, arm)
+    ticks = iter((0.0, 0.02))
+    monkeypatch.setattr(law_stream, "time", SimpleNamespace(perf_counter=lambda: next(ticks)))
+    arm.run(plan, law)
+    assert caplog.messages == [
+        "own law law took 20.0 ms for its first command, a cycle is 8 ms: frames may come late"
+    ]
+    (frame, reference), (first, again) = calls[:2]
+    assert frame.timestamp == before.timestamp < first.timestamp
+    np.testing.assert_allclose(frame.actual_q, plan.joints.start_q)
+    np.testing.assert_allclose(frame.actual_tcp_pose, arm.fk(plan.joints.start_q))
+    assert not frame.actual_qd.any()
+    assert reference.t == again.t == -0.2
+    assert not np.any(again.p != reference.p)
+
+
+@pytest.mark.parametrize("end", [KeyboardInterrupt, SystemExit, ZeroDivisionError])
+def test_whatever_ends_a_run_or_a_stream_names_what_is_kept_of_it(arm, end, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
+    def law(frame, reference=None):
+        calls.append(frame)
+        if len(calls) > 50:
+            raise end
+        return np.zeros(6) if reference is None else reference.qd_feedforward
+
+    for act in (lambda: arm.run(MOVE, law), lambda: arm.stream(law)):
+        calls = []
+        with pytest.raises(end) as caught:
+            act()
+        (note,) = caught.value.__notes__
+        path = Path(note.removeprefix("recorded until then: "))
+        assert path.is_relative_to(tmp_path)
+        if path.suffix == ".parquet":
+            assert len(polars.read_parquet(path)) == 50
+        else:
+            assert end.__name__ in load_recording(path).aborted
 
 
 def test_joint_angles_over_time_are_a_motion(arm):
@@ -257,6 +391,23 @@ def test_a_plan_for_another_arm_or_cell_is_refused_before_it_moves(arm):
         arm.run(ur.plan(movement, "ur3", ur.Cell(name="table", floor_z=-0.1)))
 
 
+@pytest.mark.parametrize(
+    ("load", "says"),
+    [
+        ((0.3, (0.0, 0.0, 0.05)), r"payload 0 kg at \(0, 0, 0\) mm.* payload 0.3 kg at \(0, 0, 50\) mm"),
+        ((0.0, (0.0, 0.01, 0.0)), r"payload 0 kg at \(0, 0, 0\) mm.* payload 0 kg at \(0, 10, 0\) mm"),
+    ],
+)
+def test_a_plan_for_another_payload_is_refused_by_its_payload(lockstep_box, load, says):
+    arm = ur.connect(lockstep_box.host, lockstep_box.ports)
+    plan = ur.plan(MOVE, arm)
+    arm.set_payload(*load)
+    for act in (arm.run, arm.approach):
+        with pytest.raises(ur.ClientError, match=says):
+            act(plan)
+    arm.approach(ur.plan(MOVE, arm))
+
+
 def test_another_robot_at_the_same_address_is_refused_before_it_moves(box):
     with ControlBox(pace="lockstep", port_base=None, seed=8) as other:
         arm = ur.connect(box.host, box.ports)
@@ -291,3 +442,78 @@ def test_an_arm_that_may_be_real_is_asked_for(box, monkeypatch):
         real.stream(lambda frame: None)
     assert "box of motion" in shown[0]
     assert "velocity law" in shown[1]
+
+
+def move_away(box):
+    box.run_program("def p():\n  movej([1.6, -1.6, -1.9, -0.5, 1.3, 1.0])\nend\n", wait=True)
+
+
+def another_tool(box):
+    box.run_program("def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\nend\n", wait=True)
+
+
+@pytest.mark.parametrize(
+    ("meddle", "said", "ends"),
+    [
+        (move_away, r"the arm was moved, its base by \d+\.\d deg", ""),
+        (
+            lambda box: box.run_program("sec p():\n  set_payload(0.04)\nend\n", wait=True),
+            "payload was 0.00 kg, is 0.04 kg",
+            "",
+        ),
+        (another_tool, None, "the robot's TCP offset is"),
+        (lambda box: box.set_speed(0.5), None, "the robot's speed slider is 50 %"),
+        (lambda box: box.press_button("teach", True), None, "the robot's control mode is TEACH"),
+        (lambda box: box.emergency_stop(), None, "the robot's safety mode is ROBOT_EMERGENCY_STOP"),
+    ],
+)
+@pytest.mark.parametrize("act", ["run", "approach", "stream"])
+def test_what_was_agreed_to_is_compared_with_the_robot_after_the_answer(
+    lockstep_box, monkeypatch, act, meddle, said, ends
+):
+    """What has changed and may still move is asked for anew, with the way from there; the rest is refused."""
+    box, shown, places = lockstep_box, [], []
+
+    def yes(text):
+        shown.append(text)
+        places.append(np.degrees(arm.frame().actual_q))
+        if len(shown) == 1:
+            meddle(box)
+        return True
+
+    monkeypatch.setattr(report, "_is_simulated", lambda *told: None)
+    arm = ur.connect(box.host, box.ports, confirm=yes)
+    plan = ur.plan(MOVE, arm)
+    acts = {
+        "run": lambda: arm.run(plan),
+        "approach": lambda: arm.approach(plan),
+        "stream": lambda: arm.stream(ends_soon()),
+    }
+    before = arm.frame().actual_q
+    if ends:
+        with pytest.raises(ur.ClientError, match=ends) as caught:
+            acts[act]()
+        assert "\n" not in str(caught.value)
+        np.testing.assert_allclose(arm.frame().actual_q, before, atol=1e-3)
+        return
+    acts[act]()
+    assert len(shown) == 2
+    assert re.search(said, shown[1].partition("\n")[0])
+    if act != "stream":
+        begin = ", ".join(f"{angle:.1f}" for angle in places[1])
+        assert f"from            ({begin}) deg" in shown[1]
+
+
+def ends_soon():
+    frames = []
+    return lambda frame: None if frames.append(frame) or len(frames) > 20 else [0.0] * 6
+
+
+def test_nothing_is_asked_anew_of_a_robot_that_stays_as_it_was_shown(lockstep_box, monkeypatch):
+    shown = []
+    monkeypatch.setattr(report, "_is_simulated", lambda *told: None)
+    arm = ur.connect(lockstep_box.host, lockstep_box.ports, confirm=lambda text: not shown.append(text))
+    arm.run(MOVE)
+    arm.repeat(MOVE, 2, ur.Controller.paper())
+    assert len(shown) == 2
+    assert "expected SNR    at best 45.0 dB" in shown[0]

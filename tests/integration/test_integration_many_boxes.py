@@ -25,7 +25,7 @@ from integration_support import (
 )
 
 from pc_client.control.controller import APPROACH
-from pc_client.control.reference import ReferenceTable
+from pc_client.control.reference import ReferenceTable, RunRecipe
 from pc_client.control.tracker import Tracker
 from pc_client.driver.session import UrDriver
 from pc_client.kinematics.model import robot_model
@@ -277,7 +277,7 @@ def test_the_client_moves_an_arm_at_any_loopback_address(box):
         q = driver.actual_q()
         goal = q + np.array([0.05, 0, 0, 0, 0, 0])
         lines = JointLines([q, goal], v=0.5, a=1.0)
-        table = ReferenceTable(lines, period=driver.info.period, lead=0.0, settle=0.8)
+        table = ReferenceTable(lines, RunRecipe.first(APPROACH, driver.info.period), lead=0.0, settle=0.8)
         driver.stream(
             Tracker(table, APPROACH, robot_model("ur3")), lambda frame, step: None, acceleration=5.0
         )

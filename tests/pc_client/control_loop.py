@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
+from pc_client.control.controller import CONTROLLERS
+from pc_client.control.loop import LoopModel
+from pc_client.control.reference import RunRecipe
+
 PERIOD = 0.008
+
+
+def recipe(lookahead=None, lag=0.0, period=PERIOD):
+    """Of a reference without feed-forward ahead, or ahead by so much [s]."""
+    config = replace(CONTROLLERS["preview"], uses_preview=lookahead is not None, compensates_lag=True)
+    return RunRecipe(config, LoopModel(lookahead or 0.0, lag, None, 0.0), period)
 
 
 class DelayedArm:

@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 
 import pc_client.commands.experiment as experiment
 import pc_client.studies.comparison as comparison
@@ -182,10 +181,10 @@ def test_own_numbers_reach_robot_recording_and_table(robot, short, tmp_path, cap
 def test_yes_skips_the_question_before_a_real_arm_moves(robot, short, tmp_path, monkeypatch):
     robot.serial = "2017355123"
 
-    def answer(question, abort):
+    def answer(question):
         raise AssertionError("asked")
 
-    monkeypatch.setattr(typer, "confirm", answer)
+    monkeypatch.setattr("builtins.input", answer)
     assert cli.run(["run", short, "--robot", "192.0.2.7", "--yes", "--out", str(tmp_path / "out")]) == 0
     assert robot.programs
 
@@ -211,20 +210,20 @@ def test_a_real_arm_does_not_move_before_the_answer(robot, tmp_path, capsys, mon
     robot.serial = "2017355123"
     asked = []
 
-    def answer(question, abort):
+    def answer(question):
         asked.append(question)
         assert robot.programs == []
         assert set(robot.closed) == set(robot.pipes)
-        raise typer.Abort
+        return "n"
 
-    monkeypatch.setattr(typer, "confirm", answer)
+    monkeypatch.setattr("builtins.input", answer)
     code = cli.run(["run", "uniform_4_1", "--robot", "192.0.2.7", "--out", str(tmp_path / "out")])
     assert code == 1
     assert len(asked) == 1
     assert robot.programs == []
     assert not (tmp_path / "out").exists()
     told = capsys.readouterr()
-    assert told.err.splitlines()[-1] == "ur-client: aborted"
+    assert told.err.splitlines()[-1] == "ur-client: the arm was not moved: the answer was no"
     asked_about = ("UR3, software 3.15.8", "speed slider", "TCP offset", "box of motion", "joint range")
     for words in (*asked_about, "top TCP speed", "top joint speed", "duration"):
         assert words in told.out

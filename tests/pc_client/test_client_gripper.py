@@ -1,5 +1,9 @@
 """The client's gripper: against the port of a box, and against one that answers as it likes."""
 
+import math
+import threading
+
+import numpy as np
 import pytest
 
 import pc_client as ur
@@ -51,6 +55,122 @@ def test_an_arm_has_the_gripper_that_it_was_given(box):
     box.run_program("def off():\n  set_tool_voltage(0)\nend\n", wait=True)
     with pytest.raises(ClientError, match="has no power: 24 V at the tool"):
         arm.gripper.open()
+
+
+@pytest.fixture
+def arm_with_hand(box):
+    box.run_program(SETTINGS, wait=True)
+    arm = ur.connect(box.host, box.ports, tool="robotiq-2f85")
+    arm.gripper.open()
+    return arm
+
+
+SWING = 3.0  # s
+
+
+def swing(command, seen):
+    """A law that swings the base for 3 s, calls a command once at 1 s, and keeps what it gives."""
+
+    def law(frame, reference=None):
+        t = frame.timestamp - started[0] if started else 0.0
+        started.append(frame.timestamp)
+        if t > 1.0 and not seen:
+            seen.append("called")
+            seen.append(command())
+        if reference is not None:
+            return reference.qd_feedforward
+        return [0.05 * math.sin(2.0 * math.pi * t / SWING), 0, 0, 0, 0, 0] if t < SWING else None
+
+    started = []
+    return law
+
+
+def in_a_thread(act):
+    def begin():
+        thread = threading.Thread(target=act)
+        thread.start()
+        return thread
+
+    return begin
+
+
+@pytest.mark.parametrize("how", ["inline", "thread"])
+@pytest.mark.parametrize("motion", ["stream", "run"])
+def test_fingers_move_while_a_law_drives_the_arm_and_the_arm_goes_on(arm_with_hand, how, motion):
+    arm, hand, seen = arm_with_hand, arm_with_hand.gripper, []
+    hand.speed = 0.15
+
+    def close():
+        hand.move(0.01)
+        return hand.width  # asked of the same connection: its answer comes after that to the command
+
+    law = swing(close if how == "inline" else in_a_thread(close), seen)
+    if motion == "stream":
+        signals = arm.stream(law)
+        assert np.ptp(signals.t) == pytest.approx(SWING, abs=0.1)
+    else:
+        signals = arm.run(ur.Movement.through([(0.45, -0.15, 0.35), (0.5, 0.0, 0.4)], durations=[SWING]), law)
+    assert (signals.stream.late_frames, signals.stream.stops) == (0, [])
+    if how == "thread":
+        seen[1].join()
+    else:
+        assert seen[1] > 0.08  # they had not begun to move
+    assert hand.width == pytest.approx(0.01, abs=0.0005)
+
+
+def test_in_real_time_a_law_that_commands_the_fingers_does_not_make_the_arm_stop(ur_box_factory):
+    box = ur_box_factory(robot="ur5e", tool="robotiq-2f85", pace="realtime")
+    box.run_program(SETTINGS, wait=True)
+    arm = ur.connect(box.host, box.ports, tool="robotiq-2f85")
+    arm.gripper.open()
+    seen = []
+    assert np.ptp(arm.stream(swing(arm.gripper.close, seen)).t) == pytest.approx(SWING, abs=0.1)
+    assert seen == ["called", None]
+    assert arm.gripper.width == 0.0
+
+
+def test_in_a_rehearsal_no_finger_moves_and_each_command_of_a_law_counts(arm_with_hand):
+    arm, hand, calls = arm_with_hand, arm_with_hand.gripper, []
+
+    def law(frame, reference):
+        calls.append(hand.width)
+        hand.close()
+        return [9.0] * 6  # the first command is refused
+
+    with pytest.raises(ClientError, match="not safe to send"):
+        arm.run(ur.Movement.through([(0.45, -0.15, 0.35), (0.5, 0.0, 0.4)]), law)
+    assert (calls, hand.width) == ([HAND.stroke], HAND.stroke)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda box: None, "the Robotiq 2F-85 is not active: open it before the law runs"),
+        (
+            lambda box: box.run_program("def off():\n  set_tool_voltage(0)\nend\n", wait=True),
+            "has no power: 24 V at the tool",
+        ),
+    ],
+)
+def test_fingers_that_cannot_move_are_refused_when_a_law_moves_them_and_not_before(box, spoil, said):
+    box.run_program(SETTINGS, wait=True)
+    arm = ur.connect(box.host, box.ports, tool="robotiq-2f85")
+    spoil(box)
+    assert len(arm.stream(swing(lambda: None, [])).t) > 100
+    with pytest.raises(ClientError, match=said) as caught:
+        arm.stream(swing(arm.gripper.close, []))
+    assert "\n" not in str(caught.value)
+    assert "recorded until then" in caught.value.__notes__[0]
+
+
+def test_a_person_is_asked_once_for_a_law_with_its_fingers(arm_with_hand, monkeypatch):
+    asked = []
+    monkeypatch.setattr(ur.Arm, "simulated", None)
+    arm = arm_with_hand
+    arm._confirm = lambda text: not asked.append(text)
+    arm.stream(swing(arm.gripper.close, []))
+    (text,) = asked
+    assert "a velocity law drives arm and fingers at" in text
 
 
 def test_a_person_is_asked_before_fingers_of_an_arm_that_may_be_real(box, monkeypatch):
@@ -197,6 +317,24 @@ def test_a_gripper_that_does_not_do_it_is_one_line(software, values, said):
     with pytest.raises(DriverError, match=said) as refused:
         hand().open()
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("becomes", "said"),
+    [({"values": {"FLT": 14}}, r"reports fault 14 \(OVER_CURRENT\)"), ({"answer": b""}, "does not answer")],
+)
+def test_what_comes_of_the_commands_of_a_law_is_told_when_it_has_ended(software, becomes, said):
+    software.values.update(STA=3, ACT=1)
+
+    def drive():
+        with gripper.beside_law():
+            gripper.close()
+            software.values.update(becomes.get("values", {}))
+            software.answer = becomes.get("answer")
+
+    gripper = hand()
+    with pytest.raises(DriverError, match=said):
+        drive()
 
 
 def test_a_fault_is_named(software):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from control_loop import PERIOD, DelayedArm
+from control_loop import PERIOD, DelayedArm, recipe
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,7 +25,7 @@ Q0 = np.array((0.4, -1.7, -2.1, -0.1, 1.3, 1.9))
 
 def commands(pulse):
     """Stamps and what the driver sends for the excitation, one row a cycle."""
-    table = ReferenceTable(Excitation(Q0, pulse), period=PERIOD, lead=0.1, settle=0.3, lookahead=0.0)
+    table = ReferenceTable(Excitation(Q0, pulse), recipe(0.0), lead=0.1, settle=0.3)
     sent = table.commands()
     return np.arange(len(sent)) * PERIOD, sent
 
@@ -152,7 +152,7 @@ def test_an_arm_that_does_something_else_cannot_be_separated():
 def test_feedforward_with_lag_is_what_the_lag_undoes():
     """Sent through the lag, qd + lag qdd comes out as qd: the joint is where it should be."""
     lag, excite = 0.02, Excitation(np.zeros(6), 0.4)
-    table = ReferenceTable(excite, period=PERIOD, lead=0.1, settle=0.4, lookahead=0.0, lag=lag)
+    table = ReferenceTable(excite, recipe(0.0, lag), lead=0.1, settle=0.4)
     arm = DelayedArm(np.zeros(6), lag=lag)
     plain = DelayedArm(np.zeros(6), lag=lag)
     errors = []

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from control_loop import PERIOD, DelayedArm
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pc_client.control.gear import LARGEST_SLOPE, ORDERS, GearModel, GearObserver, MotorReference, find_waves
+from pc_client.control.controller import CONTROLLERS
+from pc_client.control.gear import LARGEST_SLOPE, ORDERS, GearModel, GearObserver, find_waves
 from pc_client.control.identification import Excitation
 from pc_client.control.learning import (
-    LearningBounds,
     LearningFilter,
     RunSignals,
     bounded,
@@ -20,10 +22,10 @@ from pc_client.control.learning import (
     noise_share_below,
 )
 from pc_client.control.loop import LoopModel, frequency_response, sensitivity, velocity_response
+from pc_client.control.reference import RunRecipe
 
 LOOP = LoopModel(0.022, 0.010, 0.002, 0.0)
-GAINS = {"learning_gain": 0.8, "gain_p": 5.0, "gain_i": 3.0}
-BOUNDS = LearningBounds(0.2, 20.0)
+BEST = CONTROLLERS["best"]
 QUIET = (0.1, 0.15)
 N = 400
 
@@ -57,34 +59,39 @@ def rms(error):
 @pytest.mark.parametrize("real", [(3, 0.010), (2, 0.014), (3, 0.006)])
 def test_what_repeats_is_gone_after_a_few_runs(real):
     loop = LoopModel(0.023, 0.010, 0.004, 0.0)  # not quite any of them
-    weight = design_filter(loop, PERIOD, **GAINS)
+    weight = design_filter(RunRecipe(BEST, loop, PERIOD))
     assert weight.contraction < 1.0
     learned, errors = None, []
     for _ in range(4):
         run = run_once(learned, real)
         errors.append(rms(run.error))
-        learned = learn(run, loop, weight, 0.8, BOUNDS, QUIET, PERIOD)
+        learned = learn(run, RunRecipe(BEST, loop, PERIOD), weight)
     assert errors[1] < 0.5 * errors[0]
     assert errors[2] < 0.2 * errors[0]
     assert errors[3] < 1.05 * errors[2]
 
 
 def test_nothing_is_added_where_the_arm_rests():
-    weight = design_filter(LOOP, PERIOD, **GAINS)
+    weight = design_filter(RunRecipe(BEST, LOOP, PERIOD))
     random = np.random.default_rng(0)
-    learned = learn(run_once(None, (3, 0.008), random), LOOP, weight, 0.8, BOUNDS, QUIET, PERIOD)
+    learned = learn(run_once(None, (3, 0.008), random), RunRecipe(BEST, LOOP, PERIOD), weight)
     assert not learned[: int(QUIET[0] / PERIOD)].any()
     assert not learned[N - int(QUIET[1] / PERIOD) :].any()
     assert learned[60:300].any()
 
 
 def test_noise_that_is_learned_costs_what_the_filter_says():
-    weight = design_filter(LOOP, PERIOD, **GAINS)
+    weight = design_filter(RunRecipe(BEST, LOOP, PERIOD))
     assert weight.limited_by == "noise"
     random = np.random.default_rng(1)
     noise = random.normal(0.0, 1.5e-5, (N, 6))
     # A run without disturbance, of which only noise is learned, seen again by the same loop without noise.
-    learned = learn(RunSignals(noise, 0 * noise), LOOP, weight, 1.0, BOUNDS, (0.0, 0.0), PERIOD)
+    learned = learn(
+        RunSignals(noise, 0 * noise),
+        RunRecipe(replace(BEST, learning_gain=1.0), LOOP, PERIOD),
+        weight,
+        (0.0, 0.0),
+    )
     arm = DelayedArm(np.zeros(6), cycles=0, lag=LOOP.lag)
     q = []
     for row in learned:
@@ -105,7 +112,7 @@ def test_noise_that_is_learned_costs_what_the_filter_says():
 @settings(max_examples=40)
 def test_contraction_holds_for_every_loop_within_the_spread(dead_time, lag, spread, share, late):
     loop = LoopModel(dead_time, lag, spread, 0.0)
-    promised = design_filter(loop, PERIOD, **GAINS)
+    promised = design_filter(RunRecipe(BEST, loop, PERIOD))
     shift = late * spread
     inside = LoopModel(max(dead_time + (1 - share) * shift, 0.0), max(lag + share * shift, 0.0), 0.0, 0.0)
     hertz = np.linspace(0.5, 60, 100)
@@ -115,8 +122,8 @@ def test_contraction_holds_for_every_loop_within_the_spread(dead_time, lag, spre
 
 
 def test_a_loop_that_is_known_badly_is_learned_at_low_frequencies_only():
-    good = design_filter(LoopModel(0.02, 0.01, 0.0005, 0.0), PERIOD, **GAINS)
-    bad = design_filter(LoopModel(0.02, 0.01, 0.01, 0.0), PERIOD, **GAINS)
+    good = design_filter(RunRecipe(BEST, LoopModel(0.02, 0.01, 0.0005, 0.0), PERIOD))
+    bad = design_filter(RunRecipe(BEST, LoopModel(0.02, 0.01, 0.01, 0.0), PERIOD))
     assert (good.limited_by, bad.limited_by) == ("noise", "loop")
     assert bad.cut_off < 0.5 * good.cut_off
     # |1 - exp(-j w 10 ms)| = 0.5 at w = 2 asin(0.25) / 10 ms
@@ -142,15 +149,18 @@ def test_share_of_differenced_noise():
 @given(seed=st.integers(0, 99), size=st.floats(0.01, 100.0))
 def test_bounds_hold_whatever_was_measured(seed, size):
     wild = size * np.random.default_rng(seed).normal(size=(200, 6))
-    kept = bounded(wild, BOUNDS, PERIOD)
-    assert np.abs(kept).max() <= BOUNDS.speed
-    assert np.abs(np.diff(kept, axis=0, prepend=0 * kept[:1])).max() <= BOUNDS.acceleration * PERIOD + 1e-12
+    kept = bounded(wild, BEST, PERIOD)
+    assert np.abs(kept).max() <= BEST.learning_speed
+    assert (
+        np.abs(np.diff(kept, axis=0, prepend=0 * kept[:1])).max()
+        <= BEST.learning_acceleration * PERIOD + 1e-12
+    )
 
 
 def test_what_keeps_the_bounds_is_not_changed():
     t = np.arange(300) * PERIOD
     gentle = 0.1 * np.sin(2 * np.pi * 3 * t)[:, None] * np.ones(6)
-    np.testing.assert_allclose(bounded(gentle, BOUNDS, PERIOD), gentle)
+    np.testing.assert_allclose(bounded(gentle, BEST, PERIOD), gentle)
 
 
 TURNS = np.array([101.0, 80.0, 120.0, 50.0, 101.0, 160.0])  # of each motor in a turn of its joint
@@ -251,15 +261,17 @@ def test_a_wave_too_large_for_a_gear_is_left_out():
 
 def test_motors_that_are_sent_against_the_waves_leave_the_joints_on_their_reference():
     gear, joints = true_gear(), Excitation((0.3, -1.0, 1.2, 0.1, 0.5, -0.7))
-    motors = MotorReference(joints, gear)
-    assert motors.duration == joints.duration
+
+    def motors_at(t):
+        return gear.motors(*map(np.asarray, joints.at(t)))
+
     for t in np.linspace(0.01, joints.duration - 0.01, 50):
         q, qd = (np.asarray(x) for x in joints.at(t))
-        motor, motor_qd = motors.at(t)
+        motor, motor_qd = motors_at(t)
         error, slope = gear.error(motor)
         # left is e of e, a hundredth of the wave
         np.testing.assert_allclose(motor + error, q, atol=3e-6)
         np.testing.assert_allclose(motor_qd * (1 + slope), qd, atol=1e-3)
-        later = motors.at(t + 1e-6)[0]
+        later = motors_at(t + 1e-6)[0]
         np.testing.assert_allclose((later - motor) / 1e-6, motor_qd, atol=1e-4)
-    assert np.abs(np.asarray(motors.at(0.1)[0]) - np.asarray(joints.at(0.1)[0])).max() > 5e-5
+    assert np.abs(np.asarray(motors_at(0.1)[0]) - np.asarray(joints.at(0.1)[0])).max() > 5e-5

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from control_loop import PERIOD, Ramp
+from control_loop import PERIOD, Ramp, recipe
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -40,10 +40,7 @@ REFERENCES = {
     "excitation": Excitation(POSTURE.tolist()),
     "wrist 3 alone": Ramp([0, 0, 0, 0, 0, 1.0], DURATION, POSTURE),
 }
-TABLES = {
-    name: ReferenceTable(reference, period=PERIOD, lead=LEAD, settle=SETTLE)
-    for name, reference in REFERENCES.items()
-}
+TABLES = {name: ReferenceTable(reference, recipe()) for name, reference in REFERENCES.items()}
 GUARDS = {name: ToolGuard(table, UR3, ALLOWED, ALLOWED_ANGLE) for name, table in TABLES.items()}
 
 names = st.sampled_from(list(REFERENCES))

@@ -24,13 +24,15 @@ from pc_client.driver.watchdog import (
     speed_slider,
 )
 from pc_client.errors import CellError
-from pc_client.experiment.experiment import experiment_text, load_movements
+from pc_client.experiment.experiment import experiment_text
 from pc_client.experiment.preflight import operational_mode, payload, tcp_offset
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.model import robot_model
 from pc_client.kinematics.tool import surroundings
+from pc_client.movements.movement import load_motion
 from pc_client.planning.approach import approach_text, plan_approach
 from pc_client.planning.limits import limits_of
+from protocol.primary.layout import RobotModeData
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_hil.cell import load_cell, parse_cell
 
@@ -89,7 +91,7 @@ def conditions():
         operational_mode(report, model),
         robot_mode(frame),
         program_state(frame),
-        speed_slider(0.5),
+        speed_slider(RobotModeData(target_speed_fraction=0.5)),
         speed_scaling(frame),
         tcp_offset(report, model),
         payload(report, model),
@@ -174,7 +176,7 @@ def test_the_cell_of_the_page_is_one():
 
 
 def test_the_plan_of_the_page_is_the_clients(tmp_path):
-    experiment = prepare_experiment(load_movements(["lognorm_4_1"]), repeat=1, out=tmp_path, cell=CELL)
+    experiment = prepare_experiment([load_motion("lognorm_4_1")], repeat=1, out=tmp_path, cell=CELL)
     assert experiment_text(experiment) in PAGE
     q_now = np.radians((22.6, -101.1, -120.3, -5.9, 74.2, 106.4))
     way = plan_approach(experiment.planned[0].joints, q_now, model=experiment.model)

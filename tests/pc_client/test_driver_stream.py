@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from control_loop import Ramp
+from control_loop import Ramp, recipe
 from fake_robot import PERIOD, FakeRobot
 
 from pc_client.control.controller import CONTROLLERS
@@ -26,10 +26,7 @@ CONFIG = CONTROLLERS["preview"]
 
 
 def tracker(duration=0.4, qd=0.1):
-    reference = ReferenceTable(
-        Ramp([qd] * 6, duration), period=PERIOD, lead=0.2, settle=0.3, lookahead=3 * PERIOD
-    )
-    return Tracker(reference, CONFIG, UR3)
+    return Tracker(ReferenceTable(Ramp([qd] * 6, duration), recipe(3 * PERIOD)), CONFIG, UR3)
 
 
 class Rows(list):
@@ -85,7 +82,6 @@ def test_heartbeats_are_neither_answered_nor_logged():
     report, rows = stream(robot)
     stamps = [stamp for stamp, _ in rows]
     assert len(set(stamps)) == len(stamps) == len(velocities(robot))
-    assert report.heartbeats >= len(rows)
     assert report.lost_frames == 0
 
 
@@ -93,8 +89,8 @@ def test_a_robot_that_repeats_a_frame_now_and_then_is_followed():
     def repeat(robot):
         robot.pipes["realtime"].incoming.append(robot.frame())
 
-    report, _ = stream(FakeRobot(lockstep=False, on_tick=spoil_at(1050, repeat)))
-    assert report.heartbeats == 1
+    report, rows = stream(FakeRobot(lockstep=False, on_tick=spoil_at(1050, repeat)))
+    assert report.n_commands == len(rows)
     assert report.lost_frames == 0
 
 
@@ -187,6 +183,63 @@ def test_what_goes_wrong_ends_the_run_with_one_line_and_a_stopped_arm(action, er
     assert "reverse" in robot.closed
 
 
+def held_up(every, cycles):
+    """Each so many ticks the frames of so many cycles come together: the client had no time."""
+
+    def on_tick(robot):
+        if robot.program == "receiver" and robot.tick % every == 0:
+            robot.hold = cycles
+
+    return on_tick
+
+
+@pytest.mark.parametrize(("cycles", "stops"), [(0, 0), (2, 0), (3, 1), (40, 1)])
+def test_a_silence_in_which_the_robots_program_begins_to_stop_the_arm_is_counted(cycles, stops):
+    report, _ = stream(FakeRobot(lockstep=False, on_tick=spoil_at(1040, set_to(hold=cycles))))
+    assert report.late_frames == cycles
+    assert len(report.stops) == stops
+    assert bool(report.trouble) == (cycles > 5 or stops > 0)
+    assert (f"went on {stops} times; beside" in report.trouble) == bool(report.trouble)
+
+
+def test_an_arm_that_stops_and_goes_all_the_time_is_stopped():
+    robot = FakeRobot(lockstep=False, on_tick=held_up(10, 4))
+    with pytest.raises(
+        DriverError, match=r"stopped and went on 10 times; .*: give this computer less to do"
+    ) as caught:
+        stream(robot, tracker(duration=4.0))
+    assert "\n" not in str(caught.value)
+    assert robot.at_rest
+    report, _ = stream(FakeRobot(lockstep=False, on_tick=held_up(100, 4)), tracker(duration=9.0, qd=0.01))
+    assert len(report.stops) > 10  # but seldom
+
+
+def test_the_time_for_a_command_is_measured_and_a_law_that_hangs_is_named():
+    def slow(robot, seconds):
+        def work(step):
+            robot.clock += seconds
+            robot.hold = round(seconds / PERIOD) - 1
+            return step
+
+        return work
+
+    robot = FakeRobot(lockstep=False)
+    report, _ = stream(robot, Spoilt(slow(robot, 0.024)))
+    assert report.slowest_command == report.computing_time == pytest.approx(0.024)
+    robot = FakeRobot(lockstep=False)
+    with pytest.raises(
+        DriverError, match=r"no command for .* law took 0\.60 s to compute one, or this computer"
+    ):
+        stream(robot, Spoilt(slow(robot, 0.6)))
+    assert robot.at_rest
+    robot = FakeRobot(lockstep=False)
+    always = Spoilt(None, after=math.inf)
+    always.answer = lambda frame: slow(robot, 0.04)(always.inner.answer(frame))
+    with pytest.raises(DriverError, match=r"10 times; .* took 40\.0 ms to compute, .*: make the law faster"):
+        stream(robot, always)
+    assert robot.at_rest
+
+
 def test_the_frames_of_a_freeze_are_recorded_before_the_run_ends():
     rows = Rows()
     with pytest.raises(DriverError, match="no command for"):
@@ -270,7 +323,7 @@ class Spoilt:
 
     def __init__(self, act, after=60):
         self.inner, self.act, self.left = tracker(), act, after
-        self.check_report = self.inner.check_report
+        self.check_report, self.observe = self.inner.check_report, self.inner.observe
 
     def answer(self, frame):
         self.left -= 1
@@ -319,6 +372,29 @@ def test_when_the_stop_word_does_not_help_a_stop_program_is_sent():
         stream(robot, Spoilt(fail))
     assert robot.programs[-1] == "def ur_client_stop():\n  stopj(20.0)\nend\n"
     assert robot.at_rest
+
+
+@pytest.mark.parametrize(
+    "error", [TimeoutError, OSError(9, "bad"), ValueError("closed"), DriverError("gone")]
+)
+def test_whatever_a_socket_raises_the_other_way_to_stop_is_tried_and_a_person_is_told(error):
+    """First only the way back fails; then the second way as well."""
+    for fails, n_notes in ((("reverse",), 0), (("reverse", "secondary"), 1)):
+        robot = FakeRobot(lockstep=False)
+        take = robot.took
+
+        def took(pipe, data, robot=robot, take=take, fails=fails):
+            if robot.tick >= 1040 and pipe.kind in fails:
+                raise error
+            take(pipe, data)
+
+        robot.took = took
+        with pytest.raises(type(error) if isinstance(error, Exception) else error) as caught:
+            stream(robot)
+        notes = getattr(caught.value, "__notes__", [])
+        assert len(notes) == n_notes
+        assert all("PRESS THE EMERGENCY STOP" in note for note in notes)
+        assert robot.at_rest == (not n_notes)
 
 
 def test_a_row_sink_that_fails_ends_the_run():

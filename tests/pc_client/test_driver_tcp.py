@@ -55,6 +55,47 @@ def test_clean_end_of_stream(pair):
     assert ours.receive(1.0) == b""
 
 
+class Scripted:
+    """A socket that takes so many bytes at a time; None: its buffer is full."""
+
+    def __init__(self, real, takes):
+        self.real, self.takes, self.taken = real, list(takes), b""
+        self.fileno, self.close = real.fileno, real.close
+
+    def send(self, data):
+        n = self.takes.pop(0)
+        if n is None:
+            raise BlockingIOError
+        self.taken += bytes(data[:n])
+        return n
+
+
+@pytest.mark.parametrize(
+    "takes", [[28], [None, 28], [10, None, 18], [10, None, None, 5, 13], [None, 1, None, 27]]
+)
+def test_every_byte_is_sent_once_however_the_system_takes_them(pair, takes):
+    ours, _ = pair
+    ours._socket = scripted = Scripted(ours._socket, takes)
+    message = bytes(range(28))
+    ours.send(message)
+    assert scripted.taken == message
+
+
+def test_a_peer_that_takes_nothing_is_one_line_and_gets_nothing_after_half_a_message(pair, monkeypatch):
+    ours, theirs = pair
+    monkeypatch.setattr(transport, "_SEND_TIMEOUT", 0.01)
+    with pytest.raises(DriverError, match=r"cannot send, the other end took nothing for 0\.01 s"):
+        ours.send(bytes(1 << 24))
+    with pytest.raises(DriverError):
+        ours.send(b"stop")
+    with pytest.raises(DriverError):
+        ours.receive(0.0)
+    taken = b""
+    while data := theirs.recv(1 << 20):
+        taken += data
+    assert not taken.strip(b"\0")  # of the first message only, then the end
+
+
 def test_connection_refused_names_address_and_cure():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]

@@ -15,13 +15,14 @@ from pc_client.control.controller import CONTROLLERS
 from pc_client.control.gear import GearModel
 from pc_client.control.learning import design_filter
 from pc_client.control.loop import LoopModel
-from pc_client.control.reference import ReferenceTable
+from pc_client.control.reference import ReferenceTable, RunRecipe
 from pc_client.driver.session import UrDriver
-from pc_client.driver.velocity_stream import StreamReport
+from pc_client.driver.velocity_stream import StreamLog, StreamReport
 from pc_client.errors import DriverError
-from pc_client.experiment.checks import LEAD, SETTLE, broken_limit
+from pc_client.experiment import checks, runner
+from pc_client.experiment.checks import broken_limit
 from pc_client.experiment.identification import learning_filter
-from pc_client.experiment.repetitions import Repetitions, RunLog
+from pc_client.experiment.repetitions import Repetitions
 from pc_client.experiment.runner import ExperimentRunner
 from pc_client.movements.movement import Movement, load_movement
 from pc_client.planning.plan import plan_movement
@@ -100,6 +101,22 @@ def test_facts_of_the_loop_go_with_the_recording(two, tmp_path, lockstep):
     assert recording.provenance.controller_config["uses_ilc"] is True
 
 
+@pytest.mark.parametrize(
+    "changes", [{}, {"uses_ilc": True}, {"compensates_gear": True}, {"compensates_lag": True}]
+)
+def test_the_guard_is_made_for_the_reference_that_runs(two, tmp_path, monkeypatch, changes):
+    predicted, followed = [], []
+
+    def spy(known, kind):
+        return lambda table, *others: known.append(table.commands()) or kind(table, *others)
+
+    monkeypatch.setattr(checks, "ToolGuard", spy(predicted, checks.ToolGuard))
+    monkeypatch.setattr(runner, "Tracker", spy(followed, runner.Tracker))
+    one = replace(two, planned=two.planned[:1], repeat=1)
+    run(WavyRobot(), one, tmp_path, replace(CONTROLLERS["preview"], **changes))
+    np.testing.assert_array_equal(predicted[-1], followed[-1])
+
+
 def test_preview_neither_learns_nor_separates_lag_from_delay(two, tmp_path):
     short = replace(two, planned=two.planned[:1], repeat=2)
     report, recordings = run(WavyRobot(), short, tmp_path, CONTROLLERS["preview"])
@@ -134,15 +151,15 @@ def test_a_run_that_is_not_clean_teaches_no_command(two, tmp_path, attribute, co
     assert speed_error(recordings[2]) < 0.6 * speed_error(recordings[0])
 
 
+RECIPE = RunRecipe(BEST, LOOP, PERIOD)
+
+
 def commands_of(plan):
-    table = ReferenceTable(
-        plan.spline, period=PERIOD, lead=LEAD, settle=SETTLE, lookahead=LOOP.dead_time, lag=LOOP.lag
-    )
-    return table, table.commands()
+    return ReferenceTable(plan.spline, RECIPE).commands()
 
 
 def test_a_plan_itself_keeps_the_limits(two, plan):
-    assert broken_limit(plan, commands_of(plan)[1], None, two.model, BEST, PERIOD) == ""
+    assert broken_limit(plan, commands_of(plan), RECIPE, two.model) == ""
 
 
 @pytest.mark.parametrize(
@@ -156,54 +173,57 @@ def test_a_plan_itself_keeps_the_limits(two, plan):
     ],
 )
 def test_commands_that_break_a_limit_are_named(two, plan, spoil, words):
-    assert words in broken_limit(plan, spoil(commands_of(plan)[1]), None, two.model, BEST, PERIOD)
+    assert words in broken_limit(plan, spoil(commands_of(plan)), RECIPE, two.model)
 
 
 def test_a_learned_displacement_is_limited(two, plan):
-    _, commands = commands_of(plan)
+    commands = commands_of(plan)
     learned = np.full_like(commands, 0.06 / (len(commands) * PERIOD))
-    assert "learned displacement" in broken_limit(plan, commands, learned, two.model, BEST, PERIOD)
-    assert broken_limit(plan, commands, 0.5 * learned, two.model, BEST, PERIOD) == ""
+    assert "learned displacement" in broken_limit(plan, commands, replace(RECIPE, learned=learned), two.model)
+    assert broken_limit(plan, commands, replace(RECIPE, learned=0.5 * learned), two.model) == ""
+
+
+def memory_of(experiment):
+    return Repetitions(RECIPE, learning_filter(RECIPE), experiment.model)
 
 
 def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
-    gear = WavyRobot.gear
-    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
+    gear, plain = WavyRobot.gear, commands_of(plan)
+    memory, tcp = memory_of(two), two.planned[0].movement
     memory.renew(lambda: gear)
-    table, commands = commands_of(plan)
-    assert memory.may_use(plan, table)
-    memory.learned = np.full_like(commands, 0.19)
+    assert 0.0 < np.abs(memory.table(plan, tcp).commands() - plain).max() < 0.1
+    memory.recipe = replace(memory.recipe, learned=np.full_like(plain, 0.19))
     memory.learned_from = 1
-    assert not memory.may_use(plan, table)
-    assert (memory.learned, memory.learned_from, memory.gear) == (None, 0, None)
+    np.testing.assert_array_equal(memory.table(plan, tcp).commands(), plain)
+    assert (memory.recipe, memory.learned_from) == (RECIPE, 0)
     assert "learned displacement" in memory.remarks[0]
     memory.renew(lambda: gear)
-    assert memory.gear is None  # refused for the rest of this movement
+    assert memory.recipe.gear is None  # refused for the rest of this movement
 
 
 def test_gears_are_renewed_unless_something_was_learned_with_them(two):
-    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
+    memory = memory_of(two)
     memory.renew(lambda: None)
-    assert memory.gear is None
+    assert memory.recipe.gear is None
     memory.renew(lambda: WavyRobot.gear)
-    memory.learned = np.zeros((10, 6))
+    memory.recipe = replace(memory.recipe, learned=np.zeros((10, 6)))
     memory.renew(lambda: None)
-    assert memory.gear is WavyRobot.gear
+    assert memory.recipe.gear is WavyRobot.gear
     memory.forget("run 2 had a late frame")
     memory.renew(lambda: None)
-    assert memory.gear is None
+    assert memory.recipe.gear is None
 
 
 def log_of(slow, fast):
     """A run of 4 s, from rest to rest, whose joints swing about the reference by so much at 10 and 50 Hz [rad]."""
-    log = RunLog()
+    log = StreamLog()
     for k in range(500):
         t = k * PERIOD
         swing = slow * math.sin(20.0 * math.pi * t) + fast * math.sin(100.0 * math.pi * t)
         q = [math.sin(math.pi * t / 4.0) ** 2 * swing] * 6
         frame = SimpleNamespace(actual_q=np.array(q))
-        point = SimpleNamespace(q=(0.0,) * 6, qd_feedforward=(0.0,) * 6)
-        log.append(frame, SimpleNamespace(t=t - 0.2, point=point, qd_cmd=[0.0] * 6))
+        point = SimpleNamespace(q=(0.0,) * 6, qd_feedforward=np.zeros(6))
+        log(frame, SimpleNamespace(t=t - 0.2, point=point, qd_cmd=[0.0] * 6))
     return log
 
 
@@ -217,9 +237,9 @@ def log_of(slow, fast):
     ids=["better", "worse", "worse where nothing is learned"],
 )
 def test_learning_ends_when_it_makes_a_run_worse(two, slow, fast, learned_from):
-    memory = Repetitions(BEST, LOOP, learning_filter(BEST, LOOP, PERIOD), two.model, PERIOD)
+    memory = memory_of(two)
     for n in range(3):
-        memory.take(n + 1, log_of(slow[n], fast[n]), StreamReport(), 0.2, 0.3)
+        memory.take(n + 1, log_of(slow[n], fast[n]), StreamReport())
     assert memory.learned_from == learned_from
     worse = [remark for remark in memory.remarks if "was worse than the one before" in remark]
     assert len(worse) == (learned_from == 0)
@@ -228,8 +248,8 @@ def test_learning_ends_when_it_makes_a_run_worse(two, slow, fast, learned_from):
 def test_learning_that_might_not_converge_is_refused():
     nervous = replace(BEST, gain_p=30.0, gain_i=60.0, learning_gain=0.3)
     loop = LoopModel(0.03, 0.01, 0.004, 0.0)
-    weight = design_filter(loop, PERIOD, learning_gain=0.3, gain_p=30.0, gain_i=60.0)
+    weight = design_filter(RunRecipe(nervous, loop, PERIOD))
     assert weight.contraction >= 1.0
     with pytest.raises(DriverError, match="would not converge"):
-        learning_filter(nervous, loop, PERIOD)
-    assert learning_filter(CONTROLLERS["preview"], loop, PERIOD) is None
+        learning_filter(RunRecipe(nervous, loop, PERIOD))
+    assert learning_filter(RunRecipe(CONTROLLERS["preview"], loop, PERIOD)) is None

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from pc_client.driver.questions import RtdeAnswer, ask_rtde
 from pc_client.driver.report import read_report
 from pc_client.driver.session import UrDriver
-from pc_client.driver.watchdog import conditions_text
+from pc_client.driver.watchdog import conditions_text, refusal, require
 from pc_client.errors import DriverError
-from pc_client.experiment.preflight import model_of, preflight, refusal, require
+from pc_client.experiment.preflight import model_of, preflight
 from pc_client.kinematics.model import robot_model
 from protocol.primary.layout import ConfigurationData, KinematicsInfo
 from protocol.primary.messages import encode_message, version_message
@@ -46,7 +46,7 @@ def failing(fake, model=UR3):
 
 def test_a_robot_as_it_must_be_passes_every_condition():
     conditions = preflight(report(robot()), UR3)
-    assert len(conditions) == 12
+    assert len(conditions) == 13
     assert all(condition.holds for condition in conditions)
     assert refusal(conditions) == ""
     require(conditions)
@@ -58,7 +58,7 @@ def test_a_session_reports_what_a_fresh_connection_does():
         said = driver.report()
     fresh = report(fake)
     assert said.frame.values.tolist() == fresh.frame.values.tolist()
-    for name in ("info", "configured", "slider", "tcp_offset", "payload"):
+    for name in ("info", "configured", "mode", "tcp_offset", "payload"):
         assert getattr(said, name) == getattr(fresh, name)
 
 
@@ -220,9 +220,9 @@ def test_what_a_robot_does_not_report_is_neither_passed_nor_refused():
     fake.state = encode_state([ConfigurationData(robot_type=RobotType.UR3)], fake.version)
     conditions = preflight(report(fake), UR3)
     unreported = {condition.name for condition in conditions if condition.holds is None}
-    assert unreported == {"speed slider", "TCP offset", "payload", "RTDE"}
+    assert unreported == {"control mode", "speed slider", "TCP offset", "payload", "RTDE"}
     assert refusal(conditions) == ""
-    assert conditions_text(conditions).count("not reported") == 4
+    assert conditions_text(conditions).count("not reported") == 5
 
 
 def test_an_arm_that_is_not_reported_cannot_be_compared():

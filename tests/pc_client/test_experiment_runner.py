@@ -28,13 +28,12 @@ from pc_client.errors import (
 )
 from pc_client.experiment.experiment import (
     clear_folder,
-    load_movements,
     scratch_folder,
 )
 from pc_client.experiment.identification import identify
 from pc_client.experiment.runner import ExperimentRunner, run_approach
 from pc_client.kinematics.model import robot_model
-from pc_client.movements.movement import Movement
+from pc_client.movements.movement import Movement, load_motion
 from pc_client.planning.approach import Approach
 from pc_client.recording.recorder import Recorder
 from pc_client.recording.recording import load_recording
@@ -43,24 +42,6 @@ from protocol.velocity_stream import VelocityMode
 from ur_hil.cell import Cell, Wall
 
 POSTURE = [0.4, -1.77, -2.1, -0.1, 1.3, 1.86]
-
-
-class Notes(list):
-    def connected(self, info):
-        self.append("connected")
-
-    def approaching(self, approach):
-        self.append("approaching")
-
-    def identified(self, estimate):
-        self.append("identified")
-        self.delay = estimate.delay
-
-    def running(self, name, repetition):
-        self.append(f"running {name} {repetition}")
-
-    def finished(self, name, repetition, path, report):
-        self.append(f"finished {path.name}")
 
 
 POINTS = [(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)]
@@ -77,10 +58,10 @@ def with_folder(experiment, out):
     return replace(experiment, out=out, overwrite=True)
 
 
-def run(robot, experiment, controller="preview", notes=None, posture=POSTURE):
+def run(robot, experiment, controller="preview", posture=POSTURE):
     robot.q = list(posture)
     with UrDriver("robot", network=robot) as driver:
-        return ExperimentRunner(driver, experiment, CONTROLLERS[controller], notes).run()
+        return ExperimentRunner(driver, experiment, CONTROLLERS[controller]).run()
 
 
 @pytest.mark.parametrize("held_up", [0, 4])
@@ -109,7 +90,7 @@ def test_an_identification_that_fails_says_how_many_commands_came_late(two, held
 def test_an_excitation_too_near_to_a_wall_is_refused_before_anything_moves(tmp_path):
     """The movement begins 20.2 mm from the wall, 20 mm are asked: the pulses would lead 0.6 mm nearer."""
     cell = Cell("c", walls=(Wall("window", (0.0, 1.0, 0.0), -0.2059),))
-    one = prepare_experiment(load_movements(["uniform_4_1"]), repeat=1, out=tmp_path / "new", cell=cell)
+    one = prepare_experiment([load_motion("uniform_4_1")], repeat=1, out=tmp_path / "new", cell=cell)
     robot = FakeRobot()
     with pytest.raises(DriverError, match=r"cannot be identified .* of wall 'window', at least 20 mm"):
         run(robot, one)
@@ -147,25 +128,47 @@ def test_log_times_are_absolute_in_real_time_only(tmp_path, monkeypatch, lockste
     assert first == (round(load_recording(path).t[0] * 1e9) if lockstep else now)
 
 
-def test_two_movements_twice(two, tmp_path):
-    notes = Notes()
+def test_what_came_late_stands_on_the_run(two, tmp_path, caplog):
+    one = replace(two, planned=two.planned[:1], repeat=2)
+
+    def hold_up(robot):
+        if sum("velocity_receiver" in text for text in robot.programs) == 5 and robot.tick % 50 == 0:
+            robot.hold = 5
+
+    (tmp_path / "late").mkdir()
+    report = run(FakeRobot(lockstep=False, on_tick=hold_up), with_folder(one, tmp_path / "late"))
+    first, second = map(Run.from_file, report.paths)
+    assert (first.stream.late_frames, first.stream.stops, first.warnings) == (0, [], ())
+    assert second.stream.late_frames == 5 * len(second.stream.stops) > 0
+    assert second.stream.n_commands == report.streams[1].n_commands
+    assert second.stream.slowest_command == report.streams[1].slowest_command
+    (warning,) = second.warnings
+    assert caplog.messages == report.remarks == [f"there: run 2: {warning}"]
+    assert f"stopped and went on {len(second.stream.stops)} times" in warning
+    in_lockstep = load_recording(run(FakeRobot(), with_folder(one, tmp_path)).paths[0])
+    assert in_lockstep.summary["stops"] == []
+    assert "slowest_command" not in in_lockstep.summary  # equal runs give equal bytes
+
+
+def test_two_movements_twice(two, tmp_path, caplog):
+    caplog.set_level("DEBUG", "pc_client")
     robot = FakeRobot(delay=4)
-    report = run(robot, with_folder(two, tmp_path), notes=notes)
-    assert notes == [
-        "connected",
-        "approaching",
-        "identified",
-        "running there 1",
-        "finished there_r1.mcap",
-        "approaching",
-        "running there 2",
-        "finished there_r2.mcap",
-        "approaching",
-        "running back 1",
-        "finished back_r1.mcap",
-        "approaching",
-        "running back 2",
-        "finished back_r2.mcap",
+    report = run(robot, with_folder(two, tmp_path))
+    assert caplog.messages == [
+        "robot: UR3, software 3.15.8, serial number 20993000007, SIMULATED",
+        "there: to the start",
+        str(report.delay),
+        "there, run 1",
+        f"{tmp_path / 'there_r1.mcap'}: recorded",
+        "there: to the start",
+        "there, run 2",
+        f"{tmp_path / 'there_r2.mcap'}: recorded",
+        "back: to the start",
+        "back, run 1",
+        f"{tmp_path / 'back_r1.mcap'}: recorded",
+        "back: to the start",
+        "back, run 2",
+        f"{tmp_path / 'back_r2.mcap'}: recorded",
     ]
     assert report.delay.delay == pytest.approx(4 * PERIOD, abs=1e-3)
     assert robot.at_rest
@@ -304,7 +307,7 @@ def test_an_error_keeps_and_names_recordings_that_nobody_asked_for(tmp_path, mon
         fail()
     (folder,) = tmp_path.iterdir()
     assert [path.name for path in folder.iterdir()] == ["a.mcap"]
-    assert caught.value.__notes__ == [f"recordings of the runs before: {folder}"]
+    assert caught.value.__notes__ == [f"recorded until then: {folder}"]
 
 
 def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp_path):
@@ -332,7 +335,7 @@ def test_plans_for_a_ur3_do_not_run_on_another_arm(two, tmp_path):
 @pytest.mark.parametrize(("movements", "repeat"), [([], 1), (["uniform_4_1"], 0), (["uniform_4_1"] * 2, 1)])
 def test_experiments_that_make_no_sense(movements, repeat, tmp_path):
     with pytest.raises(ClientError):
-        prepare_experiment(load_movements(movements), repeat=repeat, out=tmp_path)
+        prepare_experiment(map(load_motion, movements), repeat=repeat, out=tmp_path)
 
 
 def test_two_plans_of_one_name_are_refused_in_the_experiment_itself(two):

@@ -8,7 +8,6 @@ from contextlib import nullcontext
 
 import pytest
 import sweep_samples
-import typer
 from sweep_samples import write
 
 from pc_client import cli
@@ -269,16 +268,16 @@ def test_a_robot_that_is_there_runs_one_case_after_the_other(robot, given, tmp_p
 def test_a_real_arm_does_not_move_before_the_answer(robot, given, tmp_path, capsys, monkeypatch):
     robot.serial = "2017355123"
 
-    def answer(question, abort):
+    def answer(question):
         assert robot.programs == []
-        raise typer.Abort
+        return "n"
 
-    monkeypatch.setattr(typer, "confirm", answer)
+    monkeypatch.setattr("builtins.input", answer)
     assert run(given, tmp_path / "out") == 1
     assert robot.programs == []
     told = capsys.readouterr()
     assert "2 runs of each" in told.out
-    assert told.err == "ur-client: aborted\n"
+    assert told.err == "ur-client: the arm was not moved: the answer was no\n"
 
 
 def test_a_robot_that_is_not_as_it_must_be_is_refused(robot, given, tmp_path, capsys):

@@ -8,8 +8,9 @@ from fake_robot import FakeRobot
 
 from pc_client.arm import connect
 from pc_client.driver.report import read_report
+from pc_client.driver.watchdog import refusal
 from pc_client.errors import CellError, DriverError
-from pc_client.experiment.preflight import preflight, refusal
+from pc_client.experiment.preflight import preflight
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import (

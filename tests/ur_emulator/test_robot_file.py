@@ -10,7 +10,8 @@ import pytest
 
 from pc_client.driver.report import read_report
 from pc_client.driver.transport import TcpNetwork
-from pc_client.experiment.preflight import model_of, preflight, refusal
+from pc_client.driver.watchdog import refusal
+from pc_client.experiment.preflight import model_of, preflight
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError, ModelError, RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel

@@ -10,6 +10,7 @@ ends it together with whoever started it.
 
 from __future__ import annotations
 
+import logging
 import os
 import random
 import shutil
@@ -28,7 +29,7 @@ from typing import TYPE_CHECKING
 
 from pc_client.analysis.run import analyse_run
 from pc_client.driver.session import UrDriver
-from pc_client.errors import ClientError, GainMarginError, SweepError, full_message
+from pc_client.errors import LOG, ClientError, GainMarginError, SweepError, full_message
 from pc_client.experiment.experiment import Experiment
 from pc_client.experiment.identification import Identification
 from pc_client.experiment.runner import ExperimentRunner
@@ -183,6 +184,8 @@ def run_case(case: Case, keep_recordings: bool) -> Outcome:
     Errors of robot, plan or disk are in the outcome, and the recordings of a case that failed.
     """
     incident: tuple[tuple[str, bytes], ...] = ()
+    level = LOG.level
+    LOG.setLevel(logging.ERROR)  # of hundreds of cases the table shows what warnings are about
     try:
         with _robot_of(case.arm) as (host, ports, reverse_port, folder):
             experiment = plan_case(case, folder / "recordings")
@@ -203,6 +206,8 @@ def run_case(case: Case, keep_recordings: bool) -> Outcome:
         return Outcome("refused", full_message(error), (row,))
     except (ClientError, ProtocolError, OSError) as error:
         return failed(full_message(error), incident)
+    finally:
+        LOG.setLevel(level)
 
 
 def plan_case(case: Case, out: Path = Path()) -> Experiment:
