@@ -21,7 +21,7 @@ import numpy as np
 
 from protocol import pose as algebra
 from urscript import values
-from urscript.catalogue.calls import fit_int, integer, number, numbers, pose, string, type_error
+from urscript.catalogue.calls import argument, fit_int, integer, number, pose, string
 from urscript.catalogue.types import ParamType
 from urscript.dialect import LONGEST_LIST
 from urscript.errors import ScriptRuntimeError
@@ -174,13 +174,13 @@ def pose_dist(p_from: Any, p_to: Any) -> float:
 
 def rotvec2rpy(rotation_vector: Any) -> list[float]:
     """Roll, pitch, yaw [rad] with R = Rz(yaw) Ry(pitch) Rx(roll) of a rotation vector [rad]."""
-    vector = numbers("rotvec2rpy", "rotation_vector", rotation_vector, ParamType.VECTOR3)
+    vector = argument("rotvec2rpy", "rotation_vector", ParamType.VECTOR3, rotation_vector)
     return list(_computed("rotvec2rpy", algebra.rotvec_to_rpy, vector))
 
 
 def rpy2rotvec(rpy_vector: Any) -> list[float]:
     """Rotation vector [rad] of roll, pitch, yaw [rad] with R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    vector = numbers("rpy2rotvec", "rpy_vector", rpy_vector, ParamType.VECTOR3)
+    vector = argument("rpy2rotvec", "rpy_vector", ParamType.VECTOR3, rpy_vector)
     return list(_computed("rpy2rotvec", algebra.rpy_to_rotvec, vector))
 
 
@@ -194,7 +194,7 @@ def wrench_trans(T_from_to: Any, w_from: Any) -> list[float]:
     `wrench_trans(get_tcp_offset(), get_wrench_at_tool_flange())`.
     """
     x, y, z, rx, ry, rz = pose("wrench_trans", "T_from_to", T_from_to)
-    fx, fy, fz, mx, my, mz = numbers("wrench_trans", "w_from", w_from, ParamType.VECTOR6)
+    fx, fy, fz, mx, my, mz = argument("wrench_trans", "w_from", ParamType.VECTOR6, w_from)
     mx, my, mz = mx - (y * fz - z * fy), my - (z * fx - x * fz), mz - (x * fy - y * fx)
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = _computed(
         "wrench_trans", algebra.rotvec_to_flat, rx, ry, rz
@@ -216,13 +216,10 @@ _WORD = 32  # bits of an int
 
 def norm(a: Any) -> float:
     """Absolute value of a number (an int stays int), Euclidean length of a list or of all six of a pose."""
-    if type(a) is int:
-        return values.wrap_int(abs(a))
-    if is_number(a):
-        return abs(a)  # type: ignore[no-any-return]
-    if type(a) is Pose or (isinstance(a, list) and all(map(is_number, a))):
-        return math.hypot(*a)
-    raise type_error("norm", "a", ParamType.NORMED, a)
+    value = argument("norm", "a", ParamType.NORMED, a)
+    if isinstance(value, (list, Pose)):
+        return math.hypot(*value)
+    return values.wrap_int(abs(value)) if type(value) is int else abs(value)
 
 
 def normalize(v: Any) -> list[float]:
@@ -231,7 +228,7 @@ def normalize(v: Any) -> list[float]:
     Raises:
         ScriptRuntimeError: the sum of the squares is zero.
     """
-    parts = numbers("normalize", "v", v)
+    parts: list[float] = argument("normalize", "v", ParamType.NUMBERS, v)
     square = sum(part * part for part in parts)
     if square == 0:
         raise ScriptRuntimeError("normalize: the sum of all squared elements is zero")
@@ -241,46 +238,39 @@ def normalize(v: Any) -> list[float]:
 
 def length(v: Any) -> int:
     """Number of elements of a list or pose, or of bytes of a string."""
-    if isinstance(v, (list, str, Pose)):
-        return len(v)
-    raise type_error("length", "v", ParamType.SIZED, v)
+    return len(argument("length", "v", ParamType.SIZED, v))
 
 
 def get_list_length(v: Any) -> int:
     """Number of elements of a list or pose."""
-    if isinstance(v, (list, Pose)):
-        return len(v)
-    raise type_error("get_list_length", "v", ParamType.ARRAY, v)
+    return len(argument("get_list_length", "v", ParamType.ARRAY, v))
 
 
 def size(v: Any) -> int | list[int]:
     """[rows, columns] of a matrix, else the number of elements or bytes."""
-    if isinstance(v, Matrix):
-        return list(v.shape)
-    if isinstance(v, (list, str, Pose)):
-        return len(v)
-    raise type_error("size", "v", ParamType.SHAPED, v)
+    value = argument("size", "v", ParamType.SHAPED, v)
+    return list(value.shape) if isinstance(value, Matrix) else len(value)
 
 
 def transpose(m: Any) -> Matrix | list[Any]:
     """Rows become columns; a list becomes a column matrix, and a column matrix becomes a list."""
-    if isinstance(m, Matrix):
-        if m.shape[1] == 1:
-            return [row[0] for row in m.rows]
-        return Matrix(list(zip(*m.rows, strict=True)))
-    return Matrix([[value] for value in numbers("transpose", "m", m, ParamType.LIST_OR_MATRIX)])
+    array = argument("transpose", "m", ParamType.LIST_OR_MATRIX, m)
+    if not isinstance(array, Matrix):
+        return Matrix([[value] for value in array])
+    if array.shape[1] == 1:
+        return [row[0] for row in array.rows]
+    return Matrix(list(zip(*array.rows, strict=True)))
 
 
 def inv(m: Any) -> Matrix | Pose:
     """Inverse of a pose or of a square, non-singular matrix."""
-    if type(m) is Pose:
-        return pose_inv(m, "inv")
-    if not isinstance(m, Matrix):
-        raise type_error("inv", "m", ParamType.POSE_OR_MATRIX, m)
-    rows, columns = m.shape
+    matrix = argument("inv", "m", ParamType.POSE_OR_MATRIX, m)
+    if isinstance(matrix, Pose):
+        return pose_inv(matrix, "inv")
+    rows, columns = matrix.shape
     if rows != columns or rows == 0:
         raise ScriptRuntimeError(f"inv: the matrix must be square, got {rows} x {columns}")
-    array = np.array(m.rows, dtype=np.float64)
+    array = np.array(matrix.rows, dtype=np.float64)
     if not np.isfinite(array).all():
         raise ScriptRuntimeError("inv: the matrix must be finite")
     # Rounding hides exact singularity from the inversion itself: ask for the rank first.
@@ -295,10 +285,9 @@ def integer_to_binary_list(x: Any) -> list[bool]:
     return [bool(value >> bit & 1) for bit in range(_WORD)]
 
 
-def binary_list_to_integer(bits: Any) -> int:
+def binary_list_to_integer(binary: Any) -> int:
     """Signed value of bits, least significant first; missing ones are 0, those after the 32nd are ignored."""
-    if not isinstance(bits, list) or not all(type(bit) is bool for bit in bits):
-        raise type_error("binary_list_to_integer", "l", ParamType.BOOLS, bits)
+    bits = argument("binary_list_to_integer", "l", ParamType.BOOLS, binary)
     value = sum(1 << place for place, bit in enumerate(bits[:_WORD]) if bit)
     return value - (1 << _WORD) if value >> (_WORD - 1) else value
 

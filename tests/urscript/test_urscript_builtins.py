@@ -110,7 +110,7 @@ def test_against_numpy(
 @pytest.mark.parametrize(
     "name", ["sin", "cos", "tan", "asin", "acos", "atan", "ceil", "floor", "d2r", "r2d", "sqrt"]
 )
-@pytest.mark.parametrize("value", ["1", True, None, [1.0]])
+@pytest.mark.parametrize("value", ["1", None, [1.0]])
 def test_only_numbers_are_numbers(name: str, value: object) -> None:
     text = refusal(name, value)
     assert text.startswith(f"{name}: Parameter '")

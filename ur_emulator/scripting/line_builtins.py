@@ -61,7 +61,7 @@ class LineBuiltins(BuiltinGroup):
 
     @builtin("get_flag")
     def _get_flag(self, thread: object, n: float) -> bool:
-        return self._io.flags[int(n)]
+        return n < len(self._io.flags) and self._io.flags[int(n)]
 
     @builtin("set_flag")
     def _set_flag(self, thread: object, n: float, b: bool) -> None:
@@ -236,7 +236,7 @@ class LineSetupBuiltins(BuiltinGroup):
 
     def _list_setter(self, names: Sequence[tuple[OutputKind, int]], function: str) -> HostFunction:
         def set_list(thread: object, outputs: list[Any]) -> None:
-            if not all(type(i) in (int, float) and i in range(len(names)) for i in outputs):
+            if not all(i in range(len(names)) for i in outputs):
                 raise ScriptRuntimeError(f"{function}: outputs are numbers from 0 to {len(names) - 1}")
             for i, (kind, index) in enumerate(names):
                 state = lines.RunState.LOW_WHEN_STOPPED if i in outputs else lines.RunState.KEEP

@@ -29,7 +29,7 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network
 from urscript import Blocked, ScriptRuntimeError
-from urscript.values import is_number, log_form, wrap_int
+from urscript.values import log_form, wrap_int
 
 # Source: URScript manual, modbus_add_signal.
 MAX_NAME = 20
@@ -154,17 +154,14 @@ class ModbusBuiltins(BuiltinGroup):
     def _set_output_signal(self, thread: object, name: str, value: Any, is_secondary: bool) -> None:
         function = "modbus_set_output_signal"
         signal = self._signal(function, name, SignalType.DIGITAL_OUTPUT)
-        values = _values_for(function, signal, value)
-        if not all(isinstance(item, bool) for item in values):
-            raise ScriptRuntimeError(f"{function}: {log_form(value)} is not modelled; allowed: True or False")
-        self._set_output(function, signal, values)
+        self._set_output(function, signal, _values_for(function, signal, value))
 
     @builtin("modbus_set_output_register")
     def _set_output_register(self, thread: object, name: str, value: Any, is_secondary: bool) -> None:
         function = "modbus_set_output_register"
         signal = self._signal(function, name, SignalType.REGISTER_OUTPUT)
         values = _values_for(function, signal, value)
-        if not all(is_number(item) and 0 <= item <= WORD_MAX for item in values):
+        if not all(0 <= item <= WORD_MAX for item in values):
             raise ScriptRuntimeError(
                 f"{function}: {log_form(value)} does not fit into a register; allowed: 0 to {WORD_MAX}"
             )

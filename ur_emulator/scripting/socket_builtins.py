@@ -181,9 +181,7 @@ class SocketBuiltins(BuiltinGroup):
 
     @builtin("socket_set_var")
     def _set_var(self, thread: object, variable: str, value: float, name: _Name) -> None:
-        # Programs of Robotiq give a bool, to a server whose values are numbers.
-        shown = log_form(int(value) if isinstance(value, bool) else value)
-        self._send(name, f"SET {variable} {shown}\n".encode("latin-1", "replace"))
+        self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
 
     # --- reading
 

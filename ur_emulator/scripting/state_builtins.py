@@ -45,6 +45,7 @@ class StateBuiltins(BuiltinGroup):
             "get_actual_joint_positions": lambda thread: list(past.sensed.actual_q),
             "get_target_joint_positions": lambda thread: list(motion.target.q),
             "get_joint_positions": lambda thread: list(motion.path.q),
+            "get_joint_speeds": lambda thread: list(past.sensed.actual_qd),
             "get_actual_joint_speeds": lambda thread: list(past.sensed.actual_qd),
             "get_target_joint_speeds": lambda thread: list(motion.target.qd),
             "get_actual_joint_accelerations": lambda thread: list(past.joint_accelerations()),

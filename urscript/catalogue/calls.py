@@ -9,6 +9,7 @@ the texts about values, the one for poses is the controller's own (log of 5.12: 
 must be a Pose on the form p[x,y,z,a,b,c]"); the others follow its pattern, adding what was given.
 """
 
+import operator
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from math import hypot, isfinite
@@ -100,11 +101,12 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
     return slots
 
 
-# --- values: a check is compiled once for each builtin and then only runs small predicates, because motion
-# commands pass here every control cycle. It never converts: an integer parameter also takes a float without
-# fraction, because programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS), so hosts call `int()`.
+# --- values: what fits them is compiled once for each builtin and then only runs small predicates, because
+# motion commands pass here every control cycle. An integer parameter also takes a float without fraction,
+# because programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS), so hosts call `int()`.
 
 Predicate = Callable[[Any], bool]
+Fitting = Callable[[Sequence[Any]], Sequence[Any]]
 
 _SHOWN_TEXT = 40
 # Larger numbers are not a length, time or angle of a robot; their products would overflow.
@@ -129,6 +131,10 @@ def _is_six(value: Any) -> bool:
     return _is_numbers(value, 6)
 
 
+def _is_bools(value: Any) -> bool:
+    return isinstance(value, list) and all(type(item) is bool for item in value)
+
+
 def _is_pose(value: Any) -> bool:
     return type(value) is Pose
 
@@ -137,7 +143,6 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.BOOL: lambda value: type(value) is bool,
     ParamType.INT: _is_int,
     ParamType.NUMBER: is_number,
-    ParamType.NUMBER_OR_BOOL: lambda value: is_number(value) or type(value) is bool,
     ParamType.STRING: lambda value: isinstance(value, str),
     ParamType.STRING_OR_INT: lambda value: isinstance(value, str) or _is_int(value),
     ParamType.POSE: _is_pose,
@@ -146,7 +151,9 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
     ParamType.VECTOR6: lambda value: type(value) is Pose or _is_numbers(value, 6),
     ParamType.NUMBERS: _is_numbers,
-    ParamType.BOOLS: lambda value: isinstance(value, list) and all(type(item) is bool for item in value),
+    ParamType.NUMBER_OR_NUMBERS: lambda value: is_number(value) or _is_numbers(value),
+    ParamType.BOOLS: _is_bools,
+    ParamType.BOOL_OR_BOOLS: lambda value: type(value) is bool or _is_bools(value),
     ParamType.LIST: lambda value: isinstance(value, list),
     ParamType.MATRIX: lambda value: isinstance(value, Matrix),
     ParamType.ARRAY: lambda value: isinstance(value, (list, Pose)),
@@ -157,7 +164,28 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.NORMED: lambda value: type(value) is Pose or is_number(value) or _is_numbers(value),
 }
 
-_NUMERIC = FIXED_SIZE - {ParamType.BOOL, ParamType.INT} | {ParamType.NUMBERS}
+_BOOLS = frozenset({ParamType.BOOL, ParamType.BOOLS, ParamType.BOOL_OR_BOOLS})
+_NUMERIC = FIXED_SIZE - {ParamType.BOOL, ParamType.INT} | {ParamType.NUMBERS, ParamType.NUMBER_OR_NUMBERS}
+_NUMBERS = _NUMERIC | {
+    ParamType.INT,
+    ParamType.STRING_OR_INT,
+    ParamType.LIST_OR_MATRIX,
+    ParamType.NORMED,
+}
+"""Types of what is a number, or may hold some."""
+
+
+def converted(kind: ParamType, value: Any) -> Any:
+    """A value as a parameter of this type takes it (see dialect: BOOL_AND_NUMBER_ARGUMENTS).
+
+    Where it takes numbers, True is 1 and False 0; where it takes bools, 0 is False, any other number True.
+    """
+    if isinstance(value, list):
+        parts = [converted(kind, item) for item in value]
+        return value if all(map(operator.is_, parts, value)) else parts
+    if type(value) is bool:
+        return int(value) if kind in _NUMBERS else value
+    return value != 0 if kind in _BOOLS and is_number(value) else value
 
 
 def fits(kind: ParamType, value: Any) -> bool:
@@ -218,7 +246,7 @@ def _is_in_range(param: Param, value: Any) -> bool:
 
 
 def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
-    """The error for an argument that a check refused."""
+    """The error for an argument that does not fit."""
     if not fits(param.type, value):
         return type_error(builtin.name, param.name, param.type, value)
     if _must_be_finite(builtin, param) and not _is_bounded(value):
@@ -288,47 +316,61 @@ _FAST_PREDICATES: dict[ParamType, Predicate] = {
 }
 
 
-def compile_check(builtin: Builtin) -> Callable[[Sequence[Any]], None]:
-    """A function that takes bound arguments and raises ScriptRuntimeError for the first that does not fit."""
+def compile_fitting(builtin: Builtin) -> Fitting:
+    """A function that returns bound arguments as the builtin takes them.
+
+    It raises ScriptRuntimeError for the first that does not fit.
+    """
     tests = [
-        (index, accepts)
+        (index, param, accepts)
         for index, param in enumerate(builtin.params)
         if (accepts := _accepts(builtin, param)) is not None
     ]
 
-    def check(args: Sequence[Any]) -> None:
-        for index, accepts in tests:
+    def fit(args: Sequence[Any]) -> Sequence[Any]:
+        for index, param, accepts in tests:
             if not accepts(args[index]):
-                raise explain(builtin, builtin.params[index], args[index])
+                value = converted(param.type, args[index])
+                if not accepts(value):
+                    raise explain(builtin, param, args[index])
+                args = [*args[:index], value, *args[index + 1 :]]
+        return args
 
-    return check
+    return fit
 
 
-# --- what pure functions check their own arguments with, so that calls of them need no check of the catalogue
+# --- what pure functions fit their own arguments with, so that calls of them need no look at the catalogue
+
+
+def argument(function: str, parameter: str, kind: ParamType, value: Any) -> Any:
+    """The argument as the function takes it; raises ScriptRuntimeError if it does not fit."""
+    taken = value if fits(kind, value) else converted(kind, value)
+    if fits(kind, taken):
+        return taken
+    raise type_error(function, parameter, kind, value)
 
 
 def number(function: str, parameter: str, value: Any) -> float:
-    """The argument, if it is an int or a float; raises ScriptRuntimeError otherwise."""
+    """The argument as an int or a float."""
     kind = type(value)
-    if kind is float or kind is int or is_number(value):
+    if kind is float or kind is int:
         return value  # type: ignore[no-any-return]
-    raise type_error(function, parameter, ParamType.NUMBER, value)
+    return argument(function, parameter, ParamType.NUMBER, value)  # type: ignore[no-any-return]
 
 
 def integer(function: str, parameter: str, value: Any) -> int:
     """The argument as an int; a float without fraction will do (see dialect: INDEX_TAKES_WHOLE_FLOATS)."""
     if type(value) is int:
         return value
-    if isinstance(value, float) and value.is_integer() and INT_MIN <= value <= INT_MAX:
-        return int(value)
+    whole = argument(function, parameter, ParamType.INT, value)
+    if INT_MIN <= whole <= INT_MAX:
+        return int(whole)
     raise type_error(function, parameter, ParamType.INT, value)
 
 
 def string(function: str, parameter: str, value: Any) -> str:
     """The argument, if it is a string."""
-    if isinstance(value, str):
-        return value
-    raise type_error(function, parameter, ParamType.STRING, value)
+    return argument(function, parameter, ParamType.STRING, value)  # type: ignore[no-any-return]
 
 
 def pose(function: str, parameter: str, value: Any) -> Pose:
@@ -336,16 +378,6 @@ def pose(function: str, parameter: str, value: Any) -> Pose:
     if type(value) is Pose:
         return value
     raise type_error(function, parameter, ParamType.POSE, value)
-
-
-def numbers(function: str, parameter: str, value: Any, kind: ParamType = ParamType.NUMBERS) -> list[float]:
-    """The argument, if it is a list of numbers: 3 for VECTOR3, 6 or a pose for VECTOR6, else any number."""
-    count = {ParamType.VECTOR3: 3, ParamType.VECTOR6: 6}.get(kind)
-    if kind is ParamType.VECTOR6 and type(value) is Pose:
-        return list(value)
-    if isinstance(value, list) and (count is None or len(value) == count) and all(map(is_number, value)):
-        return value
-    raise type_error(function, parameter, kind, value)
 
 
 def fit_int(function: str, value: float) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 
 from urscript import dialect, values
-from urscript.catalogue.calls import integer, type_error
+from urscript.catalogue.calls import argument, converted, integer
 from urscript.catalogue.methods import ValueMethod
 from urscript.catalogue.types import ParamType
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
@@ -203,10 +203,15 @@ def _are_alike(a: Any, b: Any) -> bool:
 
 def make_pose(*items: Any) -> Pose:
     """The value of a pose literal."""
-    for item in items:
-        if not is_number(item):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(item)}")
-    return Pose(*items)
+    return Pose(*map(_element_of_pose, items))
+
+
+def _element_of_pose(value: Any) -> float:
+    """A value as an element of a pose: a pose takes what a builtin takes for a number."""
+    element = converted(ParamType.NUMBER, value)
+    if is_number(element):
+        return element  # type: ignore[no-any-return]
+    raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(value)}")
 
 
 def _position(index: Any, length: int) -> int:
@@ -258,10 +263,7 @@ def store_item(value: Any, index: Any, target: Any) -> Any:
         changed[place] = fitted(value, old, "element", str(place)) if type(old) is Struct else value
         return changed if kind is list else values.list_with_capacity(changed, capacity_of(target), old)
     if kind is Pose:
-        place = _position(index, 6)
-        if not is_number(value):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(value)}")
-        return target.with_item(place, value)
+        return target.with_item(_position(index, 6), _element_of_pose(value))
     if kind is Matrix:
         raise ScriptRuntimeError("a matrix needs a row and a column: m[row, column] = value")
     if kind is Struct:
@@ -431,9 +433,7 @@ def _append(target: list[Any], value: Any) -> Changed:
 
 
 def _extend(target: list[Any], items: Any) -> Changed:
-    if not isinstance(items, list):
-        raise type_error("extend", "values", ParamType.LIST, items)
-    return _grown(target, "extend", len(target), items)
+    return _grown(target, "extend", len(target), argument("extend", "values", ParamType.LIST, items))
 
 
 def _insert(target: list[Any], index: Any, value: Any) -> Changed:
