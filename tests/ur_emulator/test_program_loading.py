@@ -69,9 +69,26 @@ def test_a_node_that_is_not_known_needs_the_saved_script(tmp_path, header, softw
     )
 
 
+OLD = b'<gui.program.ProgramRootNode serialization="custom"><unserializable-parents/></gui.program.ProgramRootNode>'
+
+
+def test_a_program_of_polyscope_1_8_runs_as_its_saved_script(tmp_path):
+    program = load_pair(tmp_path, OLD, twin())
+    assert (script_of(program), program.undefined) == (twin(), "")
+    assert program.notes[0].startswith(
+        "p.urp: a program of PolyScope 1.8 cannot be turned into a script: instead"
+    )
+
+
 @pytest.mark.parametrize(
     ("program", "saved", "problem"),
     [
+        (
+            OLD,
+            None,
+            "a program of PolyScope 1.8 cannot be turned into a script; put the .script that PolyScope saved",
+        ),
+        (OLD, 'textmsg("mine")\n', "and p.script is not a script that PolyScope saved"),
         (UNKNOWN, None, "'Gripper' cannot be turned into a script; put the .script that PolyScope saved"),
         (UNKNOWN, 'textmsg("mine")\n', "and p.script is not a script that PolyScope saved"),
         (
@@ -81,7 +98,14 @@ def test_a_node_that_is_not_known_needs_the_saved_script(tmp_path, header, softw
         ),
         (urp(GRIPPER + external_control()), twin(), "and p.script has what a PC sent when it was saved"),
     ],
-    ids=["none", "statements of the user", "a program of the user", "with a PC's part"],
+    ids=[
+        "old",
+        "old beside the user's",
+        "none",
+        "statements of the user",
+        "a program of the user",
+        "with a PC's part",
+    ],
 )
 def test_when_there_is_no_saved_script_to_use(tmp_path, program, saved, problem):
     with pytest.raises(ProgramFileError, match=problem):
