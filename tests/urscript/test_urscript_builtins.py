@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from urscript.builtins import PURE, pure_builtins
+from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptRuntimeError
 from urscript.run import runtime
 from urscript.values import Matrix, Pose, wrap_int
 
+ROWS = catalogue_for("5.25")
+
 
 def call(name: str, *args: Any) -> Any:
-    return PURE[name](*args)
+    return PURE[name](*ROWS.fitting_of(name)(args))
 
 
 def refusal(name: str, *args: Any) -> str:

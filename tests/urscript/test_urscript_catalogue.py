@@ -7,7 +7,6 @@ import itertools
 import math
 import pickle
 from collections import Counter
-from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -102,7 +101,7 @@ def test_defaults_fit_their_own_parameters():
                 param.name,
             )
         if not any(param.is_required for param in row.params):
-            compile_fitting(row)([param.default for param in row.params])
+            compile_fitting(row.name, row.params, row.nan_ok)([param.default for param in row.params])
 
 
 RESULTS = {
@@ -348,7 +347,7 @@ def test_parameter_types_all_have_a_check():
 def taken(row, param, value):
     """What a builtin gets for a value, with its type; None if it refuses it."""
     try:
-        (got,) = compile_fitting(replace(row, params=(param,)))([value])
+        (got,) = compile_fitting(row.name, (param,), row.nan_ok)([value])
     except ScriptRuntimeError:
         return None
     return repr(got)

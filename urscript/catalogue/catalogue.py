@@ -189,7 +189,9 @@ class Catalogue:
         self.arrays: Mapping[str, types.BuiltinArray] = {item.name: item for item in ARRAYS}
         self.methods: Mapping[tuple[str, str], ValueMethod] = methods_of(version)
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
-        self._fittings = {name: compile_fitting(row) for name, row in self._by_name.items()}
+        self._fittings = {
+            name: compile_fitting(name, row.params, row.nan_ok) for name, row in self._by_name.items()
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle it as its version, and its rows if they are others than those of the tables."""

@@ -2,11 +2,9 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from math import degrees, hypot
 from typing import Any, Final, NamedTuple
 
-from urscript.builtins import PURE
 from urscript.catalogue import STEP_TIME, Catalogue
 from urscript.catalogue.calls import compile_fitting, converted, fits, type_error
 from urscript.catalogue.types import Builtin, Param
@@ -35,7 +33,7 @@ class KnownValue(NamedTuple):
 
 
 def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
-    """Everything this module warns about, in no order; pure functions check their arguments themselves."""
+    """Everything this module warns about, in no order."""
     constants = _constants(program)
     cycle = STEP_TIME[catalogue.version.generation]
     for scope, call in expressions_read(program):
@@ -47,7 +45,7 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
                 yield ScriptWarning(warnings.WRONG_COUNT, refusal, call.span, program.source)
             continue
         builtin = catalogue.lookup(call.function)
-        if builtin is None or builtin.name in PURE:
+        if builtin is None:
             continue
         for param, argument in _arguments(call, builtin, catalogue):
             known = _known_value(_value_of(argument, scope, constants))
@@ -122,7 +120,7 @@ def _arguments(
 def _refused(builtin: Builtin, param: Param, known: KnownValue) -> str | None:
     if known.whole:
         try:
-            compile_fitting(replace(builtin, params=(param,)))([known.value])
+            compile_fitting(builtin.name, (param,), builtin.nan_ok)([known.value])
         except ScriptRuntimeError as error:
             return error.message
         return None

@@ -21,6 +21,7 @@ from typing import Any, Final
 from urscript import dialect, values
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
+from urscript.catalogue.calls import Fitting
 from urscript.catalogue.costs import OF_THREAD
 from urscript.catalogue.types import FIXED_SIZE
 from urscript.dialect import Dialect
@@ -337,7 +338,7 @@ def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Me
 
 
 def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, meter: Meter) -> dict[str, Any]:
-    """The builtins that a program uses; the arguments of the host's are fitted first."""
+    """The builtins that a program uses; their arguments are fitted first."""
     offered = host.builtins()
     flow = _flow_builtins(host)
     bound: dict[str, Any] = {}
@@ -346,7 +347,7 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
         if function is not None:
             bound[f"b_{name}"] = _fitted(name, function, catalogue, meter)
         elif name in PURE:
-            pure = _without_thread(PURE[name])
+            pure = _without_thread(PURE[name], catalogue.fitting_of(name))
             bound[f"b_{name}"] = meter.function(pure, pure_cost(name), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
@@ -384,9 +385,9 @@ def _fitted(
     return meter.function(call, cost, name)
 
 
-def _without_thread(function: Callable[..., Any]) -> Callable[..., Any]:
+def _without_thread(function: Callable[..., Any], fit: Fitting) -> Callable[..., Any]:
     def call(thread: ScriptThread, *arguments: Any) -> Any:
-        return function(*arguments)
+        return function(*fit(arguments))
 
     return call
 
