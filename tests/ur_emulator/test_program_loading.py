@@ -19,6 +19,7 @@ from ur_emulator.errors import ProgramFileError
 from ur_emulator.program_files import reader
 from ur_emulator.program_files.compiling import compile_loaded
 from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation_reader import NEW_BOX
 from ur_emulator.program_files.loading import load_program
 from ur_emulator.program_files.script_writer import Header
 from urscript.catalogue import catalogue_for
@@ -73,8 +74,10 @@ OLD = b'<gui.program.ProgramRootNode serialization="custom"><unserializable-pare
 
 
 def test_a_program_of_polyscope_1_8_runs_as_its_saved_script(tmp_path):
+    old = '<gui.installation.RobotInstallation><Features reference="../gone"/></gui.installation.RobotInstallation>'
+    (tmp_path / "default.installation").write_text(old)
     program = load_pair(tmp_path, OLD, twin())
-    assert (script_of(program), program.undefined) == (twin(), "")
+    assert (script_of(program), program.undefined, program.installation) == (twin(), "", NEW_BOX)
     assert program.notes[0].startswith(
         "p.urp: a program of PolyScope 1.8 cannot be turned into a script: instead"
     )

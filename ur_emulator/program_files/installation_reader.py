@@ -132,6 +132,8 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
 
     ProgramFileError if a value makes no sense, or there are too many.
     """
+    if tree.root.tag.startswith("gui."):  # of PolyScope 1.8, a dump of its objects: nothing is read
+        return Installation(wire_path)
     reader = _Reader(tree)
     pc, pc_name = reader.external_control()
     tcps, active_tcp = reader.tcps()
