@@ -6,6 +6,7 @@ EmulatorError
 ├── PlantError        the physics cannot go on: a target that is not a number, or a diverged simulation
 ├── ProgramFileError  a program or installation file cannot be used
 │   ├── FileMissingError      there is no such file
+│   ├── UndefinedError        something in it is not filled in, or names what is not there
 │   └── UnknownNodeError      no script is known for a node of a program
 ├── ControlError      an operation of the control API was not done
 │   ├── ArgumentError         it was given something that it does not take
@@ -56,6 +57,10 @@ class ProgramFileError(EmulatorError):
 
 class FileMissingError(ProgramFileError):
     """There is no such program or installation file among those that the box may use."""
+
+
+class UndefinedError(ProgramFileError):
+    """Something in a program or installation is not filled in, not taught, or names what is not there."""
 
 
 class UnknownNodeError(ProgramFileError):

@@ -1,7 +1,7 @@
 """The builtins that are plain functions of their arguments: mathematics, lists, poses, strings.
 
-They check their own arguments, raise ScriptRuntimeError without a place, and change no value: every result
-is new. The host has the builtins that need a robot, a socket or a clock.
+They get arguments of the types that the catalogue asks for, raise ScriptRuntimeError without a place, and
+change no value: every result is new. The host has the builtins that need a robot, a socket or a clock.
 
 Infinities and NaN follow IEEE 754 as in the controller's C, where Python would raise. Strings are bytes, and
 positions in them count from 0. The algebra of poses is `protocol.pose`.
@@ -11,6 +11,7 @@ error but not its text; for lists with room and structs the e-Series script dire
 """
 
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from random import Random
@@ -21,8 +22,6 @@ import numpy as np
 
 from protocol import pose as algebra
 from urscript import values
-from urscript.catalogue.calls import fit_int, integer, number, numbers, pose, string, type_error
-from urscript.catalogue.types import ParamType
 from urscript.dialect import LONGEST_LIST
 from urscript.errors import ScriptRuntimeError
 from urscript.values import Matrix, Pose, Struct, a_type, is_number
@@ -30,17 +29,12 @@ from urscript.values import Matrix, Pose, Struct, a_type, is_number
 # --- numbers ---------------------------------------------------------------------------------------------
 
 
-def _of_angle(function: str, compute: Callable[[float], float]) -> Callable[[Any], float]:
-    def call(f: Any) -> float:
-        angle = number(function, "f", f)
-        return compute(angle) if math.isfinite(angle) else math.nan
-
-    return call
+def _of_angle(compute: Callable[[float], float]) -> Callable[[float], float]:
+    return lambda angle: compute(angle) if math.isfinite(angle) else math.nan
 
 
-def _of_ratio(function: str, compute: Callable[[float], float]) -> Callable[[Any], float]:
-    def call(f: Any) -> float:
-        ratio = number(function, "f", f)
+def _of_ratio(function: str, compute: Callable[[float], float]) -> Callable[[float], float]:
+    def call(ratio: float) -> float:
         if ratio < -1 or ratio > 1:
             raise ScriptRuntimeError(f"{function}: Parameter 'f' must be in the range [-1, 1], got {ratio}")
         return compute(ratio)
@@ -48,53 +42,41 @@ def _of_ratio(function: str, compute: Callable[[float], float]) -> Callable[[Any
     return call
 
 
-def atan(f: Any) -> float:
-    """Arc tangent [rad]."""
-    return math.atan(number("atan", "f", f))
+def _rounded(function: str, compute: Callable[[float], int]) -> Callable[[float], int]:
+    def call(value: float) -> int:
+        whole = compute(value) if math.isfinite(value) else value
+        # A controller converts by a C cast, arbitrary for numbers out of range; here that is an error.
+        if values.INT_MIN <= whole <= values.INT_MAX:
+            return int(whole)
+        raise ScriptRuntimeError(f"{function}: result {whole} does not fit into a 32-bit integer")
+
+    return call
 
 
-def atan2(x: Any, y: Any) -> float:
-    """Arc tangent of x / y [rad] in the right quadrant: the first argument is the numerator."""
-    return math.atan2(number("atan2", "x", x), number("atan2", "y", y))
-
-
-def ceil(f: Any) -> int:
-    """Smallest integer not below f."""
-    value = number("ceil", "f", f)
-    return fit_int("ceil", math.ceil(value) if math.isfinite(value) else value)
-
-
-def floor(f: Any) -> int:
-    """Largest integer not above f."""
-    value = number("floor", "f", f)
-    return fit_int("floor", math.floor(value) if math.isfinite(value) else value)
-
-
-def d2r(d: Any) -> float:
+def d2r(d: float) -> float:
     """Degrees to radians: (d / 180) * pi."""
-    return number("d2r", "d", d) / 180 * math.pi
+    return d / 180 * math.pi
 
 
-def r2d(r: Any) -> float:
+def r2d(r: float) -> float:
     """Radians to degrees."""
-    return number("r2d", "r", r) / math.pi * 180
+    return r / math.pi * 180
 
 
-def sqrt(f: Any) -> float:
+def sqrt(f: float) -> float:
     """Square root; negative numbers are an error."""
-    value = number("sqrt", "f", f)
-    if value < 0:
-        raise ScriptRuntimeError(f"sqrt: Parameter 'f' must not be negative, got {value}")
-    return math.sqrt(value)
+    if f < 0:
+        raise ScriptRuntimeError(f"sqrt: Parameter 'f' must not be negative, got {f}")
+    return math.sqrt(f)
 
 
-def power(base: Any, exponent: Any) -> float:
+def power(base: float, exponent: float) -> float:
     """`pow`: base raised to the power of exponent.
 
     Raises:
         ScriptRuntimeError: negative base with a fractional exponent, zero base with a negative exponent.
     """
-    b, e = float(number("pow", "base", base)), float(number("pow", "exponent", exponent))
+    b, e = float(base), float(exponent)
     if b < 0 and math.isfinite(e) and not e.is_integer():
         raise ScriptRuntimeError(f"pow: a negative base ({b:g}) needs an integral exponent, got {e:g}")
     if b == 0 and e < 0:
@@ -109,7 +91,7 @@ def _ln(value: float) -> float:
     return math.log(value) if value else -math.inf
 
 
-def log(b: Any, f: Any) -> float:
+def log(b: float, f: float) -> float:
     """Logarithm of f to base b.
 
     Zero is not mentioned by the manual: it gives the infinities and zeros of C's log(f) / log(b).
@@ -117,12 +99,11 @@ def log(b: Any, f: Any) -> float:
     Raises:
         ScriptRuntimeError: b or f negative, or b equal to 1.
     """
-    base, value = number("log", "b", b), number("log", "f", f)
-    if base < 0 or base == 1:
-        raise ScriptRuntimeError(f"log: Parameter 'b' must be neither negative nor 1, got {base}")
-    if value < 0:
-        raise ScriptRuntimeError(f"log: Parameter 'f' must not be negative, got {value}")
-    return _ln(value) / _ln(base)
+    if b < 0 or b == 1:
+        raise ScriptRuntimeError(f"log: Parameter 'b' must be neither negative nor 1, got {b}")
+    if f < 0:
+        raise ScriptRuntimeError(f"log: Parameter 'f' must not be negative, got {f}")
+    return _ln(f) / _ln(b)
 
 
 # --- poses, rotations and wrenches -----------------------------------------------------------------------
@@ -136,55 +117,34 @@ def _computed(function: str, compute: Callable[..., Sequence[float]], *args: Any
         raise ScriptRuntimeError(f"{function}: Parameters must be finite") from None
 
 
-def _of_two(
-    function: str, first: str, second: str, compute: Callable[[Pose, Pose], Sequence[float]]
-) -> Callable[[Any, Any], Pose]:
-    def call(a: Any, b: Any) -> Pose:
-        return Pose.of(_computed(function, compute, pose(function, first, a), pose(function, second, b)))
-
-    return call
+def _pose_of(function: str, compute: Callable[..., Sequence[float]]) -> Callable[..., Pose]:
+    return lambda *args: Pose.of(_computed(function, compute, *args))
 
 
-def pose_inv(p_from: Any, function: str = "pose_inv") -> Pose:
-    """The inverse transformation; `function` is the builtin that errors name."""
-    return Pose.of(_computed(function, algebra.pose_inv, pose(function, "p_from", p_from)))
-
-
-def interpolate_pose(p_from: Any, p_to: Any, alpha: Any) -> Pose:
-    """From p_from (alpha 0) to p_to (alpha 1) on a straight line with the shortest rotation, or beyond."""
-    start, goal = pose("interpolate_pose", "p_from", p_from), pose("interpolate_pose", "p_to", p_to)
-    fraction = number("interpolate_pose", "alpha", alpha)
-    return Pose.of(_computed("interpolate_pose", algebra.interpolate_pose, start, goal, fraction))
-
-
-def point_dist(p_from: Any, p_to: Any) -> float:
+def point_dist(p_from: Pose, p_to: Pose) -> float:
     """Distance of the two positions [m]."""
-    start, goal = pose("point_dist", "p_from", p_from), pose("point_dist", "p_to", p_to)
-    return math.dist(start[:3], goal[:3])
+    return math.dist(p_from[:3], p_to[:3])
 
 
-def pose_dist(p_from: Any, p_to: Any) -> float:
+def pose_dist(p_from: Pose, p_to: Pose) -> float:
     """Distance including rotation: Euclidean length of pose_sub(p_to, p_from) over all six numbers.
 
     The manual gives no formula; this one is assumed, to be checked on a real arm.
     """
-    start, goal = pose("pose_dist", "p_from", p_from), pose("pose_dist", "p_to", p_to)
-    return math.hypot(*_computed("pose_dist", algebra.pose_sub, goal, start))
+    return math.hypot(*_computed("pose_dist", algebra.pose_sub, p_to, p_from))
 
 
-def rotvec2rpy(rotation_vector: Any) -> list[float]:
+def rotvec2rpy(rotation_vector: list[float]) -> list[float]:
     """Roll, pitch, yaw [rad] with R = Rz(yaw) Ry(pitch) Rx(roll) of a rotation vector [rad]."""
-    vector = numbers("rotvec2rpy", "rotation_vector", rotation_vector, ParamType.VECTOR3)
-    return list(_computed("rotvec2rpy", algebra.rotvec_to_rpy, vector))
+    return list(_computed("rotvec2rpy", algebra.rotvec_to_rpy, rotation_vector))
 
 
-def rpy2rotvec(rpy_vector: Any) -> list[float]:
+def rpy2rotvec(rpy_vector: list[float]) -> list[float]:
     """Rotation vector [rad] of roll, pitch, yaw [rad] with R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    vector = numbers("rpy2rotvec", "rpy_vector", rpy_vector, ParamType.VECTOR3)
-    return list(_computed("rpy2rotvec", algebra.rpy_to_rotvec, vector))
+    return list(_computed("rpy2rotvec", algebra.rpy_to_rotvec, rpy_vector))
 
 
-def wrench_trans(T_from_to: Any, w_from: Any) -> list[float]:
+def wrench_trans(T_from_to: Pose, w_from: Sequence[float]) -> list[float]:
     """A wrench [F, M] seen from another frame, whose pose in the present frame is T_from_to.
 
     F_to = R^T F and M_to = R^T (M - p x F): the torque about the new point, in the new axes. Assumed: some
@@ -193,8 +153,8 @@ def wrench_trans(T_from_to: Any, w_from: Any) -> list[float]:
     Source: e-Series script directory, get_tcp_force: its example takes the wrench at the TCP from
     `wrench_trans(get_tcp_offset(), get_wrench_at_tool_flange())`.
     """
-    x, y, z, rx, ry, rz = pose("wrench_trans", "T_from_to", T_from_to)
-    fx, fy, fz, mx, my, mz = numbers("wrench_trans", "w_from", w_from, ParamType.VECTOR6)
+    x, y, z, rx, ry, rz = T_from_to
+    fx, fy, fz, mx, my, mz = w_from
     mx, my, mz = mx - (y * fz - z * fy), my - (z * fx - x * fz), mz - (x * fy - y * fx)
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = _computed(
         "wrench_trans", algebra.rotvec_to_flat, rx, ry, rz
@@ -214,69 +174,44 @@ def wrench_trans(T_from_to: Any, w_from: Any) -> list[float]:
 _WORD = 32  # bits of an int
 
 
-def norm(a: Any) -> float:
+def norm(a: float | list[float] | Pose) -> float:
     """Absolute value of a number (an int stays int), Euclidean length of a list or of all six of a pose."""
-    if type(a) is int:
-        return values.wrap_int(abs(a))
-    if is_number(a):
-        return abs(a)  # type: ignore[no-any-return]
-    if type(a) is Pose or (isinstance(a, list) and all(map(is_number, a))):
+    if isinstance(a, (list, Pose)):
         return math.hypot(*a)
-    raise type_error("norm", "a", ParamType.NORMED, a)
+    return values.wrap_int(abs(a)) if isinstance(a, int) else abs(a)
 
 
-def normalize(v: Any) -> list[float]:
+def normalize(v: list[float]) -> list[float]:
     """The unit vector in the direction of v.
 
     Raises:
         ScriptRuntimeError: the sum of the squares is zero.
     """
-    parts = numbers("normalize", "v", v)
-    square = sum(part * part for part in parts)
+    square = sum(part * part for part in v)
     if square == 0:
         raise ScriptRuntimeError("normalize: the sum of all squared elements is zero")
     length = math.sqrt(square)
-    return [part / length for part in parts]
+    return [part / length for part in v]
 
 
-def length(v: Any) -> int:
-    """Number of elements of a list or pose, or of bytes of a string."""
-    if isinstance(v, (list, str, Pose)):
-        return len(v)
-    raise type_error("length", "v", ParamType.SIZED, v)
-
-
-def get_list_length(v: Any) -> int:
-    """Number of elements of a list or pose."""
-    if isinstance(v, (list, Pose)):
-        return len(v)
-    raise type_error("get_list_length", "v", ParamType.ARRAY, v)
-
-
-def size(v: Any) -> int | list[int]:
+def size(v: Matrix | list[Any] | str | Pose) -> int | list[int]:
     """[rows, columns] of a matrix, else the number of elements or bytes."""
-    if isinstance(v, Matrix):
-        return list(v.shape)
-    if isinstance(v, (list, str, Pose)):
-        return len(v)
-    raise type_error("size", "v", ParamType.SHAPED, v)
+    return list(v.shape) if isinstance(v, Matrix) else len(v)
 
 
-def transpose(m: Any) -> Matrix | list[Any]:
+def transpose(m: Matrix | list[Any]) -> Matrix | list[Any]:
     """Rows become columns; a list becomes a column matrix, and a column matrix becomes a list."""
-    if isinstance(m, Matrix):
-        if m.shape[1] == 1:
-            return [row[0] for row in m.rows]
-        return Matrix(list(zip(*m.rows, strict=True)))
-    return Matrix([[value] for value in numbers("transpose", "m", m, ParamType.LIST_OR_MATRIX)])
-
-
-def inv(m: Any) -> Matrix | Pose:
-    """Inverse of a pose or of a square, non-singular matrix."""
-    if type(m) is Pose:
-        return pose_inv(m, "inv")
     if not isinstance(m, Matrix):
-        raise type_error("inv", "m", ParamType.POSE_OR_MATRIX, m)
+        return Matrix([[value] for value in m])
+    if m.shape[1] == 1:
+        return [row[0] for row in m.rows]
+    return Matrix(list(zip(*m.rows, strict=True)))
+
+
+def inv(m: Matrix | Pose) -> Matrix | Pose:
+    """Inverse of a pose or of a square, non-singular matrix."""
+    if isinstance(m, Pose):
+        return Pose.of(_computed("inv", algebra.pose_inv, m))
     rows, columns = m.shape
     if rows != columns or rows == 0:
         raise ScriptRuntimeError(f"inv: the matrix must be square, got {rows} x {columns}")
@@ -289,40 +224,36 @@ def inv(m: Any) -> Matrix | Pose:
     return Matrix(np.linalg.inv(array).tolist())
 
 
-def integer_to_binary_list(x: Any) -> list[bool]:
+def integer_to_binary_list(x: int) -> list[bool]:
     """The 32 bits of an int in two's complement, least significant first."""
-    value = integer("integer_to_binary_list", "x", x)
-    return [bool(value >> bit & 1) for bit in range(_WORD)]
+    return [bool(x >> bit & 1) for bit in range(_WORD)]
 
 
-def binary_list_to_integer(bits: Any) -> int:
+def binary_list_to_integer(bits: list[bool]) -> int:
     """Signed value of bits, least significant first; missing ones are 0, those after the 32nd are ignored."""
-    if not isinstance(bits, list) or not all(type(bit) is bool for bit in bits):
-        raise type_error("binary_list_to_integer", "l", ParamType.BOOLS, bits)
     value = sum(1 << place for place, bit in enumerate(bits[:_WORD]) if bit)
     return value - (1 << _WORD) if value >> (_WORD - 1) else value
 
 
-def make_list(length: Any, initial_value: Any, capacity: Any = None) -> list[Any]:
+def make_list(length: int, initial_value: Any, capacity: int | None = None) -> list[Any]:
     """A list of `length` equal elements with room for `capacity` of them, by default for no more.
 
     Raises:
         ScriptRuntimeError: a length below 0 or above the capacity, a list of lists.
     """
-    count = integer("make_list", "length", length)
-    most = count if capacity is None else integer("make_list", "capacity", capacity)
-    for name, wanted in (("length", count), ("capacity", most)):
+    most = length if capacity is None else capacity
+    for name, wanted in (("length", length), ("capacity", most)):
         if not 0 <= wanted <= LONGEST_LIST:
             raise ScriptRuntimeError(
                 f"make_list: Parameter '{name}' must be in the range 0 to {LONGEST_LIST}, got {wanted}"
             )
-    if count > most:
-        raise ScriptRuntimeError(f"make_list: a length of {count} exceeds the capacity of {most}")
+    if length > most:
+        raise ScriptRuntimeError(f"make_list: a length of {length} exceeds the capacity of {most}")
     if isinstance(initial_value, (list, Matrix)):
         raise ScriptRuntimeError(
             f"make_list: elements must be no lists, got {a_type(initial_value)}; a list of lists is a matrix"
         )
-    return values.list_with_capacity([initial_value] * count, most, initial_value)
+    return values.list_with_capacity([initial_value] * length, most, initial_value)
 
 
 def struct(names: tuple[str, ...], *members: Any) -> Struct:
@@ -343,14 +274,13 @@ _NUMBER = re.compile(
 )
 
 
-def str_at(src: Any, index: Any) -> str:
+def str_at(src: str, index: int) -> str:
     """One byte of a string; run-time error for an empty string or an index past its ends."""
-    text, place = string("str_at", "src", src), integer("str_at", "index", index)
-    if not text:
+    if not src:
         raise ScriptRuntimeError("str_at: source string is empty")
-    if not 0 <= place < len(text):
-        raise ScriptRuntimeError(f"str_at: index {place} is out of bounds, the string has {len(text)} bytes")
-    return text[place]
+    if not 0 <= index < len(src):
+        raise ScriptRuntimeError(f"str_at: index {index} is out of bounds, the string has {len(src)} bytes")
+    return src[index]
 
 
 def str_cat(op1: Any, op2: Any) -> str:
@@ -363,44 +293,30 @@ def to_str(val: Any) -> str:
     return _limited("to_str", _operand_text("to_str", val))
 
 
-def str_empty(text: Any) -> bool:
-    """Whether a string has no bytes."""
-    return not string("str_empty", "str", text)
-
-
-def str_len(text: Any) -> int:
-    """Number of bytes."""
-    return len(string("str_len", "str", text))
-
-
-def str_find(src: Any, target: Any, start_from: Any = 0) -> int:
+def str_find(src: str, target: str, start_from: int = 0) -> int:
     """Index of the first occurrence of target from start_from on, -1 if there is none.
 
     A start past either end finds nothing; the manual lists no error.
     """
-    text, wanted = string("str_find", "src", src), string("str_find", "target", target)
-    start = integer("str_find", "start_from", start_from)
-    return text.find(wanted, start) if 0 <= start <= len(text) else -1
+    return src.find(target, start_from) if 0 <= start_from <= len(src) else -1
 
 
-def str_sub(src: Any, index: Any, count: Any = None) -> str:
+def str_sub(src: str, index: int, count: int | None = None) -> str:
     """At most `count` bytes from `index` on, all to the end without it.
 
     Raises:
         ScriptRuntimeError: index outside [0, length], negative count.
     """
-    text, start = string("str_sub", "src", src), integer("str_sub", "index", index)
-    if not 0 <= start <= len(text):
-        raise ScriptRuntimeError(f"str_sub: index {start} is out of bounds, the string has {len(text)} bytes")
+    if not 0 <= index <= len(src):
+        raise ScriptRuntimeError(f"str_sub: index {index} is out of bounds, the string has {len(src)} bytes")
     if count is None:
-        return text[start:]
-    at_most = integer("str_sub", "len", count)
-    if at_most < 0:
-        raise ScriptRuntimeError(f"str_sub: len {at_most} is out of bounds, it must not be negative")
-    return text[start : start + at_most]
+        return src[index:]
+    if count < 0:
+        raise ScriptRuntimeError(f"str_sub: len {count} is out of bounds, it must not be negative")
+    return src[index : index + count]
 
 
-def to_num(number_text: Any) -> int | float:
+def to_num(text: str) -> int | float:
     """The number a string spells: a float if it has a decimal point, else an int.
 
     Leading spaces, a sign, an exponent, 0x..., inf and nan are allowed. An exponent without a point that
@@ -409,7 +325,6 @@ def to_num(number_text: Any) -> int | float:
     Raises:
         ScriptRuntimeError: no valid number, or out of range for its type.
     """
-    text = string("to_num", "str", number_text)
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise ScriptRuntimeError(f'to_num: string doesn\'t contain a valid number: "{text[:40]}"')
@@ -476,25 +391,26 @@ def _limited(function: str, text: str) -> str:
 
 
 _NAMED: tuple[Callable[..., Any], ...] = (
-    atan, atan2, ceil, floor, d2r, r2d, sqrt, log,
-    norm, normalize, length, get_list_length, size, transpose, inv,
+    math.atan, math.atan2, d2r, r2d, sqrt, log,
+    norm, normalize, size, transpose, inv,
     integer_to_binary_list, binary_list_to_integer, make_list, struct,
-    pose_inv, interpolate_pose, point_dist, pose_dist, rotvec2rpy, rpy2rotvec, wrench_trans,
-    str_at, str_cat, str_empty, str_len, str_find, str_sub, to_num, to_str,
+    point_dist, pose_dist, rotvec2rpy, rpy2rotvec, wrench_trans,
+    str_at, str_cat, str_find, str_sub, to_num, to_str,
 )  # fmt: skip
 
 PURE: Mapping[str, Callable[..., Any]] = MappingProxyType(
     {function.__name__: function for function in _NAMED}
-    | {name: _of_angle(name, getattr(math, name)) for name in ("sin", "cos", "tan")}
+    | {name: _of_angle(getattr(math, name)) for name in ("sin", "cos", "tan")}
     | {name: _of_ratio(name, getattr(math, name)) for name in ("asin", "acos")}
+    | {name: _rounded(name, getattr(math, name)) for name in ("ceil", "floor")}
     | {
-        "pow": power,
-        "pose_add": _of_two("pose_add", "p_1", "p_2", algebra.pose_add),
-        "pose_sub": _of_two("pose_sub", "p_to", "p_from", algebra.pose_sub),
-        "pose_trans": _of_two("pose_trans", "p_from", "p_from_to", algebra.pose_trans),
+        name: _pose_of(name, getattr(algebra, name))
+        for name in ("pose_add", "pose_sub", "pose_trans", "pose_inv", "interpolate_pose")
     }
+    | {"pow": power, "str_empty": operator.not_}
+    | dict.fromkeys(("length", "get_list_length", "str_len"), len)
 )
-"""URScript name -> function of the bound arguments, for all whose result depends on nothing else."""
+"""URScript name -> function of the fitted arguments, for all whose result depends on nothing else."""
 
 
 def pure_builtins(seed: int) -> dict[str, Callable[..., Any]]:

@@ -6,8 +6,12 @@ lists the U rows for users.
 
 Decisions without a constant, and where they are made:
 
-| question (all U) | decision | made in |
+| question (U where nothing stands) | decision | made in |
 |---|---|---|
+| a bool where a builtin, or a pose, takes a number (O, drivers) | 1 or 0 | catalogue.calls |
+| a number where a builtin takes a bool (O, PolyScope) | 0 is False | catalogue.calls |
+| a bool in a list of numbers, compared with a number | an error, not equal | variables, runtime |
+| `;` (O, a driver for CB2 and CB3) | may end a statement | grammar.lark |
 | hexadecimal literals, a line end in a string | refused | grammar.lark |
 | a label after a statement, `return` without a value | accepted | grammar.lark |
 | list * matrix, matrix / matrix; matrix + matrix | errors; of equal shape by element | runtime |
@@ -76,6 +80,10 @@ INT_OVERFLOW: Literal["wrap", "error"] = "wrap"
 EXACT_DIVISION_GIVES_INT: Final = False
 """6 / 3 is a float as 7 / 3 is (U). Both print the same; the driver script relies on real division."""
 
+BOOL_IN_ARITHMETIC: Final = True
+"""`2 * get_digital_in(1)` is 2 or 0 (O for `*`: a driver for software up to 3.2 makes a word of the inputs; I
+for the other signs)."""
+
 MODULO_SIGN: Literal["dividend", "divisor"] = "dividend"
 """-7 % 3 is -1, the rule of C (U)."""
 
@@ -108,7 +116,8 @@ class Dialect:
         short_circuit: `and` / `or` do not evaluate the right side when the left decides (U).
         list_resize: What storing a list of another length into a list variable does. "capacity" since 5.15:
             it keeps its capacity, a list that is longer is an error (D); "error" since 3.14 / 5.9.4 (O for
-            5.9.4-5.14.6, I for 3.14-3.15), "free" before (O).
+            5.9.4-5.14.6, I for 3.14-3.15), "free" before (O), "error" before 3.2 (I: a driver of that time
+            has a list for each length that it reads).
         array_arithmetic: The arithmetic operators work on lists and matrices: since 3.14 / 5.9 (O).
         has_pause: `pause` is a statement (e-Series 5.x, D); elsewhere it is an ordinary name.
         statement_budget: Statements a thread may run in one cycle.
@@ -128,7 +137,7 @@ def dialect_for(version: Sequence[int]) -> Dialect:
     major, minor = version[0], version[1]
     if major == 3:
         recent = minor >= 14
-        return Dialect(list_resize="error" if recent else "free", array_arithmetic=recent)
+        return Dialect(list_resize="error" if recent or minor < 2 else "free", array_arithmetic=recent)
     modern = major > 5 or minor >= 15
     resize: ListResize = "capacity" if modern else "error" if minor >= 9 else "free"
     return Dialect(list_resize=resize, array_arithmetic=major > 5 or minor >= 9, has_pause=True)

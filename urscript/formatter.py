@@ -187,7 +187,12 @@ def _needs_space(before: RuleToken, token: RuleToken) -> bool:
     kind = token.kind
     if kind == "DOT":
         return before.kind in _NUMBERS  # or the dot would become part of the number
-    if kind in ("COMMA", "COLON") or kind in _CLOSERS or before.kind == "DOT" or before.kind in _OPENERS:
+    if (
+        kind in ("COMMA", "COLON", "SEMICOLON")
+        or kind in _CLOSERS
+        or before.kind == "DOT"
+        or before.kind in _OPENERS
+    ):
         return False
     if _is_sign(before):
         return False
@@ -328,11 +333,11 @@ def _logical_lines(program: Tree[Any]) -> Iterator[LogicalLine]:
             stack.extend((level + 1, rule, part) for part in reversed(item.children))
         elif rule in _COMPOUND:
             stack.extend((level, rule, part) for part in reversed(item.children))
-        elif parent == "block":
-            yield LogicalLine(level, tuple(_tokens(item, parent)))
         else:
             head.extend(_tokens(item, parent))
-            if head and head[-1].kind == "END":
+            if head and (parent == "block" or head[-1].kind == "END"):
+                if stack and getattr(stack[-1][2], "type", "") == "SEMICOLON":
+                    head.extend(_tokens(stack.pop()[2], parent))
                 yield LogicalLine(level, tuple(head))
                 head = []
 

@@ -96,13 +96,14 @@ def urp(
         packed: with gzip, as PolyScope does it.
         name: of the program.
         saved_in: version of the software that saved it.
-        first: what is in the node of first values.
+        first: what is in the node of first values; "" without one.
     """
+    values = f"<InitVariablesNode>{first}</InitVariablesNode>" if first else ""
     text = (
         f'<?xml version="1.0" encoding="UTF-8"?>\n<URProgram name="{name}" installation="{installation}" '
         f'installationRelativePath="{installation}" directory="/programs" createdIn="3.15.8.106339" '
         f'lastSavedIn="{saved_in}"><kinematics status="NOT_INITIALIZED" validChecksum="false"/>'
-        f'<children><InitVariablesNode>{first}</InitVariablesNode>{around}<MainProgram runOnlyOnce="{str(once).lower()}">'
+        f'<children>{values}{around}<MainProgram runOnlyOnce="{str(once).lower()}">'
         f"<children>{nodes}</children></MainProgram></children></URProgram>"
     )
     return gzip.compress(text.encode(), mtime=0) if packed else text.encode()

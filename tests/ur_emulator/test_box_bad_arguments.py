@@ -14,7 +14,7 @@ from ur_emulator.commands.safety import UnlockProtectiveStop
 from urscript import compile_program
 from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15
-from urscript.catalogue.calls import fits
+from urscript.catalogue.calls import converted, fits
 from urscript.catalogue.types import ParamType
 from urscript.recording_host import RecordingHost
 
@@ -26,7 +26,6 @@ USUAL = {
     ParamType.BOOL: "True",
     ParamType.INT: "1.0",
     ParamType.NUMBER: "1.0",
-    ParamType.NUMBER_OR_BOOL: "True",
     ParamType.STRING: '"a"',
     ParamType.STRING_OR_INT: "1.0",
     ParamType.POSE: POSE,
@@ -35,8 +34,10 @@ USUAL = {
     ParamType.VECTOR3: "[0.0, 0.1, 0.2]",
     ParamType.VECTOR6: "[0.01, 0, 0, 0, 0, 0.01]",
     ParamType.NUMBERS: "[1.0, 2]",
+    ParamType.NUMBER_OR_NUMBERS: "[1.0, 2]",
     ParamType.LIST: "[1.0, 2.0]",
     ParamType.BOOLS: "[True, False]",
+    ParamType.BOOL_OR_BOOLS: "[True, False]",
     ParamType.MATRIX: "[[1, 2], [3, 5]]",
     ParamType.ARRAY: "[1, 2]",
     ParamType.SIZED: "[1, 2]",
@@ -86,7 +87,7 @@ def calls(row):
     yield arguments
     for i, param in enumerate(row.params):
         for other in ODD:
-            if fits(param.type, value_of(other)):
+            if fits(param.type, converted(param.type, value_of(other))):
                 yield [*arguments[:i], other, *arguments[i + 1 :]]
     yield ["[None]", *arguments[1:]]
 

@@ -125,6 +125,36 @@ def test_features(tmp_path, container):
     assert cell.features["Below"].pose[3:] == pytest.approx((half_turn, half_turn, 0.0))
 
 
+NAN = '<jointPositionVector value="NaN, NaN, NaN, NaN, NaN, NaN"/>'
+LINE = [(0.1, 0, 0), (0.2, 0, 0), (0.3, 0, 0)]
+CORNER = [(0.1, 0.2, 0.3), (0.4, 0.2, 0.3), (0, 0, 0)]
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        plane_feature("P", [(0, 0, 0)] * 3).replace("<toolPosition", f"{NAN}<toolPosition"),
+        plane_feature("P", CORNER).replace('<toolPosition value="0,', f'{NAN}<toolPosition value="0,'),
+        plane_feature("P", LINE),
+        '<GeomPlaneNode name="P"><firstPoint/><secondPoint/><thirdPoint/></GeomPlaneNode>',
+        pose_feature("P", (0, 0, 0, 0, 0, 0)),
+        '<GeomPoseNode name="P"><GeomPoseNode name="P"/></GeomPoseNode>',
+        pose_feature("P", ("NaN",) * 6),
+    ],
+    ids=["plane", "third point", "line", "no points", "pose", "no pose", "no numbers"],
+)
+def test_a_feature_that_was_never_taught_is_zero(tmp_path, node):
+    for text, is_variable in (
+        (node, False),
+        (node.replace('isVariable="false"', 'isVariable="true"'), "isVariable" in node),
+    ):
+        cell = read(tmp_path, f"<Features>{text}{pose_feature('Q', (0.1, 0, 0, 0, 0, 0))}</Features>")
+        assert cell.features == {
+            "P": Feature((0.0,) * 6, is_variable, is_taught=False),
+            "Q": Feature((0.1, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        }
+
+
 def test_modbus_signals(tmp_path):
     signal = (
         '<ModbusSignal class="ModbusSignal" name="{}" type="{}" slaveAddress="255" updateFrequency="{}" '
@@ -262,7 +292,6 @@ SECTION = "[SafetyLimits Normal Joints]\nmaxJointSpeed = [1, 2]\n"
         ([TCP.replace("0.0, 0.0, 0.12", "0.0, 0.12")], None, "offset of a TCP has 5 values, it needs 6"),
         ([TCP.replace("1.25", "heavy")], None, "mass of the payload is 'heavy', a number is needed"),
         ([listed("analogInputRange", 0, 1)], None, r"<analogInputRange> is \['0', '1'\], 4 of 0 and 1 are needed"),
-        ([f"<Features>{plane_feature('P', [(0, 0, 0)] * 3)}</Features>"], None, "points of a plane lie on a line"),
         ([f"<SafetySettings>{SECTION}</SafetySettings>"], None, "maxJointSpeed of the safety settings has not six"),
         ([f"<SafetySettings>{SECTION.replace('1, 2', '1, 1, 1, 1, 1, nan')}</SafetySettings>"], None, "has not six numbers"),
         ([f"<SafetySettings>{SECTION.replace('1, 2', '1, 1, 1, 1, 1, 0')}</SafetySettings>"], None, "maxJointSpeed of the safety settings is 0, it must be above 0"),

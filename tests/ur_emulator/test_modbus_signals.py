@@ -215,7 +215,7 @@ def test_an_address_that_is_none_is_refused(bench, address):
         ("set_signal_update_frequency", '"r", -1', "Parameter 'update_frequency' must be in the range 0 to 125, got -1"),
         ("set_signal_update_frequency", '"r", to_num("nan")', "Parameter 'update_frequency' must be finite, got nan"),
         ("set_digital_input_action", '"i", "dance"', "Parameter 'action' must be one of default, freedrive, got dance"),
-        ("send_custom_command", '"10.0.0.2", 1, 6, [True]', "data must be a list of up to 252 integers from 0 to 255"),
+        ("send_custom_command", '"10.0.0.2", 1, 6, [0.5]', "data must be a list of up to 252 integers from 0 to 255"),
     ],
 )  # fmt: skip
 def test_wrong_arguments_are_run_time_errors_of_one_line(bench, name, arguments, text):

@@ -19,6 +19,7 @@ from ur_emulator.errors import ProgramFileError
 from ur_emulator.program_files import reader
 from ur_emulator.program_files.compiling import compile_loaded
 from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.installation_reader import NEW_BOX
 from ur_emulator.program_files.loading import load_program
 from ur_emulator.program_files.script_writer import Header
 from urscript.catalogue import catalogue_for
@@ -69,9 +70,28 @@ def test_a_node_that_is_not_known_needs_the_saved_script(tmp_path, header, softw
     )
 
 
+OLD = b'<gui.program.ProgramRootNode serialization="custom"><unserializable-parents/></gui.program.ProgramRootNode>'
+
+
+def test_a_program_of_polyscope_1_8_runs_as_its_saved_script(tmp_path):
+    old = '<gui.installation.RobotInstallation><Features reference="../gone"/></gui.installation.RobotInstallation>'
+    (tmp_path / "default.installation").write_text(old)
+    program = load_pair(tmp_path, OLD, twin())
+    assert (script_of(program), program.undefined, program.installation) == (twin(), "", NEW_BOX)
+    assert program.notes[0].startswith(
+        "p.urp: a program of PolyScope 1.8 cannot be turned into a script: instead"
+    )
+
+
 @pytest.mark.parametrize(
     ("program", "saved", "problem"),
     [
+        (
+            OLD,
+            None,
+            "a program of PolyScope 1.8 cannot be turned into a script; put the .script that PolyScope saved",
+        ),
+        (OLD, 'textmsg("mine")\n', "and p.script is not a script that PolyScope saved"),
         (UNKNOWN, None, "'Gripper' cannot be turned into a script; put the .script that PolyScope saved"),
         (UNKNOWN, 'textmsg("mine")\n', "and p.script is not a script that PolyScope saved"),
         (
@@ -81,7 +101,14 @@ def test_a_node_that_is_not_known_needs_the_saved_script(tmp_path, header, softw
         ),
         (urp(GRIPPER + external_control()), twin(), "and p.script has what a PC sent when it was saved"),
     ],
-    ids=["none", "statements of the user", "a program of the user", "with a PC's part"],
+    ids=[
+        "old",
+        "old beside the user's",
+        "none",
+        "statements of the user",
+        "a program of the user",
+        "with a PC's part",
+    ],
 )
 def test_when_there_is_no_saved_script_to_use(tmp_path, program, saved, problem):
     with pytest.raises(ProgramFileError, match=problem):

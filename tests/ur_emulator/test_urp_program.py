@@ -25,13 +25,13 @@ from urp_samples import (
     variable_waypoint,
     waypoint,
 )
-from urp_support import NEW_BOX, lines_of, script_of
+from urp_support import NEW_BOX, lines_of, script_of, undefined_in
 
 from protocol.pose import pose_inv, pose_trans
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.events import ErrorReported, PopupShown, ScriptFailed
 from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.errors import ProgramFileError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.cb3_arms import UR5
 from ur_emulator.models.robot_model import ZERO6
@@ -169,6 +169,25 @@ def test_all_parts_stand_in_the_order_of_polyscope(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("top", "numbers"),
+    [
+        ("", [1, 2]),
+        ("<InitVariablesNode/>", [2, 3]),
+        ("<InitVariablesNode><children/></InitVariablesNode>", [2, 3]),
+        (
+            '<InitVariablesNode><variables><variable name="n"><expression/></variable></variables></InitVariablesNode>',
+            [2, 3],
+        ),
+    ],
+    ids=["none", "empty", "without variables", "without values"],
+)
+def test_the_node_of_first_values_has_a_number_if_it_is_there(tmp_path, top, numbers):
+    data = urp(HALT, packed=False).replace(b"<children><MainProgram", f"<children>{top}<MainProgram".encode())
+    labels = [line for line in script_of(tmp_path, data).splitlines() if "$" in line]
+    assert labels == [f'  $ {numbers[0]} "Robot Program"', f'  $ {numbers[1]} "Halt"']
+
+
+@pytest.mark.parametrize(
     ("name", "function"),
     [
         ("pick place", "pick_place"),
@@ -252,8 +271,8 @@ def test_sub_programs_in_files_of_their_own(tmp_path):
     (tmp_path / "cell" / "main.urp").write_bytes(urp(fresh))
     assert "\n    halt\n" in load_program(ProgramFolder(tmp_path), "cell/main.urp").script(lambda pc: "")
     (tmp_path / "cell" / "main.urp").write_bytes(urp(empty))
-    with pytest.raises(FileMissingError, match=r"grip\.urp"):
-        load_program(ProgramFolder(tmp_path), "cell/main.urp")
+    undefined = load_program(ProgramFolder(tmp_path), "cell/main.urp").undefined
+    assert undefined.startswith("main.urp: sub-program 'grip' is missing: ")
 
 
 def test_a_script_file_of_a_node_is_read_where_it_lies(tmp_path):
@@ -375,8 +394,8 @@ def test_a_pose_of_cb3_software_is_kept_in_its_feature(tmp_path):
     lines = lines_of(tmp_path, move("MoveL", waypoint("W", inside), feature=feature("Table")), CELL)
     half = ", ".join([".500000000000", *[".000000000000"] * 5])
     assert lines[-1] == f"movel(pose_trans(Table, p[{half}]), a=1.2, v=0.25)"
-    with pytest.raises(ProgramFileError, match="the pose of waypoint 'W' in feature 'Table' is not known"):
-        lines_of(tmp_path, move("MoveL", waypoint(), feature=feature("Table")), CELL)
+    unknown = undefined_in(tmp_path, move("MoveL", waypoint(), feature=feature("Table")), CELL)
+    assert "the pose of waypoint 'W' in feature 'Table' is not known" in unknown
 
 
 def test_features_are_targets_frames_and_values(tmp_path):
@@ -401,8 +420,34 @@ def test_features_are_targets_frames_and_values(tmp_path):
         lines = lines_of(tmp_path, nodes, CELL)
         assert lines[1] == f'$ 3 "Direction: {label}"'
         assert f"calculate_point_to_move_towards({frame}, [-1.0, 0.0, 0.0], 0.1)" in lines[6]
-    with pytest.raises(ProgramFileError, match="the installation has no feature 'Gone'"):
-        lines_of(tmp_path, move("MoveL", direction(CONTACT, inside=feature("Gone"))), CELL)
+    gone = undefined_in(tmp_path, move("MoveL", direction(CONTACT, inside=feature("Gone"))), CELL)
+    assert "the installation has no feature 'Gone'" in gone
+
+
+@pytest.mark.parametrize("is_variable", [True, False])
+def test_what_uses_a_feature_that_was_never_taught_is_undefined(tmp_path, is_variable):
+    cell = replace(CELL, features={"Plane": Feature(ZERO6, is_variable, is_taught=False)})
+    target = (
+        '<Waypoint type="Variable" name="W"><motionParameters/><variable featureName="Plane"/></Waypoint>'
+    )
+    value = assignment("x", "").replace(
+        "<expression>",
+        '<expression><ExpressionVariable><GeomFeatureVariable featureName="Plane"/></ExpressionVariable>',
+    )
+    for nodes, kind in (
+        (move("MoveL", waypoint("W", FIXED), CARTESIAN, feature("Plane")), "Move"),
+        (move("MoveL", variable_waypoint("part"), CARTESIAN, feature("Plane")), "Move"),
+        (move("MoveL", target), "Waypoint"),
+        (value, "Assignment"),
+        (
+            move("MoveL", direction(CONTACT, inside=feature("Plane"))),
+            "gui.program.direction.MoveDirectionNode",
+        ),
+    ):
+        assert f"a <{kind}> node uses feature 'Plane', which was never taught" in undefined_in(
+            tmp_path, nodes, cell
+        )
+    assert lines_of(tmp_path, HALT, cell) == ['$ 2 "Halt"', "halt"]
 
 
 def test_a_contact_without_a_distance_is_looked_for_far_away(tmp_path):
@@ -418,8 +463,9 @@ def test_tools_have_the_names_of_the_installation(tmp_path):
     assert lines_of(tmp_path, named, CELL) == ['$ 2 "Set"', statement]
     nodes = move("MoveL", variable_waypoint("a"), 'useActiveTCP="false"', '<tcp referencedName="Gripper"/>')
     assert lines_of(tmp_path, nodes, CELL)[:2] == ['$ 2 "MoveL"', statement]
-    with pytest.raises(ProgramFileError, match="has no TCP 'Hook': it has Gripper"):
-        lines_of(tmp_path, named.replace("Gripper", "Hook"), CELL)
+    assert "has no TCP 'Hook': it has Gripper" in undefined_in(
+        tmp_path, named.replace("Gripper", "Hook"), CELL
+    )
 
 
 def test_lines_have_the_names_of_the_installation(tmp_path):

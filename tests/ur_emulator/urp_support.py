@@ -25,6 +25,12 @@ def script_of(folder, data, installation=NEW_BOX, **options):
     return text.encode("latin-1").decode()
 
 
+def undefined_in(folder, nodes, installation=NEW_BOX):
+    """Return what is undefined in the one node that is."""
+    (text,) = made(folder, urp(nodes), installation).undefined
+    return text
+
+
 def lines_of(folder, nodes, installation=NEW_BOX, *, skip_unknown=False, **options):
     """Return the lines that nodes become, without indentation, behind the label of the program."""
     text = script_of(folder, urp(nodes, **options), installation, skip_unknown=skip_unknown)

@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from urscript.builtins import PURE, pure_builtins
+from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptRuntimeError
 from urscript.run import runtime
 from urscript.values import Matrix, Pose, wrap_int
 
+ROWS = catalogue_for("5.25")
+
 
 def call(name: str, *args: Any) -> Any:
-    return PURE[name](*args)
+    return PURE[name](*ROWS.fitting_of(name)(args))
 
 
 def refusal(name: str, *args: Any) -> str:
@@ -110,7 +113,7 @@ def test_against_numpy(
 @pytest.mark.parametrize(
     "name", ["sin", "cos", "tan", "asin", "acos", "atan", "ceil", "floor", "d2r", "r2d", "sqrt"]
 )
-@pytest.mark.parametrize("value", ["1", True, None, [1.0]])
+@pytest.mark.parametrize("value", ["1", None, [1.0]])
 def test_only_numbers_are_numbers(name: str, value: object) -> None:
     text = refusal(name, value)
     assert text.startswith(f"{name}: Parameter '")

@@ -7,6 +7,7 @@ import itertools
 import math
 import pickle
 from collections import Counter
+from itertools import product
 from typing import Any
 
 import pytest
@@ -16,11 +17,11 @@ from hypothesis import strategies as st
 from docs.generate.coverage_page import render
 from urscript.builtins import pure_builtins
 from urscript.catalogue import ALL_ROWS, CB3_3_15, Builtin, Generation, TimeClass, catalogue_for
-from urscript.catalogue.calls import compile_check, fits, static_bind
+from urscript.catalogue.calls import compile_fitting, fits, static_bind
 from urscript.catalogue.catalogue import read_rows
 from urscript.catalogue.methods import METHODS
 from urscript.catalogue.types import REQUIRED, ParamType, Support, Version
-from urscript.errors import ScriptTypeError
+from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.values import Matrix, Pose
 
 VERSIONS = (
@@ -33,7 +34,7 @@ VERSIONS = (
 @pytest.mark.parametrize(
     ("version", "counts", "n_undocumented"),
     [
-        ("3.15", {"motion": 35, "internals": 44, "urmath": 34, "interfaces": 65, "ioconfiguration": 16}, 16),
+        ("3.15", {"motion": 35, "internals": 44, "urmath": 34, "interfaces": 65, "ioconfiguration": 16}, 17),
         ("5.11", {"motion": 44, "internals": 48, "urmath": 34, "interfaces": 63, "ioconfiguration": 14,
                   "processpath": 9, "interpreter_mode": 3}, 14),
     ],
@@ -100,7 +101,7 @@ def test_defaults_fit_their_own_parameters():
                 param.name,
             )
         if not any(param.is_required for param in row.params):
-            compile_check(row)([param.default for param in row.params])
+            compile_fitting(row.name, row.params, row.nan_ok)([param.default for param in row.params])
 
 
 RESULTS = {
@@ -336,8 +337,25 @@ POSE = Pose(0.1, 0.2, 0.3, 0, 3.14, 0)
     ],
 )
 def test_accepted_values(name, args):
-    CB3_3_15.check_of(name)(bind(name, args))
+    CB3_3_15.fitting_of(name)(bind(name, args))
 
 
 def test_parameter_types_all_have_a_check():
     assert [kind for kind in ParamType if kind is not ParamType.ANY and fits(kind, object())] == []
+
+
+def taken(row, param, value):
+    """What a builtin gets for a value, with its type; None if it refuses it."""
+    try:
+        (got,) = compile_fitting(row.name, (param,), row.nan_ok)([value])
+    except ScriptRuntimeError:
+        return None
+    return repr(got)
+
+
+@pytest.mark.parametrize("row", ALL_ROWS, ids=lambda row: row.name)
+def test_a_bool_is_a_number_and_a_number_a_bool_for_every_parameter(row):
+    for param, length, (a_bool, a_number) in product(row.params, (0, 3, 6), ((True, 1), (False, 0))):
+        first, second = ([value] * length if length else value for value in (a_bool, a_number))
+        if not (fits(param.type, first) and fits(param.type, second)):  # else it takes values of any type
+            assert taken(row, param, first) == taken(row, param, second), param

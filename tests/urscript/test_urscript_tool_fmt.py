@@ -107,6 +107,10 @@ def test_all_scripts_of_the_tree_stay_what_they_are(file):
 LAYOUTS = {
     "blanks": ("x=1+-2*( 3-y )", "x = 1 + -2 * (3 - y)\n"),
     "two statements": ("a = 1 b = 2", "a = 1\nb = 2\n"),
+    "semicolons": (
+        "a=1;b = 2 ;  # c\nif a==1:return ;\nf() ; end; while True:end;",
+        "a = 1;\nb = 2;  # c\nif a == 1:\n  return;\n  f();\nend;\nwhile True:\nend;\n",
+    ),
     "calls": ("f ( 1,k = [ 2 ,3] [0] )", "f(1, k=[2, 3][0])\n"),
     "pose": ("x=p [0,0,.1 , 0,0,0]", "x = p[0, 0, .1, 0, 0, 0]\n"),
     "not": ("x=!y and not(z)", "x = !y and not (z)\n"),

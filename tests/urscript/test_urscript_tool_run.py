@@ -186,6 +186,33 @@ def test_a_wrong_program_is_not_run(run):
     assert document["diagnostics"][0]["hint"] == "did you mean 'movej'?"
 
 
+def test_a_text_that_runs_nothing_is_warned_of(run):
+    definitions = "def a():\nend\ndef b():\nend\n"
+    result = run(definitions)
+    assert result.exit_code == 0
+    said = "a.script:1:5: Warning: nothing runs: the text only defines 'a' and 'b' (write a() at its end) [W121]\n"
+    assert result.stderr.startswith(said)
+    told = json.loads(run(definitions, "--json").stdout)["diagnostics"]
+    assert [(one["severity"], one["code"]) for one in told] == [("warning", "W121")]
+    for text in (f"{definitions}b()\n", "def a():\nend\n"):
+        assert "Warning" not in run(text).stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "movej(q=[0, 0, 0, 0, 0, 0], 1.2)",
+            "1:29: Syntax error: positional argument after a named argument",
+        ),
+        ("movej(a=1, p[0, 0, 0, 0, 0, 0])", "1:12: Syntax error: positional argument after a named argument"),
+        ("x = 2147483648", "1:5: Syntax error: this integer does not fit into 32 bits; write a float"),
+    ],
+)
+def test_what_the_parser_takes_is_no_error_of_the_parser(run, line, said):
+    assert run(f"{line}\n").stderr.startswith(f"a.script:{said}\n")
+
+
 def test_a_failure_is_a_diagnostic_for_editors(run):
     result = run(program_of("x = [1]", "i = 7", "textmsg(x[i])"), "--json")
     assert result.exit_code == 1

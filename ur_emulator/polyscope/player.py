@@ -305,8 +305,12 @@ class ProgramPlayer:
             self._refuse("play", "a program plays already")
         if state.pendant.requests:
             self._refuse("play", "a popup waits to be closed, or a question for its answer")
-        if self.loaded is None and not self.is_paused:
+        if self.is_paused:
+            return
+        if self.loaded is None:
             self._refuse("play", "no program is loaded")
+        if self.loaded.undefined:
+            self._refuse("play", f"{self.loaded.undefined}; fill it in with PolyScope")
 
     def _prepare(self, client: str) -> Steps[CompileResult]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""

@@ -79,13 +79,13 @@ def compile_loaded(
 def load_and_compile(
     folder: ProgramFolder, name: str, before: Installation, catalogue: Catalogue, skip_unknown: bool = False
 ) -> tuple[LoadedProgram, CompileResult | None, CompileResult | None]:
-    """Read a program and its installation, and compile it unless parts of it are fetched when it starts.
+    """Read a program and its installation; compile it unless parts are undefined, or fetched when it starts.
 
     Return the program, what starts it, and what makes its installation effective in place of the one before;
     None if it is already. ProgramFileError: one of the files cannot be used.
     """
     loaded = load_program(folder, name, skip_unknown=skip_unknown)
-    ready = None if loaded.pcs else compile_loaded(loaded, {}, catalogue)
+    ready = None if loaded.pcs or loaded.undefined else compile_loaded(loaded, {}, catalogue)
     return loaded, ready, _set_up(loaded.installation or before, before, catalogue)
 
 

@@ -46,13 +46,16 @@ class DeclaredPayload:
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A pose or a plane that was taught, in the base frame [m, rotation vector in rad].
+    """A pose or a plane in the base frame [m, rotation vector in rad].
 
-    `is_variable`: programs have it as a global variable of its name.
+    Attributes:
+        is_variable: programs have it as a global variable of its name.
+        is_taught: otherwise its pose is zero, and what uses it is undefined.
     """
 
     pose: Vector6
     is_variable: bool = False
+    is_taught: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,12 +19,12 @@ from protocol.pose import T_to_pose
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.controller.io.lines import RunState
 from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.models.robot_model import Vector3, Vector6, six
+from ur_emulator.errors import FileMissingError, ProgramFileError, UndefinedError
+from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
 from ur_emulator.program_files import installation, variables_file
 from ur_emulator.program_files.folder import WIRE_ROOTS, FoundFile, ProgramFolder
 from ur_emulator.program_files.installation import Installation
-from ur_emulator.program_files.reader import ProgramReader, XmlTree, number
+from ur_emulator.program_files.reader import ProgramReader, XmlTree, number, number_texts
 from ur_emulator.program_files.safety_text import safety_settings
 
 if TYPE_CHECKING:
@@ -132,6 +132,8 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
 
     ProgramFileError if a value makes no sense, or there are too many.
     """
+    if tree.root.tag.startswith("gui."):  # of PolyScope 1.8, a dump of its objects: nothing is read
+        return Installation(wire_path)
     reader = _Reader(tree)
     pc, pc_name = reader.external_control()
     tcps, active_tcp = reader.tcps()
@@ -215,10 +217,7 @@ class _Values:
 
     def numbers(self, text: str | None, count: int, what: str) -> list[float]:
         """Return so many numbers, which commas separate."""
-        parts = (text or "").split(",")
-        if len(parts) != count:
-            raise ProgramFileError(f"{self.tree.name}: {what} has {len(parts)} values, it needs {count}")
-        return [self.number(part, what) for part in parts]
+        return list(map(float, number_texts(self.tree, text, what, count)))
 
     def vector3(self, text: str | None, what: str) -> Vector3:
         """Return three numbers."""
@@ -385,26 +384,32 @@ def _features_in(
         child = file.tree.resolve(given)
         inner_name = child.get("name") or name
         variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
-        pose = _pose_of(file, child)
+        try:
+            pose, is_taught = _pose_of(file, child), True
+        except UndefinedError:
+            pose, is_taught = ZERO6, False
         if pose is not None and inner_name:
-            yield inner_name, installation.Feature(pose, variable)
+            yield inner_name, installation.Feature(pose, variable, is_taught)
         elif pose is None and given is child:
             yield from _features_in(file, child, inner_name, is_variable=variable)
 
 
 def _pose_of(file: _Values, node: Element) -> Vector6 | None:
-    """Return the pose of a feature; None for a node that is none."""
+    """Return the pose of a feature, None for another node; UndefinedError if it was never taught."""
     if node.tag.endswith("GeomPlaneNode") and node.find("firstPoint") is not None:
         return _plane(file, node)
-    if not node.tag.endswith("GeomPoseNode"):
+    if not node.tag.endswith("GeomPoseNode") or any(inner.tag.endswith("GeomPoseNode") for inner in node):
         return None
-    position = file.value(node, "toolPosition")
-    if not position:
-        return None
-    return (
-        *file.vector3(position, "position of a feature"),
-        *file.vector3(file.value(node, "toolAxisAngle"), "rotation of a feature"),
-    )
+    position, rotation = _taught(file, node, "toolPosition", "toolAxisAngle")
+    return (*position, *rotation)
+
+
+def _taught(file: _Values, node: Element, *names: str) -> list[Vector3]:
+    """Return vectors of a point; UndefinedError if it was never taught: no joint angles, and only zeros."""
+    vectors = [file.vector3(file.value(node, name), f"{name} of a feature") for name in names]
+    if "NaN" in file.value(node, "jointPositionVector") and not any(map(any, vectors)):
+        raise UndefinedError(f"{file.tree.name}: a feature was never taught")
+    return vectors
 
 
 def _plane(file: _Values, node: Element) -> Vector6:
@@ -412,7 +417,7 @@ def _plane(file: _Values, node: Element) -> Vector6:
     y, normal = p2 - p1, np.cross(p2 - p1, p3 - p1)
     length, area = float(np.linalg.norm(y)), float(np.linalg.norm(normal))
     if not (length > 0.0 and area > 0.0):
-        raise ProgramFileError(f"{file.tree.name}: the points of a plane lie on a line")
+        raise UndefinedError(f"{file.tree.name}: the points of a plane lie on a line")
     y, z = y / length, normal / (-area if node.get("userHasPoints") == "true" else area)
     T_base_plane = np.eye(4)
     T_base_plane[:3, :4] = np.column_stack((np.cross(y, z), y, z, p1))
@@ -423,7 +428,6 @@ def _point(file: _Values, node: Element, name: str) -> np.ndarray:
     point = node.find(name)
     inner = None if point is None else file.tree.resolve(point)
     for element in () if inner is None else inner.iter():
-        position = file.value(element, "toolPosition")
-        if position:
-            return np.array(file.vector3(position, "point of a plane"))
-    raise ProgramFileError(f"{file.tree.name}: a plane has no <{name}>")
+        if file.value(element, "toolPosition"):
+            return np.array(_taught(file, element, "toolPosition")[0])
+    raise UndefinedError(f"{file.tree.name}: a plane has no <{name}>")

@@ -18,7 +18,8 @@ from ur_emulator.program_files.installation import ExternalControlPc, Installati
 from ur_emulator.program_files.installation_reader import NEW_BOX, installation_of
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.script_writer import Gap, Header, Part, header_lines, identifier
-from ur_emulator.program_files.urp_program import ROOT, make_script, uses_external_control
+from ur_emulator.program_files.urp_nodes import OLD_ROOT, ROOT
+from ur_emulator.program_files.urp_program import make_script, uses_external_control
 from ur_emulator.program_files.urpx import read_urpx
 from urscript.values import to_script_text
 
@@ -49,6 +50,7 @@ class LoadedProgram:
         installation: of the program; a script file has none.
         parts: its script, and places for what is known when it is played.
         origin: where the script comes from if not from the file itself.
+        undefined: what somebody has to fill in before it can be played, in one line; "" for nothing.
     """
 
     wire_path: str
@@ -56,6 +58,7 @@ class LoadedProgram:
     parts: tuple[Part, ...]
     notes: tuple[str, ...] = ()
     origin: str = ""
+    undefined: str = ""
 
     @property
     def file_name(self) -> str:
@@ -144,17 +147,21 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
             f"{URPX_SUFFIX}"
         )
     tree = reader.xml(file)
-    if tree.root.tag != ROOT:
+    if tree.root.tag not in (ROOT, OLD_ROOT):
         raise ProgramFileError(f"{file.name} is not a program: it is a <{tree.root.tag}>, not a <{ROOT}>")
     installation = installation_of(reader, tree, file)
     try:
         made = make_script(file, tree, reader, installation, skip_unknown=skip_unknown)
     except UnknownNodeError as unknown:
         return _twin_instead(reader, file, tree, installation, unknown)
-    notes = [f"{_cause(text)}: it is left out" for text in made.left_out[:_MOST_NOTES]]
-    if len(made.left_out) > _MOST_NOTES:
-        notes.append(f"{file.name}: {len(made.left_out)} things are left out in all")
-    return LoadedProgram(file.wire_path, installation, made.parts, tuple(notes))
+    notes: list[str] = []
+    for texts, what in ((made.left_out, "left out"), (made.undefined, "undefined")):
+        notes += [f"{_cause(text)}: it is {what}" for text in texts[:_MOST_NOTES]]
+        if len(texts) > _MOST_NOTES:
+            notes.append(f"{file.name}: {len(texts)} things are {what} in all")
+    others = f", and {len(made.undefined) - 1} more" if len(made.undefined) > 1 else ""
+    undefined = made.undefined[0] + others if made.undefined else ""
+    return LoadedProgram(file.wire_path, installation, made.parts, tuple(notes), undefined=undefined)
 
 
 def _twin_instead(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.errors import ProgramFileError
+from ur_emulator.errors import ProgramFileError, UndefinedError
 from ur_emulator.program_files.folder import FoundFile, ProgramFolder
 from urscript.source import as_utf8, program_text
 
@@ -173,25 +173,25 @@ _SHOWN = 100
 
 
 def number_text(tree: XmlTree, text: str | None, what: str) -> str:
-    """Return a finite number as it stands in the file, which is how a script has it, or ProgramFileError."""
+    """Return a finite number as it stands in the file, which is how a script has it, or UndefinedError."""
     plain = (text or "").strip()
     if not _NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
         shown = None if text is None else text[:_SHOWN]
-        raise ProgramFileError(f"{tree.name}: {what} is {shown!r}, a number is needed")
+        raise UndefinedError(f"{tree.name}: {what} is {shown!r}, a number is needed")
     return plain
 
 
 def number(tree: XmlTree, text: str | None, what: str) -> float:
-    """Return a finite number; ProgramFileError if it is none."""
+    """Return a finite number; UndefinedError if it is none."""
     return float(number_text(tree, text, what))
 
 
 def number_texts(tree: XmlTree, text: str | None, what: str, count: int = 6) -> list[str]:
     """Return numbers that have commas between, as they stand in the file.
 
-    ProgramFileError if there are more or fewer than `count`, or one is not a finite number.
+    UndefinedError if there are more or fewer than `count`, or one is not a finite number.
     """
     parts = text.split(",") if text else []
     if len(parts) != count:
-        raise ProgramFileError(f"{tree.name}: {what} has {len(parts)} values, it needs {count}")
+        raise UndefinedError(f"{tree.name}: {what} has {len(parts)} values, it needs {count}")
     return [number_text(tree, part, what) for part in parts]

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from protocol.pose import Pose, T_to_pose, pose_trans
-from ur_emulator.errors import ProgramFileError
-from ur_emulator.program_files.installation import Installation
+from ur_emulator.errors import ProgramFileError, UndefinedError
+from ur_emulator.program_files.installation import Feature, Installation
 from ur_emulator.program_files.reader import XmlTree, number_texts
 from ur_emulator.program_files.script_writer import identifier, is_identifier
 from ur_emulator.program_files.urp_maker import UrpMaker
@@ -45,15 +45,15 @@ class Expression(NamedTuple):
 def expression_of(maker: UrpMaker, node: Node, element: Element | None = None) -> Expression:
     """Return the expression that an element is, or that of a node.
 
-    ProgramFileError if there is none, or it has parts that are not known.
+    UndefinedError if there is none, UnknownNodeError if it has parts that are not known.
     """
     found = node.find("expression") if element is None else node.source.tree.resolve(element)
     if found is None:
-        raise node.source.error(f"a <{node.kind}> node has no expression")
+        raise node.source.undefined(f"a <{node.kind}> node has no expression")
     parts = [_part(maker, node, child) for child in found]
     expression = Expression("".join(part.script for part in parts), "".join(part.label for part in parts))
     if not expression.script.strip():
-        raise node.source.error(f"the expression of a <{node.kind}> node is empty")
+        raise node.source.undefined(f"the expression of a <{node.kind}> node is empty")
     return expression
 
 
@@ -68,13 +68,14 @@ def _part(maker: UrpMaker, node: Node, element: Element) -> Expression:
             return Expression(f" {_WORDS.get(token.strip(), token).translate(_SIGNS)} ", token)
         case "ExpressionVariable" if len(element):
             name = variable_name(node, element[0])
+            taught_feature(maker, node, name)
             return Expression(name, name)
         case "ExpressionWaypoint" if len(element):
             waypoint = tree.resolve(element[0])
             name = element[0].get("referenceName") or waypoint.get("name") or ""
             pose = taught_waypoint(maker, node, waypoint.find("position"), name).pose
             if not pose:
-                raise node.source.error(f"the file has only the joint angles of waypoint {name[:100]!r}")
+                raise node.source.undefined(f"the file has only the joint angles of waypoint {name[:100]!r}")
             return Expression(pose, name)
     pins = element.findall("pin")
     if len(pins) == 1:
@@ -84,14 +85,22 @@ def _part(maker: UrpMaker, node: Node, element: Element) -> Expression:
 
 
 def variable_name(node: Node, element: Element | None) -> str:
-    """Return the name of the variable or feature that an element is, or stands for; else ProgramFileError."""
+    """Return the name of the variable or feature that an element is, or stands for; else UndefinedError."""
     name = ""
     if element is not None:
         found = node.source.tree.resolve(element)
         name = found.get("name") or found.get("featureName") or ""
     if not is_identifier(name):
-        raise node.source.error(f"{name[:100]!r} is not the name of a variable")
+        raise node.source.undefined(f"{name[:100]!r} of a <{node.kind}> node is not the name of a variable")
     return name
+
+
+def taught_feature(maker: UrpMaker, node: Node, name: str) -> Feature | None:
+    """Return the feature of that name, if there is one; UndefinedError if it was never taught."""
+    feature = maker.installation.features.get(name)
+    if feature is not None and not feature.is_taught:
+        raise node.source.undefined(f"a <{node.kind}> node uses feature {name!r}, which was never taught")
+    return feature
 
 
 class TaughtWaypoint(NamedTuple):
@@ -107,7 +116,7 @@ class TaughtWaypoint(NamedTuple):
 def taught_waypoint(maker: UrpMaker, node: Node, element: Element | None, name: str) -> TaughtWaypoint:
     """Return a position that was taught: globals of its name, or in programs of CB3 the values themselves.
 
-    ProgramFileError if there are no joint angles, or numbers are damaged.
+    UndefinedError if there are no joint angles, or numbers are damaged.
     """
     position = position_of(node.source.tree, element, f"waypoint {name[:100]!r}")
     if position.pose is None:
@@ -193,12 +202,12 @@ class Line:
 
 
 def line_of(installation: Installation, name: str, file_name: str) -> Line:
-    """Return the line that a program calls by a name; ProgramFileError if there is none."""
+    """Return the line that a program calls by a name; UndefinedError if there is none."""
     if any(signal.name == name for signal in installation.modbus):
         return Line(_MODBUS, name.replace('"', "'"), name)
     match = _OWN_NAME.fullmatch(installation.lines.get(name, name))
     if match is None or match[1] not in LINES:
-        raise ProgramFileError(
+        raise UndefinedError(
             f"{file_name}: the installation has no line {name[:100]!r}: "
             "use one of its names, or a line's own, such as digital_in[0]"
         )
@@ -233,7 +242,7 @@ class Position:
 
 
 def pose_of(tree: XmlTree, text: str | None, what: str) -> Pose:
-    """Return the pose that six numbers with commas between are; ProgramFileError if they are not."""
+    """Return the pose that six numbers with commas between are; UndefinedError if they are not."""
     x, y, z, rx, ry, rz = _moderate(tree, number_texts(tree, text, what), what)
     return (x, y, z, rx, ry, rz)
 
@@ -261,10 +270,10 @@ def _decimals(value: float) -> str:
 def position_of(tree: XmlTree, element: Element | None, what: str) -> Position:
     """Return the position in a `<position>` element, or in one like it.
 
-    ProgramFileError if there are no joint angles, or numbers are damaged.
+    UndefinedError if there are no joint angles, or numbers are damaged.
     """
     if element is None:
-        raise ProgramFileError(f"{tree.name}: {what} has no position")
+        raise UndefinedError(f"{tree.name}: {what} has no position")
     angles = element.find("JointAngles")
     joints = number_texts(tree, element.get("joints") if angles is None else angles.get("angles"), what)
     given = element.get("pose")

@@ -149,7 +149,7 @@ def write_call(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<CallSubProgram>`."""
     called = node.find("subprogram")
     if called is None:
-        raise node.source.error("a <CallSubProgram> node names no sub-program")
+        raise node.source.undefined("a <CallSubProgram> node names no sub-program")
     name = maker.program.functions[called]
     maker.writer.label(node.number, f"Call {name}", around.mark)
     maker.writer.add(f"{name}()")
@@ -175,7 +175,7 @@ def write_events(maker: UrpMaker, events: Sequence[Node], around: Around) -> Non
     writer = maker.writer
     known: list[tuple[Node, str]] = []
     for event in events:
-        maker.try_to(partial(_note_condition, maker, event, known))
+        maker.try_to(event, partial(_note_condition, maker, event, known))
     if not known:
         return
     with writer.block("thread EventThread():"), writer.block("while (True):"):

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from ur_emulator.errors import UnknownNodeError
+from ur_emulator.errors import UndefinedError, UnknownNodeError
 from ur_emulator.program_files.installation import Installation
 from ur_emulator.program_files.reader import ProgramReader
 from ur_emulator.program_files.script_writer import ScriptWriter
@@ -42,6 +42,7 @@ class UrpMaker:
         last_motions: numbers of the motions at which a path of MoveP ends.
         switches: how many were written.
         left_out: what is not known and was left out.
+        undefined: what somebody has to fill in before the program can be played.
     """
 
     program: ProgramNodes
@@ -55,10 +56,11 @@ class UrpMaker:
     last_motions: set[int] = field(default_factory=set)
     switches: int = 0
     left_out: list[str] = field(default_factory=list)
+    undefined: list[str] = field(default_factory=list)
 
     def write(self, node: Node, around: Around) -> None:
         """Write one node; UnknownNodeError if it, or something in it, is not known."""
-        self.try_to(partial(self._write, node, around))
+        self.try_to(node, partial(self._write, node, around))
 
     def _write(self, node: Node, around: Around) -> None:
         write = self.writers.get(node.kind)
@@ -66,14 +68,17 @@ class UrpMaker:
             raise node.source.unknown(f"a <{node.kind}> node")
         write(self, node, around)
 
-    def try_to(self, action: Callable[[], None]) -> None:
-        """Do something; what it has written is removed if it meets what is not known and may be left out.
+    def try_to(self, node: Node, action: Callable[[], None]) -> None:
+        """Do something for a node; what it has written is removed if the node is undefined.
 
-        UnknownNodeError if that must not be left out.
+        So it is if it meets what is not known and may be left out; UnknownNodeError if that must not be.
         """
         place = self.writer.place
         try:
             action()
+        except UndefinedError as error:
+            self.writer.take(place)
+            self.undefined.append(f"{error} (label {node.number})")
         except UnknownNodeError as error:
             if not self.skip_unknown:
                 raise

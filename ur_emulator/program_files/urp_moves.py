@@ -17,6 +17,7 @@ from ur_emulator.program_files.urp_expressions import (
     pose_of,
     pose_text,
     position_of,
+    taught_feature,
     taught_waypoint,
     variable_name,
 )
@@ -56,7 +57,7 @@ def write_direction(maker: UrpMaker, node: Node, around: Around) -> None:
     writer, n = maker.writer, node.number
     untils = [child for child in node.children if child.kind == "Until"]
     if not untils or len(untils) != len(node.children):
-        raise node.source.error("a direction needs <Until> nodes, and no others")
+        raise node.source.undefined("a direction needs <Until> nodes, and no others")
     feature = feature_name(node)
     name, vector = _direction(maker, node)
     writer.label(n, f"Direction: {feature_label(feature)}{name}", around.mark)
@@ -104,7 +105,7 @@ def _tool_parameters(node: Node, around: Around) -> list[str]:
     if own := node.get("toolParams"):
         return number_texts(tree, own, "toolParams of a direction", 2)
     if around.move is None:
-        raise node.source.error("a direction stands outside of a <Move> and has no toolParams")
+        raise node.source.undefined("a direction stands outside of a <Move> and has no toolParams")
     return [
         number_text(tree, around.move.get(name), f"{name} of a direction")
         for name in ("speed", "acceleration")
@@ -208,12 +209,12 @@ def write_move(maker: UrpMaker, node: Node, around: Around) -> None:
 
 
 def set_tcp(maker: UrpMaker, node: Node, tcp: Element) -> str:
-    """Return the statement that makes a TCP of the installation the active one, or ProgramFileError."""
+    """Return the statement that makes a TCP of the installation the active one, or UndefinedError."""
     name = tcp.get("referencedName", "")
     offset = maker.installation.tcps.get(name)
     if offset is None:
         known = ", ".join(maker.installation.tcps) or "none"
-        raise node.source.error(f"the installation has no TCP {name[:100]!r}: it has {known}")
+        raise node.source.undefined(f"the installation has no TCP {name[:100]!r}: it has {known}")
     return f"set_tcp(p[{', '.join(map(repr, offset))}])"
 
 
@@ -232,7 +233,7 @@ def write_circle(maker: UrpMaker, node: Node, around: Around) -> None:
     """Write a `<CircleMove>`: a motion through its first waypoint to its second."""
     move = _move_around(node, around)
     if [child.kind for child in node.children] != ["Waypoint", "Waypoint"]:
-        raise node.source.error("a <CircleMove> needs two waypoints: one on the way, and its end")
+        raise node.source.undefined("a <CircleMove> needs two waypoints: one on the way, and its end")
     via, end = node.children
     maker.writer.label(node.number, "CircleMove", around.mark)
     maker.writer.label(via.number, _waypoint_name(via), "noBreak")
@@ -264,6 +265,7 @@ def _target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
     match node.get("type") or "Fixed":
         case "Variable":
             name = variable_name(node, node.element.find("variable"))
+            taught_feature(maker, node, name)
             feature = _variable_feature(maker, move)
             return f"pose_trans({feature}, {name})" if feature else name
         case "Fixed":
@@ -293,7 +295,7 @@ def _in_feature(node: Node, pose: str, feature: str) -> str:
     inside = node.find("position/poseInFeatureCoordinates")
     if inside is None:
         name = _waypoint_name(node)[:100]
-        raise node.source.error(f"the pose of waypoint {name!r} in feature {feature!r} is not known")
+        raise node.source.undefined(f"the pose of waypoint {name!r} in feature {feature!r} is not known")
     taught = pose_of(tree, inside.get("pose"), "<poseInFeatureCoordinates>")
     return f"pose_trans({feature}, {pose_text(taught)})"
 
@@ -305,7 +307,7 @@ def _relative_target(maker: UrpMaker, node: Node) -> str:
     for part, tag in (("from", "relativeFromPosition"), ("to", "position")):
         position = position_of(node.source.tree, node.find(tag), f"waypoint {name[:100]!r}")
         if position.pose is None:
-            raise node.source.error(f"the file has only the joint angles of waypoint {name[:100]!r}")
+            raise node.source.undefined(f"the file has only the joint angles of waypoint {name[:100]!r}")
         text = pose_text(position.pose)
         if node.source.series != CB3:
             variable = f"{identifier(name)}_{part}_p"
@@ -333,22 +335,22 @@ def feature_name(node: Node) -> str:
 def _variable_feature(maker: UrpMaker, move: Node) -> str:
     """Return the variable of the feature that a move follows; "" for base, tool, or a fixed feature."""
     name = feature_name(move)
-    feature = maker.installation.features.get(name)
+    feature = taught_feature(maker, move, name)
     return name if feature is not None and feature.is_variable else ""
 
 
 def frame_of(maker: UrpMaker, node: Node, name: str, tool: str) -> str:
     """Return the pose of a feature in the base frame, as a script has it; "" is the base.
 
-    `tool` is what a script has for the tool. ProgramFileError if the installation has no such feature.
+    `tool` is what a script has for the tool. UndefinedError if there is no such feature, or it is not taught.
     """
     if name in ("", _BASE):
         return ZERO_POSE
     if name == _TOOL:
         return tool
-    feature = maker.installation.features.get(name)
+    feature = taught_feature(maker, node, name)
     if feature is None:
-        raise node.source.error(f"the installation has no feature {name[:100]!r}")
+        raise node.source.undefined(f"the installation has no feature {name[:100]!r}")
     return name if feature.is_variable else pose_text(feature.pose)
 
 
@@ -369,7 +371,7 @@ def _motion(maker: UrpMaker, move: Node) -> str:
 
 def _move_around(node: Node, around: Around) -> Node:
     if around.move is None:
-        raise node.source.error(f"a <{node.kind}> stands outside of a <Move>")
+        raise node.source.undefined(f"a <{node.kind}> stands outside of a <Move>")
     return around.move
 
 

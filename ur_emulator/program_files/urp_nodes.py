@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.errors import FileMissingError, ProgramFileError, UnknownNodeError
+from ur_emulator.errors import FileMissingError, ProgramFileError, UndefinedError, UnknownNodeError
 from ur_emulator.program_files.folder import FoundFile
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.script_writer import Names
@@ -18,6 +18,10 @@ from ur_emulator.program_files.script_writer import Names
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
+
+ROOT = "URProgram"
+OLD_ROOT = "gui.program.ProgramRootNode"
+"""Of programs of PolyScope 1.8: a dump of its objects."""
 
 CB3 = 3
 """Series of the software of CB3; that of the e-Series is 5."""
@@ -34,6 +38,10 @@ class Source:
     def error(self, problem: str) -> ProgramFileError:
         """Return the error that says what is wrong with this file."""
         return ProgramFileError(f"{self.tree.name}: {problem}")
+
+    def undefined(self, problem: str) -> UndefinedError:
+        """Return the error that says what is missing in a node; the program is loaded, and not played."""
+        return UndefinedError(f"{self.tree.name}: {problem}")
 
     def unknown(self, what: str) -> UnknownNodeError:
         """Return the error that names what is not known."""
@@ -98,6 +106,7 @@ class ProgramNodes:
         others: threads, events, and what has no name here.
         sub_programs: in the order of their numbers.
         functions: names of the functions of sub-programs by the element that defines each.
+        undefined: sub-programs whose files are missing; one line each.
     """
 
     source: Source
@@ -108,6 +117,7 @@ class ProgramNodes:
     sub_programs: tuple[SubProgram, ...]
     functions: Mapping[Element, str]
     names: Names
+    undefined: tuple[str, ...]
 
 
 # --- from the tree of a program file to its nodes, with the numbers of their labels
@@ -122,8 +132,14 @@ _VARIABLES = frozenset({"variable", "ProgramVariable"})
 
 
 def read_nodes(file: FoundFile, tree: XmlTree, reader: ProgramReader) -> ProgramNodes:
-    """Return the nodes of a program; ProgramFileError without a main program, or beyond a limit."""
-    return _NodeReader(reader).program(_source(file, tree))
+    """Return the nodes of a program.
+
+    UnknownNodeError for one of PolyScope 1.8, ProgramFileError without a main program, or beyond a limit.
+    """
+    source = _source(file, tree)
+    if tree.root.tag == OLD_ROOT:
+        raise source.unknown("a program of PolyScope 1.8")
+    return _NodeReader(reader).program(source)
 
 
 def _source(file: FoundFile, tree: XmlTree) -> Source:
@@ -139,13 +155,13 @@ class _NodeReader:
     names: Names = field(default_factory=Names)
     functions: dict[Element, str] = field(default_factory=dict)
     waiting: list[tuple[Source, Element]] = field(default_factory=list)
+    undefined: list[str] = field(default_factory=list)
 
     def program(self, source: Source) -> ProgramNodes:
         self._reserve_names(source)
         top = source.tree.root.findall("children/*")
-        variables = source.tree.root.find("children/InitVariablesNode/variables")
-        if variables is not None:
-            self.last = 1
+        first_values = source.tree.root.find("children/InitVariablesNode")
+        self.last = 0 if first_values is None else 1  # its number, also when it is empty
         before = [self._node(source, one) for one in top if one.tag == "SpecialSequence"]
         for node in before:
             if node.get("type") != "BeforeStart":
@@ -161,13 +177,14 @@ class _NodeReader:
                 self._call(source, one)
         return ProgramNodes(
             source,
-            variables,
+            None if first_values is None else first_values.find("variables"),
             before[0] if before else None,
             main[0],
             tuple(node for node in others if node.kind not in _SUPPRESSED),
             tuple(self._sub_programs()),
             self.functions,
             self.names,
+            tuple(self.undefined),
         )
 
     def _reserve_names(self, source: Source) -> None:
@@ -216,9 +233,10 @@ class _NodeReader:
             return source, definition
         try:
             file = self.reader.folder.beside(source.file, file_name)
-        except FileMissingError:
+        except FileMissingError as error:
             if is_empty:
-                raise
+                name = self.functions[definition]
+                self.undefined.append(f"{source.tree.name}: sub-program {name!r} is missing: {error}")
             return source, definition
         other = _source(file, self.reader.xml(file))
         self._reserve_names(other)

@@ -102,18 +102,17 @@ NOT_KNOWN: tuple[str, ...] = (
 """What programs of PolyScope may hold and no script is known for."""
 
 
-ROOT = "URProgram"
-
-
 @dataclass(frozen=True, slots=True)
 class MadeScript:
     """The script of a program: texts, and places for what is known when the program is played.
 
-    `left_out` is what is not known and was left out; one line each.
+    `left_out` is what is not known and was left out, `undefined` what has to be filled in before the program
+    can be played; one line each.
     """
 
     parts: tuple[Part, ...]
     left_out: tuple[str, ...]
+    undefined: tuple[str, ...]
 
 
 def uses_external_control(tree: XmlTree) -> bool:
@@ -170,7 +169,8 @@ def make_script(
             writer.add(*lines)
         _write_timers(maker)
         writer.parts += [*functions, *before, *others, *body]
-    return MadeScript(tuple(_joined(writer.parts)), tuple(maker.left_out))
+    undefined = (*program.undefined, *maker.undefined)
+    return MadeScript(tuple(_joined(writer.parts)), tuple(maker.left_out), undefined)
 
 
 @contextmanager
@@ -219,11 +219,11 @@ def _write_first_values(maker: UrpMaker) -> None:
     for element in program.source.tree.root.iter():
         first = element.find("initializeExpression")
         if first is not None and len(first):
-            maker.try_to(partial(_declare_first_value, maker, element, first))
+            maker.try_to(program.main, partial(_declare_first_value, maker, element, first))
     for variable in () if program.variables is None else program.variables:
         given = variable.find("expression")
         if given is not None and len(given):
-            maker.try_to(partial(_declare_first_value, maker, variable, given))
+            maker.try_to(program.main, partial(_declare_first_value, maker, variable, given))
 
 
 def _declare_first_value(maker: UrpMaker, variable: Element, value: Element) -> None:

@@ -81,7 +81,7 @@ def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
     writer, data, (n, *others) = maker.writer, node.data, _grippers(node, "GripperIdKey")
     branches = {child.get("strategyProgramNodeType"): child for child in node.children}
     if branches.keys() != {"If", "Else"} or others:
-        raise node.source.error("a Grip Check node needs one gripper, an If and an Else")
+        raise node.source.undefined("a Grip Check node needs one gripper, an If and an Else")
     detects = data.get("ObjectDetectedKey", "true") == "true"
     label = "If object detected" if detects else "If object not detected"
     condition = f'{"" if detects else "not "}rq_is_object_detected("{n}")'
@@ -109,11 +109,11 @@ def _grippers(node: Node, key: str) -> list[int]:
 
 
 def _percent(node: Node, *keys: str) -> float:
-    """Return the value under the first of the keys that is there [%]; ProgramFileError without one."""
+    """Return the value under the first of the keys that is there [%]; UndefinedError without one."""
     text = next((node.data[key] for key in keys if key in node.data), None)
     value = number(node.source.tree, text, f"{keys[-1]} of a {node.get('strategyProgramNodeType')} node")
     if not 0.0 <= value <= 100.0:
-        raise node.source.error(f"{keys[-1]} is {value:g} %: use 0 to 100")
+        raise node.source.undefined(f"{keys[-1]} is {value:g} %: use 0 to 100")
     return value
 
 

@@ -69,11 +69,11 @@ def write_script(maker: UrpMaker, node: Node, around: Around) -> None:
     if name:
         try:
             content = maker.reader.script(maker.reader.folder.beside(node.source.file, name))
-        except FileMissingError:
+        except FileMissingError as error:
             if content is None:
-                raise
+                raise node.source.undefined(f"the file of a <Script> node is missing: {error}") from None
     if content is None:
-        raise node.source.error("a <Script> node is empty and names no file")
+        raise node.source.undefined("a <Script> node is empty and names no file")
     maker.writer.label(node.number, f"Script: {PurePosixPath(name).name}", around.mark)
     maker.writer.add(content)
 
@@ -104,7 +104,7 @@ def write_set(maker: UrpMaker, node: Node, around: Around) -> None:
         is_high = _is_high(node)
         statement = line.write(str(is_high))
         if not statement:
-            raise node.source.error(f"line {line.label!r} is an input: it cannot be set")
+            raise node.source.undefined(f"line {line.label!r} is an input: it cannot be set")
         maker.writer.label(node.number, f"Set {line.label}={'On' if is_high else 'Off'}", around.mark)
         maker.writer.add(statement)
     elif kind != "NoAction":
@@ -134,7 +134,7 @@ def write_wait(maker: UrpMaker, node: Node, around: Around) -> None:
         case "AnalogInput":
             sign = _COMPARISONS.get(node.text("analogComparison"))
             if sign is None:
-                raise node.source.error(
+                raise node.source.undefined(
                     "a <Wait> compares in an unknown way: use 0 (less), 1 (more) or 2 (equal)"
                 )
             level = number_text(tree, node.element.findtext("analogValue"), "level of a <Wait>")
@@ -217,8 +217,8 @@ def _line(maker: UrpMaker, node: Node) -> Line:
 
 
 def _is_high(node: Node) -> bool:
-    """Return the level that a node names; ProgramFileError if it names none."""
+    """Return the level that a node names; UndefinedError if it names none."""
     text = node.text("digitalValue").lower()
     if text not in ("0", "1", "true", "false"):
-        raise node.source.error(f"a <{node.kind}> node has the level {text[:100]!r}: it is 0 or 1")
+        raise node.source.undefined(f"a <{node.kind}> node has the level {text[:100]!r}: it is 0 or 1")
     return text in ("1", "true")

@@ -1,6 +1,6 @@
 """Builtins for lines, flags, registers, what lines stand for, and the tool connector; they act at once.
 
-The catalogue has checked that a line or register exists; its number may be a float without fraction.
+The catalogue has checked that a line or register exists.
 """
 
 from collections.abc import MutableSequence, Sequence
@@ -46,26 +46,26 @@ class LineBuiltins(BuiltinGroup):
     def _digital(self, group: str, bits: Sequence[int]) -> dict[str, HostFunction]:
         io = self._io
         return {
-            f"get_{group}digital_in": lambda thread, n: io.read_digital_in(bits[int(n)]),
-            f"get_{group}digital_out": lambda thread, n: io.read_digital_out(bits[int(n)]),
-            f"set_{group}digital_out": lambda thread, n, b: io.write_digital_out(bits[int(n)], b),
+            f"get_{group}digital_in": lambda thread, n: io.read_digital_in(bits[n]),
+            f"get_{group}digital_out": lambda thread, n: io.read_digital_out(bits[n]),
+            f"set_{group}digital_out": lambda thread, n, b: io.write_digital_out(bits[n], b),
         }
 
     @builtin("set_standard_analog_out", "set_analog_out")
-    def _set_analog_out(self, thread: object, n: float, f: float) -> None:
-        self._io.analog_out[int(n)].set_ratio(f)
+    def _set_analog_out(self, thread: object, n: int, f: float) -> None:
+        self._io.analog_out[n].set_ratio(f)
 
     @builtin("set_tool_voltage")
-    def _set_tool_voltage(self, thread: object, voltage: float) -> None:
-        self._io.set_tool_voltage(int(voltage))
+    def _set_tool_voltage(self, thread: object, voltage: int) -> None:
+        self._io.set_tool_voltage(voltage)
 
     @builtin("get_flag")
-    def _get_flag(self, thread: object, n: float) -> bool:
-        return self._io.flags[int(n)]
+    def _get_flag(self, thread: object, n: int) -> bool:
+        return n < len(self._io.flags) and self._io.flags[n]
 
     @builtin("set_flag")
-    def _set_flag(self, thread: object, n: float, b: bool) -> None:
-        self._io.flags[int(n)] = b
+    def _set_flag(self, thread: object, n: int, b: bool) -> None:
+        self._io.flags[n] = b
 
     @builtin("set_tool_communication")
     def _set_tool_line(
@@ -76,17 +76,15 @@ class LineBuiltins(BuiltinGroup):
             raise ScriptRuntimeError(
                 f"set_tool_communication: baud rate {baud_rate} is not supported; allowed: {allowed}"
             )
-        self._io.set_tool_line(
-            lines.ToolLine(enabled, int(baud_rate), int(parity), int(stop_bits), *idle_chars)
-        )
+        self._io.set_tool_line(lines.ToolLine(enabled, baud_rate, parity, stop_bits, *idle_chars))
 
     @builtin("set_tool_output_mode")
-    def _set_tool_output_mode(self, thread: object, mode: float) -> None:
-        self._io.set_tool_output_mode(0, int(mode))
+    def _set_tool_output_mode(self, thread: object, mode: int) -> None:
+        self._io.set_tool_output_mode(0, mode)
 
     @builtin("set_tool_digital_output_mode")
-    def _set_pin_mode(self, thread: object, n: float, mode: float) -> None:
-        self._io.set_tool_output_mode(1 + int(n), int(mode))
+    def _set_pin_mode(self, thread: object, n: int, mode: int) -> None:
+        self._io.set_tool_output_mode(1 + n, mode)
 
     @builtin("set_baselight_off", "set_baselight_iec", "set_baselight_solid")
     def _accept(self, thread: object, *setting: int) -> None:
@@ -94,7 +92,7 @@ class LineBuiltins(BuiltinGroup):
 
 
 def _analog_reader(analog: Sequence[lines.AnalogLine]) -> HostFunction:
-    return lambda thread, n: analog[int(n)].value
+    return lambda thread, n: analog[n].value
 
 
 class RegisterBuiltins(BuiltinGroup):
@@ -119,14 +117,14 @@ class RegisterBuiltins(BuiltinGroup):
 
 
 def _register_reader(memory: MutableSequence[Any]) -> HostFunction:
-    return lambda thread, address: memory[int(address)]
+    return lambda thread, address: memory[address]
 
 
 def _register_writer(memory: MutableSequence[Any]) -> HostFunction:
     kind = type(memory[0])
 
     def write(thread: object, address: int, value: Any) -> None:
-        memory[int(address)] = kind(value)
+        memory[address] = kind(value)
 
     return write
 
@@ -186,17 +184,17 @@ class LineSetupBuiltins(BuiltinGroup):
         return functions
 
     @builtin("set_analog_inputrange")
-    def _set_input_range(self, thread: object, port: float, code: float) -> None:
+    def _set_input_range(self, thread: object, port: int, code: int) -> None:
         ranges, line = (
-            (_BOX_RANGES, self._io.analog_in[int(port)])
+            (_BOX_RANGES, self._io.analog_in[port])
             if port < 2
-            else (_TOOL_RANGES, self._io.tool_analog_in[int(port) - 2])
+            else (_TOOL_RANGES, self._io.tool_analog_in[port - 2])
         )
-        domain = ranges.get(int(code))
+        domain = ranges.get(code)
         if domain is None:
             allowed = ", ".join(map(str, ranges))
             raise ScriptRuntimeError(
-                f"set_analog_inputrange: range {code:g} is not supported on port {port:g}; allowed: {allowed}"
+                f"set_analog_inputrange: range {code} is not supported on port {port}; allowed: {allowed}"
             )
         line.set_domain(domain)
 
@@ -205,38 +203,38 @@ class LineSetupBuiltins(BuiltinGroup):
         self._configuration.clear_input_actions()
 
     @builtin("get_euromap_input")
-    def _get_euromap_input(self, thread: object, n: float) -> bool:
+    def _get_euromap_input(self, thread: object, n: int) -> bool:
         return self._euromap.read_input(_euromap_port(n))
 
     @builtin("get_euromap_output")
-    def _get_euromap_output(self, thread: object, n: float) -> bool:
+    def _get_euromap_output(self, thread: object, n: int) -> bool:
         return self._euromap.read_output(_euromap_port(n))
 
     @builtin("set_euromap_output")
-    def _set_euromap_output(self, thread: object, n: float, value: bool) -> None:
+    def _set_euromap_output(self, thread: object, n: int, value: bool) -> None:
         self._euromap.write_output(_euromap_port(n), value)
 
     @builtin("set_euromap_runstate_dependent_choice")
-    def _set_euromap_rule(self, thread: object, n: float, choice: float) -> None:
-        self._configuration.set_rule(OutputKind.EUROMAP, _euromap_port(n), lines.RunState(int(choice)))
+    def _set_euromap_rule(self, thread: object, n: int, choice: int) -> None:
+        self._configuration.set_rule(OutputKind.EUROMAP, _euromap_port(n), lines.RunState(choice))
 
     def _action_setter(self, group: str) -> HostFunction:
-        return lambda thread, port, action: self._configuration.set_input_action(group, int(port), action)
+        return lambda thread, port, action: self._configuration.set_input_action(group, port, action)
 
     def _runstate_setter(self, kind: OutputKind, name: str) -> HostFunction:
         # The catalogue checks the codes of the others, which the e-Series has more of.
         allowed = range(4) if kind in (OutputKind.GP_INTEGER, OutputKind.GP_FLOAT) else tuple(lines.RunState)
 
-        def set_runstate(thread: object, output: float, code: float) -> None:
+        def set_runstate(thread: object, output: int, code: int) -> None:
             if code not in allowed:
-                raise ScriptRuntimeError(f"{name}: state {code:g} does not exist; allowed: 0 to 3")
-            self._configuration.set_rule(kind, int(output), lines.RunState(int(code)))
+                raise ScriptRuntimeError(f"{name}: state {code} does not exist; allowed: 0 to 3")
+            self._configuration.set_rule(kind, output, lines.RunState(code))
 
         return set_runstate
 
     def _list_setter(self, names: Sequence[tuple[OutputKind, int]], function: str) -> HostFunction:
         def set_list(thread: object, outputs: list[Any]) -> None:
-            if not all(type(i) in (int, float) and i in range(len(names)) for i in outputs):
+            if not all(i in range(len(names)) for i in outputs):
                 raise ScriptRuntimeError(f"{function}: outputs are numbers from 0 to {len(names) - 1}")
             for i, (kind, index) in enumerate(names):
                 state = lines.RunState.LOW_WHEN_STOPPED if i in outputs else lines.RunState.KEEP
@@ -246,12 +244,12 @@ class LineSetupBuiltins(BuiltinGroup):
 
 
 def _domain_setter(analog: Sequence[lines.AnalogLine]) -> HostFunction:
-    return lambda thread, port, domain: analog[int(port)].set_domain(int(domain))
+    return lambda thread, port, domain: analog[port].set_domain(domain)
 
 
-def _euromap_port(number: float) -> int:
+def _euromap_port(number: int) -> int:
     if not 0 <= number < lines.N_EUROMAP:
         raise ScriptRuntimeError(
-            f"Euromap67 port {number:g} does not exist; allowed: 0 to {lines.N_EUROMAP - 1}"
+            f"Euromap67 port {number} does not exist; allowed: 0 to {lines.N_EUROMAP - 1}"
         )
-    return int(number)
+    return number

@@ -29,7 +29,7 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.scripting.builtin_group import BuiltinGroup, builtin
 from ur_emulator.scripting.network import Network
 from urscript import Blocked, Outside, ScriptRuntimeError
-from urscript.values import is_number, log_form, wrap_int
+from urscript.values import log_form, wrap_int
 
 # Source: URScript manual, modbus_add_signal.
 MAX_NAME = 20
@@ -64,20 +64,20 @@ class ModbusBuiltins(BuiltinGroup):
         self,
         thread: object,
         ip: str,
-        slave: float,
-        address: float,
-        kind: float,
+        slave: int,
+        address: int,
+        kind: int,
         name: str,
         sequential: bool,
-        register_count: float = 1,
+        register_count: int = 1,
     ) -> None:
         function = "modbus_add_signal"
         if kind not in tuple(SignalType) or kind == SignalType.READ_WRITE_REGISTERS:
             raise ScriptRuntimeError(
-                f"{function}: signal_type {kind:g} is not known; allowed: 0 to 3, 15 and 16"
+                f"{function}: signal_type {kind} is not known; allowed: 0 to 3, 15 and 16"
             )
-        unit, type_, count = _unit_address(function, ip), SignalType(int(kind)), int(register_count)
-        signal = ModbusSignal(name, unit, int(slave), int(address), type_, sequential, count=count)
+        unit, type_, count = _unit_address(function, ip), SignalType(kind), register_count
+        signal = ModbusSignal(name, unit, slave, address, type_, sequential, count=count)
         self._add(function, signal)
 
     @builtin("modbus_add_rw_signal")
@@ -85,11 +85,11 @@ class ModbusBuiltins(BuiltinGroup):
         self,
         thread: object,
         ip: str,
-        slave: float,
-        read_address: float,
-        read_count: float,
-        write_address: float,
-        write_count: float,
+        slave: int,
+        read_address: int,
+        read_count: int,
+        write_address: int,
+        write_count: int,
         name: str,
         sequential: bool,
     ) -> None:
@@ -97,13 +97,13 @@ class ModbusBuiltins(BuiltinGroup):
         signal = ModbusSignal(
             name,
             _unit_address(function, ip),
-            int(slave),
-            int(read_address),
+            slave,
+            read_address,
             SignalType.READ_WRITE_REGISTERS,
             sequential,
-            count=int(read_count),
-            write_address=int(write_address),
-            write_count=int(write_count),
+            count=read_count,
+            write_address=write_address,
+            write_count=write_count,
         )
         self._add(function, signal)
 
@@ -127,16 +127,14 @@ class ModbusBuiltins(BuiltinGroup):
         self._modbus.delete(name)
 
     @builtin("modbus_send_custom_command")
-    def _send_custom_command(
-        self, thread: object, ip: str, slave: float, code: float, data: list[Any]
-    ) -> None:
+    def _send_custom_command(self, thread: object, ip: str, slave: int, code: int, data: list[Any]) -> None:
         function = "modbus_send_custom_command"
         if len(data) > MAX_DATA or not all(type(item) is int and 0 <= item <= BYTE_MAX for item in data):
             raise ScriptRuntimeError(
                 f"{function}: data must be a list of up to {MAX_DATA} integers from 0 to {BYTE_MAX}"
             )
         unit = _unit_address(function, ip)
-        self._modbus.send(unit, self._network.modbus_unit, int(slave), int(code), bytes(data))
+        self._modbus.send(unit, self._network.modbus_unit, slave, code, bytes(data))
 
     # --- values
 
@@ -154,17 +152,14 @@ class ModbusBuiltins(BuiltinGroup):
     def _set_output_signal(self, thread: object, name: str, value: Any, is_secondary: bool) -> None:
         function = "modbus_set_output_signal"
         signal = self._signal(function, name, SignalType.DIGITAL_OUTPUT)
-        values = _values_for(function, signal, value)
-        if not all(isinstance(item, bool) for item in values):
-            raise ScriptRuntimeError(f"{function}: {log_form(value)} is not modelled; allowed: True or False")
-        self._set_output(function, signal, values)
+        self._set_output(function, signal, _values_for(function, signal, value))
 
     @builtin("modbus_set_output_register")
     def _set_output_register(self, thread: object, name: str, value: Any, is_secondary: bool) -> None:
         function = "modbus_set_output_register"
         signal = self._signal(function, name, SignalType.REGISTER_OUTPUT)
         values = _values_for(function, signal, value)
-        if not all(is_number(item) and 0 <= item <= WORD_MAX for item in values):
+        if not all(0 <= item <= WORD_MAX for item in values):
             raise ScriptRuntimeError(
                 f"{function}: {log_form(value)} does not fit into a register; allowed: 0 to {WORD_MAX}"
             )
@@ -188,12 +183,12 @@ class ModbusBuiltins(BuiltinGroup):
         self._signal(function, name, SignalType.DIGITAL_INPUT).action = action or DEFAULT_ACTION
 
     @builtin("modbus_set_runstate_dependent_choice")
-    def _set_rule(self, thread: object, name: str, code: float) -> None:
+    def _set_rule(self, thread: object, name: str, code: int) -> None:
         function = "modbus_set_runstate_dependent_choice"
         signal = self._signal(function, name)
         if not signal.type.is_output:
             raise ScriptRuntimeError(f'{function}: signal "{name}" is a {signal.type.title}, not an output')
-        self._modbus.set_rule(signal, RunState(int(code)), self._configuration.program_runs)
+        self._modbus.set_rule(signal, RunState(code), self._configuration.program_runs)
 
     @builtin("modbus_set_signal_watchdog")
     def _set_watchdog(self, thread: object, name: str, timeout: float) -> None:
@@ -202,11 +197,11 @@ class ModbusBuiltins(BuiltinGroup):
     # --- connections
 
     @builtin("modbus_get_error")
-    def _get_error(self, thread: object, name: str, source: float) -> int:
+    def _get_error(self, thread: object, name: str, source: int) -> int:
         signal = self._signal("modbus_get_error", name)
         device, connection = signal.device_error, signal.connection_error
         # Both: the connection error in the upper two bytes.
-        return (wrap_int((connection & WORD_MAX) << 16 | device), device, connection)[int(source)]
+        return (wrap_int((connection & WORD_MAX) << 16 | device), device, connection)[source]
 
     @builtin("modbus_get_time_since_signal_invalid")
     def _get_time_invalid(self, thread: object, name: str) -> float:
@@ -277,24 +272,24 @@ class MapBuiltins(BuiltinGroup):
         self._state = state
 
     @builtin("read_port_bit")
-    def _read_bit(self, thread: object, address: float) -> bool:
+    def _read_bit(self, thread: object, address: int) -> bool:
         return self._access(modbus_map.read_coil, address)
 
     @builtin("read_port_register")
-    def _read_register(self, thread: object, address: float) -> int:
+    def _read_register(self, thread: object, address: int) -> int:
         word = self._access(modbus_map.read_register, address)
         return word - 2 * _SIGN if word & _SIGN else word
 
     @builtin("write_port_bit")
-    def _write_bit(self, thread: object, address: float, value: bool) -> None:
+    def _write_bit(self, thread: object, address: int, value: bool) -> None:
         self._access(modbus_map.write_coil, address, value)
 
     @builtin("write_port_register")
-    def _write_register(self, thread: object, address: float, value: float) -> None:
-        self._access(modbus_map.write_register, address, int(value))
+    def _write_register(self, thread: object, address: int, value: int) -> None:
+        self._access(modbus_map.write_register, address, value)
 
-    def _access(self, function: Callable[..., _T], address: float, *value: int | bool) -> _T:
+    def _access(self, function: Callable[..., _T], address: int, *value: int | bool) -> _T:
         try:
-            return function(self._state, int(address), *value)
+            return function(self._state, address, *value)
         except modbus_map.MapAddressError as error:
             raise ScriptRuntimeError(str(error)) from None

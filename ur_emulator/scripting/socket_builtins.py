@@ -123,7 +123,7 @@ class SocketBuiltins(BuiltinGroup):
                 f"socket_open: a socket name of {len(name)} characters; allowed: up to {LONGEST_NAME}"
             )
         self._close(thread, name)
-        socket = self._network.open(address, int(port))
+        socket = self._network.open(address, port)
         # Stored before it is open: a program that is killed meanwhile closes it.
         reader = self._sockets[name] = SocketReader(socket)
         expired = self._timer(OPEN_TIMEOUT)
@@ -181,9 +181,7 @@ class SocketBuiltins(BuiltinGroup):
 
     @builtin("socket_set_var")
     def _set_var(self, thread: object, variable: str, value: float, name: _Name) -> None:
-        # Programs of Robotiq give a bool, to a server whose values are numbers.
-        shown = log_form(int(value) if isinstance(value, bool) else value)
-        self._send(name, f"SET {variable} {shown}\n".encode("latin-1", "replace"))
+        self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
 
     # --- reading
 
@@ -280,21 +278,20 @@ class SocketBuiltins(BuiltinGroup):
 
     @builtin("socket_read_binary_integer")
     def _read_binary_integer(
-        self, thread: object, number: float, name: _Name, timeout: float
+        self, thread: object, number: int, name: _Name, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        return self._read_numbers(name, timeout, int(number), "i", 4)
+        return self._read_numbers(name, timeout, number, "i", 4)
 
     @builtin("socket_read_byte_list")
     def _read_byte_list(
-        self, thread: object, number: float, name: _Name, timeout: float
+        self, thread: object, number: int, name: _Name, timeout: float
     ) -> Generator[Blocked, None, list[int]]:
-        return self._read_numbers(name, timeout, int(number), "B", 1)
+        return self._read_numbers(name, timeout, number, "B", 1)
 
     @builtin("socket_read_ascii_float")
     def _read_ascii_float(
-        self, thread: object, number: float, name: _Name, timeout: float
+        self, thread: object, number: int, name: _Name, timeout: float
     ) -> Generator[Wait, None, list[float]]:
-        number = int(number)
         data = yield from self._take(name, timeout, TextSearch(b"", b")"))
         failed: list[float] = [0, *([math.nan] * number)]
         if data is None:

@@ -45,12 +45,13 @@ class StateBuiltins(BuiltinGroup):
             "get_actual_joint_positions": lambda thread: list(past.sensed.actual_q),
             "get_target_joint_positions": lambda thread: list(motion.target.q),
             "get_joint_positions": lambda thread: list(motion.path.q),
+            "get_joint_speeds": lambda thread: list(past.sensed.actual_qd),
             "get_actual_joint_speeds": lambda thread: list(past.sensed.actual_qd),
             "get_target_joint_speeds": lambda thread: list(motion.target.qd),
             "get_actual_joint_accelerations": lambda thread: list(past.joint_accelerations()),
             "get_target_joint_accelerations": lambda thread: list(motion.target.qdd),
             "get_target_waypoint": lambda thread: Pose.of(arm.tcp_pose(motion.goal)),
-            "get_joint_temp": lambda thread, j: past.sensed.joint_temperatures[int(j)],
+            "get_joint_temp": lambda thread, j: past.sensed.joint_temperatures[j],
             "get_tool_temp": lambda thread: past.sensed.joint_temperatures[-1],
             "get_controller_temp": lambda thread: past.snapshot.masterboard_temperature,
             "get_target_tcp_pose": lambda thread: Pose.of(arm.tcp_pose(motion.target.q)),
@@ -87,13 +88,13 @@ class StateBuiltins(BuiltinGroup):
         return Pose.of(self._arm.tcp_speed(sensed.actual_q, sensed.actual_qd))
 
     @builtin("get_actual_joint_positions_history")
-    def _joint_positions_history(self, thread: object, steps: float) -> list[float]:
+    def _joint_positions_history(self, thread: object, steps: int) -> list[float]:
         history = self._past.q_history
         if not steps < len(history):
             raise ScriptRuntimeError(
-                f"get_actual_joint_positions_history: {steps:g} steps back; allowed: 0 to {len(history) - 1}"
+                f"get_actual_joint_positions_history: {steps} steps back; allowed: 0 to {len(history) - 1}"
             )
-        return list(history[int(steps)])
+        return list(history[steps])
 
     @builtin("get_joint_torques")
     def _joint_torques(self, thread: object) -> list[float]:

@@ -9,6 +9,7 @@ the texts about values, the one for poses is the controller's own (log of 5.12: 
 must be a Pose on the form p[x,y,z,a,b,c]"); the others follow its pattern, adding what was given.
 """
 
+import operator
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from math import hypot, isfinite
@@ -100,19 +101,15 @@ def static_bind(builtin: Builtin, n_positional: int, keyword_names: Sequence[str
     return slots
 
 
-# --- values: a check is compiled once for each builtin and then only runs small predicates, because motion
-# commands pass here every control cycle. It never converts: an integer parameter also takes a float without
-# fraction, because programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS), so hosts call `int()`.
+# --- values: what fits them is compiled once for each builtin and then only runs small predicates, because
+# motion commands pass here every control cycle. What they refuse may still be converted.
 
 Predicate = Callable[[Any], bool]
+Fitting = Callable[[Sequence[Any]], Sequence[Any]]
 
 _SHOWN_TEXT = 40
 # Larger numbers are not a length, time or angle of a robot; their products would overflow.
 _LARGEST = 1e15
-
-
-def _is_int(value: Any) -> bool:
-    return type(value) is int or (isinstance(value, float) and value.is_integer())
 
 
 def _is_numbers(value: Any, count: int | None = None) -> bool:
@@ -129,24 +126,29 @@ def _is_six(value: Any) -> bool:
     return _is_numbers(value, 6)
 
 
+def _is_bools(value: Any) -> bool:
+    return isinstance(value, list) and all(type(item) is bool for item in value)
+
+
 def _is_pose(value: Any) -> bool:
     return type(value) is Pose
 
 
 _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.BOOL: lambda value: type(value) is bool,
-    ParamType.INT: _is_int,
+    ParamType.INT: lambda value: type(value) is int,
     ParamType.NUMBER: is_number,
-    ParamType.NUMBER_OR_BOOL: lambda value: is_number(value) or type(value) is bool,
     ParamType.STRING: lambda value: isinstance(value, str),
-    ParamType.STRING_OR_INT: lambda value: isinstance(value, str) or _is_int(value),
+    ParamType.STRING_OR_INT: lambda value: isinstance(value, (str, int)),
     ParamType.POSE: _is_pose,
     ParamType.JOINTS: _is_six,
     ParamType.POSE_OR_JOINTS: lambda value: type(value) is Pose or _is_numbers(value, 6),
     ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
     ParamType.VECTOR6: lambda value: type(value) is Pose or _is_numbers(value, 6),
     ParamType.NUMBERS: _is_numbers,
-    ParamType.BOOLS: lambda value: isinstance(value, list) and all(type(item) is bool for item in value),
+    ParamType.NUMBER_OR_NUMBERS: lambda value: is_number(value) or _is_numbers(value),
+    ParamType.BOOLS: _is_bools,
+    ParamType.BOOL_OR_BOOLS: lambda value: type(value) is bool or _is_bools(value),
     ParamType.LIST: lambda value: isinstance(value, list),
     ParamType.MATRIX: lambda value: isinstance(value, Matrix),
     ParamType.ARRAY: lambda value: isinstance(value, (list, Pose)),
@@ -157,7 +159,27 @@ _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.NORMED: lambda value: type(value) is Pose or is_number(value) or _is_numbers(value),
 }
 
-_NUMERIC = FIXED_SIZE - {ParamType.BOOL, ParamType.INT} | {ParamType.NUMBERS}
+_INTS = frozenset({ParamType.INT, ParamType.STRING_OR_INT})
+_BOOLS = frozenset({ParamType.BOOL, ParamType.BOOLS, ParamType.BOOL_OR_BOOLS})
+_NUMERIC = FIXED_SIZE - {ParamType.BOOL, ParamType.INT} | {ParamType.NUMBERS, ParamType.NUMBER_OR_NUMBERS}
+_NUMBERS = _NUMERIC | _INTS | {ParamType.LIST_OR_MATRIX, ParamType.NORMED}
+"""Types of what is a number, or may hold some."""
+
+
+def converted(kind: ParamType, value: Any) -> Any:
+    """A value as a parameter of this type takes it, if it can be converted.
+
+    Where it takes numbers, True is 1 and False 0; where it takes bools, 0 is False, any other number True. An
+    integer may be a float without fraction: programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS).
+    """
+    if isinstance(value, list):
+        parts = [converted(kind, item) for item in value]
+        return value if all(map(operator.is_, parts, value)) else parts
+    if type(value) is bool:
+        return int(value) if kind in _NUMBERS else value
+    if isinstance(value, float) and kind in _INTS and value.is_integer() and INT_MIN <= value <= INT_MAX:
+        return int(value)
+    return value != 0 if kind in _BOOLS and is_number(value) else value
 
 
 def fits(kind: ParamType, value: Any) -> bool:
@@ -205,10 +227,6 @@ def _is_bounded(value: Any) -> bool:
     return bool(-_LARGEST <= value <= _LARGEST)
 
 
-def _must_be_finite(builtin: Builtin, param: Param) -> bool:
-    return not builtin.nan_ok and param.type in _NUMERIC
-
-
 def _is_in_range(param: Param, value: Any) -> bool:
     if param.choices and value not in param.choices:
         return False
@@ -217,12 +235,13 @@ def _is_in_range(param: Param, value: Any) -> bool:
     return param.high is None or bool(value <= param.high)
 
 
-def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
-    """The error for an argument that a check refused."""
-    if not fits(param.type, value):
-        return type_error(builtin.name, param.name, param.type, value)
-    if _must_be_finite(builtin, param) and not _is_bounded(value):
-        allowed = f"in the range {-_LARGEST:g} to {_LARGEST:g}" if _is_finite(value) else "finite"
+def explain(function: str, param: Param, value: Any, needs_finite: bool) -> ScriptRuntimeError:
+    """The error for an argument that does not fit."""
+    taken = converted(param.type, value)
+    if not fits(param.type, taken):
+        return type_error(function, param.name, param.type, value)
+    if needs_finite and not _is_bounded(taken):
+        allowed = f"in the range {-_LARGEST:g} to {_LARGEST:g}" if _is_finite(taken) else "finite"
     elif param.choices:
         allowed = "one of " + ", ".join(map(str, param.choices))
     elif param.low is not None and param.high is not None:
@@ -231,21 +250,18 @@ def explain(builtin: Builtin, param: Param, value: Any) -> ScriptRuntimeError:
         allowed = f"at least {param.low:g}"
     else:
         allowed = f"at most {param.high:g}"
-    return ScriptRuntimeError(
-        f"{builtin.name}: Parameter '{param.name}' must be {allowed}, got {_show(value)}"
-    )
+    return ScriptRuntimeError(f"{function}: Parameter '{param.name}' must be {allowed}, got {_show(taken)}")
 
 
 def _show(value: Any) -> str:
     return f"[{', '.join(map(str, value))}]" if isinstance(value, (list, Pose)) else str(value)
 
 
-def _accepts(builtin: Builtin, param: Param) -> Predicate | None:
+def _accepts(param: Param, needs_finite: bool) -> Predicate | None:
     """All conditions on one argument in one predicate, or None if there is none."""
     of_type = _PREDICATES.get(param.type)
     if of_type is None:
         return None
-    needs_finite = _must_be_finite(builtin, param)
     is_ranged = bool(param.choices) or param.low is not None or param.high is not None
     may_be_left_out = param.default is None
 
@@ -288,71 +304,24 @@ _FAST_PREDICATES: dict[ParamType, Predicate] = {
 }
 
 
-def compile_check(builtin: Builtin) -> Callable[[Sequence[Any]], None]:
-    """A function that takes bound arguments and raises ScriptRuntimeError for the first that does not fit."""
-    tests = [
-        (index, accepts)
-        for index, param in enumerate(builtin.params)
-        if (accepts := _accepts(builtin, param)) is not None
-    ]
+def compile_fitting(function: str, params: Sequence[Param], nan_ok: bool = True) -> Fitting:
+    """A function that returns bound arguments as a builtin or method with these parameters takes them.
 
-    def check(args: Sequence[Any]) -> None:
-        for index, accepts in tests:
-            if not accepts(args[index]):
-                raise explain(builtin, builtin.params[index], args[index])
-
-    return check
-
-
-# --- what pure functions check their own arguments with, so that calls of them need no check of the catalogue
-
-
-def number(function: str, parameter: str, value: Any) -> float:
-    """The argument, if it is an int or a float; raises ScriptRuntimeError otherwise."""
-    kind = type(value)
-    if kind is float or kind is int or is_number(value):
-        return value  # type: ignore[no-any-return]
-    raise type_error(function, parameter, ParamType.NUMBER, value)
-
-
-def integer(function: str, parameter: str, value: Any) -> int:
-    """The argument as an int; a float without fraction will do (see dialect: INDEX_TAKES_WHOLE_FLOATS)."""
-    if type(value) is int:
-        return value
-    if isinstance(value, float) and value.is_integer() and INT_MIN <= value <= INT_MAX:
-        return int(value)
-    raise type_error(function, parameter, ParamType.INT, value)
-
-
-def string(function: str, parameter: str, value: Any) -> str:
-    """The argument, if it is a string."""
-    if isinstance(value, str):
-        return value
-    raise type_error(function, parameter, ParamType.STRING, value)
-
-
-def pose(function: str, parameter: str, value: Any) -> Pose:
-    """The argument, if it is a pose."""
-    if type(value) is Pose:
-        return value
-    raise type_error(function, parameter, ParamType.POSE, value)
-
-
-def numbers(function: str, parameter: str, value: Any, kind: ParamType = ParamType.NUMBERS) -> list[float]:
-    """The argument, if it is a list of numbers: 3 for VECTOR3, 6 or a pose for VECTOR6, else any number."""
-    count = {ParamType.VECTOR3: 3, ParamType.VECTOR6: 6}.get(kind)
-    if kind is ParamType.VECTOR6 and type(value) is Pose:
-        return list(value)
-    if isinstance(value, list) and (count is None or len(value) == count) and all(map(is_number, value)):
-        return value
-    raise type_error(function, parameter, kind, value)
-
-
-def fit_int(function: str, value: float) -> int:
-    """A whole number as a 32-bit int.
-
-    A controller converts by a C cast, arbitrary for numbers out of range; here that is an error.
+    It raises ScriptRuntimeError for the first that does not fit. `nan_ok`: see `Builtin`.
     """
-    if INT_MIN <= value <= INT_MAX:
-        return int(value)
-    raise ScriptRuntimeError(f"{function}: result {value} does not fit into a 32-bit integer")
+    tests = []
+    for index, param in enumerate(params):
+        needs_finite = not nan_ok and param.type in _NUMERIC
+        if (accepts := _accepts(param, needs_finite)) is not None:
+            tests.append((index, param, needs_finite, accepts))
+
+    def fit(args: Sequence[Any]) -> Sequence[Any]:
+        for index, param, needs_finite, accepts in tests:
+            if not accepts(args[index]):
+                value = converted(param.type, args[index])
+                if not accepts(value):
+                    raise explain(function, param, args[index], needs_finite)
+                args = [*args[:index], value, *args[index + 1 :]]
+        return args
+
+    return fit

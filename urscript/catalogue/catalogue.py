@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from urscript.catalogue import types
-from urscript.catalogue.calls import Slot, compile_check, static_bind
+from urscript.catalogue.calls import Fitting, Slot, compile_fitting, static_bind
 from urscript.catalogue.methods import ValueMethod, methods_of
 from urscript.catalogue.types import Builtin, Generation, ModuleVariable, Param, PerGeneration, Version
 from urscript.errors import ScriptTypeError
@@ -189,7 +189,9 @@ class Catalogue:
         self.arrays: Mapping[str, types.BuiltinArray] = {item.name: item for item in ARRAYS}
         self.methods: Mapping[tuple[str, str], ValueMethod] = methods_of(version)
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
-        self._checks = {name: compile_check(row) for name, row in self._by_name.items()}
+        self._fittings = {
+            name: compile_fitting(name, row.params, row.nan_ok) for name, row in self._by_name.items()
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle it as its version, and its rows if they are others than those of the tables."""
@@ -252,12 +254,12 @@ class Catalogue:
                 raise
         return slots
 
-    def check_of(self, name: str) -> Callable[[Sequence[Any]], None]:
-        """A function that checks bound arguments against what the table asks for: types, ranges, finiteness.
+    def fitting_of(self, name: str) -> Fitting:
+        """A function that returns bound arguments as the table asks for them: types, ranges, finiteness.
 
         It raises ScriptRuntimeError with the controller's text where it is known.
         """
-        return self._checks[name]
+        return self._fittings[name]
 
 
 def _fits(builtin: Builtin, n_positional: int, keyword_names: Sequence[str]) -> bool:

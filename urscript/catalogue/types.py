@@ -138,7 +138,6 @@ class ParamType(Enum):
     BOOL = "True or False"
     INT = "an integer"
     NUMBER = "a number"
-    NUMBER_OR_BOOL = "a number, True or False"
     STRING = "a string"
     STRING_OR_INT = "a string or an integer"
     POSE = "a Pose on the form p[x,y,z,a,b,c]"
@@ -147,8 +146,10 @@ class ParamType(Enum):
     VECTOR3 = "a list of 3 numbers"
     VECTOR6 = "a list of 6 numbers or a Pose"
     NUMBERS = "a list of numbers"
+    NUMBER_OR_NUMBERS = "a number or a list of numbers"
     LIST = "a list"
     BOOLS = "a list of bools"
+    BOOL_OR_BOOLS = "True or False, or a list of them"
     MATRIX = "a matrix"
     ARRAY = "a list or a Pose"
     SIZED = "a list, a string or a Pose"
@@ -163,7 +164,6 @@ FIXED_SIZE: Final = frozenset(
         ParamType.BOOL,
         ParamType.INT,
         ParamType.NUMBER,
-        ParamType.NUMBER_OR_BOOL,
         ParamType.POSE,
         ParamType.JOINTS,
         ParamType.POSE_OR_JOINTS,

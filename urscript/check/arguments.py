@@ -2,13 +2,11 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from math import degrees, hypot
 from typing import Any, Final, NamedTuple
 
-from urscript.builtins import PURE
 from urscript.catalogue import STEP_TIME, Catalogue
-from urscript.catalogue.calls import compile_check, fits, type_error
+from urscript.catalogue.calls import compile_fitting, converted, fits, type_error
 from urscript.catalogue.types import Builtin, Param
 from urscript.check import warnings
 from urscript.check.unused import Variable, expressions_read, owner
@@ -17,7 +15,7 @@ from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression, all_statements
-from urscript.values import Pose, is_number
+from urscript.values import Pose, is_number, log_form
 
 _STREAMED: Final = frozenset({"servoj", "speedj", "speedl"})
 
@@ -35,7 +33,7 @@ class KnownValue(NamedTuple):
 
 
 def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
-    """Everything this module warns about, in no order; pure functions check their arguments themselves."""
+    """Everything this module warns about, in no order."""
     constants = _constants(program)
     cycle = STEP_TIME[catalogue.version.generation]
     for scope, call in expressions_read(program):
@@ -47,15 +45,20 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
                 yield ScriptWarning(warnings.WRONG_COUNT, refusal, call.span, program.source)
             continue
         builtin = catalogue.lookup(call.function)
-        if builtin is None or builtin.name in PURE:
+        if builtin is None:
             continue
         for param, argument in _arguments(call, builtin, catalogue):
             known = _known_value(_value_of(argument, scope, constants))
             if known is None:
                 continue
             message = _refused(builtin, param, known)
+            taken = converted(param.type, known.value)
             if message:
                 yield ScriptWarning(warnings.REFUSED_ARGUMENT, message, argument.span, program.source)
+            elif taken is not known.value:
+                message = type_error(builtin.name, param.name, param.type, known.value).message
+                hint = f"it is taken as {log_form(taken)}"
+                yield ScriptWarning(warnings.IN_NO_MANUAL, message, argument.span, program.source, hint)
             elif found := _wrong_unit(param, known.value):
                 rule, text, hint = found
                 yield ScriptWarning(rule, f"{builtin.name}: {text}", argument.span, program.source, hint)
@@ -117,11 +120,11 @@ def _arguments(
 def _refused(builtin: Builtin, param: Param, known: KnownValue) -> str | None:
     if known.whole:
         try:
-            compile_check(replace(builtin, params=(param,)))([known.value])
+            compile_fitting(builtin.name, (param,), builtin.nan_ok)([known.value])
         except ScriptRuntimeError as error:
             return error.message
         return None
-    if fits(param.type, known.value):
+    if fits(param.type, converted(param.type, known.value)):
         return None
     return type_error(builtin.name, param.name, param.type, known.value).message
 

@@ -229,7 +229,8 @@ def with_advice(error: ScriptCompileError) -> ScriptCompileError:
     if source is None:
         return error
     if isinstance(error, ScriptSyntaxError):
-        advice = advise(source.text, error)
+        # No rule is about those of the names, which the parser does not make.
+        advice = advise(source.text, error) if first_syntax_error(source) else None
         return error if advice is None else _error_from(advice, error, source.text, source)
     return with_hint(error)
 

@@ -5,10 +5,11 @@ from typing import Final
 
 from urscript.catalogue import Catalogue
 from urscript.check import warnings
+from urscript.check.tokens import TokenizedText
 from urscript.check.unused import Variable, expressions_read, owner
 from urscript.check.warnings import ScriptWarning
 from urscript.names.scopes import FunctionScope, ResolvedProgram
-from urscript.source import Span
+from urscript.source import Source, Span
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Block, Expression, Statement
 
@@ -32,9 +33,20 @@ def flow_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
             elif isinstance(statement, nodes.If):
                 yield from _dead_branches(statement, program)
     yield from _unchecked_reads(program)
+    yield from _semicolons(program.source)
     for call in program.calls_after:
         message = f"'{program.name}' runs when it is defined; this call is a program of its own and fails"
         yield ScriptWarning(warnings.CALL_OF_PROGRAM, message, call.span, program.source, "leave it out")
+
+
+def _semicolons(source: Source) -> Iterator[ScriptWarning]:
+    text = TokenizedText(source.text)
+    for token in text.tokens if ";" in source.text else ():
+        if token.text == ";":
+            line, column = text.place(token.start)
+            place = Span(line, column, line, column + 1)
+            message, hint = "no manual has a ';'", "leave it out"
+            yield ScriptWarning(warnings.IN_NO_MANUAL, message, place, source, hint)
 
 
 def constant_truth(expression: Expression) -> bool | None:

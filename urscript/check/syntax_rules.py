@@ -66,7 +66,7 @@ def quotes(problem: Problem) -> Advice | None:
 def symbol(problem: Problem) -> Advice | None:
     """Symbols of other languages, and those that editors insert."""
     token, last = problem.token, problem.token
-    if problem.error.unexpected or token.kind != "symbol":
+    if not problem.is_lexical or token.kind != "symbol":
         return None
     written = as_utf8(token.text)
     if token.text + problem.following.text in words.SYMBOLS and problem.following.start == token.end:
@@ -90,7 +90,7 @@ def symbol(problem: Problem) -> Advice | None:
 def number(problem: Problem) -> Advice | None:
     """Malformed numbers: hexadecimal, with units, with two points."""
     token, following = problem.token, problem.following
-    if problem.error.unexpected or token.kind != "number":
+    if not problem.is_lexical or token.kind != "number":
         return None
     text = token.text
     if following.start == token.end and as_utf8(following.text) == "\u00b0":
@@ -111,7 +111,7 @@ def number(problem: Problem) -> Advice | None:
 def unterminated_string(problem: Problem) -> Advice | None:
     """A string without its closing quote."""
     token = problem.token
-    if problem.error.unexpected or token.kind != "string" or token.text.count('"') != 1:
+    if not problem.is_lexical or token.kind != "string" or token.text.count('"') != 1:
         return None
     text = token.text.rstrip()
     n_open = len(problem.open_brackets())

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from urscript.errors import ScriptSyntaxError
+from urscript.errors import ScriptLexerError, ScriptSyntaxError
 
 _TOKENS: Final = re.compile(
     r"""(?P<space>[ \t\r\n\f\v]+|\#[^\n]*|\$[^\n]*)
@@ -168,6 +168,11 @@ class Problem:
         """The token at a distance, negative before it; limited to the first and last token."""
         tokens = self.tokenized.tokens
         return tokens[max(0, min(self.index + distance, len(tokens) - 1))]
+
+    @property
+    def is_lexical(self) -> bool:
+        """Whether the text there is no token of the language."""
+        return isinstance(self.error, ScriptLexerError)
 
     @property
     def starts_line(self) -> bool:

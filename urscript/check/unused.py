@@ -1,6 +1,7 @@
 """Warnings about what is never used, defined twice, hiding a builtin; methods of values without methods."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from urscript.catalogue import Catalogue
 from urscript.check import warnings
@@ -8,8 +9,16 @@ from urscript.check.warnings import ScriptWarning
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import Expression, Statement, all_expressions, all_statements, own_expressions
+from urscript.syntax.nodes import (
+    Block,
+    Expression,
+    Statement,
+    all_expressions,
+    all_statements,
+    own_expressions,
+)
 
+_MOST_NAMES: Final = 5
 Variable = tuple[FunctionScope | None, str]
 """A local of a function, or a global (None) of the program."""
 
@@ -18,8 +27,23 @@ def name_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[Sc
     """Everything this module warns about, in no order."""
     if not program.is_open:  # statements of interpreter mode may read them
         yield from _unused_variables(program)
-    yield from _functions(program)
+    idle = None if program.main.node else nothing_runs(program.main.body, program.source)
+    yield from _functions(program) if idle is None else (idle,)
     yield from _hidden_builtins(program, catalogue)
+
+
+def nothing_runs(block: Block, source: Source) -> ScriptWarning | None:
+    """The warning about a text that has only definitions and is not one program; None for any other."""
+    definitions = [item for item in block if isinstance(item, nodes.Function)]
+    others = any(not isinstance(item, (nodes.Function, nodes.Label)) for item in block)
+    if others or not definitions or (len(definitions) == 1 and definitions[0].kind != "thread"):
+        return None
+    first = definitions[0]
+    names = " and ".join(f"'{item.name}'" for item in definitions[:_MOST_NAMES])
+    more = f" and {len(definitions) - _MOST_NAMES} more" if len(definitions) > _MOST_NAMES else ""
+    call = f"run {first.name}()" if first.kind == "thread" else f"{first.name}()"
+    message, hint = f"nothing runs: the text only defines {names}{more}", f"write {call} at its end"
+    return ScriptWarning(warnings.NOTHING_RUNS, message, name_of(first, source), source, hint)
 
 
 def owner(name: str, scope: FunctionScope) -> Variable:

@@ -90,9 +90,18 @@ SHORT_TIME: Final = Rule(
     "it takes a whole one, 8 ms on a CB3 and 2 ms on an e-Series, so a stream of them gets slower",
 )
 
+NOTHING_RUNS: Final = Rule(
+    "W121", "a text has only definitions, so that nothing runs", "several are no program; only one alone is"
+)
+IN_NO_MANUAL: Final = Rule(
+    "W122",
+    "a form that is in no manual: a ';', a bool for a number, a number for a bool",
+    "controllers of drivers that have it take it; that all software does is not known",
+)
+
 RULES: Final = tuple(value for value in tuple(globals().values()) if isinstance(value, Rule))
 
-ABOUT_VALUES: Final = frozenset({REFUSED_ARGUMENT, DEGREES, MILLIMETRES, SHORT_TIME})
+ABOUT_VALUES: Final = frozenset({REFUSED_ARGUMENT, DEGREES, MILLIMETRES, SHORT_TIME, IN_NO_MANUAL})
 """Those that are shown beside errors too: they do not follow from them."""
 
 

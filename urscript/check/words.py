@@ -147,7 +147,6 @@ SYMBOLS: Final[dict[str, tuple[str, str]]] = _by_word(
         "||": ("or", "write or"),
         "&": ("and", "write and; bits are in integer_to_binary_list(...)"),
         "|": ("or", "write or; bits are in integer_to_binary_list(...)"),
-        ";": (" ", "remove it; statements need no separator"),
         "{": (":", "a block begins with ':' and ends with 'end'"),
         "}": ("end", "a block begins with ':' and ends with 'end'"),
         "^": ("*", "write pow(a, b)"),

@@ -13,6 +13,7 @@ from ur_hil.command_line import ExitCode
 from urscript.catalogue import Catalogue
 from urscript.catalogue.types import Generation, Version
 from urscript.check.checking import with_advice
+from urscript.check.unused import nothing_runs
 from urscript.commands.run_output import JsonOutput, MoveWatch, RunOutput, TextOutput
 from urscript.commands.support import AsJson, catalogue_of, read_program, show, shown_name
 from urscript.errors import ScriptCompileError
@@ -20,6 +21,7 @@ from urscript.program import CompiledProgram, ProgramStatus, compile_program
 from urscript.recording_host import RecordedCall, RecordingHost
 from urscript.robot import Report, ReportKind, RobotMaker, RunStatus, ScriptRobot, find_makers
 from urscript.source import Source
+from urscript.syntax.parser import parse
 
 NO_ROBOT: Final = "none"
 DEFAULT_SOFTWARE: Final = "3.15"
@@ -81,6 +83,8 @@ def run(
     except ScriptCompileError as error:
         output.compile_error(with_advice(error))
         raise typer.Exit(ExitCode.FAILED) from None
+    if warning := nothing_runs(parse(source), source):
+        output.warning(warning)
     n_lines = trace_lines if trace else 0
     if maker is None:
         status = _run_without_robot(program, catalogue, limit, output, n_lines)

@@ -48,6 +48,10 @@ class TextOutput:
         """Print the error of a program that does not compile, with its place."""
         show(error.render(), error=True)
 
+    def warning(self, warning: ScriptError) -> None:
+        """Print what is probably a mistake, with its place; the program runs."""
+        show(warning.render(), error=True)
+
     def report(self, report: Report) -> None:
         """Print a text unchanged, errors with their place, everything else with its time."""
         kind, text = report.kind, report.text
@@ -106,6 +110,10 @@ class JsonOutput:
         """Keep the error; there is no run."""
         self._errors.append(error)
         self._print("failed", None, "", None)
+
+    def warning(self, warning: ScriptError) -> None:
+        """Keep it."""
+        self._errors.append(warning)
 
     def report(self, report: Report) -> None:
         """Keep it; the failure of the program is a diagnostic too."""

@@ -11,10 +11,11 @@ Compiled code counts its own statements and units (`compile.compiler`): `_b` is 
 the units beyond one a statement. Here are the charges that depend on values: arrays, texts, builtins.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from math import inf
 from typing import Any, Final
 
+from urscript.catalogue.calls import Fitting
 from urscript.catalogue.costs import OF_HOST, OF_PURE, TEXT, UNITS
 from urscript.errors import ScriptBudgetError
 from urscript.values import CapacityList, Matrix, Pose, Struct, size_of
@@ -173,10 +174,8 @@ class Meter:
 
         return call
 
-    def checked(
-        self, function: Function, cost: tuple[int, int], check: Callable[[Sequence[Any]], None]
-    ) -> Function:
-        """A builtin without long arguments, charged its statements and units; its arguments are checked."""
+    def fitted(self, function: Function, cost: tuple[int, int], fit: Fitting) -> Function:
+        """A builtin without long arguments, charged its statements and units; its arguments are fitted."""
         namespace, settle = self._namespace, self.settle
         statements, units = cost
         extra = units - statements
@@ -186,8 +185,7 @@ class Meter:
             namespace["_x"] += extra
             if left < 0 and settle() < 0:
                 raise ScriptBudgetError
-            check(arguments)
-            return function(thread, *arguments)
+            return function(thread, *fit(arguments))
 
         return call
 

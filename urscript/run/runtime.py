@@ -21,6 +21,7 @@ from typing import Any, Final
 from urscript import dialect, values
 from urscript.builtins import PURE
 from urscript.catalogue import Catalogue
+from urscript.catalogue.calls import Fitting
 from urscript.catalogue.costs import OF_THREAD
 from urscript.catalogue.types import FIXED_SIZE
 from urscript.dialect import Dialect
@@ -126,15 +127,14 @@ def neg(a: Any) -> Any:
         return [neg(item) for item in a]
     if kind is Matrix:
         return Matrix([neg(item) for item in row] for row in a.rows)
-    if is_number(a):
+    if _is_scalar(a):
         return neg(_to_builtin(a))
     raise ScriptRuntimeError(f"a sign needs a number, a list or a matrix of numbers, got {values.a_type(a)}")
 
 
 def pos(a: Any) -> Any:
-    """`+a`: the value itself, for whatever can be negated."""
-    neg(a)
-    return a
+    """`+a`, for whatever can be negated."""
+    return neg(neg(a))
 
 
 def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]:
@@ -149,8 +149,13 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
     return operate
 
 
+def _is_scalar(value: Any) -> bool:
+    """Whether an arithmetic operator takes it for a number."""
+    return is_number(value) or (dialect.BOOL_IN_ARITHMETIC and type(value) is bool)
+
+
 def _to_builtin(value: Any) -> Any:
-    """A number of a subclass (of numpy, an enum) as int or float."""
+    """A bool, or a number of a subclass (of numpy, an enum), as int or float."""
     return float(value) if isinstance(value, float) else int(value)
 
 
@@ -163,20 +168,20 @@ def _elementwise(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> A
         if len(a) != len(b):
             raise ScriptRuntimeError(f"'{sign}' needs lists of equal length, got {len(a)} and {len(b)}")
         return [one(x, y) for x, y in zip(a, b, strict=True)]
-    if isinstance(a, list) and is_number(b):
+    if isinstance(a, list) and _is_scalar(b):
         return [one(x, b) for x in a]
-    if is_number(a) and isinstance(b, list):
+    if _is_scalar(a) and isinstance(b, list):
         return [one(a, y) for y in b]
-    if type(a) is Matrix and is_number(b):
+    if type(a) is Matrix and _is_scalar(b):
         return Matrix([one(x, b) for x in row] for row in a.rows)
-    if is_number(a) and type(b) is Matrix:
+    if _is_scalar(a) and type(b) is Matrix:
         return Matrix([one(a, y) for y in row] for row in b.rows)
     if sign in "+-" and type(a) is Matrix and type(b) is Matrix:
         if a.shape != b.shape:
             raise ScriptRuntimeError(f"'{sign}' needs matrices of equal shape, got {_size(a)} and {_size(b)}")
         pairs = zip(a.rows, b.rows, strict=True)
         return Matrix([one(x, y) for x, y in zip(left, right, strict=True)] for left, right in pairs)
-    if is_number(a) and is_number(b):
+    if _is_scalar(a) and _is_scalar(b):
         return one(_to_builtin(a), _to_builtin(b))
     raise ScriptRuntimeError(f"'{sign}' is not defined for {type_name(a)} and {type_name(b)}")
 
@@ -333,16 +338,16 @@ def flow_namespace(scheduler: Scheduler, namespace: Mapping[str, Any], meter: Me
 
 
 def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, meter: Meter) -> dict[str, Any]:
-    """The builtins that a program uses; those of the host check their arguments first."""
+    """The builtins that a program uses; their arguments are fitted first."""
     offered = host.builtins()
     flow = _flow_builtins(host)
     bound: dict[str, Any] = {}
     for name in names:
         function = flow.get(name) or offered.get(name)
         if function is not None:
-            bound[f"b_{name}"] = _checked(name, function, catalogue, meter)
+            bound[f"b_{name}"] = _fitted(name, function, catalogue, meter)
         elif name in PURE:
-            pure = _without_thread(PURE[name])
+            pure = _without_thread(PURE[name], catalogue.fitting_of(name))
             bound[f"b_{name}"] = meter.function(pure, pure_cost(name), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
@@ -363,27 +368,26 @@ def _flow_builtins(host: Host) -> dict[str, Callable[..., Any]]:
     return {"textmsg": textmsg, "varmsg": lambda thread, name, value: None, "sleep": sleep}
 
 
-def _checked(
+def _fitted(
     name: str, function: Callable[..., Any], catalogue: Catalogue, meter: Meter
 ) -> Callable[..., Any]:
-    """A builtin of the host, charged for, with the check of its arguments in front."""
+    """A builtin of the host, charged for, that gets its arguments as it takes them."""
     cost, builtin = host_cost(name), catalogue.lookup(name)
     if builtin is None or not builtin.params:
         return meter.function(function, cost, name)
-    check = catalogue.check_of(name)
+    fit = catalogue.fitting_of(name)
     if all(param.type in FIXED_SIZE for param in builtin.params):
-        return meter.checked(function, cost, check)
+        return meter.fitted(function, cost, fit)
 
     def call(thread: ScriptThread, *arguments: Any) -> Any:
-        check(arguments)
-        return function(thread, *arguments)
+        return function(thread, *fit(arguments))
 
     return meter.function(call, cost, name)
 
 
-def _without_thread(function: Callable[..., Any]) -> Callable[..., Any]:
+def _without_thread(function: Callable[..., Any], fit: Fitting) -> Callable[..., Any]:
     def call(thread: ScriptThread, *arguments: Any) -> Any:
-        return function(*arguments)
+        return function(*fit(arguments))
 
     return call
 

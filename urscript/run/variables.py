@@ -9,8 +9,8 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 
 from urscript import dialect, values
-from urscript.catalogue.calls import integer, type_error
-from urscript.catalogue.methods import ValueMethod
+from urscript.catalogue.calls import compile_fitting, converted
+from urscript.catalogue.methods import METHODS, ValueMethod
 from urscript.catalogue.types import ParamType
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.run.host import Handle
@@ -203,10 +203,15 @@ def _are_alike(a: Any, b: Any) -> bool:
 
 def make_pose(*items: Any) -> Pose:
     """The value of a pose literal."""
-    for item in items:
-        if not is_number(item):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(item)}")
-    return Pose(*items)
+    return Pose(*map(_element_of_pose, items))
+
+
+def _element_of_pose(value: Any) -> float:
+    """A value as an element of a pose: a pose takes what a builtin takes for a number."""
+    element = converted(ParamType.NUMBER, value)
+    if is_number(element):
+        return element  # type: ignore[no-any-return]
+    raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(value)}")
 
 
 def _position(index: Any, length: int) -> int:
@@ -258,10 +263,7 @@ def store_item(value: Any, index: Any, target: Any) -> Any:
         changed[place] = fitted(value, old, "element", str(place)) if type(old) is Struct else value
         return changed if kind is list else values.list_with_capacity(changed, capacity_of(target), old)
     if kind is Pose:
-        place = _position(index, 6)
-        if not is_number(value):
-            raise ScriptRuntimeError(f"a pose holds numbers only, got {a_type(value)}")
-        return target.with_item(place, value)
+        return target.with_item(_position(index, 6), _element_of_pose(value))
     if kind is Matrix:
         raise ScriptRuntimeError("a matrix needs a row and a column: m[row, column] = value")
     if kind is Struct:
@@ -396,7 +398,7 @@ class MethodCalls:
             except ScriptTypeError as error:
                 raise ScriptRuntimeError(error.message) from None
             arguments = [*arguments, *(named[param.name] for param in row.params[len(arguments) :])]
-        made = _FUNCTIONS[row.type, row.name](target, *arguments)
+        made = _FUNCTIONS[row.type, row.name](target, *_FITTINGS[row.type, row.name](arguments))
         return made if row.changes else (UNDEFINED, made)
 
 
@@ -430,13 +432,11 @@ def _append(target: list[Any], value: Any) -> Changed:
     return _grown(target, "append", len(target), [value])
 
 
-def _extend(target: list[Any], items: Any) -> Changed:
-    if not isinstance(items, list):
-        raise type_error("extend", "values", ParamType.LIST, items)
+def _extend(target: list[Any], items: list[Any]) -> Changed:
     return _grown(target, "extend", len(target), items)
 
 
-def _insert(target: list[Any], index: Any, value: Any) -> Changed:
+def _insert(target: list[Any], index: int, value: Any) -> Changed:
     return _grown(target, "insert", _place("insert", index, len(target)), [value])
 
 
@@ -446,7 +446,7 @@ def _pop(target: list[Any]) -> Changed:
     return _changed(target, target[:-1], target[-1])
 
 
-def _remove(target: list[Any], index: Any) -> Changed:
+def _remove(target: list[Any], index: int) -> Changed:
     place = _place("remove", index, len(target) - 1)
     rest = target.copy()
     del rest[place]
@@ -457,27 +457,26 @@ def _clear(target: list[Any]) -> Changed:
     return _changed(target, [])
 
 
-def _slice(target: list[Any], begin: Any, end: Any) -> list[Any]:
+def _slice(target: list[Any], begin: int, end: int) -> list[Any]:
     first, last = _place("slice", begin, len(target)), _place("slice", end, len(target))
     if first > last:
         raise ScriptRuntimeError(f"slice: it ends at {last}, before it begins at {first}")
     return target[first:last]
 
 
-def _place(method: str, index: Any, last: int) -> int:
+def _place(method: str, index: int, last: int) -> int:
     """An index from 0 to `last`."""
-    place = integer(method, "index", index)
-    if not 0 <= place <= last:
+    if not 0 <= index <= last:
         allowed = f"allowed: 0 to {last}" if last >= 0 else "the list is empty"
-        raise ScriptRuntimeError(f"{method}: index {place} is out of range; {allowed}")
-    return place
+        raise ScriptRuntimeError(f"{method}: index {index} is out of range; {allowed}")
+    return index
 
 
-def _get_row(target: Matrix, index: Any) -> list[Any]:
+def _get_row(target: Matrix, index: int) -> list[Any]:
     return list(target.rows[_place("get_row", index, target.shape[0] - 1)])
 
 
-def _get_column(target: Matrix, index: Any) -> list[Any]:
+def _get_column(target: Matrix, index: int) -> list[Any]:
     column = _place("get_column", index, target.shape[1] - 1)
     return [row[column] for row in target.rows]
 
@@ -493,6 +492,8 @@ def _to_string(target: Any) -> str:
 def _length(target: Struct) -> int:
     return len(target.members)
 
+
+_FITTINGS: Final = {(row.type, row.name): compile_fitting(row.name, row.params) for row in METHODS}
 
 _FUNCTIONS: Final[dict[tuple[str, str], Callable[..., Any]]] = {
     ("list", "append"): _append,

@@ -35,8 +35,8 @@ def _cover(items: list[Any]) -> Span:
     return Span(first.line, first.column, last.end_line, last.end_column)
 
 
-def _expressions(items: list[Any]) -> tuple[Any, ...]:
-    """The nodes among `items`, without brackets, commas and gaps."""
+def _nodes(items: list[Any]) -> tuple[Any, ...]:
+    """The nodes among `items`, without brackets, commas, semicolons and gaps."""
     return tuple(item for item in items if isinstance(item, nodes.Node))
 
 
@@ -51,7 +51,7 @@ class _TreeBuilder:
         return cast(nodes.Block, items[0])
 
     def block(self, items: list[Any]) -> nodes.Block:
-        return tuple(items)
+        return _nodes(items)
 
     # definitions
 
@@ -66,7 +66,7 @@ class _TreeBuilder:
         return nodes.Function("thread", str(name), (), body, _span(end), span=_cover(items))
 
     def params(self, items: list[Any]) -> tuple[nodes.Parameter, ...]:
-        return _expressions(items)
+        return _nodes(items)
 
     def param(self, items: list[Any]) -> nodes.Parameter:
         name, _, default = items
@@ -143,7 +143,7 @@ class _TreeBuilder:
         raise _syntax_error("cannot call this expression, only a function by its name", callee.span)
 
     def index(self, items: list[Any]) -> nodes.Expression:
-        target, indices = items[0], _expressions(items[1:])
+        target, indices = items[0], _nodes(items[1:])
         # `p` is an ordinary name: only six items make it a pose. Source: maker's driver script.
         if len(indices) == 6 and isinstance(target, nodes.Name) and target.name == "p":
             return nodes.PoseLiteral(indices, span=_cover(items))
@@ -194,7 +194,7 @@ class _TreeBuilder:
         return cast(nodes.Expression, items[1])
 
     def list_(self, items: list[Any]) -> nodes.ListLiteral:
-        return nodes.ListLiteral(_expressions(items), span=_cover(items))
+        return nodes.ListLiteral(_nodes(items), span=_cover(items))
 
     def run(self, items: list[Any]) -> nodes.RunThread:
         return nodes.RunThread(str(items[1]), span=_cover(items))
