@@ -74,7 +74,7 @@ OLD = b'<gui.program.ProgramRootNode serialization="custom"><unserializable-pare
 
 
 def test_a_program_of_polyscope_1_8_runs_as_its_saved_script(tmp_path):
-    old = '<gui.installation.RobotInstallation><Features reference="../gone"/></gui.installation.RobotInstallation>'
+    old = '<gui.installation.RobotInstallation><TCPSettings toolPayload="heavy"/></gui.installation.RobotInstallation>'
     (tmp_path / "default.installation").write_text(old)
     program = load_pair(tmp_path, OLD, twin())
     assert (script_of(program), program.undefined, program.installation) == (twin(), "", NEW_BOX)
