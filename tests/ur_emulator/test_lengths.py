@@ -76,7 +76,7 @@ def rtde(kind, payload, version=2):
 ROWS = {
     "dashboard line": ("cb3", "dashboard", b"x" * (dashboard.MAX_LINE + 1), IS_CLOSED),
     "dashboard path": ("cb3", "dashboard", f"load {PARTS}x.urp\n".encode(), b"File not found: a/a/"),
-    "path in a program": ("cb3", "dashboard", b"load call.urp\n", "load call.urp failed: a path of 4097"),
+    "path in a program": ("cb3", "dashboard", b"load call.urp\n", "is missing: a path of 4097 characters"),
     "path of an installation": ("cb3", "dashboard", b"load far.urp\n", "far.urp needs the installation far"),
     "line on 30001": ("cb3", "primary", b"x" * (MAX_LINE + 1), f"line of more than {MAX_LINE} bytes was dr"),
     "line on 30002": ("cb3", "secondary", b"x" * (MAX_LINE + 1), f"line of more than {MAX_LINE} bytes was"),
