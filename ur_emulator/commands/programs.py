@@ -101,7 +101,7 @@ class SetSpeedSlider(CommandOperation):
     fraction: float = parameter("of full speed", low=0.0, high=1.0)
 
     def apply(self, box: BoxParts) -> None:
-        box.state.speed.set_slider(self.fraction)
+        box.state.speed.slider = self.fraction
 
 
 def _why_not_running(state: ControllerState) -> str:

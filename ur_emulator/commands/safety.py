@@ -186,7 +186,7 @@ class PressButton(CommandOperation):
     def apply(self, box: BoxParts) -> None:
         box.state.pendant.press(BUTTON_BITS[self.button], self.pressed)
         if self.button == "teach":
-            box.state.compliance.press_teach_button(self.pressed)
+            box.state.compliance.is_teach_pressed = self.pressed
 
 
 # --- Safety planes and the limit of the tool's direction, as the pendant sets them up

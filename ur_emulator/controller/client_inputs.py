@@ -88,7 +88,7 @@ def _set_analog_outputs(inputs: ClientInputs) -> None:
 def _set_speed_slider(inputs: ClientInputs) -> None:
     fraction = inputs.get("speed_slider_fraction", math.nan)
     if inputs.get("speed_slider_mask", 0) and math.isfinite(fraction):
-        inputs.speed.set_slider(min(1.0, max(0.0, fraction)))
+        inputs.speed.slider = min(1.0, max(0.0, fraction))
 
 
 def _keep(inputs: ClientInputs) -> None:

@@ -39,6 +39,7 @@ class Compliance:
         by_program, by_client, by_input: who has requested freedrive; an input or the teach button also acts.
         force_damping: as programs have set it, for a force mode to come; 0..1.
         force_gain_scaling: likewise, 0..2.
+        is_teach_pressed: the teach button acts as an input that is set up for freedrive.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class Compliance:
         self._force: ForceMode | None = None
         self._hold: AxisHold | None = None
         self._is_refused = False
-        self._is_teach_pressed = False
+        self.is_teach_pressed = False
 
     @property
     def is_in_freedrive(self) -> bool:
@@ -91,7 +92,7 @@ class Compliance:
     @property
     def is_on(self) -> bool:
         """True while `step` must be called in every cycle."""
-        return self._motion.is_compliant or self._is_teach_pressed or self.force_mode is not None
+        return self._motion.is_compliant or self.is_teach_pressed or self.force_mode is not None
 
     # --- requests
 
@@ -118,10 +119,6 @@ class Compliance:
             self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
         self._hand_over()
 
-    def press_teach_button(self, pressed: bool) -> None:
-        """Press or release the teach button: it acts as an input that is set up for freedrive."""
-        self._is_teach_pressed = pressed
-
     def end_freedrive_by_program(self) -> None:
         """End the freedrive that the program has requested."""
         self.by_program = False
@@ -131,14 +128,6 @@ class Compliance:
         """End the freedrive that a client has requested."""
         self.by_client = False
         self._hand_over()
-
-    def set_force_damping(self, damping: float) -> None:
-        """Set the damping of a force mode to come, 0..1."""
-        self.force_damping = damping
-
-    def set_force_gain_scaling(self, scaling: float) -> None:
-        """Set the gain scaling of a force mode to come, 0..2."""
-        self.force_gain_scaling = scaling
 
     def begin_force(self, force_mode: ForceMode) -> None:
         """Go into force mode; freedrive by the program ends."""
@@ -178,7 +167,7 @@ class Compliance:
         """Follow inputs, and what forbids compliance, after the scripts have run."""
         may_guide = self._operational.allows.allows_freedrive
         self.by_client = self.by_client and may_guide
-        wanted = may_guide and (self._is_teach_pressed or self._inputs.requests_freedrive())
+        wanted = may_guide and (self.is_teach_pressed or self._inputs.requests_freedrive())
         self.by_input = wanted and (self.by_input or not self._motion.is_moving)
         self._hand_over()
         if self._is_forbidden:

@@ -86,7 +86,7 @@ def set_analog_domain(lines: str, index: int) -> Writer:
 def write_tool_voltage(state: ControllerState, offset: int, value: int) -> None:
     """Set the supply of the tool [V]; other values than the allowed ones change nothing."""
     if value in (0, 12, 24):
-        state.io.set_tool_voltage(value)
+        state.io.tool_voltage = value
 
 
 # --- state of the robot

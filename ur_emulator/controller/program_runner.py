@@ -126,7 +126,7 @@ class ProgramRunner:
         self._phase = ProgramState.PLAYING
         self._is_loaded = loaded
         if loaded:
-            self._state.planning.set_motion_version(1)
+            self._state.planning.motion_version = 1
         self._state.motion.begin_program()
         self._state.io_configuration.program_started()
         self._state.interpreter.program_started()

@@ -200,7 +200,7 @@ class SafetySystem:
         limits = limits_of_mode(mode, is_manual, state.safety.limits, rules)
         state.motion.scaling_rate = SCALING_RATE
         hard = not state.error_settings.transition_hardness
-        state.speed.set_limiter(None if limits is None else SpeedLimiter(limits, state.motion.scale, hard))
+        state.speed.limiter = None if limits is None else SpeedLimiter(limits, state.motion.scale, hard)
 
     def _is_in_range(self) -> bool:
         safety, past = self._state.safety, self._state.past

@@ -100,14 +100,6 @@ class ToolSettings:
         else:
             self.change_payload(after)
 
-    def set_gravity(self, gravity: Vector3) -> None:
-        """Set the acceleration of gravity [m/s^2]."""
-        self.gravity = gravity
-
-    def set_base_acceleration(self, acceleration: Vector3) -> None:
-        """Set the acceleration of the base [m/s^2]."""
-        self.base_acceleration = acceleration
-
 
 # --- PlanningSettings: how programs want their moves to be planned
 #
@@ -147,18 +139,6 @@ class PlanningSettings:
         """Time in which the acceleration of a jerk-limited move changes [s]."""
         return JERK_TIME / self.jerk_gain
 
-    def set_motion_version(self, version: int) -> None:
-        """Set the version: 1 or 2."""
-        self.motion_version = version
-
-    def set_jerk_gain(self, gain: float) -> None:
-        """Set the share of the jerk limit, 0.01 to 1."""
-        self.jerk_gain = gain
-
-    def limit_tool_wrench(self, limit: ToolWrenchLimit | None) -> None:
-        """Limit the wrench of the payload in moves from now on, or remove the limit."""
-        self.tool_wrench_limit = limit
-
 
 # --- what programs have set up about errors and limits. Some settings are only kept: they have no effect here
 #
@@ -189,29 +169,9 @@ class ErrorSettings:
     holds_high: bool = True
     _has_warned: bool = False
 
-    def pause_on(self, code: int, argument: int | None) -> None:
-        """Pause the program when an error is reported; None: with any argument."""
-        self.pause_codes.add((code, argument))
-
     def program_ended(self) -> None:
         """Forget the errors at which the program was to be paused."""
         self.pause_codes.clear()
-
-    def warn_of_deviation(self, enabled: bool, threshold: float) -> None:
-        """Report joints that deviate by this part of the limit, or do not."""
-        self.warns_of_deviation, self.deviation_threshold = enabled, threshold
-
-    def set_transition_hardness(self, hardness: int) -> None:
-        """Set how a safeguard stop and reduced mode begin: 0 hard, 1 soft."""
-        self.transition_hardness = hardness
-
-    def set_revolution_reference(self, q: Vector6) -> None:
-        """Keep the joint positions of `reset_revolution_counter` [rad]."""
-        self.revolution_reference = q
-
-    def set_high_holding_torque(self, enabled: bool) -> None:
-        """Let a resting arm give way further before it is stopped, or as a moving one."""
-        self.holds_high = enabled
 
     def must_pause(self, events: Iterable[Event]) -> bool:
         """True when one of the events is an error code at which the program is to be paused."""

@@ -126,8 +126,8 @@ def make_state(
     grippers = make_grippers(tools, clock.period_s, has_tool_line)
     if grippers:
         # As the installations of their makers do.
-        io.set_tool_voltage(SUPPLY)
-        io.set_tool_line(grippers[0].line)
+        io.tool_voltage = SUPPLY
+        io.tool_line = grippers[0].line
     return ControllerState(
         robot=robot,
         arm=arm,

@@ -102,31 +102,31 @@ class ErrorBuiltins(BuiltinGroup):
         self._requests = requests
 
     @builtin("pause_on_error_code")
-    def _pause_on_error_code(self, thread: object, code: float, argument: float | None) -> None:
-        self._settings.pause_on(int(code), None if argument is None else int(argument))
+    def _pause_on_error_code(self, thread: object, code: int, argument: int | None) -> None:
+        self._settings.pause_codes.add((code, argument))
 
     @builtin("position_deviation_warning")
     def _position_deviation_warning(self, thread: object, enabled: bool, threshold: float) -> None:
-        self._settings.warn_of_deviation(enabled, float(threshold))
+        settings = self._settings
+        settings.warns_of_deviation, settings.deviation_threshold = enabled, float(threshold)
 
     @builtin("set_safety_mode_transition_hardness")
-    def _set_safety_mode_transition_hardness(self, thread: object, kind: float) -> None:
-        self._settings.set_transition_hardness(int(kind))
+    def _set_safety_mode_transition_hardness(self, thread: object, kind: int) -> None:
+        self._settings.transition_hardness = kind
 
     @builtin("reset_revolution_counter")
     def _reset_revolution_counter(self, thread: object, q_near: Any) -> None:
         # A real box uses it when new safety settings limit a joint that had no limits: not here.
-        self._settings.set_revolution_reference(
-            self._past.sensed.actual_q if q_near is None else six([float(x) for x in q_near])
-        )
+        given = None if q_near is None else six([float(x) for x in q_near])
+        self._settings.revolution_reference = given or self._past.sensed.actual_q
 
     @builtin("high_holding_torque_enable")
     def _enable_high_holding_torque(self, thread: object) -> None:
-        self._settings.set_high_holding_torque(True)
+        self._settings.holds_high = True
 
     @builtin("high_holding_torque_disable")
     def _disable_high_holding_torque(self, thread: object) -> None:
-        self._settings.set_high_holding_torque(False)
+        self._settings.holds_high = False
 
     @builtin("protective_stop")
     def _protective_stop(self, thread: object) -> None:

@@ -117,11 +117,11 @@ class ForceBuiltins(BuiltinGroup):
 
     @builtin("force_mode_set_damping")
     def _set_damping(self, thread: object, damping: float) -> None:
-        self._compliance.set_force_damping(float(damping))
+        self._compliance.force_damping = float(damping)
 
     @builtin("force_mode_set_gain_scaling")
     def _set_gain_scaling(self, thread: object, scaling: float) -> None:
-        self._compliance.set_force_gain_scaling(float(scaling))
+        self._compliance.force_gain_scaling = float(scaling)
 
     @builtin("force_mode_get_damping")
     def _get_damping(self, thread: object) -> float:

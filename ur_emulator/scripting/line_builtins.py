@@ -57,7 +57,7 @@ class LineBuiltins(BuiltinGroup):
 
     @builtin("set_tool_voltage")
     def _set_tool_voltage(self, thread: object, voltage: int) -> None:
-        self._io.set_tool_voltage(voltage)
+        self._io.tool_voltage = voltage
 
     @builtin("get_flag")
     def _get_flag(self, thread: object, n: int) -> bool:
@@ -76,7 +76,7 @@ class LineBuiltins(BuiltinGroup):
             raise ScriptRuntimeError(
                 f"set_tool_communication: baud rate {baud_rate} is not supported; allowed: {allowed}"
             )
-        self._io.set_tool_line(lines.ToolLine(enabled, baud_rate, parity, stop_bits, *idle_chars))
+        self._io.tool_line = lines.ToolLine(enabled, baud_rate, parity, stop_bits, *idle_chars)
 
     @builtin("set_tool_output_mode")
     def _set_tool_output_mode(self, thread: object, mode: int) -> None:

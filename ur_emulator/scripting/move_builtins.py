@@ -26,7 +26,7 @@ from ur_emulator.scripting.builtin_group import (
     until_over,
 )
 from ur_emulator.scripting.move_planner import MovePlanner
-from urscript import NEXT_CYCLE, HostFunction, ScriptRuntimeError
+from urscript import NEXT_CYCLE, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
 
 # Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.
@@ -278,20 +278,29 @@ class PlanningBuiltins(BuiltinGroup):
     def __init__(self, planning: PlanningSettings) -> None:
         self._planning = planning
 
-    def functions(self) -> dict[str, HostFunction]:
-        """Return the builtins."""
-        planning = self._planning
-        return super().functions() | {
-            "motion_version_set": lambda thread, version: planning.set_motion_version(int(version)),
-            "motion_version_get": lambda thread: planning.motion_version,
-            "jerk_gain_scaling_set": lambda thread, gain: planning.set_jerk_gain(float(gain)),
-            "jerk_gain_scaling_get": lambda thread: planning.jerk_gain,
-            "tool_wrench_limit_disable": lambda thread: planning.limit_tool_wrench(None),
-        }
+    @builtin("motion_version_set")
+    def _set_version(self, thread: object, version: int) -> None:
+        self._planning.motion_version = version
+
+    @builtin("motion_version_get")
+    def _version(self, thread: object) -> int:
+        return self._planning.motion_version
+
+    @builtin("jerk_gain_scaling_set")
+    def _set_jerk_gain(self, thread: object, gain: float) -> None:
+        self._planning.jerk_gain = float(gain)
+
+    @builtin("jerk_gain_scaling_get")
+    def _jerk_gain(self, thread: object) -> float:
+        return self._planning.jerk_gain
+
+    @builtin("tool_wrench_limit_disable")
+    def _remove_limit(self, thread: object) -> None:
+        self._planning.tool_wrench_limit = None
 
     @builtin("tool_wrench_limit_set")
     def _set_limit(self, thread: object, frame: Pose, *most: float | None) -> None:
         given = {name: value for name, value in zip(_AXES, most, strict=True) if value is not None}
         require_positive("tool_wrench_limit_set", **given)
         limits = [inf if value is None else float(value) for value in most]
-        self._planning.limit_tool_wrench(ToolWrenchLimit(six(frame), six(limits)))
+        self._planning.tool_wrench_limit = ToolWrenchLimit(six(frame), six(limits))

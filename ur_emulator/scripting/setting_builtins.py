@@ -83,11 +83,11 @@ class SettingBuiltins(BuiltinGroup):
 
     @builtin("set_gravity")
     def _set_gravity(self, thread: object, d: Any) -> None:
-        self._tool.set_gravity(vector(d))
+        self._tool.gravity = vector(d)
 
     @builtin("set_base_acceleration")
     def _set_base_acceleration(self, thread: object, a: Any) -> None:
-        self._tool.set_base_acceleration(vector(a))
+        self._tool.base_acceleration = vector(a)
 
     @builtin("estimate_payload")
     def _estimate_payload(self, thread: object, poses: list[Any], wrenches: list[Any]) -> Struct:

@@ -243,15 +243,7 @@ class InputOutput:
         """Set the outputs in `mask` to the bits of `word`."""
         self.digital_out = self.digital_out & ~mask | word & mask
 
-    def set_tool_voltage(self, voltage: int) -> None:
-        """Set the supply of the tool [V]: 0, 12 or 24."""
-        self.tool_voltage = voltage
-
     def set_tool_output_mode(self, index: int, mode: int) -> None:
         """Set one of `tool_output_modes`."""
         modes = self.tool_output_modes
         self.tool_output_modes = (*modes[:index], mode, *modes[index + 1 :])  # type: ignore[assignment]
-
-    def set_tool_line(self, line: ToolLine) -> None:
-        """Set up the serial line at the tool."""
-        self.tool_line = line

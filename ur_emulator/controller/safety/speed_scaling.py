@@ -138,14 +138,6 @@ class SpeedScaling:
         self.slider = 1.0
         self.limiter: SpeedLimiter | None = None
 
-    def set_slider(self, fraction: float) -> None:
-        """Set the speed slider, 0..1."""
-        self.slider = fraction
-
-    def set_limiter(self, limiter: SpeedLimiter | None) -> None:
-        """Limit the speeds from now on, or no longer."""
-        self.limiter = limiter
-
     @property
     def share(self) -> float:
         """Part of the slider's speed that the limits allow, 0..1."""
