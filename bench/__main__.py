@@ -1,12 +1,13 @@
 """`make bench`: measure, print, write bench/results.json. BENCH_MINUTES shortens the parts in real time.
 
-python -m bench                      # everything
-python -m bench tick lockstep        # these measurements
+python -m bench                      # everything, into bench/results.json
+python -m bench tick lockstep        # these measurements; nothing is written without --out
 python -m bench lockstep_cycle_us    # the measurement that this figure is asked of
+python -m bench --short              # as little as shows that everything runs; its figures mean nothing
 """
 
+import argparse
 import json
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +19,9 @@ from bench.boxes import measure_box_start, measure_boxes
 from bench.clients import measure_clients
 from bench.compiling import measure_compiling
 from bench.connect_storm import measure_connect_storm
+from bench.length import FULL, SHORT, Length
 from bench.lockstep import measure_lockstep
+from bench.origin import origin
 from bench.paper_set import measure_paper_set
 from bench.realtime import measure_realtime
 from bench.script import measure_script
@@ -26,7 +29,7 @@ from bench.script_in_box import measure_script_in_box
 from bench.tick import measure_tick
 
 RESULTS = Path(__file__).with_name("results.json")
-Measurement = Callable[[float], dict[str, float]]
+Measurement = Callable[[Length], dict[str, float]]
 # A cycle of 2 ms.
 E_SERIES_ARM = "ur5e"
 
@@ -36,23 +39,22 @@ def _on_e_series(figures: dict[str, float]) -> dict[str, float]:
     return {f"e_series_{name}": value for name, value in figures.items()}
 
 
-# Name -> what runs, given the length of the parts in real time in minutes.
 MEASUREMENTS: dict[str, Measurement] = {
-    "script": lambda minutes: measure_script(),
-    "script_in_box": lambda minutes: measure_script_in_box(),
-    "compiling": lambda minutes: measure_compiling(60.0 * min(minutes, 1.0)),
-    "tick": lambda minutes: measure_tick(),
-    "lockstep": lambda minutes: measure_lockstep(),
+    "script": measure_script,
+    "script_in_box": measure_script_in_box,
+    "compiling": measure_compiling,
+    "tick": measure_tick,
+    "lockstep": measure_lockstep,
     "realtime": measure_realtime,
-    "clients": lambda minutes: measure_clients(60.0 * min(minutes, 1.0)),
-    "box_start": lambda minutes: measure_box_start(),
-    "boxes": lambda minutes: measure_boxes(60.0 * min(minutes, 1.0)),
-    "e_series_tick": lambda minutes: _on_e_series(measure_tick(E_SERIES_ARM)),
-    "e_series_lockstep": lambda minutes: _on_e_series(measure_lockstep(E_SERIES_ARM)),
-    "e_series_realtime": lambda minutes: _on_e_series(measure_realtime(minutes, E_SERIES_ARM)),
-    "e_series_boxes": lambda minutes: _on_e_series(measure_boxes(60.0 * min(minutes, 1.0), 5, E_SERIES_ARM)),
-    "connect_storm": lambda minutes: measure_connect_storm(60.0 * min(minutes, 1.0)),
-    "paper_set": lambda minutes: measure_paper_set(),
+    "clients": measure_clients,
+    "box_start": measure_box_start,
+    "boxes": measure_boxes,
+    "e_series_tick": lambda length: _on_e_series(measure_tick(length, E_SERIES_ARM)),
+    "e_series_lockstep": lambda length: _on_e_series(measure_lockstep(length, E_SERIES_ARM)),
+    "e_series_realtime": lambda length: _on_e_series(measure_realtime(length, E_SERIES_ARM)),
+    "e_series_boxes": lambda length: _on_e_series(measure_boxes(length, 5, E_SERIES_ARM)),
+    "connect_storm": measure_connect_storm,
+    "paper_set": measure_paper_set,
 }
 # What the project asks of itself: measurement -> figure -> (sign, bound).
 ASKED: dict[str, dict[str, tuple[str, float]]] = {
@@ -105,23 +107,39 @@ ASKED: dict[str, dict[str, tuple[str, float]]] = {
 }
 
 
-def main(names: list[str]) -> None:
-    """Run these measurements, or all; figures that are not measured keep their last value in the file."""
-    chosen = [_measurement_of(name) for name in names] or list(MEASUREMENTS)
-    minutes = float(os.environ.get("BENCH_MINUTES", "10"))
+def measure(names: list[str], length: Length) -> dict[str, float]:
+    """Take these measurements, or all; print their figures beside what is asked of them."""
     results: dict[str, float] = {}
     table = Table("figure", "measured", "asked")
-    for name in dict.fromkeys(chosen):
-        found = MEASUREMENTS[name](minutes)
+    for name in dict.fromkeys(map(_measurement_of, names or MEASUREMENTS)):
+        found = MEASUREMENTS[name](length)
         results |= found
         for figure, value in found.items():
             sign, bound = ASKED.get(name, {}).get(figure, ("", None))
             table.add_row(figure, f"{value:.4g}", f"{sign} {bound:g}" if bound is not None else "")
-    known = json.loads(RESULTS.read_text()) if names and RESULTS.exists() else {}
-    known |= {name: round(value, 3) for name, value in results.items()}
-    RESULTS.write_text(json.dumps(known, indent=2) + "\n")
     Console().print(table)
-    print(f"written to {RESULTS}")
+    return results
+
+
+def main(words: list[str]) -> None:
+    """Do what the command line says; a file has the figures of one run, and says where they come from."""
+    parser = argparse.ArgumentParser(
+        prog="bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="measurements or figures; all, if none is given"
+    )
+    parser.add_argument("--short", action="store_true", help="only show that everything runs")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="for the figures of this run")
+    given = parser.parse_args(words)
+    is_whole = not given.names and not given.short
+    out: Path | None = given.out or (RESULTS if is_whole else None)
+    made_by = origin()  # before hours pass
+    results = measure(given.names, SHORT if given.short else FULL)
+    if out:
+        figures = {name: round(value, 3) for name, value in results.items()}
+        out.write_text(json.dumps({**made_by, **figures}, indent=2) + "\n")
+        print(f"written to {out}")
 
 
 def _measurement_of(name: str) -> str:
@@ -134,4 +152,5 @@ def _measurement_of(name: str) -> str:
     sys.exit(f"bench: {name!r} given: choose of {', '.join(MEASUREMENTS)}, or a figure with an asked value")
 
 
-main(sys.argv[1:])
+if __name__ == "__main__":
+    main(sys.argv[1:])
