@@ -76,12 +76,12 @@ def _show(title: str, row: dict[str, Any]) -> None:
         print(f"  {problem}", flush=True)
 
 
-def repeat(attack: Attack, kind: Kind, times: int, growth: float) -> str:
+def repeat(attack: Attack, kind: Kind, times: int, seconds: float, growth: float) -> str:
     """Attack one box again and again; return what is wrong: a growing memory, or a problem."""
     held: list[float] = []
     with served(attack, kind) as box:
         for number in range(1, times + 1):
-            problems = attacked(attack, box, SECONDS_OF_OTHERS).problems
+            problems = attacked(attack, box, seconds / SECONDS * SECONDS_OF_OTHERS).problems
             if problems:
                 return f"{attack.name}, repetition {number}: {'; '.join(problems)}"
             time.sleep(_REST)
@@ -126,7 +126,7 @@ if __name__ == "__main__":
         main(given.attacks or ATTACKS, given.box or KINDS, given.seconds, given.out)
     else:
         found = [
-            repeat(ATTACKS[name], KINDS[kind], given.repeat, given.growth)
+            repeat(ATTACKS[name], KINDS[kind], given.repeat, given.seconds, given.growth)
             for name in given.attacks or ATTACKS
             for kind in given.box or ATTACKS[name].kinds[:1]
             if kind in ATTACKS[name].kinds

@@ -160,7 +160,7 @@ def _figures(rounds: list[dict[str, Any]], samples: list[Sample], period: float)
     warm = min(_LONGEST_WARM_UP, _WARM_UP * samples[-1].t)
     rest = [sample for sample in samples if sample.at_rest and sample.t >= warm]
     rss = [sample.box_mb for sample in rest]
-    slope = np.polyfit([sample.t / 3600.0 for sample in rest], rss, 1)[0] if len(rest) > 2 else float("nan")
+    slope = np.polyfit([sample.t / 3600.0 for sample in rest], rss, 1)[0] if len(rest) > 2 else None
     return {
         "seconds": samples[-1].t,
         "attacks": len(rounds),
@@ -171,7 +171,7 @@ def _figures(rounds: list[dict[str, Any]], samples: list[Sample], period: float)
         "rss_first_mb": rss[0] if rss else None,
         "rss_last_mb": rss[-1] if rss else None,
         "rss_max_mb": max(sample.box_mb for sample in samples),
-        "rss_slope_mb_per_hour": round(float(slope), 2),
+        "rss_slope_mb_per_hour": None if slope is None else round(float(slope), 2),
         "workers_max_mb": max(sample.workers_mb for sample in samples),
         "descriptors": [rest[0].descriptors, rest[-1].descriptors, max(s.descriptors for s in rest)]
         if rest
