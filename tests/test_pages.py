@@ -1,5 +1,6 @@
 """Every block of code of every page runs as it stands, or says why it does not."""
 
+import re
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,12 +8,10 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from page_blocks import ROOT, PageReader, blocks_of
+from page_blocks import APPS, PAGES, ROOT, PageReader, blocks_of, commands_in_text, options_of
 
 from pc_client.analysis.report import build_tables
 from pc_client.movements.movement import Movement, load_movement
-
-PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def drawing(path):
@@ -54,6 +53,14 @@ def one_thread(workers, dask):
     """In place of processes, which cost more than the work of a page."""
     with ThreadPoolExecutor(1) as executor:
         yield executor
+
+
+def test_commands_in_text_and_their_options_exist():
+    for page in (page for page in PAGES if page.name != "CHANGELOG.md"):
+        for line in commands_in_text(page):
+            if line.split()[0] in APPS:
+                named = set(re.findall(r"(?<![\w-])--[a-z-]+", line))
+                assert named <= options_of(line), f"{page}: {line}"
 
 
 @pytest.mark.slow
