@@ -44,6 +44,7 @@ PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
     *sorted((ROOT / "examples").rglob("*.md")),
 ]
+MANUAL = [page for page in PAGES if page.name != "CHANGELOG.md"]  # what holds now
 LANGUAGES = {"python", "sh", "console", "urscript", "toml", "yaml", "text", "mermaid"}
 CODE = re.compile(r"^(?:\$|ur-\w+|urscript|make|pip|import|from|def|git) ", re.MULTILINE)
 _FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
@@ -280,7 +281,7 @@ def shown_commands():
     In place of what installs and serves, and of targets, a `PageReader` does something else.
     """
     run, shown = set(), set()
-    for page in (page for page in PAGES if page.name != "CHANGELOG.md"):
+    for page in MANUAL:
         for block in blocks_of(page):
             lines = commands_of(block.text) if block.language == "sh" else _after_prompts(block)
             (shown if block.reason else run).update(map(_first_words, lines))

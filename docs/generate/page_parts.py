@@ -65,5 +65,6 @@ def _line(cells: Iterable[object]) -> str:
 
 def example(command: str, lines: Iterable[str]) -> str:
     """A command and what it prints, as a block of code."""
+    install = "The command comes with `pip install ur-hil`."
     why = "<!-- not run: values differ each time; tests/test_generated_pages.py compares the form -->"
-    return "\n".join((why, "", "```console", f"$ {command}", *lines, "```"))
+    return "\n".join((install, "", why, "", "```console", f"$ {command}", *lines, "```"))

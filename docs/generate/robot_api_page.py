@@ -40,6 +40,7 @@ _EXAMPLES = """\
 ## Try it
 
 ```sh
+pip install ur-hil
 ur-emulator serve --robot ur5e --software 10.14 --programs my_programs --port-base 1000
 ```
 
