@@ -62,7 +62,7 @@ ELSEWHERE = {
     "python examples/ablation.py": "test_examples.py::test_ablation",
     "python examples/draw.py": "test_examples.py::test_draw",
     "ur-client compare": "pc_client/test_comparison.py::test_command_executes_measures_and_writes",
-    "ur-client experiment": "test_wheel.py::test_the_commands_of_a_page_need_no_more_than_its_install",
+    "ur-client experiment": "pc_client/test_client_cli.py::test_own_numbers_reach_robot_recording_and_table",
     "ur-client movements duplicate": "pc_client/test_movements_commands.py::test_duplicate_varies_a_movement_of_the_library",
     "ur-client movements generate": "pc_client/test_movements_commands.py::test_every_kind_can_be_generated_and_planned",
     "ur-client movements kinds": "pc_client/test_movements_commands.py::test_kinds_lists_every_generator_and_says_that_a_duplicate_has_its_own_target_points",
