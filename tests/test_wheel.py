@@ -167,29 +167,36 @@ def test_links_and_images_of_a_readme_become_text():
     assert page_for_index(text) == "See the box (`docs/box.md`), `a.md`, [UR](https://example.com/x)."
 
 
-def requirements(install, wheel):
+def requirements(wanted, wheel):
     """Names of all distributions that an install brings, as pip would choose them; `wheel` stands for ours."""
     with ZipFile(wheel) as archive:
         (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
         ours = email.message_from_bytes(archive.read(name)).get_all("Requires-Dist")
-    found, left = set(), [Requirement(text) for text in install]
+    found, left = set(), [Requirement(text) for text in wanted]
     while left:
-        wanted = left.pop()
-        for extra in {"", *wanted.extras}:
-            if (wanted.name, extra) in found:
+        one = left.pop()
+        for extra in {"", *one.extras}:
+            if (one.name, extra) in found:
                 continue
-            found.add((wanted.name, extra))
-            texts = ours if wanted.name == OURS else distribution(wanted.name).requires or ()
-            for one in map(Requirement, texts):
-                if one.marker is None or one.marker.evaluate({"extra": extra}):
-                    left.append(one)
+            found.add((one.name, extra))
+            texts = ours if one.name == OURS else distribution(one.name).requires or ()
+            for next_one in map(Requirement, texts):
+                if next_one.marker is None or next_one.marker.evaluate({"extra": extra}):
+                    left.append(next_one)
     return {name for name, _ in found} - {OURS}
 
 
-def link(distributions, folder):
-    """Make a folder of packages that has these distributions, and nothing else of this environment."""
+def install(wanted, wheel, folder):
+    """Make a folder of packages that has what an install brings, and nothing else of this environment.
+
+    They are links to what is installed here. With REAL_INSTALLS in the environment pip gets them from the index.
+    """
+    if os.environ.get("REAL_INSTALLS"):
+        words = [word.replace(OURS, str(wheel)) for word in wanted]
+        run(sys.executable, "-m", "pip", "install", "-q", "--target", folder, *words)
+        return
     folder.mkdir()
-    for name in distributions:
+    for name in requirements(wanted, wheel):
         found = distribution(name)
         for top in {path.parts[0] for path in found.files or ()} - {"..", "__pycache__"}:
             if not (folder / top).exists():
@@ -219,24 +226,24 @@ def steps_of(page):
     """What a page shows, in its order: (install that stands last above it, kind of step, what is done)."""
     text = page.read_text(encoding="utf-8")
     blocks = {block.line: block for block in blocks_of(page)}
-    install = ()
+    wanted = ()
     for shown in re.finditer(r"^```\w.*?^```$|`(p[^`]+|ur[^`]+)`", text, re.DOTALL | re.MULTILINE):
         block = blocks.get(text.count("\n", 0, shown.start()) + 1)
         if block is None and shown[1]:
             lines = [shown[1].replace("\n", " ")] * (shown[1].count(" ") > 1)
         elif block.name or block.language == "python":
-            yield install, block.language, block
+            yield wanted, block.language, block
             continue
         elif block.language == "sh":
             lines = commands_of(block.text)
         else:
             lines = [line[2:] for line in block.text.splitlines() if line.startswith("$ ")]
         for line in lines:
-            install = install_of(line) or install
+            wanted = install_of(line) or wanted
             words = shlex.split(line, comments=True)
             # Of what no page runs, a box and its window begin and end here.
             if words and words[0] in APPS and not (block and block.reason and words[1] != "serve"):
-                yield install, block.language if block else "sh", words
+                yield wanted, block.language if block else "sh", words
 
 
 def shortened(words):
@@ -274,17 +281,17 @@ STEPS_OF_PAGES = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("install", sorted({install for install, _, _ in STEPS_OF_PAGES}), ids=" ".join)
-def test_the_commands_of_a_page_need_no_more_than_its_install(install, wheel, environment, tmp_path):
-    assert install, "a start page shows a command, and no `pip install` above it"
+@pytest.mark.parametrize("wanted", sorted({wanted for wanted, _, _ in STEPS_OF_PAGES}), ids=" ".join)
+def test_the_commands_of_a_page_need_no_more_than_its_install(wanted, wheel, environment, tmp_path):
+    assert wanted, "a start page shows a command, and no `pip install` above it"
     packages, here = tmp_path / "packages", tmp_path / "here"
-    link(requirements(install, wheel), packages)
+    install(wanted, wheel, packages)
     here.mkdir()
     points = [(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)]
     Movement.through(points, durations=[1.2]).save(here / "short.toml")
     (here / "my_program.script").write_text('def hello():\n  textmsg("hello")\nend\n')
     steps = []
-    for _, kind, what in (step for step in STEPS_OF_PAGES if step[0] == install):
+    for _, kind, what in (step for step in STEPS_OF_PAGES if step[0] == wanted):
         if kind in ("sh", "console"):
             words = shortened(what)
             steps.append(("serve" if words[1] == "serve" else kind, words))
@@ -303,7 +310,7 @@ def test_the_commands_of_a_page_need_no_more_than_its_install(install, wheel, en
 
 @pytest.mark.slow
 def test_the_commands_of_the_wheel_start(wheel, environment, tmp_path):
-    link(requirements([OURS], wheel), tmp_path / "packages")
+    install([OURS], wheel, tmp_path / "packages")
     for script in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]:
         said = run(
             environment / "bin" / script, "--help", cwd=tmp_path, DEPENDENCIES=str(tmp_path / "packages")
