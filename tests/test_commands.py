@@ -1,6 +1,7 @@
 """Every target of the Makefile, and every command that a page shows, begins and ends in a test, in its shortest form."""
 
 import json
+import os
 import re
 import runpy
 import shlex
@@ -104,9 +105,13 @@ def begin(tmp_path, monkeypatch):
 
 
 def make(*words, cwd=ROOT):
-    """Run make, as with an environment that is up to date; returns what it prints."""
+    """Run make, as with an environment that is up to date; returns what it prints.
+
+    It must not take itself for a part of the `make test` that runs this.
+    """
     command = ["make", "-f", str(ROOT / "Makefile"), "STAMP=", f"BIN={BIN}", *words]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd)
+    own = {name: value for name, value in os.environ.items() if "MAKE" not in name and name != "MFLAGS"}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=own)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -39,10 +39,9 @@ BIN = pathlib.Path(sys.prefix, "bin")
 def served(words):
     with subprocess.Popen([BIN / words[0], *words[1:]], stdout=subprocess.PIPE, text=True) as process:
         try:
-            said = process.stdout.readline()
+            wanted = "window at " if "--pendant" in words else " ready at "
+            said = next(line for line in process.stdout if wanted in line)
             if "--pendant" in words:
-                said = process.stdout.readline()
-            if "window at" in said:
                 assert b"<html" in urllib.request.urlopen(said.split()[-1]).read().lower()
             yield
         finally:
