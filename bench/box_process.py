@@ -49,16 +49,8 @@ def box_process(*arguments: str) -> Iterator[BoxProcess]:
     """Run `ur-emulator serve` with these arguments as long as the block lasts."""
     with tempfile.TemporaryDirectory() as folder:
         ready = Path(folder) / "ready.json"
-        command = [
-            sys.executable,
-            "-m",
-            "ur_emulator",
-            "serve",
-            "--host",
-            HOST,
-            "--port-base",
-            str(PORT_BASE),
-        ]
+        where = ("--host", HOST, "--port-base", str(PORT_BASE))
+        command = [sys.executable, "-m", "ur_emulator", "serve", *where]
         began = time.monotonic()
         child = subprocess.Popen(
             [*command, "--ready-file", str(ready), *arguments],
