@@ -6,13 +6,16 @@ STAMP := $(VENV)/.installed
 # A file is one process's; those with slow tests come first (tests/conftest.py), so that no core waits at the end.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
+# Options of the command behind a target: make bench ARGS=--short, make attack ARGS='--box rack'.
+ARGS ?=
+
 PAGES := README.md SECURITY.md CONTRIBUTING.md CHANGELOG.md docs examples
 
 # The tests start some hundred processes: they shall find compiled modules, whatever the environment says.
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: ablation attack pictures help setup demo draw explore pick show soak test check check-static bench format docs clean
+.PHONY: ablation attack bench check check-static clean demo docs draw explore format help pick pictures setup show soak test walk
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -38,19 +41,19 @@ $(STAMP): pyproject.toml
 setup: $(STAMP) ## install everything that the other targets use
 
 demo: $(STAMP) ## the paper's experiment: published controller and ours side by side, into out/demo
-	$(BIN)/python examples/demo.py
+	$(BIN)/python examples/demo.py $(ARGS)
 
 ablation: $(STAMP) ## what each piece of the controller brings, into out/ablation (half an hour)
-	$(BIN)/python examples/ablation.py
+	$(BIN)/python examples/ablation.py $(ARGS)
 
 draw: $(STAMP) ## drawings on the emulated arm: extracted, executed, compared, into out/draw
-	$(BIN)/python examples/draw.py
+	$(BIN)/python examples/draw.py $(ARGS)
 
 pick: $(STAMP) ## a block picked up like a hand and like a robot, page and film, into out/pick
-	$(BIN)/python examples/08_pick_like_a_hand.py
+	$(BIN)/python examples/08_pick_like_a_hand.py $(ARGS)
 
 show: $(STAMP) ## a box with its window: an arm that signs, then waits for your hands; into out/show
-	$(BIN)/python examples/09_show.py
+	$(BIN)/python examples/09_show.py $(ARGS)
 
 test: $(STAMP) ## all tests, in one process more than there are cores, at most four
 	$(PYTEST)
@@ -59,7 +62,7 @@ explore: $(STAMP) ## the property tests with new random cases (make test draws t
 	HYPOTHESIS_PROFILE=explore $(PYTEST) -m hypothesis
 
 attack: $(STAMP) ## attack served boxes of all kinds in every way, into docs/security.md (a quarter of an hour)
-	$(BIN)/python tests/attack
+	$(BIN)/python tests/attack $(ARGS)
 	$(BIN)/python -m docs.generate
 
 check-static: $(STAMP)
@@ -67,15 +70,19 @@ check-static: $(STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/mdformat --check $(PAGES)
 	$(BIN)/mypy
+	$(BIN)/mypy tests/walk
 
 check: check-static ## lint, types, fast tests
 	$(PYTEST) -m "not slow"
 
 bench: $(STAMP) ## measure speed, lateness, memory, tracking; writes bench/results.json
-	$(BIN)/python -m bench
+	$(BIN)/python -m bench $(ARGS)
 
 soak: $(STAMP) ## an hour (or SOAK_MINUTES) under load, with an attack every minute, into out/soak
 	$(BIN)/python tests/attack/soak.py
+
+walk: $(STAMP) ## random walks over boxes of all kinds; SEED=5 BOX=X: one walk again; STEPS of all together
+	$(BIN)/python tests/walk $(if $(SEED),--seed $(SEED)) $(if $(BOX),--box '$(BOX)') $(if $(STEPS),--steps $(STEPS)) $(ARGS)
 
 format: $(STAMP) ## put the code into its canonical layout
 	$(BIN)/ruff format .
@@ -87,7 +94,7 @@ docs: $(STAMP) ## rewrite the generated pages, build the documentation site into
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 pictures: $(STAMP) ## draw the pictures of docs/contact.md (needs off-screen OpenGL, e.g. libegl1)
-	$(BIN)/python -m docs.make_contact_pictures
+	$(BIN)/python -m docs.make_contact_pictures $(ARGS)
 
 clean: ## remove what the targets made
 	rm -rf $(VENV) out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

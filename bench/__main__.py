@@ -1,127 +1,59 @@
 """`make bench`: measure, print, write bench/results.json. BENCH_MINUTES shortens the parts in real time.
 
-python -m bench                      # everything
-python -m bench tick lockstep        # these measurements
+python -m bench                      # everything, into bench/results.json
+python -m bench tick lockstep        # these measurements; nothing is written without --out
 python -m bench lockstep_cycle_us    # the measurement that this figure is asked of
+python -m bench --short              # as little as shows that everything runs; its figures mean nothing
 """
 
+import argparse
 import json
-import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
-from bench.boxes import measure_box_start, measure_boxes
-from bench.clients import measure_clients
-from bench.compiling import measure_compiling
-from bench.connect_storm import measure_connect_storm
-from bench.lockstep import measure_lockstep
-from bench.paper_set import measure_paper_set
-from bench.realtime import measure_realtime
-from bench.script import measure_script
-from bench.script_in_box import measure_script_in_box
-from bench.tick import measure_tick
+from bench.length import FULL, SHORT, Length
+from bench.measurements import ASKED, MEASUREMENTS
+from bench.origin import origin
 
 RESULTS = Path(__file__).with_name("results.json")
-Measurement = Callable[[float], dict[str, float]]
-# A cycle of 2 ms.
-E_SERIES_ARM = "ur5e"
 
 
-def _on_e_series(figures: dict[str, float]) -> dict[str, float]:
-    """The same figures under names of their own."""
-    return {f"e_series_{name}": value for name, value in figures.items()}
-
-
-# Name -> what runs, given the length of the parts in real time in minutes.
-MEASUREMENTS: dict[str, Measurement] = {
-    "script": lambda minutes: measure_script(),
-    "script_in_box": lambda minutes: measure_script_in_box(),
-    "compiling": lambda minutes: measure_compiling(60.0 * min(minutes, 1.0)),
-    "tick": lambda minutes: measure_tick(),
-    "lockstep": lambda minutes: measure_lockstep(),
-    "realtime": measure_realtime,
-    "clients": lambda minutes: measure_clients(60.0 * min(minutes, 1.0)),
-    "box_start": lambda minutes: measure_box_start(),
-    "boxes": lambda minutes: measure_boxes(60.0 * min(minutes, 1.0)),
-    "e_series_tick": lambda minutes: _on_e_series(measure_tick(E_SERIES_ARM)),
-    "e_series_lockstep": lambda minutes: _on_e_series(measure_lockstep(E_SERIES_ARM)),
-    "e_series_realtime": lambda minutes: _on_e_series(measure_realtime(minutes, E_SERIES_ARM)),
-    "e_series_boxes": lambda minutes: _on_e_series(measure_boxes(60.0 * min(minutes, 1.0), 5, E_SERIES_ARM)),
-    "connect_storm": lambda minutes: measure_connect_storm(60.0 * min(minutes, 1.0)),
-    "paper_set": lambda minutes: measure_paper_set(),
-}
-# What the project asks of itself: measurement -> figure -> (sign, bound).
-ASKED: dict[str, dict[str, tuple[str, float]]] = {
-    "script": {"compile_1200_lines_s": ("<=", 0.3)},
-    "script_in_box": {
-        "compile_20000_locals_s": ("<=", 1.0),
-        "script_sync_thread_us": ("<=", 10.0),
-        "statements_in_a_cycle": (">=", 100_000.0),
-    },
-    "compiling": {"frames_lost_while_compiling": ("<=", 0.0)},
-    "tick": {"tick_x_steps": ("<=", 2.5)},
-    "lockstep": {"lockstep_x_realtime": (">=", 40.0), "lockstep_cycle_x_limit": ("<=", 3.0)},
-    "realtime": {
-        "stream_late_p50_us": ("<=", 250.0),
-        "stream_late_p999_over_timer_us": ("<=", 300.0),
-        "stream_lost_cycles": ("<=", 0.0),
-        "cpu_percent": ("<=", 15.0),
-        "rss_mb": ("<=", 150.0),
-        "startup_s": ("<=", 1.0),
-    },
-    "clients": {
-        "rtde_clients_125hz": (">=", 50.0),
-        "realtime_readers_125hz": (">=", 50.0),
-        "clients_late_p999_over_timer_us": ("<=", 1000.0),
-    },
-    "box_start": {"box_start_ms": ("<=", 60.0)},
-    "boxes": {"boxes_realtime": (">=", 20.0)},
-    "e_series_lockstep": {"e_series_lockstep_x_realtime": (">=", 20.0)},
-    "e_series_realtime": {
-        "e_series_stream_late_p50_us": ("<=", 250.0),
-        "e_series_stream_late_p999_over_timer_us": ("<=", 300.0),
-        "e_series_stream_lost_cycles": ("<=", 0.0),
-        "e_series_cpu_percent": ("<=", 40.0),
-        "e_series_rss_mb": ("<=", 150.0),
-    },
-    "e_series_boxes": {"e_series_boxes_realtime": (">=", 5.0)},
-    "connect_storm": {
-        "connect_storm_per_s": (">=", 199.0),
-        "connect_storm_leak_kb": ("<=", 1024.0),
-        "connect_storm_leak_descriptors": ("<=", 0.0),
-        "connect_storm_lost_cycles": ("<=", 0.0),
-    },
-    "paper_set": {
-        "paper_set_preview_lognormal_db": (">=", 35.0),
-        "paper_set_preview_uniform_db": (">=", 30.0),
-        "paper_set_preview_least_above_paper_db": (">=", 5.0),
-        "paper_set_best_third_least_above_floor_db": (">=", -1.0),
-        "paper_set_best_third_above_first_db": (">=", 0.0),
-    },
-}
-
-
-def main(names: list[str]) -> None:
-    """Run these measurements, or all; figures that are not measured keep their last value in the file."""
-    chosen = [_measurement_of(name) for name in names] or list(MEASUREMENTS)
-    minutes = float(os.environ.get("BENCH_MINUTES", "10"))
+def measure(names: list[str], length: Length) -> dict[str, float]:
+    """Take these measurements, or all; print their figures beside what is asked of them."""
     results: dict[str, float] = {}
     table = Table("figure", "measured", "asked")
-    for name in dict.fromkeys(chosen):
-        found = MEASUREMENTS[name](minutes)
+    for name in dict.fromkeys(map(_measurement_of, names or MEASUREMENTS)):
+        found = MEASUREMENTS[name](length)
         results |= found
         for figure, value in found.items():
             sign, bound = ASKED.get(name, {}).get(figure, ("", None))
             table.add_row(figure, f"{value:.4g}", f"{sign} {bound:g}" if bound is not None else "")
-    known = json.loads(RESULTS.read_text()) if names and RESULTS.exists() else {}
-    known |= {name: round(value, 3) for name, value in results.items()}
-    RESULTS.write_text(json.dumps(known, indent=2) + "\n")
     Console().print(table)
-    print(f"written to {RESULTS}")
+    return results
+
+
+def main(words: list[str]) -> None:
+    """Do what the command line says; a file has the figures of one run, and says where they come from."""
+    parser = argparse.ArgumentParser(
+        prog="bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="measurements or figures; all, if none is given"
+    )
+    parser.add_argument("--short", action="store_true", help="only show that everything runs")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="for the figures of this run")
+    given = parser.parse_args(words)
+    is_whole = not given.names and not given.short
+    out: Path | None = given.out or (RESULTS if is_whole else None)
+    made_by = origin()  # before hours pass
+    results = measure(given.names, SHORT if given.short else FULL)
+    if out:
+        figures = {name: round(value, 3) for name, value in results.items()}
+        out.write_text(json.dumps({**made_by, **figures}, indent=2) + "\n")
+        print(f"written to {out}")
 
 
 def _measurement_of(name: str) -> str:
@@ -134,4 +66,5 @@ def _measurement_of(name: str) -> str:
     sys.exit(f"bench: {name!r} given: choose of {', '.join(MEASUREMENTS)}, or a figure with an asked value")
 
 
-main(sys.argv[1:])
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -18,6 +18,9 @@ import psutil
 from protocol.ur_types import Ports
 
 START_LIMIT = 30.0  # s
+# On Linux and Windows all of 127.0.0.0/8 is this machine: runs at the same time have an address each.
+_NUMBER = os.getpid()
+HOST = "127.0.0.1" if sys.platform == "darwin" else f"127.{128 + _NUMBER // 256 % 64}.{_NUMBER % 256}.1"
 # Away from the standard ports, where a box may run, and from those that the kernel gives to clients.
 PORT_BASE = 31_100
 
@@ -41,23 +44,19 @@ class BoxProcess:
     startup_s: float
 
 
-def _with_bytecode() -> dict[str, str]:
-    """An environment in which compiled modules are kept, as pip keeps them for those who install the box."""
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    return {"PYTHONPYCACHEPREFIX": str(Path(tempfile.gettempdir()) / "ur-hil-bench-bytecode"), **environment}
-
-
 @contextmanager
 def box_process(*arguments: str) -> Iterator[BoxProcess]:
     """Run `ur-emulator serve` with these arguments as long as the block lasts."""
     with tempfile.TemporaryDirectory() as folder:
         ready = Path(folder) / "ready.json"
-        command = [sys.executable, "-m", "ur_emulator", "serve", "--port-base", str(PORT_BASE)]
+        where = ("--host", HOST, "--port-base", str(PORT_BASE))
+        command = [sys.executable, "-m", "ur_emulator", "serve", *where]
         began = time.monotonic()
         child = subprocess.Popen(
             [*command, "--ready-file", str(ready), *arguments],
             stdout=subprocess.DEVNULL,
-            env=_with_bytecode(),
+            # Compiled modules are kept, as pip keeps them for those who install the box.
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": ""},
         )
         try:
             while not ready.exists():

@@ -7,19 +7,19 @@ import time
 from statistics import median
 
 from bench.box_process import box_process
+from bench.length import FULL, Length
 from bench.side_process import SideProcesses
 from ur_emulator import ControlBox
 from ur_emulator.models.robots import robot_by_name
 
-# On Linux and Windows all of 127.0.0.0/8 is this machine.
-_FIRST_HOST = "127.0.0.2"
+_STARTS = 20
 _SETTLE = 1.0  # s
 
 
-def measure_box_start(n_boxes: int = 20) -> dict[str, float]:
+def measure_box_start(length: Length = FULL) -> dict[str, float]:
     """Start boxes as a test-suite does: the first one, and those after it; each until it answers."""
     durations = []
-    for _ in range(1 + n_boxes):
+    for _ in range(1 + length.part_of(_STARTS)):
         began = time.perf_counter()
         with ControlBox(pace="lockstep", port_base=None) as box:
             assert box.state.steady
@@ -27,12 +27,12 @@ def measure_box_start(n_boxes: int = 20) -> dict[str, float]:
     return {"box_first_start_ms": durations[0], "box_start_ms": median(durations[1:])}
 
 
-def measure_boxes(seconds: float, n_boxes: int = 20, robot: str = "ur3") -> dict[str, float]:
-    """Run so many boxes for so many seconds."""
+def measure_boxes(length: Length = FULL, n_boxes: int = 20, robot: str = "ur3") -> dict[str, float]:
+    """Run so many boxes at once."""
     if sys.platform == "darwin":
         return {}
-    options = ("--robot", robot, "--seed", "7", "--boxes", str(n_boxes))
-    with box_process(*options, "--host", _FIRST_HOST) as rack:
+    seconds = length.seconds
+    with box_process("--robot", robot, "--seed", "7", "--boxes", str(length.part_of(n_boxes))) as rack:
         time.sleep(_SETTLE)
         kinds = (("realtime", rack.ports.realtime), ("rtde", rack.ports.rtde))
         clients = [(host, port, kind) for host in rack.hosts for kind, port in kinds]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from bench.box_process import box_process
+from bench.length import FULL, Length
 from bench.side_process import SideProcesses
 from ur_emulator.models.generations import CB3
 
@@ -12,8 +13,9 @@ N_RTDE, N_REALTIME = 50, 50
 _SETTLE = 1.0  # s; until the box has settled
 
 
-def measure_clients(seconds: float) -> dict[str, float]:
-    """Serve them for so many seconds; compare with the same box without clients."""
+def measure_clients(length: Length = FULL) -> dict[str, float]:
+    """Serve them; compare with the same box without clients."""
+    seconds = length.seconds
     with box_process("--seed", "7") as box:
         time.sleep(_SETTLE)
         box.process.cpu_percent()

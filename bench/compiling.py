@@ -7,21 +7,24 @@ import sys
 import time
 
 from bench.box_process import box_process
+from bench.length import FULL, Length
 from bench.script import driver_like_script
 from bench.side_process import SideProcesses
+from ur_emulator.models.generations import CB3
 
 _EVERY = 1.0  # s, from one program to the next
 _LIMIT = 30.0  # s
 
 
-def measure_compiling(seconds: float) -> dict[str, float]:
-    """Send a control script again and again, one client reading; then only read, for so many seconds each."""
+def measure_compiling(length: Length = FULL) -> dict[str, float]:
+    """Send a control script again and again, one client reading; then only read."""
+    seconds = length.seconds
     with box_process("--seed", "7") as box:
         reader = [(box.host, box.ports.realtime, "realtime")]
-        beside = SideProcesses(seconds, reader)
+        beside = SideProcesses(seconds, CB3.period_s, reader)
         took = _send_programs(box.host, box.ports.secondary, seconds - _EVERY)
         busy = beside.wait()
-        idle = SideProcesses(seconds, reader).wait()
+        idle = SideProcesses(seconds, CB3.period_s, reader).wait()
     return {
         "compile_in_box_s": min(took),
         "frames_lost_while_compiling": float(sum(busy.lost)),
@@ -33,8 +36,8 @@ def measure_compiling(seconds: float) -> dict[str, float]:
 
 
 def _send_programs(host: str, port: int, seconds: float) -> list[float]:
-    """Send programs that call back when they run; return how long each took until then [s]."""
-    took = []
+    """Send programs, at least one, that call back when they run; return how long each took until then [s]."""
+    took: list[float] = []
     with (
         socket.create_connection((host, port), timeout=_LIMIT) as box,
         socket.create_server((host, 0)) as home,
@@ -42,7 +45,8 @@ def _send_programs(host: str, port: int, seconds: float) -> list[float]:
         home.settimeout(_LIMIT)
         script = _calling_back(host, home.getsockname()[1]).encode()
         end = time.monotonic() + seconds
-        while (began := time.monotonic()) < end:
+        while not took or time.monotonic() < end:
+            began = time.monotonic()
             box.sendall(script)
             try:
                 home.accept()[0].close()

@@ -12,8 +12,10 @@ from itertools import count
 from rich.progress import track
 
 from bench.box_process import BoxProcess, box_process
+from bench.length import FULL, Length
 from bench.side_process import SideProcesses
 from protocol.ur_types import Ports
+from ur_emulator.models.generations import CB3
 
 RATE = 200.0  # connections a second
 # Before memory is compared the box must have seen everything once, and its bounded log must be full.
@@ -56,17 +58,18 @@ def visit(host: str, number: int, request: bytes, manner: str, rng: random.Rando
             sock.recv(4096)
 
 
-def measure_connect_storm(seconds: float) -> dict[str, float]:
-    """Storm for so many seconds, after a storm that warms up."""
+def measure_connect_storm(length: Length = FULL) -> dict[str, float]:
+    """Storm, after a storm that warms up."""
+    seconds = length.seconds
     with box_process("--seed", "7") as box:
         rng = random.Random(7)
         visits = count()
         descriptors = box.process.num_fds()
-        for _ in track(range(_WARM_UP), description="storm, warming up"):
+        for _ in track(range(length.part_of(_WARM_UP)), description="storm, warming up"):
             _visit_next(box, next(visits), rng)
         time.sleep(_SETTLE)
         memory = box.process.memory_info().rss
-        beside = SideProcesses(seconds, [(box.host, box.ports.realtime, "realtime")])
+        beside = SideProcesses(seconds, CB3.period_s, [(box.host, box.ports.realtime, "realtime")])
         box.process.cpu_percent()
         began = time.monotonic()
         n = round(RATE * seconds)

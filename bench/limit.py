@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import mujoco
 
+from bench.length import FULL, Length
 from ur_emulator.models.robots import robot_by_name
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.plant import Plant
@@ -46,12 +47,12 @@ class Limit(NamedTuple):
         return self.steps_us + self.round_trip_us
 
 
-def measure_limit(robot: str) -> Limit:
+def measure_limit(robot: str, length: Length = FULL) -> Limit:
     """Measure both parts, in a second."""
-    return Limit(measure_steps(robot), _measure_round_trip())
+    return Limit(_measure_steps(robot, length), _measure_round_trip(length))
 
 
-def measure_steps(robot: str) -> float:
+def _measure_steps(robot: str, length: Length) -> float:
     """The steps of a cycle of the arm's own model, at rest under its servos [us]."""
     arm = robot_by_name(robot)
     generation = arm.generation
@@ -59,10 +60,10 @@ def measure_steps(robot: str) -> float:
     for _ in range(100):
         plant.step(JointTarget(arm.home_q))
     model, data = plant._physics.model, plant._physics.data
-    return best_of(lambda: mujoco.mj_step(model, data, generation.n_substeps))
+    return best_of(lambda: mujoco.mj_step(model, data, generation.n_substeps), length)
 
 
-def _measure_round_trip() -> float:
+def _measure_round_trip(length: Length) -> float:
     with socket.create_server(("127.0.0.1", 0)) as server:
         arguments = (str(server.getsockname()[1]), str(FRAME), str(COMMAND))
         echo = subprocess.Popen([sys.executable, "-c", _ECHO, *arguments])
@@ -77,15 +78,15 @@ def _measure_round_trip() -> float:
             while left:
                 left -= len(sock.recv(left))
 
-        best = best_of(there_and_back)
+        best = best_of(there_and_back, length)
     echo.wait()
     return best
 
 
-def best_of(action: Callable[[], object]) -> float:
+def best_of(action: Callable[[], object], length: Length) -> float:
     """Microseconds that an action takes, over the best of many batches."""
     best = float("inf")
-    for _ in range(BATCHES):
+    for _ in range(length.part_of(BATCHES)):
         began = time.perf_counter()
         for _ in range(BATCH):
             action()

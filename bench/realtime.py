@@ -13,6 +13,7 @@ from rich.progress import track
 
 from bench import bare_timer
 from bench.box_process import box_process
+from bench.length import FULL, Length
 from protocol.frame_buffer import FrameBuffer
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
 from ur_emulator.models.robots import robot_by_name
@@ -22,8 +23,9 @@ _PROGRAMS = Path(__file__).parent.parent / "examples" / "scripts"
 _CONTROL_PORT = 31_090
 
 
-def measure_realtime(minutes: float, robot: str = "ur3") -> dict[str, float]:
-    """Attach one client for so many minutes; compare arrivals with the grid on which the earliest lie."""
+def measure_realtime(length: Length = FULL, robot: str = "ur3") -> dict[str, float]:
+    """Attach one client; compare arrivals with the grid on which the earliest lie."""
+    minutes = length.minutes
     generation = robot_by_name(robot).generation
     period = generation.period_s
     everything = ("--programs", str(_PROGRAMS), "--control-port", str(_CONTROL_PORT))
@@ -35,7 +37,7 @@ def measure_realtime(minutes: float, robot: str = "ur3") -> dict[str, float]:
         )
         stamps, arrivals = [], []
         n_frames = round(minutes * 60.0 / period)
-        with socket.create_connection(("127.0.0.1", box.ports.realtime), timeout=5.0) as sock:
+        with socket.create_connection((box.host, box.ports.realtime), timeout=5.0) as sock:
             buffer = FrameBuffer(MAX_FRAME_SIZE)
             box.process.cpu_percent()
             for _ in track(range(n_frames), description=f"{generation.cycle_rate} Hz for {minutes:g} min"):

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
+from bench.length import FULL, Length
 from urscript import NEXT_CYCLE, HostFunction, ProgramStatus, RunningProgram, ScriptThread, compile_program
 from urscript.dialect import Dialect
 from urscript.syntax.parser import prepare
@@ -116,20 +117,21 @@ def driver_like_script() -> str:
     return f"def control():\n{head}{functions}{calls}end\n"
 
 
-def measure_script() -> dict[str, float]:
+def measure_script(length: Length = FULL) -> dict[str, float]:
     """Everything this module measures, in about two seconds."""
     prepare()
     text = driver_like_script()
-    compiling = _best(lambda: compile_program(text))
-    script = _SCRIPT_LOOP.format(rounds=LOOP_ROUNDS)
-    loop = compile_program(script, dialect=Dialect(statement_budget=10 * STATEMENTS_A_ROUND * LOOP_ROUNDS))
-    computing = _best(lambda: _run_to_its_end(loop.start(_QuietHost())))
-    python = _best(lambda: _python_loop(LOOP_ROUNDS))
+    compiling = _best(lambda: compile_program(text), length)
+    n = length.part_of(LOOP_ROUNDS)
+    dialect = Dialect(statement_budget=10 * STATEMENTS_A_ROUND * n)
+    loop = compile_program(_SCRIPT_LOOP.format(rounds=n), dialect=dialect)
+    computing = _best(lambda: _run_to_its_end(loop.start(_QuietHost())), length)
+    python = _best(lambda: _python_loop(n), length)
     return {
         "compile_1200_lines_s": compiling * 1200 / text.count("\n"),
-        "script_statements_per_s": STATEMENTS_A_ROUND * LOOP_ROUNDS / computing,
+        "script_statements_per_s": STATEMENTS_A_ROUND * n / computing,
         "script_vs_cpython": computing / python,
-        "sync_thread_cycle_us": 1e6 * (_cycle(2) - _cycle(1)),
+        "sync_thread_cycle_us": 1e6 * (_cycle(2, length) - _cycle(1, length)),
     }
 
 
@@ -138,24 +140,25 @@ def _run_to_its_end(running: RunningProgram) -> None:
         raise AssertionError(f"the measured program did not finish: {running.error}")
 
 
-def _cycle(n_threads: int) -> float:
+def _cycle(n_threads: int, length: Length) -> float:
     """Seconds that a cycle of a program takes whose threads, main among them, only sync()."""
     runs = "  ".join(["run idle()\n"] * (n_threads - 1))
+    cycles = length.part_of(CYCLES)
     running = compile_program(SYNC_THREADS.format(runs=runs)).start(_QuietHost())
 
     def some_cycles() -> None:
-        for _ in range(CYCLES):
+        for _ in range(cycles):
             running.step()
 
-    seconds = _best(some_cycles) / CYCLES
+    seconds = _best(some_cycles, length) / cycles
     running.kill()
     return seconds
 
 
-def _best(action: Callable[[], object]) -> float:
+def _best(action: Callable[[], object], length: Length) -> float:
     """Seconds that `action` takes when nothing disturbs it."""
     times = []
-    for _ in range(ROUNDS):
+    for _ in range(length.part_of(ROUNDS)):
         began = time.perf_counter()
         action()
         times.append(time.perf_counter() - began)

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
+from bench.length import FULL, Length
 from bench.script import SYNC_THREADS
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
@@ -16,7 +17,7 @@ from ur_emulator.scripting.robot_host import robot_hosts
 from urscript import CompiledProgram, compile_program
 from urscript.syntax.parser import prepare
 
-ROUNDS = 20  # of each measurement; the best one counts, the others were disturbed
+ROUNDS, FEW_ROUNDS = 20, 3  # of short and long measurements; the best one counts, the others were disturbed
 N_THREADS = 20
 CYCLES = 200
 N_LOCALS = 20_000
@@ -32,17 +33,17 @@ end
 """
 
 
-def measure_script_in_box() -> dict[str, float]:
+def measure_script_in_box(length: Length = FULL) -> dict[str, float]:
     """Everything this module measures, in some five seconds."""
     prepare()
     alone, crowded = _box_running(0), _box_running(N_THREADS)
     # Taking turns: what disturbs one disturbs the other.
-    cycles = [(_cycles(alone), _cycles(crowded)) for _ in range(ROUNDS)]
+    cycles = [(_cycles(alone), _cycles(crowded)) for _ in range(length.part_of(ROUNDS))]
     one, all_of_them = (min(times) for times in zip(*cycles, strict=True))
-    statements, seconds = _burst()
-    text = _locals()
+    statements, seconds = _burst(length)
+    text = _locals(length.part_of(N_LOCALS))
     gc.disable()  # as in the box's worker process
-    compiling = min(_timed(lambda: compile_program(text)) for _ in range(3))
+    compiling = min(_timed(lambda: compile_program(text)) for _ in range(length.part_of(FEW_ROUNDS)))
     gc.enable()
     return {
         "script_sync_thread_us": 1e6 * (all_of_them - one) / N_THREADS,
@@ -75,11 +76,11 @@ def _cycles(box: Controller) -> float:
     return _timed(some) / CYCLES
 
 
-def _burst() -> tuple[int, float]:
+def _burst(length: Length) -> tuple[int, float]:
     """How often `n = n + 1` runs in a cycle before the program is stopped, and how long that takes [s]."""
     program: CompiledProgram = compile_program(_BURST)
     seconds = []
-    for _ in range(3):
+    for _ in range(length.part_of(FEW_ROUNDS)):
         box = _box()
         box.tick([StartProgram(program)])
         seconds.append(_timed(lambda box=box: box.tick(())))  # type: ignore[misc]
@@ -88,8 +89,8 @@ def _burst() -> tuple[int, float]:
     return statements, min(seconds)
 
 
-def _locals() -> str:
-    lines = "".join(f"    local x{n} = {n}\n" for n in range(N_LOCALS))
+def _locals(n: int) -> str:
+    lines = "".join(f"    local x{k} = {k}\n" for k in range(n))
     return f"def p():\n  def f():\n{lines}  end\n  f()\nend\n"
 
 

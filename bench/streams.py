@@ -17,6 +17,7 @@ import time
 from array import array
 
 import numpy as np
+from numpy.typing import NDArray
 
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import Request, RequestProtocolVersion, SetupOutputs, Start
@@ -31,6 +32,7 @@ _STAMP = struct.Struct(">d").unpack_from
 _STAMP_AT = 4  # in a realtime frame behind its size; in an RTDE package behind size, type and recipe
 _SIZE = {"realtime": struct.Struct(">i"), "rtde": struct.Struct(">H")}
 _BUFFER = 1 << 16
+_Times = NDArray[np.float64]  # s
 # What came while others were still connecting is read but does not count.
 _CATCH_UP = 0.5  # s
 
@@ -90,13 +92,14 @@ def lost_cycles(stream: Stream) -> int:
     return int(holes) + max(0, round(float(behind) / stream.period))
 
 
-def lateness(streams: list[Stream]) -> np.ndarray:
+def lateness(streams: list[Stream]) -> _Times:
     """How late the frames of one box came [s], measured from the grid on which the earliest of all lie."""
     late = np.concatenate([_phases(stream) for stream in streams])
-    return late - late.min()
+    behind_the_earliest: _Times = late - late.min()
+    return behind_the_earliest
 
 
-def _phases(stream: Stream) -> np.ndarray:
+def _phases(stream: Stream) -> _Times:
     period = stream.period
     return np.array(stream.arrivals) - period * np.round(np.array(stream.stamps) / period)
 

@@ -6,6 +6,7 @@ from functools import partial
 
 import mujoco
 
+from bench.length import FULL, Length
 from bench.limit import best_of
 from ur_emulator.commands.programs import StartProgram
 from ur_emulator.controller.controller import Controller
@@ -33,7 +34,7 @@ end
 """
 
 
-def measure_tick(robot: str = "ur3") -> dict[str, float]:
+def measure_tick(length: Length = FULL, robot: str = "ur3") -> dict[str, float]:
     """Measure the tick and the steps of a cycle of the same arm in turn; the best of each counts."""
     prepare()
     arm = robot_by_name(robot)
@@ -53,6 +54,9 @@ def measure_tick(robot: str = "ur3") -> dict[str, float]:
         controller.tick(())
         controller.state.events.take()
 
-    pairs = [(best_of(tick), best_of(lambda: mujoco.mj_step(model, beside, n_steps))) for _ in range(ROUNDS)]
+    def steps() -> None:
+        mujoco.mj_step(model, beside, n_steps)
+
+    pairs = [(best_of(tick, length), best_of(steps, length)) for _ in range(length.part_of(ROUNDS))]
     tick_us, steps_us = (min(times) for times in zip(*pairs, strict=True))
     return {"tick_us": tick_us, "tick_steps_us": steps_us, "tick_x_steps": tick_us / steps_us}

@@ -379,10 +379,19 @@ def draw_protective_stop(out):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "img")
-    out = parser.parse_args().out
-    out.mkdir(parents=True, exist_ok=True)
-    for draw in (draw_freedrive, draw_force_mode, draw_protective_stop):
-        draw(out)
+    parser.add_argument("--only", choices=PICTURES)
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    for name, draw in PICTURES.items():
+        if given.only in (None, name):
+            draw(given.out)
+
+
+PICTURES = {
+    "freedrive": draw_freedrive,
+    "force_mode": draw_force_mode,
+    "protective_stop": draw_protective_stop,
+}
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 `python -m docs.make_extraction_picture` from the root of the checkout. Needs the extra `report`.
 """
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -24,5 +25,7 @@ def bad_recording(name: str, seed: int) -> PenRecording:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "img" / "extraction.png")
     picture = draw_extraction(extract(bad_recording("lognorm_5_2", seed=1)))
-    Path(__file__).with_name("img").joinpath("extraction.png").write_bytes(picture)
+    parser.parse_args().out.write_bytes(picture)

@@ -17,7 +17,7 @@ end
 """
 
 
-def main():
+def main() -> None:
     with ControlBox(pace="lockstep", seed=7, port_base=None) as box:
         primary = socket.create_connection((box.host, box.ports.primary), timeout=10.0)
         with primary, socket.create_connection((box.host, box.ports.secondary)) as secondary:

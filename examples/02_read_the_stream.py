@@ -2,15 +2,16 @@
 
 import argparse
 import socket
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from protocol.frame_buffer import FrameBuffer
-from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
+from protocol.realtime.layout import MAX_FRAME_SIZE, RealtimeFrame, layout_for_size
 from ur_emulator import ControlBox
 
 
-def read_frames(address, n):
+def read_frames(address: tuple[str, int], n: int) -> Iterator[RealtimeFrame]:
     buffer = FrameBuffer(MAX_FRAME_SIZE)
     with socket.create_connection(address, timeout=5.0) as sock:
         while n:
@@ -20,7 +21,7 @@ def read_frames(address, n):
             n -= 1
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robot", help="address of an arm; without it a box is started here")
     parser.add_argument("--seconds", type=float, default=2.0)
@@ -33,7 +34,7 @@ def main():
             show(read_frames((box.host, box.ports.realtime), n))
 
 
-def show(frames):
+def show(frames: Iterable[RealtimeFrame]) -> None:
     for k, frame in enumerate(frames):
         if k % 125 == 0:
             print(f"{frame.timestamp:8.3f} s  q = {np.round(frame.actual_q, 4)} rad")

@@ -22,7 +22,7 @@ end
 """
 
 
-def main():
+def main() -> None:
     host = RecordingHost()
     host.run(compile_program(PROGRAM), 1000)
     print("called:", *host.names_called())

@@ -5,7 +5,7 @@ from pc_client.movements.generate import generate_movement
 from pc_client.planning.plan import plan_movement
 
 
-def main():
+def main() -> None:
     movement = generate_movement("lognormal", 5, seed=42)
     figures = describe(movement)
     print(f"{movement.name}: {movement.duration:.2f} s, top speed {figures['peak_speed_m_s']:.3f} m/s")

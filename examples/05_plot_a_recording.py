@@ -3,13 +3,13 @@
 import argparse
 from pathlib import Path
 
-from pc_client.analysis.run import analyse_run, speed_curve
+from pc_client.analysis.run import MeasuredRun, analyse_run, speed_curve
 from pc_client.recording.recording import load_recording
 from pc_client.results.matplotlib_figures import draw, image_bytes
-from pc_client.results.sheet import BLUE, REFERENCE_GREY, WIDTH, Panel, Sheet, boxes
+from pc_client.results.sheet import BLUE, REFERENCE_GREY, WIDTH, Box, Panel, Sheet, boxes
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("speed.png"))
@@ -22,7 +22,7 @@ def main():
     print(f"written to {options.out}")
 
 
-def panel(box, run, last):
+def panel(box: Box, run: MeasuredRun, last: bool) -> Panel:
     curves = (
         speed_curve(run, REFERENCE_GREY, "desired", desired=True, width=4.0),
         speed_curve(run, BLUE, "actual"),

@@ -1,11 +1,12 @@
 """Guide the arm by hand, press on its table, drive it into the table; docs/contact.md shows what happens."""
 
 import socket
+from collections.abc import Iterator
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE
 from protocol.primary.messages import ErrorCodeMessage, KeyMessage, TextMessage
-from protocol.primary.packages import decode_package
+from protocol.primary.packages import Package, decode_package
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 
@@ -42,7 +43,7 @@ end
 """
 
 
-def main():
+def main() -> None:
     with ControlBox(pace="lockstep", seed=7, port_base=None) as box:
         primary = socket.create_connection((box.host, box.ports.primary), timeout=10.0)
         with primary, socket.create_connection((box.host, box.ports.secondary)) as secondary:
@@ -61,7 +62,7 @@ def main():
                             break
 
 
-def messages(primary):
+def messages(primary: socket.socket) -> Iterator[Package]:
     """Everything that the primary port says."""
     buffer = FrameBuffer(MAX_PACKAGE_SIZE)
     while True:

@@ -15,28 +15,35 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Event, Thread
+from typing import Any
 
 import numpy as np
+import polars as pl
 from jinja2 import Environment, FileSystemLoader
 from markupsafe import Markup
 from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.lines import Line2D
 from rich.console import Console
 
 import pc_client as ur
+from pc_client.arrays import Array
 from pc_client.kinematics.model import tcp_pose
+from pc_client.movements.movement import Style
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.recording.provenance import origin_of
 from pc_client.results.matplotlib_figures import draw, figure
 from pc_client.results.pages import picture
 from pc_client.results.sheet import BLUE, ORANGE, REFERENCE_GREY, WIDTH, Curve, Panel, Sheet, boxes
 from pc_client.results.tables import Column, frame_of, to_html, to_rich
+from protocol.realtime.layout import RealtimeFrame
 from ur_emulator import ControlBox
 from ur_hil.tools import TOOLS
 
 HERE = Path(__file__).parent
 TOOL, BENCH = TOOLS["robotiq-2f85"], HERE / "pick.toml"
-STYLES = {"human": "lognormal strokes", "robot": "trapezoids of speed"}
+STYLES: dict[Style, str] = {"human": "lognormal strokes", "robot": "trapezoids of speed"}
 COLOURS = {"human": BLUE, "robot": ORANGE}
 FPS = 8
 
@@ -62,7 +69,7 @@ end
 """
 
 
-def movement(name: str, style: str) -> ur.Movement:
+def movement(name: str, style: Style) -> ur.Movement:
     """One of the ways in one of the styles, tool down, fingers along x."""
     points, durations = WAYS[name]
     through = ur.Movement.through(points, style, durations)
@@ -80,7 +87,7 @@ class Follow:
     def __init__(self, spline: JointSpline, delay: float) -> None:
         self.spline, self.delay, self.begin = spline, delay, 0.0
 
-    def __call__(self, frame):
+    def __call__(self, frame: RealtimeFrame) -> Array | None:
         """Six velocities for a frame [rad/s], or None at the end."""
         self.begin = self.begin or frame.timestamp
         t, end = frame.timestamp - self.begin, self.spline.duration
@@ -88,7 +95,8 @@ class Follow:
             return None
         q, _ = self.spline.at(min(t, end))
         _, qd = self.spline.at(min(t + self.delay, end))
-        return np.asarray(qd) + 5.0 * (np.asarray(q) - frame.actual_q)
+        velocities: Array = np.asarray(qd) + 5.0 * (np.asarray(q) - frame.actual_q)
+        return velocities
 
 
 @dataclass
@@ -96,9 +104,9 @@ class Stage:
     """A movement as it was done: its time in the box [s], speeds of the TCP [m/s], and Eq. 10 [dB]."""
 
     name: str
-    t: np.ndarray
-    speed: np.ndarray
-    wanted: np.ndarray
+    t: Array
+    speed: Array
+    wanted: Array
     snr: float
 
 
@@ -106,12 +114,12 @@ class Stage:
 class Take:
     """A style: its stages, and what the box reported meanwhile, one row a sample."""
 
-    style: str
+    style: Style
     stages: list[Stage] = field(default_factory=list)
-    seen: list[tuple] = field(default_factory=list)
+    seen: list[tuple[Any, ...]] = field(default_factory=list)
     held: bool = False
 
-    def column(self, index: int) -> np.ndarray:
+    def column(self, index: int) -> Array:
         """0: time [s], 1: joints [rad], 2: pose of the block [m, rad], 3: width between the pads [m]."""
         return np.array([row[index] for row in self.seen])
 
@@ -121,9 +129,10 @@ class Take:
         return float(self.stages[0].t[0])
 
     @property
-    def missed(self) -> np.ndarray:
+    def missed(self) -> Array:
         """How far the block stands from where it should [mm], (2,): along the table."""
-        return 1e3 * (self.column(2)[-1, :2] - PLACE[:2])
+        millimetres: Array = 1e3 * (self.column(2)[-1, :2] - PLACE[:2])
+        return millimetres
 
 
 @contextmanager
@@ -149,7 +158,7 @@ def watched(box: ControlBox, take: Take) -> Iterator[None]:
         thread.join()
 
 
-def pick(box: ControlBox, arm: ur.Arm, style: str) -> Take:
+def pick(box: ControlBox, arm: ur.Arm, style: Style) -> Take:
     """Reach, grip, carry, place and withdraw."""
     take, hand = Take(style), arm.gripper
     box.move_thing("block", (*GRIP[:2], 0.02, 0.0, 0.0, 0.0))
@@ -161,6 +170,7 @@ def pick(box: ControlBox, arm: ur.Arm, style: str) -> Take:
         stamp = run.recording.column("timestamp")[-1] - run.t[-1]
         take.stages.append(replace(stage("reach", plan, run, stamp), snr=run.snr))
         delay = run.recording.provenance.identified_delay_s
+        assert delay is not None  # `Arm.run` measures it
 
         hand.close()
         take.held = hand.is_holding
@@ -175,7 +185,7 @@ def pick(box: ControlBox, arm: ur.Arm, style: str) -> Take:
     return take
 
 
-def follow(arm: ur.Arm, name: str, style: str, delay: float) -> Stage:
+def follow(arm: ur.Arm, name: str, style: Style, delay: float) -> Stage:
     """Go one of the ways from where the arm stands."""
     plan = ur.plan(movement(name, style), arm)
     turns = np.rint((arm.frame().actual_q - plan.joints.start_q) / (2.0 * np.pi))
@@ -273,7 +283,7 @@ _VIEW = np.array(
 _GAP = np.full(3, np.nan)
 
 
-def skeleton(arm: ur.Arm, q: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+def skeleton(arm: ur.Arm, q: Array, width: float) -> tuple[Array, Array]:
     """The axes of the arm from base to flange, and palm and fingers: lines in space (n, 3) [m]."""
     T, model = tcp_pose(arm.model, q), arm.model
     joints = [model.pin_data.oMi[i].translation.copy() for i in range(1, 7)]
@@ -284,12 +294,13 @@ def skeleton(arm: ur.Arm, q: np.ndarray, width: float) -> tuple[np.ndarray, np.n
     return np.array([np.zeros(3), *joints, flange]), np.array(fingers)
 
 
-def box_edges(middle: np.ndarray, half: np.ndarray) -> np.ndarray:
+def box_edges(middle: Array, half: Array) -> Array:
     """The edges of an upright box, as one line with gaps (n, 3) [m]."""
     square = np.array(((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)))
     rings = [np.c_[square, np.full(5, side)] for side in (-1, 1)]
     posts = [row for corner in square[:4] for row in ((*corner, -1), (*corner, 1), _GAP)]
-    return middle + half * np.vstack([rings[0], _GAP, rings[1], _GAP, *posts])
+    edges: Array = middle + half * np.vstack([rings[0], _GAP, rings[1], _GAP, *posts])
+    return edges
 
 
 def save_film(arm: ur.Arm, takes: list[Take], path: Path) -> None:
@@ -301,7 +312,7 @@ def save_film(arm: ur.Arm, takes: list[Take], path: Path) -> None:
         page.set_dpi(66)
         grid = page.subplots(2, len(takes), height_ratios=(3.6, 1), squeeze=False)
         page.subplots_adjust(0.08, 0.11, 0.98, 0.9, hspace=0.08)
-        updates = [scene(arm, take, *grid[:, k], longest) for k, take in enumerate(takes)]
+        updates = [scene(arm, take, tuple(grid[:, k]), longest) for k, take in enumerate(takes)]
 
     film = PillowWriter(fps=FPS)
     with film.saving(page, path, dpi=page.dpi):
@@ -311,18 +322,20 @@ def save_film(arm: ur.Arm, takes: list[Take], path: Path) -> None:
             film.grab_frame()
 
 
-def scene(arm: ur.Arm, take: Take, space, below, longest: float) -> Callable[[float], None]:
+def scene(arm: ur.Arm, take: Take, pair: tuple[Axes, Axes], longest: float) -> Callable[[float], None]:
     """Set up the two pictures of a style; returns what draws them at a time [s]."""
+    space, below = pair
     t, colour = take.column(0) - take.begin, COLOURS[take.style]
     q, blocks, widths = (take.column(k) for k in (1, 2, 3))
     middles = blocks[:, :3]
     path = np.array([tcp_pose(arm.model, one)[:3, 3] for one in q])
 
-    def draw_line(points: np.ndarray, **style) -> object:
+    def draw_line(points: Array, **style: Any) -> Line2D:
+        line: Line2D
         (line,) = space.plot(*(_VIEW @ points.T), **style)
         return line
 
-    def between(values: np.ndarray, now: float) -> np.ndarray:
+    def between(values: Array, now: float) -> Array:
         return np.array([np.interp(now, t, column) for column in np.atleast_2d(values.T)])
 
     space.set(xlim=(-0.62, 0.46), ylim=(-0.32, 0.6), xticks=(), yticks=(), aspect="equal")
@@ -354,7 +367,7 @@ def scene(arm: ur.Arm, take: Take, space, below, longest: float) -> Callable[[fl
     return update
 
 
-def page(arm: ur.Arm, takes: list[Take], film: bytes, table) -> str:
+def page(arm: ur.Arm, takes: list[Take], film: bytes, table: pl.DataFrame) -> str:
     """The page with the film and all figures."""
     ours = Path(ur.__file__).parent
     templates = Environment(loader=FileSystemLoader([HERE, ours]), autoescape=True, trim_blocks=True)

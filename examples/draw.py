@@ -13,6 +13,7 @@ import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import Any
 
 from ur_emulator import ControlBox
 from ur_emulator.errors import PortError
@@ -21,7 +22,7 @@ DRAWINGS = Path(__file__).parent / "drawings"
 SHOWN = ("letter_i.txt", "elle.txt", "signature.csv")
 
 
-def open_box(stack: ExitStack, **settings) -> ControlBox:
+def open_box(stack: ExitStack, **settings: Any) -> ControlBox:
     """Return a box that runs as long as the stack: on the standard ports, or moved up if they are taken."""
     for base in range(0, 20_000, 1000):
         with suppress(PortError):

@@ -38,8 +38,17 @@ from ur_emulator.control_api import command_line
 from urscript import compile_program
 
 ROOT = Path(__file__).parents[1]
+APPS = {"ur-client": pc_client.cli.app, "ur-emulator": ur_emulator.cli.app, "urscript": urscript.cli.app}
+PAGES = [
+    *ROOT.glob("*.md"),
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "examples").rglob("*.md")),
+]
+MANUAL = [page for page in PAGES if page.name != "CHANGELOG.md"]  # what holds now
 LANGUAGES = {"python", "sh", "console", "urscript", "toml", "yaml", "text", "mermaid"}
 CODE = re.compile(r"^(?:\$|ur-\w+|urscript|make|pip|import|from|def|git) ", re.MULTILINE)
+_FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
+_COMMAND = re.compile(r"`((?:ur-client|ur-emulator|urscript|make|pip|python)\s[^`]+)`")
 REASON = re.compile(r"<!-- not run: (.+) -->")
 NAME = re.compile(r"`([\w./-]+\.\w+)`:$")
 MAKE_TARGETS = set(re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE))
@@ -188,7 +197,8 @@ class PageReader:
                 self._pytest(rest, block)
             case ["python", *rest] if not parse_only:
                 self._process([sys.executable, *map(self._here, rest)], block)
-            case [program, *_] if not parse_only and shutil.which(program):
+            case [program, *_] if not parse_only:
+                assert shutil.which(program), f"{block}: {program} is not there, so this is not run"
                 self._process(["bash", "-ec", self._here(line)], block)
 
     def _workflow(self, block):
@@ -263,6 +273,61 @@ def commands_of(text):
         yield command.rstrip("\n")
         command = ""
     assert not command, f"this command does not end: {command}"
+
+
+def shown_commands():
+    """Commands by their first words: those that blocks of pages run, and those that pages show.
+
+    In place of what installs and serves, and of targets, a `PageReader` does something else.
+    """
+    run, shown = set(), set()
+    for page in MANUAL:
+        for block in blocks_of(page):
+            lines = commands_of(block.text) if block.language == "sh" else _after_prompts(block)
+            (shown if block.reason else run).update(map(_first_words, lines))
+        shown.update(map(_first_words, commands_in_text(page)))
+    not_run = {command for command in run if command.startswith(("make ", "pip ", "ur-emulator serve"))}
+    return run - not_run - {""}, (shown | not_run) - {""}
+
+
+def commands_in_text(page):
+    """The commands of this project that stand in the running text and the tables of a page."""
+    text = _FENCED.sub("", page.read_text(encoding="utf-8"))
+    return [" ".join(span.split()).replace("\\|", "|") for span in _COMMAND.findall(text)]
+
+
+def _after_prompts(block):
+    return [line[2:] for line in block.text.splitlines() if line.startswith("$ ")] * (
+        block.language == "console"
+    )
+
+
+def _first_words(line):
+    """Enough of a command to know it by; "" for none."""
+    words = shlex.split(line, comments=True)
+    match words:
+        case ["python", "-m", "protocol", *_]:
+            n = 4
+        case ["python", "-m", *_] | ["ur-client", "movements", *_]:
+            n = 3
+        case ["ur-client" | "ur-emulator" | "urscript" | "make" | "pip" | "python", *_]:
+            n = 2
+        case _:
+            n = 1
+    return " ".join(words[:n]) if len(words) >= n else ""
+
+
+def options_of(line):
+    """The long options that a command of this project takes; an error if there is no such command."""
+    words = line.split()
+    if words[:2] == ["ur-emulator", "ctl"]:
+        (operations,) = (a.choices for a in command_line.make_parser()._actions if a.dest == "command")
+        parsers = [operations[word] for word in words[2:3] if word in operations] or operations.values()
+        return {option for parser in parsers for option in parser._option_string_actions}
+    command = typer.main.get_command(APPS[words.pop(0)])
+    while hasattr(command, "commands") and words:
+        command = command.commands[words.pop(0)]
+    return {option for parameter in command.params for option in parameter.opts}
 
 
 def parsed(app, words):

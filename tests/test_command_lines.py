@@ -10,17 +10,14 @@ from importlib.metadata import version
 
 import pytest
 import typer
-from page_blocks import ROOT, parsed
+from page_blocks import APPS, ROOT, parsed
 
-import pc_client.cli
 import ur_emulator.cli
 import ur_hil
-import urscript.cli
 from ur_emulator.control_api import command_line
 from ur_emulator.control_api.operations import OPERATIONS
 from ur_hil.command_line import EXIT_CODES, ExitCode
 
-APPS = {"ur-client": pc_client.cli.app, "ur-emulator": ur_emulator.cli.app, "urscript": urscript.cli.app}
 MODULES = {"ur-client": "pc_client.cli", "ur-emulator": "ur_emulator.cli", "urscript": "urscript.cli"}
 
 

@@ -1,44 +1,79 @@
-"""What is built: the wheel, installed into a fresh environment, moves an arm; the sdist has all the pages."""
+"""What is built: the wheel does in a fresh environment what the start pages show; the sdist has all the pages."""
 
 import email
+import json
 import os
 import re
 import runpy
+import shlex
 import shutil
 import subprocess
 import sys
 import tarfile
 import tomllib
 import venv
+from importlib.metadata import distribution
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from packaging.requirements import Requirement
+from page_blocks import APPS, ROOT, blocks_of, commands_of
 
 import ur_hil
+from bench.box_process import HOST
+from pc_client.movements.library_sets import library_names
+from pc_client.movements.movement import Movement
 
-ROOT = Path(__file__).parents[1]
+OURS = "ur-hil"
 PACKAGES = (*ur_hil.PACKAGES, "ur_hil")
 BARE = ("--no-deps", "--no-index", "--no-compile")
-PROGRAM = """
-import pathlib, sys
-import pc_client as ur
-from pc_client.cli import run as ur_client
-from ur_emulator import ControlBox
-import protocol, urscript
+# Does the steps of pages, each as it is done in a terminal, all in one process.
+STEPS = """
+import json, pathlib, runpy, signal, subprocess, sys, urllib.request
+from contextlib import ExitStack, contextmanager
 
-for package in (ur, protocol, urscript, sys.modules["ur_emulator"]):
-    assert pathlib.Path(package.__file__).is_relative_to(sys.prefix), package.__file__
-urscript.compile_program("def hello():\\n  movej([0, 0, 0, 0, 0, 0])\\nend\\n")
-with ControlBox(pace="lockstep", port_base=None, seed=7) as box:
-    arm = ur.connect(box.host, box.ports)
-    ur.plan(ur.Movement.library("lognorm_4_1"), arm)
-    short = ur.Movement.through([(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)], durations=[1.5])
-    run = arm.run(short, ur.Controller.preview(), out="out")
-assert run.snr > 20
-assert ur_client(["report", "out"]) == 0
-assert pathlib.Path("out/report.html").stat().st_size > 10_000
+BIN = pathlib.Path(sys.prefix, "bin")
+
+@contextmanager
+def served(words):
+    with subprocess.Popen([BIN / words[0], *words[1:]], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            wanted = "window at " if "--pendant" in words else " ready at "
+            said = next(line for line in process.stdout if wanted in line)
+            if "--pendant" in words:
+                assert b"<html" in urllib.request.urlopen(said.split()[-1]).read().lower()
+            yield
+        finally:
+            process.send_signal(signal.SIGINT)
+    assert process.returncode in (0, 130)
+
+with ExitStack() as stack:
+    names = {"__name__": "page"}
+    for kind, given in json.loads(pathlib.Path("steps.json").read_text()):
+        print(kind, given, flush=True)
+        if kind == "serve":
+            stack.enter_context(served(given))
+        elif kind == "python":
+            exec(given, names)
+        elif kind == "pytest":
+            import pytest
+            assert pytest.main(["-q", "-p", "no:cacheprovider"]) == 0
+        else:
+            sys.argv = given
+            try:
+                runpy.run_path(str(BIN / given[0]), run_name="__main__")
+            except SystemExit as end:
+                # What a page shows with its error is an error.
+                assert not end.code or kind == "console" and end.code == 1
+for name in {"pc_client", "protocol", "urscript", "ur_emulator"} & set(sys.modules):
+    assert pathlib.Path(sys.modules[name].__file__).is_relative_to(sys.prefix), name
 """
+# A box has an address of its own, and waits for its client; a movement is short, and so is a look.
+SHORTER = {
+    ("ur-emulator", "serve"): ["--host", "HOST", "--pace", "lockstep"],
+    ("ur-client", "doctor"): ["--seconds", "0.1"],
+}
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +109,8 @@ def wheel(built):
     return made
 
 
-def run(*words, cwd=None):
-    keep = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+def run(*words, cwd=None, **more):
+    keep = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | more
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True, cwd=cwd, env=keep)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -131,17 +166,152 @@ def test_links_and_images_of_a_readme_become_text():
     assert page_for_index(text) == "See the box (`docs/box.md`), `a.md`, [UR](https://example.com/x)."
 
 
-@pytest.mark.slow
-def test_a_fresh_environment_with_the_wheel_moves_an_arm(wheel, tmp_path):
-    home = tmp_path / "venv"
+def requirements(wanted, wheel):
+    """Names of all distributions that an install brings, as pip would choose them; `wheel` stands for ours."""
+    with ZipFile(wheel) as archive:
+        (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
+        ours = email.message_from_bytes(archive.read(name)).get_all("Requires-Dist")
+    found, left = set(), [Requirement(text) for text in wanted]
+    while left:
+        one = left.pop()
+        for extra in {"", *one.extras}:
+            if (one.name, extra) in found:
+                continue
+            found.add((one.name, extra))
+            texts = ours if one.name == OURS else distribution(one.name).requires or ()
+            for next_one in map(Requirement, texts):
+                if next_one.marker is None or next_one.marker.evaluate({"extra": extra}):
+                    left.append(next_one)
+    return {name for name, _ in found} - {OURS}
+
+
+def install(wanted, wheel, folder):
+    """Make a folder of packages that has what an install brings, and nothing else of this environment.
+
+    They are links to what is installed here. With REAL_INSTALLS in the environment pip gets them from the index.
+    """
+    if os.environ.get("REAL_INSTALLS"):
+        words = [word.replace(OURS, str(wheel)) for word in wanted]
+        run(sys.executable, "-m", "pip", "install", "-q", "--target", folder, *words)
+        return
+    folder.mkdir()
+    for name in requirements(wanted, wheel):
+        found = distribution(name)
+        for top in {path.parts[0] for path in found.files or ()} - {"..", "__pycache__"}:
+            if not (folder / top).exists():
+                (folder / top).symlink_to(found.locate_file(top))
+
+
+@pytest.fixture(scope="module")
+def environment(wheel, tmp_path_factory):
+    """A fresh environment with the wheel; the other packages are those of the folder DEPENDENCIES."""
+    home = tmp_path_factory.mktemp("environment")
     venv.create(home, symlinks=True)
-    python = home / "bin" / "python"
-    run(sys.executable, "-m", "pip", "--python", python, "install", "-q", *BARE, wheel)
-    # The dependencies are those of this environment: its paths alone, so that its editable install is not seen.
+    run(sys.executable, "-m", "pip", "--python", home / "bin" / "python", "install", "-q", *BARE, wheel)
     (own,) = (home / "lib").glob("python*/site-packages")
-    (own / "dependencies.pth").write_text(
-        "\n".join(path for path in sys.path if "site-packages" in Path(path).parts)
-    )
-    run(python, "-c", PROGRAM, cwd=tmp_path)
+    (own / "dependencies.pth").write_text('import os, site; site.addsitedir(os.environ["DEPENDENCIES"])\n')
+    return home
+
+
+def install_of(line):
+    """What a line of pip installs, () for others; a folder of a copy stands for the name."""
+    words = shlex.split(line, comments=True)
+    if words[:2] != ["pip", "install"]:
+        return ()
+    return tuple(sorted(re.sub(r"^\.(/ur-hil)?(?=\[|$)", OURS, word) for word in words[2:]))
+
+
+def steps_of(page):
+    """What a page shows, in its order: (install that stands last above it, kind of step, what is done)."""
+    text = page.read_text(encoding="utf-8")
+    blocks = {block.line: block for block in blocks_of(page)}
+    wanted = ()
+    for shown in re.finditer(r"^```\w.*?^```$|`(p[^`]+|ur[^`]+)`", text, re.DOTALL | re.MULTILINE):
+        block = blocks.get(text.count("\n", 0, shown.start()) + 1)
+        if block is None and shown[1]:
+            lines = [shown[1].replace("\n", " ")] * (shown[1].count(" ") > 1)
+        elif block.name or block.language == "python":
+            yield wanted, block.language, block
+            continue
+        elif block.language == "sh":
+            lines = commands_of(block.text)
+        else:
+            lines = [line[2:] for line in block.text.splitlines() if line.startswith("$ ")]
+        for line in lines:
+            wanted = install_of(line) or wanted
+            words = shlex.split(line, comments=True)
+            # Of what no page runs, a box and its window begin and end here.
+            if words and words[0] in APPS and not (block and block.reason and words[1] != "serve"):
+                yield wanted, block.language if block else "sh", words
+
+
+def shortened(words):
+    """A command of a page as it is run here."""
+    words = ["short.toml" if word in library_names() else word for word in words]
+    words = [re.sub(r"^(127\.0\.0\.1|192\.168\.0\.10)$", "HOST", word) for word in words]
+    more = ["--window-port", "0"] if "--pendant" in words else []
+    return [HOST if word == "HOST" else word for word in words + SHORTER.get(tuple(words[:2]), []) + more]
+
+
+def box_of(steps):
+    """One box is enough for all pages, that with a window if one has it."""
+    if HOST not in str(steps):
+        return []
+    boxes = [words for _, words in steps if words[:2] == ["ur-emulator", "serve"]]
+    boxes.append(shortened(["ur-emulator", "serve"]))
+    return [("serve", min(boxes, key=lambda words: "--pendant" not in words))]
+
+
+def once(steps):
+    """The same steps, but `run` and `doctor` only once, and without the boxes of each page."""
+    seen = {("ur-emulator", "serve")}
+    for kind, words in steps:
+        if (first := tuple(words[:2])) not in seen:
+            yield kind, words
+        if first in (("ur-client", "run"), ("ur-client", "doctor")):
+            seen.add(first)
+
+
+STEPS_OF_PAGES = [
+    step
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs" / "start").glob("*.md")))
+    for step in steps_of(page)
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wanted", sorted({wanted for wanted, _, _ in STEPS_OF_PAGES}), ids=" ".join)
+def test_the_commands_of_a_page_need_no_more_than_its_install(wanted, wheel, environment, tmp_path):
+    assert wanted, "a start page shows a command, and no `pip install` above it"
+    packages, here = tmp_path / "packages", tmp_path / "here"
+    install(wanted, wheel, packages)
+    here.mkdir()
+    points = [(0.35, -0.05, 0.25), (0.35, 0.05, 0.28)]
+    Movement.through(points, durations=[1.2]).save(here / "short.toml")
+    (here / "my_program.script").write_text('def hello():\n  textmsg("hello")\nend\n')
+    steps = []
+    for _, kind, what in (step for step in STEPS_OF_PAGES if step[0] == wanted):
+        if kind in ("sh", "console"):
+            words = shortened(what)
+            steps.append(("serve" if words[1] == "serve" else kind, words))
+        elif what.name or "def test_" in what.text:
+            path = here / (what.name or f"test_{Path(what.page).stem.replace('-', '_')}_{what.line}.py")
+            path.parent.mkdir(exist_ok=True, parents=True)
+            path.write_text(what.text)
+        else:
+            text = re.sub(r'library\("\w+"\)', 'from_toml("short.toml")', what.text)
+            steps.append(("python", re.sub(r"\b(127\.0\.0\.1|192\.168\.0\.10)\b", HOST, text)))
+    if any(here.glob("test_*.py")):
+        steps.append(("pytest", ""))
+    (here / "steps.json").write_text(json.dumps([*box_of(steps), *once(steps)]))
+    run(environment / "bin" / "python", "-c", STEPS, cwd=here, DEPENDENCIES=str(packages))
+
+
+@pytest.mark.slow
+def test_the_commands_of_the_wheel_start(wheel, environment, tmp_path):
+    install([OURS], wheel, tmp_path / "packages")
     for script in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]:
-        assert "Usage" in run(home / "bin" / script, "--help", cwd=tmp_path)
+        said = run(
+            environment / "bin" / script, "--help", cwd=tmp_path, DEPENDENCIES=str(tmp_path / "packages")
+        )
+        assert "Usage" in said

@@ -97,6 +97,7 @@ A box that somebody else serves, in another process, in a container or on anothe
 laboratory, is used by the same methods:
 
 ```sh
+pip install ur-hil
 ur-emulator serve --control-port {DEFAULT_PORT} --ready-file box.json
 ```
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from enum import IntEnum
+
 from protocol.dashboard.commands import (
     COMMANDS,
     GREETING,
@@ -11,6 +14,7 @@ from protocol.dashboard.commands import (
     unknown_command_reply,
 )
 from protocol.dashboard.connection import MAX_LINE
+from protocol.ur_types import RobotMode, SafetyMode
 
 _INTRODUCTION = f"""\
 # Dashboard server: port 29999
@@ -49,9 +53,17 @@ def render() -> str:
             "|---|---|---|---|---|---|---|",
             *map(_line, COMMANDS),
             "",
-            f"Roles: {', '.join(f'`{role}`' for role in USER_ROLES)}.\n",
+            f"* Robot modes: {_names(RobotMode)}.",
+            f"* Safety modes: {_names(SafetyMode)}. `safetymode` gives `SAFEGUARD_STOP` for all from",
+            f"  `{SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP.name}` on, `safetystatus` gives each.",
+            f"* Roles: {', '.join(f'`{role}`' for role in USER_ROLES)}.",
+            "",
         )
     )
+
+
+def _names(modes: Iterable[IntEnum]) -> str:
+    return ", ".join(f"`{mode.name}`" for mode in modes)
 
 
 def _line(row: DashboardCommand) -> str:

@@ -16,6 +16,9 @@ the same kind of answer, from a simpler model. *Declared*: kept and read back, o
 
 ## Robotiq: variables of port 63352
 
+A request is a line of ASCII. `SET POS 100 SPE 255 GTO 1` is answered with `ack`, three bytes without a
+newline, or with `nak`; `GET POS` with `POS 100` and a newline, or with `?`.
+
 | variable | access | range | meaning | here |
 |---|---|---|---|---|
 """
@@ -73,6 +76,7 @@ back, {OUTPUTS:04X} to {OUTPUTS + 15:04X} are read; others are refused with exce
 _METHODS = """
 ## OnRobot: methods of port 41414
 
+XML-RPC over HTTP, at any path: `http://HOST:41414/`.
 The first number of a method is the place of the device: 0, or 1 and 2 of two. Other types are fault
 -501, other names -506, what is no call -503.
 

@@ -45,6 +45,7 @@ A program that calls `interpreter_mode()` waits, and runs statements that client
 {_PORT} meanwhile. e-Series software from {_SINCE} on has this port, CB3 has not.
 
 ```sh
+pip install ur-hil
 ur-emulator serve --robot ur5e
 ```
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from enum import IntEnum
 
+from protocol.ur_types import ControlMode, JointMode, ProgramState, RobotMode, RobotType, SafetyMode
 from protocol.wire_record import ValueOrigin
 
-__all__ = ["MARKS", "example", "table"]
+__all__ = ["MARKS", "example", "modes", "numbers", "table"]
 
 MARKS = """\
 The column *origin* says how the box obtains a value:
@@ -25,6 +27,31 @@ every mark: measured and modelled values change, the others do not.
 assert all(f"| {mark.value} |" in MARKS for mark in ValueOrigin)
 
 
+_MODES: dict[str, type[IntEnum]] = {
+    "RobotMode": RobotMode,
+    "JointMode": JointMode,
+    "SafetyStatus, and SafetyMode, which is 5 for all from 12 on": SafetyMode,
+    "ProgramState": ProgramState,
+    "ControlMode": ControlMode,
+    "RobotType": RobotType,
+}
+
+
+def modes(*kinds: type[IntEnum]) -> Iterator[str]:
+    """A section with the numbers of these modes."""
+    yield "## Numbers of modes\n"
+    yield "[states.md](../states.md) explains the modes.\n"
+    for name, kind in _MODES.items():
+        if kind in kinds:
+            yield f"* {name}: {numbers(kind)}."
+    yield ""
+
+
+def numbers(kind: Iterable[IntEnum]) -> str:
+    """All numbers with their names."""
+    return ", ".join(f"{int(one)} {one.name}" for one in kind)
+
+
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
     """Lines of a table; a bar in a cell stays a bar."""
     yield _line(heads)
@@ -38,5 +65,6 @@ def _line(cells: Iterable[object]) -> str:
 
 def example(command: str, lines: Iterable[str]) -> str:
     """A command and what it prints, as a block of code."""
+    install = "The command comes with `pip install ur-hil`."
     why = "<!-- not run: values differ each time; tests/test_generated_pages.py compares the form -->"
-    return "\n".join((why, "", "```console", f"$ {command}", *lines, "```"))
+    return "\n".join((install, "", why, "", "```console", f"$ {command}", *lines, "```"))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ur_emulator.controller.modbus_map import COILS, REGISTERS, MapRow
+from docs.generate.page_parts import modes
+from protocol.ur_types import JointMode, RobotMode, SafetyMode
+from ur_emulator.controller.modbus_map import COILS, REGISTERS, WORD_MAX, MapRow
 
 _INTRODUCTION = """\
 # Modbus TCP
@@ -14,7 +16,16 @@ Made from `ur_emulator/controller/modbus_map.py` by `make docs`.
 The same in all versions of CB3 and e-Series software. Functions 1 and 2 read coils, 3 and 4
 registers; 5 and 15 write coils, 6 and 16 registers. The unit number is ignored. Several clients can
 connect at once. Scripts access the same map with `read_port_register` and similar functions.
-A register is a word of 16 bits; signed values are in two's complement.
+
+A request is a number of your choice, 0, the number of bytes that follow (16 bits each, big-endian),
+a unit and a function (a byte each), then what the function takes; the answer repeats the number,
+unit and function, with 0x80 added to the function for an exception. Reading the six registers from
+400 on, and its answer at (-300.0, 87.2, 412.5) mm and (0, 3.142, 0) rad:
+
+```text
+00 01 00 00 00 06 ff 03 01 90 00 06
+00 01 00 00 00 0f ff 03 0c f4 48 03 68 10 1d 00 00 0c 46 00 00
+```
 
 | refused | exception |
 |---|---|
@@ -27,6 +38,21 @@ A write acts in the next control cycle and is answered after it, so that a clien
 written value. Data that is not Modbus ends the connection. Port 502 needs privileges on most
 systems: without them `ur-emulator serve` reports this in one line and serves all other ports.
 `--port-base N` moves this port too.
+"""
+
+_SCALES = f"""\
+### Registers
+
+A register is a word of 16 bits, rounded to the unit that the table gives: 3142 mrad are 3.142 rad.
+Values that may be negative are signed, in two's complement: velocities, currents, temperatures,
+turns, pose, speed and offset of the TCP. Words of bits, angles, levels and the clock are unsigned.
+
+* The position of a joint is 2 pi times its turns (320) plus its angle (270), which is 0 to 6283 mrad.
+* The TCP of 0.1 mm: 4125 in register 402 is z = 412.5 mm. The offset of the TCP is in whole mm.
+* A part of a range is 0 to {WORD_MAX}: from 4 to 20 mA in the domain current, from 0 to 10 V in the
+  domain voltage. {WORD_MAX // 2} is 12 mA or 5 V.
+* A word of outputs (1, 31) sets all of them; those to set and to clear (2, 3, 32, 33) take the bits
+  that shall change.
 """
 
 _CLIENT = """\
@@ -55,11 +81,12 @@ def render() -> str:
     return "\n".join(
         (
             _INTRODUCTION,
-            "### Registers\n",
+            _SCALES,
             *_table(REGISTERS),
             "\n### Coils\n",
             *_table(COILS),
             "",
+            *modes(RobotMode, JointMode, SafetyMode),
             _CLIENT.rstrip() + "\n",
         )
     )

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from docs.generate.page_parts import MARKS, example, table
+from docs.generate.page_parts import MARKS, example, modes, numbers, table
 from protocol.as_text import StreamDecoder, type_name
 from protocol.primary.layout import SUB_PACKAGES
-from protocol.primary.messages import MESSAGES, MessageSource, ReportLevel, RequestedType, version_message
+from protocol.primary.messages import (
+    MESSAGES,
+    MessageSource,
+    ReportLevel,
+    RequestedType,
+    ThreadLabel,
+    version_message,
+)
 from protocol.primary.packages import SECONDARY_MESSAGES, SafetyTolerances, encode_message_package, state_size
 from protocol.primary.values import value_codes
-from protocol.ur_types import SoftwareVersion
+from protocol.ur_types import ControlMode, JointMode, RobotMode, RobotType, SafetyMode, SoftwareVersion
 from protocol.wire_record import ALWAYS, WireField, wire_fields
 
 _V3_15 = SoftwareVersion(3, 15, 8)
@@ -38,9 +45,19 @@ variables. All four ports send states; 30001 and 30002 accept scripts ([scripts.
 30011 and 30012 ignore all input. urx uses 30002, ur_modern_driver and the maker's client library
 use 30001.
 
-A package is its size (32 bits, itself included), a type byte and a body, all big-endian. A state is
-a sequence of sub-packages, each with a header like that of a package. Readers use the size to skip
-unknown types.
+A package is its size (i32, itself included), a type (u8) and a body, all big-endian: 16 is a state,
+20 a message, 24 are tolerances, 25 global variables. A state is a sequence of sub-packages, each with
+a header like that of a package. Readers use the size to skip unknown types.
+
+| type of a field | bytes |
+|---|---|
+| u8, i8, u16, i32, u32, u64 | an unsigned or signed integer of so many bits |
+| f32, f64 | a float of so many bits |
+| bool | a byte, 0 or 1 |
+| ... x6 | six of them, one after the other; in JointData joint by joint |
+| text | up to the end of the package |
+| u8+text, i32+text | the length of the text, then the text |
+| records | {records}; again and again up to the end of the package |
 
 ## On connection
 
@@ -59,8 +76,9 @@ two come again in the first state after the brakes have opened.
 _MESSAGES = """\
 ## Messages
 
-Package type 20: time stamp in microseconds since the controller started (a multiple of the cycle,
-all ones for none), source, message type, fields. The secondary ports send only {secondary}.
+Package type 20: time stamp (u64) in microseconds since the controller started (a multiple of the
+cycle, all ones for none), source (i8), message type (u8), fields. The secondary ports send only
+{secondary}.
 
 * Sources: {sources}.
 * Levels of errors: {levels}. Codes print as `C<code>A<argument>`.
@@ -104,10 +122,23 @@ A client that connects gets the state of the last cycle; there are no messages o
 _VARIABLES = """\
 ## Global variables
 
-Package type 25, on 30001 and 30011. Sub-type 0 gives the names of a program's `global` variables
-when it starts, sub-type 1 the values that have changed, ten times a second and at the end. A value
-is a type code and its data: a string is a length of 16 bits and the text; a pose six 32-bit floats;
-a list its length and its values; a matrix its rows, its columns and its values. The codes:
+Package type 25, on 30001 and 30011: time stamp (u64), sub-type (u8), number of the first variable
+(u16), variables, each ended by a line feed. Sub-type 0 gives the names of a program's `global`
+variables when it starts, sub-type 1 the values that have changed, ten times a second and at the end.
+A value is a type code (u8) and its data, so its end is known before the line feed:
+
+| type | data |
+|---|---|
+| none | nothing |
+| const string, var string | length (i16), text |
+| list | length (i16), values, each with its code |
+| matrix | rows (i16), columns (i16), values row by row, each with its code |
+| pose | six f32 |
+| bool | a byte |
+| int | i32 |
+| num, float | f32 |
+
+The codes:
 """
 
 
@@ -121,13 +152,14 @@ def render() -> str:
         later=state_size(_V3_15, first=False),
         first_e=state_size(_V5_12, first=True),
         later_e=state_size(_V5_12, first=False),
+        records=_fields(ThreadLabel),
     )
     decoded = StreamDecoder(_V3_15).feed(greeting)
     messages = _MESSAGES.format(
         secondary=" and ".join(message.__name__ for message in SECONDARY_MESSAGES),
-        sources=_numbers(MessageSource),
-        levels=_numbers(ReportLevel),
-        wanted=_numbers(RequestedType),
+        sources=numbers(MessageSource),
+        levels=numbers(ReportLevel),
+        wanted=numbers(RequestedType),
     )
     return "\n".join(
         (
@@ -148,6 +180,7 @@ def render() -> str:
             _VARIABLES,
             *_codes(),
             "",
+            *modes(RobotMode, JointMode, SafetyMode, ControlMode, RobotType),
         )
     )
 
@@ -204,10 +237,6 @@ def _codes() -> Iterator[str]:
         ("type", "up to 3.2", "from 3.3 / 5.0", "from 3.14 / 5.9"),
         ((kind.value, *(codes.get(kind, "-") for codes in columns)) for kind in columns[-1]),
     )
-
-
-def _numbers(names: Any) -> str:
-    return ", ".join(f"{int(one)} {one.name}" for one in names)
 
 
 def _first_line(record: type[Any]) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from docs.generate.page_parts import MARKS, example, table
+from docs.generate.page_parts import MARKS, example, modes, table
 from protocol.realtime.layout import COLUMNS, MAX_FRAME_SIZE, VERSIONS, RealtimeColumn, layout_for_size
+from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 
 _INTRODUCTION = """\
 # Realtime interface: ports 30003 and 30013
@@ -37,6 +38,7 @@ _SAMPLE = (
 _NOTES = """\
 * The two words of digital bits travel as floats: 5.0 is bits 0 and 2.
   Three public clients read them as integers and get wrong values, as they do from a real robot.
+* Modes travel as floats too: 7.0 is RUNNING.
 * Gnuplot columns, as in the maker's sheets, count floats from 1.
 """
 
@@ -56,7 +58,8 @@ def render() -> str:
             MARKS,
             *table(("byte", "column", "name", "floats", "unit", "origin", "meaning", "from"), _rows()),
             "",
-            _NOTES.rstrip() + "\n",
+            _NOTES,
+            *modes(RobotMode, JointMode, SafetyMode, ProgramState),
         )
     )
 

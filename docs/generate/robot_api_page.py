@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from docs.generate.page_parts import table
-from protocol.robot_api import API_VERSIONS, BASE, CALLS
+from protocol.robot_api import API_VERSIONS, BASE, CALLS, ROBOT_MODE_NAMES, SAFETY_MODE_NAMES
 from protocol.ur_types import Ports
 from ur_emulator.budgets import BUDGETS, KIB, MIB
 
@@ -34,11 +36,56 @@ all programs of the folder together {BUDGETS.uploads_bytes // MIB} MiB.
 """
 
 
+_EXAMPLES = """\
+## Try it
+
+```sh
+pip install ur-hil
+ur-emulator serve --robot ur5e --software 10.14 --programs my_programs --port-base 1000
+```
+
+A body needs its content type. With `pick.script` in the folder:
+
+<!-- not run: the port moves; tests/integration/test_clients_from_pages.py does it -->
+"""
+
+# Method, path, body ("" for none) and answer, one after the other on a box that has just started.
+_SESSION = (
+    ("GET", "/robotstate/v1/robotmode", "", '{"mode":"RUNNING","message":""}'),
+    ("PUT", "/robotstate/v1/state", '{"action": "POWER_OFF"}', '{"message":"done"}'),
+    ("PUT", "/robotstate/v1/state", '{"action": "BRAKE_RELEASE"}',
+     '{"message":"Conflict","details":"BRAKE_RELEASE given: the robot is in POWER_OFF"}'),
+    ("PUT", "/robotstate/v1/state", '{"action": "POWER_ON"}', '{"message":"done"}'),
+    ("PUT", "/robotstate/v1/state", '{"action": "BRAKE_RELEASE"}', '{"message":"done"}'),
+    ("PUT", "/program/v1/load", '{"programName": "pick"}',
+     '{"message":"Program loaded successfully","name":"pick"}'),
+    ("PUT", "/program/v1/state", '{"action": "play"}', '{"message":"done","state":"PLAYING","details":""}'),
+    ("GET", "/program/v1/state", "", '{"state":"PLAYING","message":"","details":""}'),
+    ("PUT", "/program/v1/state", '{"action": "stop"}', '{"message":"done","state":"STOPPED","details":""}'),
+    ("POST", "/popup/v1", '{"title": "pick", "message": "empty"}', '{"message":"Popup opened successfully"}'),
+    ("DELETE", "/popup/v1", "", '{"message":"Popup closed","closed":true}'),
+)  # fmt: skip
+
+
+def _session() -> Iterator[str]:
+    yield "```console"
+    for method, path, body, answer in _SESSION:
+        how = f"-X {method} " * (method != "GET")
+        what = f"-H 'Content-Type: application/json' -d '{body}' " * bool(body)
+        yield f"$ curl {how}{what}http://127.0.0.1:{Ports().robot_api + 1000}{BASE}{path}"
+        yield answer
+    yield "```\n"
+
+
 def render() -> str:
     """Return the page."""
     return "\n".join(
         (
             _INTRODUCTION,
+            _EXAMPLES,
+            *_session(),
+            "A file is a form: `curl -F file=@pick.script http://127.0.0.1:1080" + BASE + "/programs/v1`.\n",
+            "## Calls\n",
             *table(
                 ("call", "does", "since", "R"),
                 (
@@ -51,6 +98,9 @@ def render() -> str:
                     for row in CALLS
                 ),
             ),
+            "",
+            f"* Robot modes: {', '.join(ROBOT_MODE_NAMES.values())}.",
+            f"* Safety modes: {', '.join(dict.fromkeys(SAFETY_MODE_NAMES.values()))}.",
             "",
             "Version of the API, `info.version` of `/openapi.json`:",
             "",

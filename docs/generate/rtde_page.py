@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import groupby
 from types import SimpleNamespace
 
-from docs.generate.page_parts import MARKS, example, table
+from docs.generate.page_parts import MARKS, example, modes, numbers, table
 from protocol.as_text import RtdeDecoder
 from protocol.rtde.client_connection import RtdeClientConnection
 from protocol.rtde.codec import (
@@ -20,8 +20,8 @@ from protocol.rtde.codec import (
 )
 from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
 from protocol.rtde.server_connection import RtdeServerConnection, request_limits
-from protocol.rtde.types import RobotStatusBits, SafetyStatusBits, TimeScaleSource
-from protocol.ur_types import SoftwareVersion
+from protocol.rtde.types import RobotStatusBits, RtdeType, SafetyStatusBits, TextLevel, TimeScaleSource
+from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.budgets import BUDGETS
 
 _CB3, _E_SERIES = request_limits(SoftwareVersion(3, 15)), request_limits(SoftwareVersion(5, 15))
@@ -40,13 +40,19 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
 
 | type | client to robot | robot to client |
 |---|---|---|
-| `V` | wanted protocol version | accepted or not |
-| `v` | | software: major, minor, bugfix, build |
-| `O` | rate (version 2 only) and names of outputs | recipe number (version 2 only), a type for each name |
-| `I` | names of inputs | recipe number, a type for each name |
-| `S`, `P` | start, pause | accepted |
-| `U` | recipe number, values of inputs | recipe number (version 2 only), values of outputs |
+| `V` | wanted protocol version (16 bits) | accepted (a byte: 1, or 0) |
+| `v` | nothing | software: major, minor, bugfix, build (32 bits each) |
+| `O` | rate (64-bit float, version 2 only), names of outputs \
+| recipe number (a byte, version 2 only), a type for each name |
+| `I` | names of inputs | recipe number (a byte), a type for each name |
+| `S`, `P` | start, pause: nothing | accepted (a byte) |
+| `U` | recipe number (a byte), values of inputs | recipe number (a byte, version 2 only), values of outputs |
 | `M` | text | text: to a package of another type, and before the box ends a connection |
+
+Names and types are text, separated by commas without spaces. Values stand one after the other in the
+order of the names, without gaps. A text is, in version 2, its length (a byte), the text, the length of
+its source (a byte), the source, a level (a byte); in version 1 a level and the text from the robot,
+the text alone from the client. Levels: {numbers(TextLevel)}.
 
 * Every request gets exactly one reply, in order; the box sends nothing else before the reply to
   `S`. A package of a type that the table does not have is skipped, with a text message.
@@ -69,6 +75,15 @@ connection begins in protocol version 1; `V` requests version 2, as all current 
   `external_force_torque` in place of the estimated force (`enable_external_ft_sensor`).
 """
 assert {chr(kind) for kind in RtdePackageType} == set("VvOISPUM")
+
+_NUMBERS = {
+    "?": "a byte, 0 or 1",
+    "B": "{} bits, unsigned",
+    "I": "{} bits, unsigned",
+    "i": "{} bits, signed",
+    "Q": "{} bits, unsigned",
+    "d": "float of {} bits",
+}
 
 _OUTPUTS = """\
 ## Outputs
@@ -93,6 +108,9 @@ def render() -> str:
             "## Try it\n",
             _example(),
             "\nThis decodes a running box; `decode rtde FILE --names ...` decodes captured bytes.\n",
+            "## Types\n",
+            *table(("type", "bytes", "what"), map(_type_row, RtdeType)),
+            "",
             _OUTPUTS,
             MARKS,
             *table(("name", "type", "unit", "origin", "meaning", "from"), _output_rows()),
@@ -106,8 +124,14 @@ def render() -> str:
             _INPUTS,
             *table(("name", "type", "unit", "meaning", "from"), _input_rows()),
             "",
+            *modes(RobotMode, JointMode, SafetyMode, ProgramState),
         )
     )
+
+
+def _type_row(kind: RtdeType) -> tuple[object, ...]:
+    number = _NUMBERS[kind.letters[0]].format(8 * kind.size // kind.count)
+    return kind.value, kind.size, number if kind.count == 1 else f"{kind.count} numbers: {number}"
 
 
 def _output_rows() -> Iterator[tuple[object, ...]]:

@@ -9,7 +9,7 @@ from ur_emulator.budgets import BUDGETS
 _INTRODUCTION = f"""\
 # Scripts over ports 30001, 30002 and 30003
 
-Made from `protocol/script_channel.py`, `protocol/script_channel.py` and `ur_emulator/budgets.py`
+Made from `protocol/script_channel.py` and `ur_emulator/budgets.py`
 by `make docs`.
 
 A client of one of these three ports can make the robot run [URScript](../urscript-coverage.md):

@@ -6,20 +6,24 @@ python tests/attack --box rack                  # on boxes of this kind
 python tests/attack --repeat 30 "unread log"    # on one box again and again: its memory after each, nothing written
 """
 
+from __future__ import annotations
+
 import argparse
 import json
 import math
-import os
-import platform
 import sys
 import time
+from collections.abc import Iterable
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
-from attack_record import attacked, served, watched
+from attack_record import Attack, attacked, served, watched
 from attack_table import SECTIONS, described
-from box_under_attack import KINDS, Seen
+from box_under_attack import KINDS, Kind, Seen
+
+sys.path.append(str(Path(__file__).parents[2]))
+from bench.origin import origin
 
 RESULTS = Path(__file__).with_name("results.json")
 # How long an attack lasts [s]; the first kind of box has all of them, the others those that depend on the kind.
@@ -29,19 +33,18 @@ _GROWTH, _LAST = 0.03, 10
 _REST = 0.5  # s; after an attack, until its memory is measured
 
 
-def main(names, kinds):
-    """Attack boxes of these kinds in these ways; write the figures."""
-    told = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    figures = told.get("figures", {})
+def main(names: Iterable[str], kinds: Iterable[str], seconds: float, out: Path) -> None:
+    """Attack boxes of these kinds in these ways, the first kind for so long each; write the figures."""
+    told = json.loads(out.read_text()) if out.exists() else {}
+    figures: dict[str, dict[str, Any]] = told.get("figures", {})
+    share = seconds / SECONDS
     runs = [(KINDS[kind], ATTACKS[name]) for kind in kinds for name in names if kind in ATTACKS[name].kinds]
     for number, (kind, attack) in enumerate(runs, 1):
-        figures.setdefault(kind.name, {})[attack.name] = row = _row(attack, kind)
+        figures.setdefault(kind.name, {})[attack.name] = row = _row(attack, kind, share)
         _show(f"{number}/{len(runs)} {kind.name}: {attack.name}", row)
         result = {
-            "date": f"{datetime.now(UTC):%Y-%m-%d}",
-            "machine": f"{os.cpu_count()} cores, {platform.system()} {platform.release()}, "
-            f"Python {platform.python_version()}",
-            "seconds": [SECONDS, SECONDS_OF_OTHERS],
+            **origin(),
+            "seconds": [share * SECONDS, share * SECONDS_OF_OTHERS],
             "attacks": described(),
             # In the order of the tables, without attacks that are gone.
             "figures": {
@@ -50,12 +53,13 @@ def main(names, kinds):
                 if name in figures
             },
         }
-        RESULTS.write_text(json.dumps(result, indent=1) + "\n")
-    print(f"written to {RESULTS}")
+        out.write_text(json.dumps(result, indent=1) + "\n")
+    print(f"written to {out}")
 
 
-def _row(attack, kind):
-    outcome = watched(attack, kind, SECONDS if kind.name == next(iter(KINDS)) else SECONDS_OF_OTHERS)
+def _row(attack: Attack, kind: Kind, share: float) -> dict[str, Any]:
+    seconds = SECONDS if kind.name == next(iter(KINDS)) else SECONDS_OF_OTHERS
+    outcome = watched(attack, kind, share * seconds)
     return {
         **{name: round(value, 3) for name, value in asdict(outcome.seen).items()},
         "stop_s": round(outcome.stop_s, 2) if math.isfinite(outcome.stop_s) else None,
@@ -64,7 +68,7 @@ def _row(attack, kind):
     }
 
 
-def _show(title, row):
+def _show(title: str, row: dict[str, Any]) -> None:
     gaps = f"gap {row['gap_ms']:.0f} ms (timer {row['timer_gap_ms']:.0f})"
     memory = f"{row['box_mb']:.0f} + {row['worker_mb']:.0f} MB"
     print(f"{title}: rate {row['rate']:.3f}, {gaps}, lost {row['lost']}, {memory}", row["remark"], flush=True)
@@ -72,12 +76,12 @@ def _show(title, row):
         print(f"  {problem}", flush=True)
 
 
-def repeat(attack, kind, times, growth):
+def repeat(attack: Attack, kind: Kind, times: int, seconds: float, growth: float) -> str:
     """Attack one box again and again; return what is wrong: a growing memory, or a problem."""
-    held = []
+    held: list[float] = []
     with served(attack, kind) as box:
         for number in range(1, times + 1):
-            problems = attacked(attack, box, SECONDS_OF_OTHERS).problems
+            problems = attacked(attack, box, seconds / SECONDS * SECONDS_OF_OTHERS).problems
             if problems:
                 return f"{attack.name}, repetition {number}: {'; '.join(problems)}"
             time.sleep(_REST)
@@ -93,12 +97,16 @@ def repeat(attack, kind, times, growth):
     return "" if share <= growth else f"{attack.name}: memory grows by {share:.1%}, more than {growth:.0%}"
 
 
-def _arguments():
+def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("attacks", nargs="*", metavar="ATTACK", help="all, if none is given")
     parser.add_argument("--box", action="append", choices=KINDS, help="kind of box; all, if none is given")
+    parser.add_argument(
+        "--seconds", type=float, default=SECONDS, help="of an attack on the first kind of box"
+    )
+    parser.add_argument("--out", type=Path, default=RESULTS, metavar="FILE", help="for the figures")
     parser.add_argument("--repeat", type=int, metavar="N", help=f"times, at least {_LAST}")
     parser.add_argument("--growth", type=float, default=_GROWTH, metavar="SHARE", help="that --repeat allows")
     given = parser.parse_args()
@@ -115,10 +123,10 @@ ATTACKS = {attack.name: attack for section in SECTIONS for attack in section.att
 if __name__ == "__main__":
     given = _arguments()
     if given.repeat is None:
-        main(given.attacks or ATTACKS, given.box or KINDS)
+        main(given.attacks or ATTACKS, given.box or KINDS, given.seconds, given.out)
     else:
         found = [
-            repeat(ATTACKS[name], KINDS[kind], given.repeat, given.growth)
+            repeat(ATTACKS[name], KINDS[kind], given.repeat, given.seconds, given.growth)
             for name in given.attacks or ATTACKS
             for kind in given.box or ATTACKS[name].kinds[:1]
             if kind in ATTACKS[name].kinds

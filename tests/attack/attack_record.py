@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from box_under_attack import KINDS, MOST_MEMORY, BoxUnderAttack, Kind, Seen, serving, watching
 
@@ -60,7 +62,7 @@ class Section:
     title: str
     attacks: list[Attack] = field(default_factory=list)
 
-    def attack(self, what: str, limit: str = "", **settings: object) -> Callable[[Run], Run]:
+    def attack(self, what: str, limit: str = "", **settings: Any) -> Callable[[Run], Run]:
         """Add the function below as an attack; see `Attack`."""
 
         def add(run: Run) -> Run:
@@ -88,7 +90,7 @@ class Outcome:
     stop_s: float
 
 
-def served(attack: Attack, kind: Kind):
+def served(attack: Attack, kind: Kind) -> AbstractContextManager[BoxUnderAttack]:
     """Serve a box of this kind that an attack may begin with."""
     return serving(kind, *attack.options, prelude=attack.prelude, unread_log=attack.unread_log)
 

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from typing import Any
 
 from box_under_attack import ADDRESSES, CONTROL_PORT, PATIENCE, BoxUnderAttack
 
@@ -55,7 +56,7 @@ def flood(
                 stack.callback(reset, sock)  # what was sent and not read by then is lost
                 sock.setblocking(False)
                 at[sock] = 0
-                selector.register(sock, events)
+                selector.register(sock, events, sock)
 
         for _ in range(clients):
             join()
@@ -63,7 +64,7 @@ def flood(
             if len(at) < clients:
                 join()
             for key, ready in selector.select(min(0.1, end - now)):
-                sock = key.fileobj
+                sock: socket.socket = key.data
                 try:
                     if ready & selectors.EVENT_READ and not sock.recv(_TURN):
                         raise ConnectionError
@@ -125,7 +126,7 @@ def until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) 
 
 def plays(box: BoxUnderAttack) -> bool:
     """Return whether a program runs."""
-    return box.state()["program_state"] == "PLAYING"
+    return bool(box.state()["program_state"] == "PLAYING")
 
 
 @contextmanager
@@ -139,7 +140,9 @@ def arm_at_rest(box: BoxUnderAttack) -> Iterator[None]:
 
 
 @contextmanager
-def in_background(run: object, *arguments: object, **options: object) -> Iterator[threading.Thread]:
+def in_background(
+    run: Callable[..., object], *arguments: object, **options: object
+) -> Iterator[threading.Thread]:
     """Run an attack in a thread; it has ended when the block ends."""
     thread = threading.Thread(target=run, args=arguments, kwargs=options, daemon=True)
     thread.start()
@@ -160,12 +163,13 @@ def asked_while(thread: threading.Thread, ask: Callable[[], None]) -> str:
     return f"another client was answered within {1e3 * longest:.0f} ms"
 
 
-def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[list[dict], int]:
+def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[list[dict[str, Any]], int]:
     """Return all entries of the log but the first so many, and how many there are.
 
     The API gives some at a time. A page that is not full is the last: a flood may fill it faster than it is read.
     """
-    entries, is_full = [], True
+    entries: list[dict[str, Any]] = []
+    is_full = True
     while is_full:
         answer = request(box, "GET", f"log?after={after}&level={level}")[1]
         entries += answer["entries"]
@@ -213,7 +217,7 @@ def peer(serve: Callable[[socket.socket], None]) -> Iterator[int]:
 
 def request(
     box: BoxUnderAttack, method: str, path: str, body: object = None, **headers: str
-) -> tuple[int, object]:
+) -> tuple[int, Any]:
     """Ask the control API; return the status and the JSON of the answer.
 
     Args:

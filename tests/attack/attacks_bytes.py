@@ -91,6 +91,7 @@ def stopped_client(box: BoxUnderAttack, seconds: float) -> None:
     client = subprocess.Popen(
         [sys.executable, "-c", _READER, box.host, *map(str, ports)], stdout=subprocess.PIPE
     )
+    assert client.stdout is not None
     try:
         assert client.stdout.readline()
         os.kill(client.pid, signal.SIGSTOP)

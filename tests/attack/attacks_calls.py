@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from itertools import count
+from typing import Any
 from xmlrpc.client import Fault, ServerProxy, loads
 
 from attack_record import Section
@@ -16,6 +17,7 @@ from attackers import arm_at_rest, asked_while, crowd, flood, in_background, unt
 from box_under_attack import ADDRESSES, PATIENCE, WITH_GRIPPER, BoxUnderAttack
 
 CALLS = Section("Calls to a gripper")
+Methods = Any  # those of a server, each with a result of its own type
 
 _WIDTH, _OFFSET = 60.0, 4.45  # mm
 _LIMIT = 8 * 1024  # bytes of a call
@@ -57,12 +59,12 @@ def _post(box: BoxUnderAttack, body: bytes) -> bytes:
     return _head(box, f"Content-Length: {len(body)}") + body
 
 
-def _server(box: BoxUnderAttack) -> ServerProxy:
+def _server(box: BoxUnderAttack) -> Methods:
     return ServerProxy(f"http://{box.host}:{box.ports.onrobot}/")
 
 
 @contextmanager
-def _gripper_obeys(box: BoxUnderAttack) -> Iterator[ServerProxy]:
+def _gripper_obeys(box: BoxUnderAttack) -> Iterator[Methods]:
     """The arm stands where it stood, and the fingers go where a client tells them, when the block ends."""
     with arm_at_rest(box), _server(box) as server:
         _go(server, _WIDTH)
@@ -73,14 +75,14 @@ def _gripper_obeys(box: BoxUnderAttack) -> Iterator[ServerProxy]:
         _go(server, _WIDTH)
 
 
-def _go(server: ServerProxy, width: float) -> None:
+def _go(server: Methods, width: float) -> None:
     assert server.rg_grip(0, width, 20.0) == 0
     until(lambda: not server.rg_get_busy(0), "the fingers stand")
     now = server.rg_get_width(0)
     assert abs(now - width) < 1.0, f"the width is {now:.1f} mm instead of {width:g} mm"
 
 
-def _answers_while(server: ServerProxy, thread: threading.Thread) -> str:
+def _answers_while(server: Methods, thread: threading.Thread) -> str:
     """Ask as long as others attack; return a remark."""
 
     def ask() -> None:

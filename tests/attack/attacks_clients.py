@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import struct
 import time
 from contextlib import suppress
@@ -132,7 +133,7 @@ def unread_streams(box: BoxUnderAttack, seconds: float) -> None:
             time.sleep(seconds / len(said))
 
 
-def _has_frames(client) -> bool:
+def _has_frames(client: socket.socket) -> bool:
     client.setblocking(False)
     with suppress(OSError):
         return bool(client.recv(1 << 16))

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 
 from attack_record import Section
 from attackers import arm_at_rest, asked_while, crowd, flood, in_background, until
@@ -40,6 +41,10 @@ _ODD_LINES = (
     "SET POS 100 NOTHING 1",
 )
 _ODD_QUESTIONS = ("GET", "GET NOTHING", "GET POS PRE", "GET SCN_BLOCK", "get POS", "POS", "\xff\xfe", "")
+
+
+def _is(mode: str, box: BoxUnderAttack) -> bool:
+    return box.ask("robotmode")[0] == f"Robotmode: {mode}"
 
 
 def _told(client: socket.socket, text: str) -> str:
@@ -273,5 +278,5 @@ def power_cuts_while_it_moves(box: BoxUnderAttack, seconds: float) -> None:
             assert _told(client, "SET POS 0 GTO 1\n") == "ack"
             for command, mode in (("power on", "IDLE"), ("brake release", "RUNNING")):
                 box.ask(command)
-                until(lambda mode=mode: box.ask("robotmode")[0] == f"Robotmode: {mode}", f"the arm is {mode}")
+                until(partial(_is, mode, box), f"the arm is {mode}")
             assert _told(client, "GET STA\nGET ACT\nGET FLT\n") == "STA 0\nACT 0\nFLT 0\n"

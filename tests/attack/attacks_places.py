@@ -53,9 +53,9 @@ def paths_that_lead_out(box: BoxUnderAttack, seconds: float) -> None:
             answer = box.ask(f"{word} {name}")[0] if "\0" not in name else ""
             assert not answer.startswith(("Loading", "Completed")), f"{word} {name[:40]}: {answer}"
             assert str(outside) not in answer, f"{word} {name[:40]} shows a path: {answer}"
-        status, answer = request(box, "POST", "run_program", {"file": name})
-        assert status != 200, f"{name[:40]}: {answer}"
-        assert str(outside) not in str(answer), f"{name[:40]} shows a path: {answer}"
+        status, told = request(box, "POST", "run_program", {"file": name})
+        assert status != 200, f"{name[:40]}: {told}"
+        assert str(outside) not in str(told), f"{name[:40]} shows a path: {told}"
 
 
 @PLACES.attack("Programs are loaded by a path of 32,000 parts: dashboard, Robot API", "there is no such file")
@@ -73,11 +73,11 @@ def paths_of_many_parts(box: BoxUnderAttack, seconds: float) -> None:
         said = f"{head}Content-Length: {len(body)}\r\n\r\n".encode() + body
         with box.connect("robot_api") as sock:
             sock.sendall(said)
-            status = sock.recv(1 << 16).split(b"\r\n")[0]
-        assert b" 200" not in status, status
+            first = sock.recv(1 << 16).split(b"\r\n")[0]
+        assert b" 200" not in first, first
         flood(box, "robot_api", said, seconds)
-    status, answer = request(box, "POST", "run_program", {"file": name})
-    assert status != 200, answer
+    status, told = request(box, "POST", "run_program", {"file": name})
+    assert status != 200, told
 
 
 @PLACES.attack(

@@ -7,7 +7,7 @@ import struct
 import threading
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from attack_record import Section
@@ -348,7 +348,7 @@ ODD_ANSWERS = {
 }
 
 
-def _answering(answer: bytes):
+def _answering(answer: bytes) -> Callable[[socket.socket], None]:
     def serve(client: socket.socket) -> None:
         client.recv(1 << 16)
         client.sendall(answer)
@@ -373,8 +373,8 @@ def odd_answers_of_procedures(box: BoxUnderAttack, seconds: float) -> None:
                 _call(box, port)
             except AssertionError as error:
                 raise AssertionError(f"{name}: {error}") from None
-    for port in ("99999", "-1", "x", "0"):
-        _call(box, port)
+    for absurd in ("99999", "-1", "x", "0"):
+        _call(box, absurd)
 
 
 @SCRIPTS.attack(

@@ -46,6 +46,7 @@ def _window(box: BoxUnderAttack) -> Iterator[int]:
     window = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
+    assert window.stdout is not None
     try:
         port = int(window.stdout.readline().rpartition(":")[2])
         until(shows, "the window shows the box")

@@ -22,6 +22,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import count, cycle
 from pathlib import Path
+from typing import Any
 
 import bystander
 import psutil
@@ -101,7 +102,7 @@ class BoxUnderAttack:
         is_stopped: it was told to end.
     """
 
-    process: subprocess.Popen
+    process: subprocess.Popen[bytes]
     host: str
     ports: Ports
     layout: RealtimeLayout
@@ -110,7 +111,7 @@ class BoxUnderAttack:
     programs: Path
     errors: Path
     at_rest: tuple[int, int] = (0, 0)
-    modes: tuple[dict, ...] = ()
+    modes: tuple[dict[str, Any], ...] = ()
     is_stopped: bool = False
     _turns: Iterator[int] = field(default_factory=count)
     _addresses: Iterator[str] = field(default_factory=lambda: cycle(ADDRESSES))
@@ -179,7 +180,7 @@ class BoxUnderAttack:
             worker for server in psutil.Process(self.process.pid).children() for worker in server.children()
         ]
 
-    def state(self, host: str = "") -> dict:
+    def state(self, host: str = "") -> dict[str, Any]:
         """Return the modes and the program state of a box of the rack, by the control API."""
         asking = http.client.HTTPConnection(host or self.host, CONTROL_PORT, timeout=PATIENCE)
         with closing(asking):
@@ -187,7 +188,7 @@ class BoxUnderAttack:
             found = json.loads(asking.getresponse().read())
         return {name: found[name] for name in (*_MODES, "program_state")}
 
-    def _modes(self) -> tuple[dict, ...]:
+    def _modes(self) -> tuple[dict[str, Any], ...]:
         states = [self.state(host) for host in dict.fromkeys((self.host, self.neighbour))]
         return tuple({name: state[name] for name in _MODES} for state in states)
 
@@ -424,12 +425,13 @@ def watching(box: BoxUnderAttack) -> Iterator[Seen]:
             setattr(seen, name, value)
 
 
-def _bystander(*arguments: object) -> subprocess.Popen:
+def _bystander(*arguments: object) -> subprocess.Popen[str]:
     process = subprocess.Popen(
         [sys.executable, "-S", bystander.__file__, *map(str, arguments)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
+    assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     return process

@@ -18,7 +18,7 @@ from itertools import pairwise
 _HEAD = struct.Struct(">id")
 
 
-def stream(host, port, period):
+def stream(host: str, port: int, period: float) -> dict[str, float]:
     """Read frames.
 
     Returns:
@@ -26,9 +26,11 @@ def stream(host, port, period):
         the box has ended the stream.
     """
     sock = socket.create_connection((host, port), timeout=10.0)
-    stamps, arrivals, buffer = [], [], bytearray()
+    stamps: list[float] = []
+    arrivals: list[float] = []
+    buffer = bytearray()
 
-    def read():
+    def read() -> bool:
         data = _received(sock)
         now = time.monotonic()
         buffer.extend(data)
@@ -56,7 +58,7 @@ def stream(host, port, period):
     }
 
 
-def timer(period):
+def timer(period: float) -> dict[str, float]:
     """Wake up once a period.
 
     Returns:
@@ -72,14 +74,14 @@ def timer(period):
     return {"timer_gap_ms": 1e3 * gap}
 
 
-def _received(sock):
+def _received(sock: socket.socket) -> bytes:
     try:
         return sock.recv(1 << 16)
     except OSError:
         return b""
 
 
-def _begin():
+def _begin() -> None:
     os.write(1, b"ready\n")
 
 

@@ -1,4 +1,5 @@
 """`make soak`: a served box in real time under mixed load, attacked every minute; one hour, or SOAK_MINUTES; SOAK_BOX is its kind, CB3 or another.
+Less than a minute is one short round.
 
 The load is that of `bench/clients.py`: fifty RTDE clients and fifty readers of port 30003. They and a timer that has
 nothing to do with the box join anew every minute. The attacks are those of the table that need no box of their own;
@@ -15,6 +16,7 @@ import threading
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -22,6 +24,7 @@ import psutil
 
 sys.path.append(str(Path(__file__).parents[2]))
 
+from attack_record import Attack
 from attack_table import SECTIONS
 from box_under_attack import KINDS, BoxUnderAttack, Kind, serving
 from rich.console import Console
@@ -99,7 +102,7 @@ class Sampler(threading.Thread):
         )
 
 
-def soak(minutes: float, kind: Kind) -> dict[str, object]:
+def soak(minutes: float, kind: Kind) -> dict[str, Any]:
     """Run for so long; return the figures, the rounds and the samples."""
     attacks = [
         attack
@@ -108,12 +111,14 @@ def soak(minutes: float, kind: Kind) -> dict[str, object]:
         if kind.name in attack.kinds and not attack.is_special
     ]
     random.Random(1).shuffle(attacks)
-    console, rounds = Console(width=160), []
+    console = Console(width=160)
+    rounds: list[dict[str, Any]] = []
+    share = min(minutes, 1.0)
     with serving(kind) as box:
         sampler = Sampler(box)
         sampler.start()
         while box.process.poll() is None and time.monotonic() - sampler.began < 60.0 * minutes:
-            rounds.append(_round(box, sampler, attacks[len(rounds) % len(attacks)]))
+            rounds.append(_round(box, sampler, attacks[len(rounds) % len(attacks)], share))
             console.print(f"{len(rounds)}: {rounds[-1]}, {sampler.samples[-1].box_mb} MB")
         sampler.end()
         problems = box.problems()
@@ -126,16 +131,16 @@ def soak(minutes: float, kind: Kind) -> dict[str, object]:
     return {"figures": figures, "rounds": rounds, "samples": [asdict(sample) for sample in sampler.samples]}
 
 
-def _round(box: BoxUnderAttack, sampler: Sampler, attack) -> dict[str, object]:
-    """Let the load join, attack, wait for the load to end."""
+def _round(box: BoxUnderAttack, sampler: Sampler, attack: Attack, share: float) -> dict[str, Any]:
+    """Let the load join, attack, wait for the load to end: all of a round, or a share of its times."""
     clients = [(box.host, box.ports.rtde, "rtde")] * N_RTDE
     clients += [(box.host, box.ports.realtime, "realtime")] * N_REALTIME
-    beside = SideProcesses(ROUND - _JOINING, box.period, clients)
-    time.sleep(BEFORE)
+    beside = SideProcesses(share * (ROUND - _JOINING), box.period, clients)
+    time.sleep(share * BEFORE)
     problems = []
     sampler.is_attacked = True
     try:
-        attack.run(box, ATTACK)
+        attack.run(box, share * ATTACK)
     except (AssertionError, OSError, EOFError) as error:
         problems.append(f"{attack.name}: {error or type(error).__name__}")
     sampler.is_attacked = False
@@ -151,11 +156,11 @@ def _round(box: BoxUnderAttack, sampler: Sampler, attack) -> dict[str, object]:
     }
 
 
-def _figures(rounds: list[dict], samples: list[Sample], period: float) -> dict[str, object]:
+def _figures(rounds: list[dict[str, Any]], samples: list[Sample], period: float) -> dict[str, Any]:
     warm = min(_LONGEST_WARM_UP, _WARM_UP * samples[-1].t)
     rest = [sample for sample in samples if sample.at_rest and sample.t >= warm]
     rss = [sample.box_mb for sample in rest]
-    slope = np.polyfit([sample.t / 3600.0 for sample in rest], rss, 1)[0] if len(rest) > 2 else float("nan")
+    slope = np.polyfit([sample.t / 3600.0 for sample in rest], rss, 1)[0] if len(rest) > 2 else None
     return {
         "seconds": samples[-1].t,
         "attacks": len(rounds),
@@ -166,7 +171,7 @@ def _figures(rounds: list[dict], samples: list[Sample], period: float) -> dict[s
         "rss_first_mb": rss[0] if rss else None,
         "rss_last_mb": rss[-1] if rss else None,
         "rss_max_mb": max(sample.box_mb for sample in samples),
-        "rss_slope_mb_per_hour": round(float(slope), 2),
+        "rss_slope_mb_per_hour": None if slope is None else round(float(slope), 2),
         "workers_max_mb": max(sample.workers_mb for sample in samples),
         "descriptors": [rest[0].descriptors, rest[-1].descriptors, max(s.descriptors for s in rest)]
         if rest
@@ -175,7 +180,7 @@ def _figures(rounds: list[dict], samples: list[Sample], period: float) -> dict[s
     }
 
 
-def draw(outcome: dict, path: Path) -> None:
+def draw(outcome: dict[str, Any], path: Path) -> None:
     """Draw memory, and the lateness of each round beside that of the timer, over time."""
     matplotlib.use("Agg")
     from matplotlib import pyplot

@@ -234,23 +234,18 @@ def test_an_arm_that_dashboard_and_primary_port_report_differently(box: ControlB
 # ---- without sockets: the clock of the fake robot
 
 
-class Dripping(FakeRobot):
-    """A dashboard that sends a byte a look, and never the end of a line."""
-
-    def connect(self, host: str, port: int, timeout: float) -> Pipe:
-        pipe = super().connect(host, port, timeout)
-        pipe.incoming.clear()
-
-        def drip(timeout: float) -> bytes:
-            self.clock += 0.05
-            return b"x"
-
-        pipe.receive = drip
-        return pipe
-
-
 def test_a_dashboard_that_drips_is_given_up_after_five_seconds() -> None:
-    robot = Dripping()
+    """It sends a byte a look, and never the end of a line."""
+    robot = FakeRobot()
+    pipe = robot.connect("robot", 29999, 1.0)
+    pipe.incoming.clear()
+
+    def drip(timeout: float) -> bytes:
+        robot.clock += 0.05
+        return b"x"
+
+    pipe.receive = drip
+    robot.connect = lambda host, port, timeout: pipe
     with pytest.raises(DriverError, match=rf"without the end of a line; one has at most {LONGEST_LINE}"):
         ask_dashboard(robot, "robot", 29999, ("get robot model",))
     assert robot.clock < 6.0

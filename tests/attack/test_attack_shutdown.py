@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import socket
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 import psutil
 import pytest
@@ -71,7 +71,7 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("busy", [compiling, reporting, unread, calling, looking_up])
-def test_a_busy_box_ends(busy):
+def test_a_busy_box_ends(busy: Callable[[BoxUnderAttack], AbstractContextManager[None]]) -> None:
     with serving(KINDS["CB3"], prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):
             assert box.stop() < math.inf
@@ -79,7 +79,7 @@ def test_a_busy_box_ends(busy):
         assert box.errors.read_text() == ""
 
 
-def test_a_box_ends_whose_log_nobody_reads():
+def test_a_box_ends_whose_log_nobody_reads() -> None:
     with serving(KINDS["CB3"], "--log", unread_log=True) as box:
         lines = 500 * (b"addToLog " + b"x" * 500 + b"\n")
         with box.connect("dashboard") as sock, sock.makefile("rb") as replies:
@@ -89,4 +89,5 @@ def test_a_box_ends_whose_log_nobody_reads():
                 assert replies.readline() == b"Added log message\n"
             assert box.stop() < math.inf
         assert box.process.returncode == 0
+        assert box.process.stderr is not None
         box.process.stderr.close()

@@ -158,7 +158,8 @@ def test_own_numbers_reach_robot_recording_and_table(robot, short, tmp_path, cap
     (tmp_path / "mine.toml").write_text('base = "paper"\ngain_i = 3\nspeed_share = 0.9')
     out, recording = tmp_path / "out", tmp_path / "out" / "short_r1.mcap"
     own = ["--controller", str(tmp_path / "mine.toml"), "--gain-p", "5", "--acceleration", "3"]
-    given = ["run", short, "--robot", "127.0.0.1", "--out", str(out), *own, "--reverse-port", "4321"]
+    given = ["experiment", "--movements", short, "--repeat", "1", "--robot", "127.0.0.1", "--out", str(out)]
+    given += [*own, "--reverse-port", "4321"]
     assert cli.run(given) == 0
     receivers = [program for program in robot.programs if "socket_open" in program]
     assert len(receivers) == 3  # approach, identification, run

@@ -16,7 +16,7 @@ from walk_box import KINDS
 LENGTH = 120
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -9,8 +9,10 @@ import shutil
 import struct
 import sys
 import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from walk_box import KINDS, WalkBox, rtde
 from walk_programs import KEPT_OUTPUT, program, statements_of
@@ -29,15 +31,15 @@ class Step:
     """Something that happens, and the cycles that pass after it."""
 
     action: str
-    arguments: tuple = ()
+    arguments: tuple[Any, ...] = ()
     cycles: int = 1
 
-    def __str__(self):
+    def __str__(self) -> str:
         shown = ", ".join(_short(argument) for argument in self.arguments)
         return f"{self.action}({shown}) then {self.cycles} cycles"
 
 
-def _short(argument):
+def _short(argument: object) -> str:
     text = repr(argument)
     return text if len(text) < 60 else f"<program of {text.count(chr(92))} lines>"
 
@@ -48,24 +50,26 @@ class Walk:
 
     kind: str
     seed: int
-    files: tuple
-    steps: tuple
+    files: tuple[str, ...]
+    steps: tuple[Step, ...]
 
 
 # --- what can happen: how often, and what is drawn for it
 
+Make = Callable[[random.Random], str]  # makes the text of a program
 
-def _sent(rng, make):
+
+def _sent(rng: random.Random, make: Make) -> tuple[str, str]:
     return (rng.choice(["secondary", "primary", "realtime"]), make(rng))
 
 
-def _line(rng, make):
+def _line(rng: random.Random, make: Make) -> tuple[str]:
     lines = ["movej({home}, a=2, v=1)", "speedj([0,0,0,0,0,0.3], 2, 0.2)", "stopj(3)", "end_interpreter()"]
     lines += ["skipbuffer", "clear_interpreter()", "abort", "sleep(0.2)", "nonsense("]
     return (rng.choice(lines),)
 
 
-_OPERATIONS = (
+_OPERATIONS: tuple[tuple[int, str, dict[str, list[Any]]], ...] = (
     (4, "protective_stop", {}),
     (5, "unlock_protective_stop", {}),
     (2, "emergency_stop", {"source": ["robot", "system"]}),
@@ -96,7 +100,7 @@ _OPERATIONS = (
     (1, "change_safety_settings", {}),
     (1, "confirm_safety", {}),
 )
-_ACTIONS = (
+_ACTIONS: tuple[tuple[int, str, Callable[[random.Random, Make], tuple[Any, ...]] | None], ...] = (
     (6, "play", None),
     (1, "load", lambda rng, make: (rng.randrange(LOADED),)),
     (3, "player pause", None),
@@ -129,7 +133,7 @@ _ACTIONS = (
 )
 
 
-def make_walk(kind_name, seed, length):
+def make_walk(kind_name: str, seed: int, length: int) -> Walk:
     """Make a walk of so many steps."""
     rng = random.Random(f"{kind_name} {seed}")
     kind = KINDS[kind_name]
@@ -137,11 +141,13 @@ def make_walk(kind_name, seed, length):
         home, version = box.controller.state.robot.home_q, box.served.identity.software
         names = statements_of(version.catalogue)
 
-    def make(rng):
+    def make(rng: random.Random) -> str:
         chosen = rng.sample(names, rng.randint(1, 4))
         return program(rng, chosen, home, "{port}")
 
-    table = [(weight, "operation", (name, drawn)) for weight, name, drawn in _OPERATIONS]
+    table: list[tuple[int, str, Any]] = [
+        (weight, "operation", (name, drawn)) for weight, name, drawn in _OPERATIONS
+    ]
     table += [(weight, name, drawn) for weight, name, drawn in _ACTIONS]
     weights = [weight for weight, _, _ in table]
     steps = []
@@ -158,7 +164,10 @@ def make_walk(kind_name, seed, length):
         _, name, drawn = rng.choices(table, weights)[0]
         if name == "operation":
             operation, values = drawn
-            arguments = (operation, tuple((key, rng.choice(some)) for key, some in values.items()))
+            arguments: tuple[Any, ...] = (
+                operation,
+                tuple((key, rng.choice(some)) for key, some in values.items()),
+            )
         else:
             arguments = drawn(rng, make) if drawn else ()
             arguments = tuple(
@@ -176,49 +185,49 @@ def make_walk(kind_name, seed, length):
 class Walker:
     """Does the steps of a walk on a box."""
 
-    def __init__(self, box, kind):
+    def __init__(self, box: WalkBox) -> None:
         self._box = box
         self._version = SoftwareVersion(*box.served.identity.software.version)
         self.rules = Rules(box, self._version)
 
-    def step(self, step):
+    def step(self, step: Step) -> None:
         getattr(self, "_" + step.action.replace(" ", "_"))(*step.arguments)
         self._box.tick(step.cycles)
         self._box.read()
 
-    def _operation(self, name, arguments):
+    def _operation(self, name: str, arguments: Sequence[tuple[str, object]]) -> None:
         self._box.perform(name, **dict(arguments))
 
-    def _play(self):
+    def _play(self) -> None:
         self._box.steps(self._box.player.play("walk"))
 
-    def _load(self, number):
+    def _load(self, number: int) -> None:
         self._box.steps(self._box.player.load(f"walk{number}.urp"))
 
-    def _start(self, number):
+    def _start(self, number: int) -> None:
         self._player_stop()
         self._load(number)
         self._play()
 
-    def _player_pause(self):
+    def _player_pause(self) -> None:
         self._box.steps(self._box.player.pause())
 
-    def _player_stop(self):
+    def _player_stop(self) -> None:
         self._box.steps(self._box.player.stop())
 
-    def _send(self, port, text):
+    def _send(self, port: str, text: str) -> None:
         self._box.send(port, self._text(text).encode())
 
-    def _secondary(self, statement):
+    def _secondary(self, statement: str) -> None:
         self._box.send("secondary", f"sec beside():\n  {statement}\nend\n".encode())
 
-    def _interpreter(self, line):
+    def _interpreter(self, line: str) -> None:
         self._box.send("interpreter", line.encode() + b"\n")
 
-    def _freedrive_by_a_client(self, on):
+    def _freedrive_by_a_client(self, on: bool) -> None:
         self._box.send("dashboard", b"set robotmode freedrive\n" if on else b"set robotmode run\n")
 
-    def _connect(self, name):
+    def _connect(self, name: str) -> None:
         self._box.connect(name)
         if name == "rtde" and name in self._box.clients:
             self._box.send(
@@ -226,25 +235,25 @@ class Walker:
             )
             self._box.send(name, rtde("I", b"speed_slider_mask,speed_slider_fraction") + rtde("S"))
 
-    def _leave(self, name):
+    def _leave(self, name: str) -> None:
         self._box.leave(name)
 
-    def _rtde_slider(self, fraction):
+    def _rtde_slider(self, fraction: float) -> None:
         if "rtde" not in self._box.clients:
             self._connect("rtde")
         self._box.send("rtde", rtde("U", struct.pack(">BId", 1, 1, fraction)))
 
-    def _gripper(self, line):
+    def _gripper(self, line: str) -> None:
         self._box.send("gripper", line.encode() + b"\n")
 
-    def _obstacle(self, is_there):
+    def _obstacle(self, is_there: bool) -> None:
         if is_there:
             self._operation("add_obstacle", (("name", "walk"), ("shape", "box"), ("size", (0.1, 0.1, 0.1)),
                                              ("position", (0.25, -0.3, 0.05))))  # fmt: skip
         else:
             self._operation("remove_obstacle", (("name", "walk"),))
 
-    def _recover(self):
+    def _recover(self) -> None:
         """Whatever has happened: what manuals tell to do leads back to a program at work, or to one that has ended.
 
         A program may stop the arm again and again; then it is stopped.
@@ -259,9 +268,9 @@ class Walker:
         self._claim(now.robot_mode == RobotMode.RUNNING, f"robot mode {RobotMode(now.robot_mode).name}")
         self._claim(now.safety_mode == SafetyMode.NORMAL, f"safety mode {SafetyMode(now.safety_mode).name}")
 
-    def _clear_everything(self):
+    def _clear_everything(self) -> None:
         box = self._box
-        for name, arguments in (
+        undoing: tuple[tuple[str, dict[str, object]], ...] = (
             ("release_emergency_stop", {}),
             ("set_operational_mode", {"mode": "none"}),
             ("enabling_device", {"position": "none"}),
@@ -276,7 +285,8 @@ class Walker:
             ("remove_obstacle", {"name": "walk"}),
             ("confirm_safety", {}),
             ("remote_control", {"on": True}),
-        ):
+        )
+        for name, arguments in undoing:
             box.perform(name, **arguments)
         for name in ("primary", "secondary", "realtime", "dashboard", "interpreter"):
             box.leave(name)  # those that connected in local control are not obeyed
@@ -299,7 +309,7 @@ class Walker:
             box.perform("resume_program")
         self._expect_progress()
 
-    def _expect_progress(self):
+    def _expect_progress(self) -> None:
         """A program that plays gets on now, or ends; the rules know how long that may take."""
         box = self._box
         before = self.rules.n_places
@@ -311,7 +321,7 @@ class Walker:
             box.perform("answer", value=3)
             box.tick(round(0.2 / box.controller.period_s))
 
-    def _new_program(self):
+    def _new_program(self) -> None:
         """The box takes a new program, and moves."""
         box = self._box
         self._recover()
@@ -330,18 +340,18 @@ class Walker:
         state = ProgramState(box.now.runtime_state)
         self._claim(state is ProgramState.STOPPED, f"a new program is {state.name}")
 
-    def _is_stopped(self):
+    def _is_stopped(self) -> bool:
         return self._box.now.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
-    def _claim(self, holds, text):
+    def _claim(self, holds: bool, text: str) -> None:
         if not holds:
             raise BrokenRule(f"tick {self._box.now.tick}: after a recovery: {text}")
 
-    def _text(self, text):
+    def _text(self, text: str) -> str:
         return text.replace("{port}", str(self._box.port))
 
 
-def walk(made, show=lambda text: None):
+def walk(made: Walk, show: Callable[[str], object] = lambda text: None) -> tuple[int, AssertionError] | None:
     """Walk; return the step that broke a rule and what it was, or None."""
     kind = KINDS[made.kind]
     with _tempdir() as folder, contextlib.closing(WalkBox(kind, made.seed, folder)) as box:
@@ -356,7 +366,7 @@ def walk(made, show=lambda text: None):
         (folder / "default.installation").write_bytes(installation())
         box.controller.state.io.digital_out |= 1 << KEPT_OUTPUT
         box.tick(3)
-        walker = Walker(box, kind)
+        walker = Walker(box)
         for index, step in enumerate(made.steps):
             show(f"{index}: {step}")
             try:
@@ -372,11 +382,11 @@ def walk(made, show=lambda text: None):
     return None
 
 
-def shrink(made, error, show):
+def shrink(made: Walk, error: AssertionError, show: Callable[[str], object]) -> Walk:
     """Return the shortest walk found that breaks a rule in the same way: steps are left out as long as it does."""
     wanted = _what(error)
 
-    def breaks(steps):
+    def breaks(steps: tuple[Step, ...]) -> bool:
         found = walk(Walk(made.kind, made.seed, made.files, steps))
         return found is not None and _what(found[1]) == wanted
 
@@ -394,17 +404,17 @@ def shrink(made, error, show):
     return Walk(made.kind, made.seed, made.files, steps)
 
 
-def _what(error):
+def _what(error: AssertionError) -> str:
     """What a rule says, without its numbers."""
     return "".join(c for c in str(error).partition(": ")[2] if not c.isdigit())[:30]
 
 
-def _escaped(text):
+def _escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 @contextlib.contextmanager
-def _tempdir():
+def _tempdir() -> Iterator[Path]:
     folder = Path(tempfile.mkdtemp(prefix="walk"))
     try:
         yield folder

@@ -8,12 +8,20 @@ import math
 import socket
 import struct
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from ur_emulator.box import Box
 from ur_emulator.box_options import BoxOptions
+from ur_emulator.controller.controller import Controller
+from ur_emulator.controller.events import Event
+from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import EmulatorError
 from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.loop.pacing import Situation
+from ur_emulator.loop.steps import Steps
 
 _HANG = 30.0  # s of real time; no walk waits for it
 
@@ -51,7 +59,7 @@ class WalkBox:
 
     publish_at = -math.inf
 
-    def __init__(self, kind, seed, programs, fidelity="typical"):
+    def __init__(self, kind: Kind, seed: int, programs: Path, fidelity: str = "typical") -> None:
         options = BoxOptions(
             kind.robot, kind.version, port_base=None, seed=seed, programs=programs, fidelity=fidelity,
             tool=kind.tool, services=kind.services,
@@ -62,36 +70,36 @@ class WalkBox:
         self.served = self._box._box
         self.served._pacer, self.served._repeats = self, False
         self.player = self._box._player
-        self.clients = {}
+        self.clients: dict[str, socket.socket] = {}
         self._left = 0
-        self._until = None
+        self._until: Callable[[], bool] = lambda: True
         self._began = 0.0
-        self._error = None
+        self._error: Exception | None = None
         self._box.listen()
         self._loop.add(self)
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.listener.setblocking(False)
-        self.peers = []
+        self.peers: list[socket.socket] = []
 
     @property
-    def controller(self):
+    def controller(self) -> Controller:
         return self.served.controller
 
     @property
-    def now(self):
+    def now(self) -> Snapshot:
         return self.served.snapshot
 
     @property
-    def port(self):
+    def port(self) -> int:
         """Where programs may connect to."""
-        return self.listener.getsockname()[1]
+        return int(self.listener.getsockname()[1])
 
-    def watch(self, look, note):
+    def watch(self, look: Callable[[Snapshot], None], note: Callable[[Event], None]) -> None:
         """Call `look(snapshot)` after every cycle, and `note(event)`; an error in `look` is raised by `tick`."""
         box = self
 
         class Watcher:
-            def publish(self, snapshot):
+            def publish(self, snapshot: Snapshot) -> None:
                 try:
                     if box._error is None:
                         look(snapshot)
@@ -103,28 +111,28 @@ class WalkBox:
 
     # --- the pacer
 
-    def may_tick(self, now, situation):
+    def may_tick(self, now: float, situation: Situation) -> bool:
         if self._left <= 0 or not self._loop.tasks.is_idle:
             return False
         self._left -= 1
         return True
 
-    def next_call(self, now):
+    def next_call(self, now: float) -> float:
         return now if self._left > 0 else now + 1e-3
 
     # --- a service of the loop, after the box
 
-    def advance(self, now):
+    def advance(self, now: float) -> float:
         if now - self._began > _HANG:
             raise AssertionError("the box hangs: it does not tick")
         if self._until() or self._error is not None:
             self._loop.stop()
         return now + 1e-3
 
-    def failed(self, error):
+    def failed(self, error: Exception) -> None:
         raise error
 
-    def _run(self, until):
+    def _run(self, until: Callable[[], bool]) -> None:
         self._until, self._began = until, time.monotonic()
         self._loop._stopping = False
         self._loop.run()
@@ -135,30 +143,30 @@ class WalkBox:
 
     # --- what a walk does
 
-    def tick(self, cycles):
+    def tick(self, cycles: int) -> None:
         self._left += cycles
         self._run(lambda: self._left <= 0)
 
-    def settle(self, turns=5):
+    def settle(self, turns: int = 5) -> None:
         """Give clients and worker their turns; no time passes."""
         left = [turns]
 
-        def is_settled():
+        def is_settled() -> bool:
             left[0] -= 1
             return left[0] <= 0 and self._loop.tasks.is_idle
 
         self._run(is_settled)
 
-    def perform(self, name, /, **arguments):
+    def perform(self, name: str, /, **arguments: object) -> None:
         """Have an operation of the control API done, in a cycle or some; what is refused is refused."""
         self._do(lambda done: self._box.operations.begin(name, arguments, done))
 
-    def steps(self, steps):
+    def steps(self, steps: Steps[Any]) -> None:
         """Have done what the player does in steps."""
         self._do(lambda done: self.served.steps.start(steps, done))
 
-    def _do(self, begin):
-        outcome = []
+    def _do(self, begin: Callable[[Callable[[Any, Exception | None], None]], object]) -> None:
+        outcome: list[Exception | None] = []
         begin(lambda result, error: outcome.append(error))
         for _ in range(50):
             self.tick(1)
@@ -167,7 +175,7 @@ class WalkBox:
         if outcome and outcome[0] is not None and not isinstance(outcome[0], EmulatorError):
             raise AssertionError("an operation failed") from outcome[0]
 
-    def connect(self, name):
+    def connect(self, name: str) -> None:
         """A client of a port; the one before it leaves."""
         self.leave(name)
         number = getattr(self._box.served_at.ports, name)
@@ -177,12 +185,12 @@ class WalkBox:
             self.clients[name] = client
             self.settle()
 
-    def leave(self, name):
+    def leave(self, name: str) -> None:
         if client := self.clients.pop(name, None):
             client.close()
             self.settle()
 
-    def send(self, name, data):
+    def send(self, name: str, data: bytes) -> None:
         """Send what a client says, connecting first if need be, and read what came."""
         if name not in self.clients:
             self.connect(name)
@@ -194,7 +202,7 @@ class WalkBox:
         self.settle()
         self.read()
 
-    def read(self):
+    def read(self) -> None:
         """Let all clients read what they have, and peers of programs be silent."""
         for name, client in tuple(self.clients.items()):
             try:
@@ -211,13 +219,13 @@ class WalkBox:
         except BlockingIOError:
             pass
 
-    def close(self):
+    def close(self) -> None:
         for sock in (*self.clients.values(), *self.peers, self.listener):
             sock.close()
         self._box.close()
         self._loop.close()
 
 
-def rtde(kind, payload=b""):
+def rtde(kind: str, payload: bytes = b"") -> bytes:
     """A package of RTDE."""
     return struct.pack(">HB", 3 + len(payload), ord(kind)) + payload

@@ -3,7 +3,10 @@
 A statement lasts some seconds at most, so a program that plays and does not get on is stuck.
 """
 
+import random
 import re
+from collections.abc import Sequence
+from typing import Protocol
 
 from urscript import ScriptError, compile_program
 from urscript.catalogue import Catalogue
@@ -114,13 +117,21 @@ def {name}():
 """
 
 
+class Draws(Protocol):
+    """What draws numbers, as `random.Random` does."""
+
+    def uniform(self, low: float, high: float, /) -> float: ...
+
+    def randint(self, low: int, high: int, /) -> int: ...
+
+
 class _Words:
     """Draws the words of the texts."""
 
-    def __init__(self, rng, home, port):
+    def __init__(self, rng: Draws, home: Sequence[float], port: str) -> None:
         self._rng, self._home, self._port = rng, home, port
 
-    def __call__(self, match):
+    def __call__(self, match: re.Match[str]) -> str:
         rng = self._rng
         draw = rng.uniform
         match match[1]:
@@ -159,7 +170,7 @@ class _Words:
             case "axes":
                 return str([rng.randint(0, 1) for _ in range(6)])
             case "port":
-                return str(self._port)
+                return self._port
             case "home":
                 return str(list(self._home))
             case "counter":
@@ -167,12 +178,12 @@ class _Words:
         return match[0]
 
 
-def statements_of(catalogue: Catalogue):
+def statements_of(catalogue: Catalogue) -> list[str]:
     """Names of the statements that a version compiles."""
     names = []
     for name, text in STATEMENTS.items():
         filled = re.sub(
-            r"\{(\w+)\}", _Words(_First(), (0.0,) * 6, 1), _HEAD + _indented(text) + "  end\nend\n"
+            r"\{(\w+)\}", _Words(_First(), (0.0,) * 6, "1"), _HEAD + _indented(text) + "  end\nend\n"
         )
         try:
             compile_program(filled.replace("{name}", "walk"), catalogue=catalogue)
@@ -185,18 +196,20 @@ def statements_of(catalogue: Catalogue):
 class _First:
     """Draws the least of everything."""
 
-    def uniform(self, low, high):
+    def uniform(self, low: float, high: float, /) -> float:
         return low
 
-    def randint(self, low, high):
+    def randint(self, low: int, high: int, /) -> int:
         return low
 
 
-def _indented(text):
+def _indented(text: str) -> str:
     return "".join(f"    {line}\n" for line in text.splitlines())
 
 
-def program(rng, chosen, home, port, name="walk"):
+def program(
+    rng: random.Random, chosen: Sequence[str], home: Sequence[float], port: str, name: str = "walk"
+) -> str:
     """The text of a program that does the chosen statements again and again."""
     text = _HEAD + "".join(map(_indented, (STATEMENTS[one] for one in chosen))) + "  end\nend\n"
     return re.sub(r"\{(\w+)\}", _Words(rng, home, port), text.replace("{name}", name))

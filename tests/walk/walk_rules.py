@@ -5,14 +5,16 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from walk_box import WalkBox
 from walk_programs import COUNTER, KEPT_OUTPUT
 
 sys.path.append(str(Path(__file__).parent.parent / "ur_emulator"))
 from states_support import check_wires
 
-from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller.events import ErrorReported
+from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from ur_emulator.controller.events import ErrorReported, Event
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
+from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.motion.ownership import ArmState
 
 # No set-point accelerates a joint more than this [rad/s²]: the hardest of the programs' commands (6 rad/s², the
@@ -32,7 +34,7 @@ class BrokenRule(AssertionError):
 class Rules:
     """Looks at every cycle."""
 
-    def __init__(self, box, version):
+    def __init__(self, box: WalkBox, version: SoftwareVersion) -> None:
         self._box = box
         self._version = version
         self._before = box.now
@@ -40,14 +42,14 @@ class Rules:
         self._most = max(MOST, 1.5 * box.controller.state.robot.stop_deceleration)
         self._still = round(STILL * 0.008 / self._dt)
         self._stopped_for = self._unpowered_for = 0
-        self._progress = None
+        self._progress: tuple[object, ...] | None = None
         self.n_places = 0  # how often a program has got on
         self._waited = 0.0
         self._placed = self._held_for = 0
         self._count = 0
         box.watch(self.look, self._note)
 
-    def look(self, now):
+    def look(self, now: Snapshot) -> None:
         before, self._before = self._before, now
         self._count += 1
         for name in ("actual_q", "actual_qd", "target_q", "target_qd", "target_qdd", "actual_tcp_force"):
@@ -60,15 +62,15 @@ class Rules:
         if self._count % 7 == 0:
             check_wires(self._box, self._version)
 
-    def _note(self, event):
+    def _note(self, event: Event) -> None:
         if isinstance(event, ErrorReported) and event.code in BLOCKED:
             self._placed = 6  # a blocked arm drops its target, which clients see two cycles later
 
-    def _claim(self, holds, text):
+    def _claim(self, holds: bool, text: str) -> None:
         if not holds:
             raise BrokenRule(f"tick {self._box.now.tick}: {text}")
 
-    def _look_at_motion(self, before, now):
+    def _look_at_motion(self, before: Snapshot, now: Snapshot) -> None:
         """Set-points are continuous, and a paused arm stands still."""
         if now.control_mode != before.control_mode:
             self._placed = max(self._placed, 3)  # what follows a hand is a cycle behind it
@@ -94,7 +96,7 @@ class Rules:
                 gone = np.abs(np.subtract(now.target_q, before.target_q)).max()
                 self._claim(gone < 1e-9, f"paused arm goes {gone:.2e} rad")
 
-    def _look_at_stops(self, before, now):
+    def _look_at_stops(self, before: Snapshot, now: Snapshot) -> None:
         mode = SafetyMode(now.safety_status)
         is_stopped = mode not in MOVING_MODES
         changed = now.safety_status != before.safety_status
@@ -121,7 +123,7 @@ class Rules:
             motion = self._box.controller.state.motion
             self._claim(motion.owner is None, f"without a program {motion.owner} has the arm")
 
-    def _look_at_progress(self, now):
+    def _look_at_progress(self, now: Snapshot) -> None:
         """A program that plays gets on, unless it waits itself, or a hand or the slider holds it."""
         state, controller = now.runtime_state, self._box.controller
         running = controller.programs.latest
