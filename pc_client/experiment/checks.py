@@ -215,7 +215,7 @@ def _remedy(
 
     own, other = recipe.controller, CONTROLLERS[DEFAULT]
     ways = []
-    slower = (x for x in _SLOWER if does(JointSpline(x * plan.duration, plan.spline.q_knots), own))
+    slower = (x for x in _SLOWER if does(JointSpline(x * plan.spline.t_knots, plan.spline.q_knots), own))
     if factor := next(slower, None):
         ways.append(f"give the movement {factor:g} times its duration")
     if own.name != other.name and does(plan.spline, other):
