@@ -18,7 +18,6 @@ from pc_client.kinematics.model import RobotModel
 from pc_client.planning.checks import PlanReport
 from pc_client.planning.plan import Plan
 from pc_client.recording.recording import load_recording
-from protocol.ur_types import JOINT_NAMES
 from ur_hil.cell import Cell
 
 _SHORTEST_HEAD = 1024
@@ -181,9 +180,9 @@ def experiment_text(experiment: Experiment) -> str:
             f"  box of motion   {axes} m, robot base frame",
             f"  duration        {moving:.0f} s of movement, plus a slow approach before each",
             f"  top TCP speed   {reports[fastest].tcp_speed.value:.3f} m/s ({fastest})",
-            f"  top joint speed {np.degrees(joint_speed.value):.0f} deg/s, {_joint(joint_speed.joint)} "
+            f"  top joint speed {np.degrees(joint_speed.value):.0f} deg/s, {joint_speed.joint_name} "
             f"({tightest}), {joint_speed.share:.0%} of what is allowed",
-            f"  joint range     nearest to its end: {_joint(joint_range.joint)} ({nearest}), "
+            f"  joint range     nearest to its end: {joint_range.joint_name} ({nearest}), "
             f"{np.degrees(joint_range.value):.0f} deg away",
             f"  cell            {experiment.model.cell.summary}",
             *_clearances(reports.values()),
@@ -194,7 +193,7 @@ def experiment_text(experiment: Experiment) -> str:
 
 def _clearances(reports: Iterable[PlanReport]) -> Iterator[str]:
     """Yield what comes nearest in all movements: to the floor, to itself, to the cell."""
-    for same_kind in zip(*(report.clearances for report in reports), strict=True):
+    for same_kind in zip(*(report.clearance for report in reports), strict=True):
         least = min(same_kind, key=lambda clearance: clearance.extreme.value)
         if least.text:
             yield f"  nearest         {least.text}"
@@ -202,7 +201,3 @@ def _clearances(reports: Iterable[PlanReport]) -> Iterator[str]:
 
 def _count(n: int, what: str) -> str:
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
-
-
-def _joint(index: int | None) -> str:
-    return "" if index is None else JOINT_NAMES[index]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, pi
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -71,18 +71,21 @@ class Distances(NamedTuple):
     nearest: tuple[Nearest, ...]
 
 
-class Clearance(NamedTuple):
-    """What was measured along a joint path.
+_T = TypeVar("_T")
+
+
+class Clearance(NamedTuple, Generic[_T]):
+    """What is measured, or kept, of each kind of distance.
 
     Attributes:
-        floor: forearm, wrists and tool above the floor.
-        own: links that are not neighbours, and the tool, from each other.
-        cell: moving links and tool from walls and solids of the cell.
+        floor: of forearm, wrists and tool from the floor.
+        own: of links that are not neighbours, and of the tool, from each other.
+        cell: of moving links and tool from walls and solids of the cell.
     """
 
-    floor: Distances
-    own: Distances
-    cell: Distances
+    floor: _T
+    own: _T
+    cell: _T
 
 
 class _Pairs(NamedTuple):
@@ -102,7 +105,7 @@ class ClearanceModel:
     _own: _Pairs = field(repr=False)
     _cell: _Pairs = field(repr=False)
 
-    def along(self, q: ArrayLike) -> Clearance:
+    def along(self, q: ArrayLike) -> Clearance[Distances]:
         """Measure the clearance at each posture of a joint path (n, 6) [rad]."""
         path = np.atleast_2d(np.asarray(q, dtype=np.float64))
         return Clearance(*(self._distances(pairs, path) for pairs in (self._floor, self._own, self._cell)))
