@@ -250,51 +250,41 @@ def housings(arm: DhArm) -> dict[str, tuple[Array, ...]]:
     upper, half = arm.shoulder_offset / 2, arm.elbow_step / 2
     end, side, cap = arm.wrist_step / 2, arm.d5 / 2, _CAP * wrist
     return {
-        "base_link": (_about_z(0.0, 0.0, arm.foot), _about_z(0.0, arm.d1 - upper, shoulder)),
+        "base_link": (*_about_z(arm.foot, (0.0, 0.0)), *_about_z(shoulder, (0.0, arm.d1 - upper))),
         "shoulder_link": (
-            _about_z(0.0, -upper, shoulder),
-            _about_z(0.0, upper, shoulder),
-            _about_y(0.0, 0.0, shoulder),
-            _about_y(upper, 0.0, shoulder),
+            *_about_z(shoulder, (0.0, -upper), (0.0, upper)),
+            *_about_y(shoulder, (0.0, 0.0), (upper, 0.0)),
         ),
         "upper_arm_link": (
-            _about_y(-upper, 0.0, shoulder),
-            _about_y(upper, 0.0, shoulder),
-            _about_y(-half, -arm.a2, elbow),
-            _about_y(half, -arm.a2, elbow),
+            *_about_y(shoulder, (-upper, 0.0), (upper, 0.0)),
+            *_about_y(elbow, (-half, -arm.a2), (half, -arm.a2)),
         ),
         "forearm_link": (
-            _about_y(-half, 0.0, elbow),
-            _about_y(half, 0.0, elbow),
-            _about_y(-end, -arm.a3, wrist),
-            _about_y(end, -arm.a3, wrist),
+            *_about_y(elbow, (-half, 0.0), (half, 0.0)),
+            *_about_y(wrist, (-end, -arm.a3), (end, -arm.a3)),
         ),
         "wrist_1_link": (
-            _about_y(end, 0.0, wrist),
-            _about_y(arm.wrist_step + wrist, 0.0, wrist),
-            _about_z(arm.wrist_step, -cap, wrist),
-            _about_z(arm.wrist_step, side, wrist),
+            *_about_y(wrist, (end, 0.0), (arm.wrist_step + wrist, 0.0)),
+            *_about_z(wrist, (arm.wrist_step, -cap), (arm.wrist_step, side)),
         ),
         "wrist_2_link": (
-            _about_z(0.0, side, wrist),
-            _about_z(0.0, arm.d5 + wrist, wrist),
-            _about_y(-cap, arm.d5, wrist),
-            _about_y(side, arm.d5, wrist),
+            *_about_z(wrist, (0.0, side), (0.0, arm.d5 + wrist)),
+            *_about_y(wrist, (-cap, arm.d5), (side, arm.d5)),
         ),
-        "wrist_3_link": (_about_y(side, 0.0, wrist), _about_y(arm.d6, 0.0, wrist)),
+        "wrist_3_link": tuple(_about_y(wrist, (side, 0.0), (arm.d6, 0.0))),
     }
 
 
-def _about_y(y: float, z: float, radius: float) -> Array:
-    """Polygon (n, 3) around a circle about an axis along y."""
+def _about_y(radius: float, *places: tuple[float, float]) -> list[Array]:
+    """Polygons (n, 3) around circles about axes along y, centred at y, z."""
     c, s = _polygon(radius)
-    return np.column_stack((c, np.full_like(c, y), s + z))
+    return [np.column_stack((c, np.full_like(c, y), s + z)) for y, z in places]
 
 
-def _about_z(y: float, z: float, radius: float) -> Array:
-    """Polygon (n, 3) around a circle about an axis along z."""
+def _about_z(radius: float, *places: tuple[float, float]) -> list[Array]:
+    """Polygons (n, 3) around circles about axes along z, centred at y, z."""
     c, s = _polygon(radius)
-    return np.column_stack((c, s + y, np.full_like(c, z)))
+    return [np.column_stack((c, s + y, np.full_like(c, z))) for y, z in places]
 
 
 def _polygon(radius: float) -> tuple[Array, Array]:
