@@ -137,6 +137,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     columns += [replace(error, header="position error")]
     rows = rows.with_columns(pl.col(_PATH_ERROR.name).list.max())
     origin, several = table.provenance.origin, len(table.all_runs) > len(table.runs)
+    learned = sum(bool(run.recording.summary.get("learned_from")) for run in table.all_runs)
     definitions = [replace(MOVEMENT, header="means over the repetitions" if several else ""), *_DEFINITIONS]
     return render(
         _TEMPLATE,
@@ -165,7 +166,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         least_rest=LEAST_STEPS,
         seed=table.provenance.seed,
         facts=provenance_facts(table.all_runs),
-        learned=_learned(table),
+        learned=f"{learned} of {len(table.all_runs)}" if learned else "",
         left_out=list(left_out),
     )
 
@@ -228,12 +229,6 @@ def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
             f"contraction {float(loop['learning_contraction']):.2f} a run"
         )
     return facts
-
-
-def _learned(table: Table) -> str:
-    """Return which runs used what an earlier one had taught, as "3 of 9"; empty when none could."""
-    learned = sum(bool(run.recording.summary.get("learned_from")) for run in table.all_runs)
-    return f"{learned} of {len(table.all_runs)}" if learned else ""
 
 
 def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[_T]:

@@ -5,7 +5,7 @@ All that can be refused is refused here, before the arm moves: plans for another
 
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,6 @@ import numpy as np
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel
-from pc_client.planning.checks import PlanReport
 from pc_client.planning.plan import Plan
 from pc_client.recording.recording import load_recording
 from ur_hil.cell import Cell
@@ -171,6 +170,8 @@ def experiment_text(experiment: Experiment) -> str:
     tightest = max(reports, key=lambda name: reports[name].joint_speed.share)
     nearest = min(reports, key=lambda name: reports[name].joint_range.value)
     joint_speed, joint_range = reports[tightest].joint_speed, reports[nearest].joint_range
+    clearances = zip(*(report.clearance for report in reports.values()), strict=True)
+    least = [min(same_kind, key=lambda one: one.extreme.value) for same_kind in clearances]
     moving = experiment.repeat * sum(report.duration for report in reports.values())
     axes = "  ".join(f"{axis} {a:.3f}..{b:.3f}" for axis, a, b in zip("xyz", low, high, strict=True))
     return "\n".join(
@@ -185,18 +186,10 @@ def experiment_text(experiment: Experiment) -> str:
             f"  joint range     nearest to its end: {joint_range.joint_name} ({nearest}), "
             f"{np.degrees(joint_range.value):.0f} deg away",
             f"  cell            {experiment.model.cell.summary}",
-            *_clearances(reports.values()),
+            *(f"  nearest         {clearance.text}" for clearance in least if clearance.text),
             "  before the first movement all joints turn to and fro by 1 degree to find the loop's delay",
         )
     )
-
-
-def _clearances(reports: Iterable[PlanReport]) -> Iterator[str]:
-    """Yield what comes nearest in all movements: to the floor, to itself, to the cell."""
-    for same_kind in zip(*(report.clearance for report in reports), strict=True):
-        least = min(same_kind, key=lambda clearance: clearance.extreme.value)
-        if least.text:
-            yield f"  nearest         {least.text}"
 
 
 def _count(n: int, what: str) -> str:
