@@ -17,8 +17,7 @@ from pathlib import Path
 from rich.console import Console
 
 import pc_client as ur
-from pc_client.analysis.report import build_report, build_tables
-from pc_client.analysis.side_by_side import build_side_by_side
+from pc_client.analysis.report import build_report, build_side_by_side, build_tables
 from pc_client.movements.library_sets import library_names
 from ur_emulator import ControlBox
 

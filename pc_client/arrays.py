@@ -1,4 +1,4 @@
-"""Arrays of numbers: their type, and copies that nobody changes."""
+"""Arrays of numbers: their type, copies that nobody changes, and the frozen records that hold them."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,3 +14,9 @@ def read_only(values: ArrayLike, shape: tuple[int, ...] | None = None) -> Array:
         array = array.reshape(shape)
     array.setflags(write=False)
     return array
+
+
+def set_fields(record: object, **values: object) -> None:
+    """Set fields of a frozen record in its `__post_init__`: what was checked, or follows from the others."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)

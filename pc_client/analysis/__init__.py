@@ -6,7 +6,6 @@
     table         Table I: ours beside the paper's
     figures       bars and speeds of all movements; loads matplotlib, so import it only to draw
     report        one self-contained page from a folder of recordings
-    side_by_side  several experiments in one table and on one page
 
 Everything is computed from recordings alone; nothing here talks to a robot.
 """

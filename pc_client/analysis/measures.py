@@ -181,22 +181,18 @@ def speed(t: Array, p: Array) -> Array:
     return length
 
 
-class _ShiftedReference:
+def _shifted_reference(track: TcpTrack) -> Callable[[float, slice], Array]:
     """The reference path, delayed by any time: what an arm would do whose only fault is a lag.
 
     The reference is shifted rather than the measurement, because it is smooth: interpolating it changes
     nothing, while interpolating noisy positions would smooth them.
+
+    Returns:
+        A function of the lag [s] and of samples: positions (n, 3) [m] at their times less the lag; at rest
+        before and after the recording.
     """
-
-    def __init__(self, track: TcpTrack) -> None:
-        self._t = track.t
-        self._spline = CubicSpline(track.t, track.p_ref)
-
-    def at(self, lag_s: float, samples: slice = slice(None)) -> Array:
-        """Return the reference position at `t - lag_s`, (n, 3) m; at rest before and after the recording."""
-        t = np.clip(self._t[samples] - lag_s, self._t[0], self._t[-1])
-        positions: Array = self._spline(t)
-        return positions
+    spline = CubicSpline(track.t, track.p_ref)
+    return lambda lag_s, samples: spline(np.clip(track.t[samples] - lag_s, track.t[0], track.t[-1]))
 
 
 # Where the best shift is looked for; loops on a UR arm lag 10-100 ms, a good preview can be slightly early.
@@ -248,24 +244,15 @@ def decibels(signal: float, noise: float) -> float:
 
 def measure_snr(track: TcpTrack) -> Snr:
     """Compute all signal-to-noise ratios of one run."""
-    steps = track.movement_steps
-    raw = [
-        snr_db(f(track.t, track.p_ref)[steps], f(track.t, track.p_actual)[steps]) for f in (speed, velocity)
-    ]
-    reference = _ShiftedReference(track)
-    speed_lag = _best_lag(track, reference, speed)
-    velocity_lag = _best_lag(track, reference, velocity)
-    return Snr(
-        speed_db=raw[0],
-        speed_shifted_db=snr_db(*_shifted_pair(track, reference, speed_lag, speed)),
-        speed_lag_s=speed_lag,
-        velocity_db=raw[1],
-        velocity_shifted_db=snr_db(*_shifted_pair(track, reference, velocity_lag, velocity)),
-        velocity_lag_s=velocity_lag,
-    )
+    steps, figures = track.movement_steps, []
+    for velocity_of in (speed, velocity):
+        raw = (velocity_of(track.t, p)[steps] for p in (track.p_ref, track.p_actual))
+        lag = _best_lag(track, velocity_of)
+        figures += [snr_db(*raw), snr_db(*_shifted_pair(track, lag, velocity_of)), lag]
+    return Snr(*figures)
 
 
-def _best_lag(track: TcpTrack, reference: _ShiftedReference, velocity_of: _VelocityOf) -> float:
+def _best_lag(track: TcpTrack, velocity_of: _VelocityOf) -> float:
     """Return the delay in s of the reference that leaves the least square error.
 
     A scan in steps of one control cycle finds the valley, a bounded search its bottom, far below one cycle.
@@ -277,10 +264,10 @@ def _best_lag(track: TcpTrack, reference: _ShiftedReference, velocity_of: _Veloc
     stop = min(len(track.t), track.movement.stop + math.ceil(_MAX_LAG_S / cycle))
     window = slice(start, stop)
     t = track.t[window]
-    actual = velocity_of(t, track.p_actual[window])
+    actual, reference = velocity_of(t, track.p_actual[window]), _shifted_reference(track)
 
     def error(lag: float) -> float:
-        return float(np.sum(np.square(actual - velocity_of(t, reference.at(lag, window)))))
+        return float(np.sum(np.square(actual - velocity_of(t, reference(lag, window)))))
 
     lags = np.arange(_MIN_LAG_S, _MAX_LAG_S + cycle / 2, cycle)
     coarse = float(lags[np.argmin([error(lag) for lag in lags])])
@@ -290,9 +277,7 @@ def _best_lag(track: TcpTrack, reference: _ShiftedReference, velocity_of: _Veloc
     return float(fine.x)
 
 
-def _shifted_pair(
-    track: TcpTrack, reference: _ShiftedReference, lag_s: float, velocity_of: _VelocityOf
-) -> tuple[Array, Array]:
+def _shifted_pair(track: TcpTrack, lag_s: float, velocity_of: _VelocityOf) -> tuple[Array, Array]:
     """Return reference and actual over the movement, both taken `lag_s` later at the robot.
 
     The window moves with the lag, so that the same piece of the reference is judged as without a shift.
@@ -309,8 +294,9 @@ def _shifted_pair(
             f"at least {_MIN_MOVEMENT_ROWS} are needed"
         )
     window = slice(int(inside[0]), int(inside[-1]) + 1)
-    t = track.t[window]
-    return velocity_of(t, reference.at(lag_s, window)), velocity_of(t, track.p_actual[window])
+    positions = _shifted_reference(track)(lag_s, window), track.p_actual[window]
+    reference, actual = (velocity_of(track.t[window], p) for p in positions)
+    return reference, actual
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,7 +332,7 @@ class Errors:
 def measure_errors(recording: Recording, track: TcpTrack, lag_s: float) -> Errors:
     """Measure position and joint errors over the movement; the best shift is that of the velocity [s]."""
     moving = track.movement
-    path_error = track.p_actual[moving] - _ShiftedReference(track).at(lag_s, moving)
+    path_error = track.p_actual[moving] - _shifted_reference(track)(lag_s, moving)
     offset = path_error.mean(axis=0)
     distance = 1e3 * position_errors(track)
     path_distance = 1e3 * np.linalg.norm(path_error - offset, axis=1)
@@ -455,7 +441,7 @@ def error_budget(recording: Recording, track: TcpTrack, lag_s: float) -> Budget:
     ref_speed = speed(track.t, track.p_ref)[steps]
     error_power = _power(speed(track.t, track.p_actual)[steps] - ref_speed)
 
-    reference, actual = _shifted_pair(track, _ShiftedReference(track), lag_s, speed)
+    reference, actual = _shifted_pair(track, lag_s, speed)
     cycle = float(np.median(np.diff(track.t)))
     error = actual - reference
     after_shift = min(_power(error), error_power)

@@ -36,47 +36,37 @@ LEAST_STEPS = 30
 """Differences at rest from which C is worth estimating: its diagonal is good to 25 % then."""
 
 
-def _rest_steps(run: MeasuredRun) -> Array:
-    """One-cycle differences (n, 6) [rad] of the reported joints at rest, each stretch less its mean."""
-    q = run.recording.column("actual_q")[run.track.rows]
-    stretches = [np.diff(q[samples], axis=0) for samples in rest_samples(run.recording, run.track)]
-    centred = [steps - steps.mean(axis=0) for steps in stretches]
-    return np.concatenate(centred) if centred else np.empty((0, q.shape[1]))
-
-
 def step_covariance(runs: Sequence[MeasuredRun]) -> Array | None:
     """Return C (6, 6) [rad2] of all runs of one arm together; None with fewer than `LEAST_STEPS` steps."""
-    steps = np.concatenate([_rest_steps(run) for run in runs])
-    if len(steps) < LEAST_STEPS:
+    stretches = [
+        np.diff(run.recording.column("actual_q")[run.track.rows[samples]], axis=0)
+        for run in runs
+        for samples in rest_samples(run.recording, run.track)
+    ]
+    if sum(map(len, stretches)) < LEAST_STEPS:
         return None
+    steps = np.concatenate([stretch - stretch.mean(axis=0) for stretch in stretches])
     # The mean of n differences is the last value less the first over n: taking it away costs 1 / n^2 of the
     # noise, not 1 / n as of independent values.
     covariance: Array = steps.T @ steps / len(steps)
     return covariance
 
 
-def _floor_power(run: MeasuredRun, covariance: Array, model: RobotModel) -> float:
-    """Return P_floor [(m/s)2] of one run's movement, by its reference and time stamps and by C (6, 6) [rad2].
-
-    The Jacobian of the nominal arm is good to the calibration, 1 %.
-    """
-    track, steps = run.track, run.track.movement_steps
-    q = run.recording.column("ref_q")[track.rows][steps]
-    dt = np.diff(track.t)[steps]
-    v = velocity(track.t, track.p_ref)[steps]
-    jacobians = np.array([tcp_jacobian(model, q_k)[:3] for q_k in q])
-    noise = jacobians @ covariance @ jacobians.transpose(0, 2, 1) / np.square(dt)[:, None, None]
-    mean, variance = speed_noise(v, noise)
-    return float(np.mean(np.square(mean) + variance))
-
-
 def floor_db(run: MeasuredRun, covariance: Array | None) -> float | None:
-    """Return the SNR [dB] at which noise alone would leave a run; None for an unknown arm or without rest."""
+    """Return the SNR [dB] at which noise alone would leave a run; None for an unknown arm or without rest.
+
+    The noise is seen through the reference and the time stamps; C is (6, 6) [rad2]. The Jacobian of the
+    nominal arm is good to the calibration, 1 %.
+    """
     model = _nominal(run)
     if covariance is None or model is None:
         return None
-    power = _floor_power(run, covariance, model)
-    signal = run.budget.signal_power
+    track, steps = run.track, run.track.movement_steps
+    dt = np.diff(track.t)[steps]
+    jacobians = _jacobians(run, model)[steps]
+    noise = jacobians @ covariance @ jacobians.transpose(0, 2, 1) / np.square(dt)[:, None, None]
+    mean, variance = speed_noise(velocity(track.t, track.p_ref)[steps], noise)
+    power, signal = float(np.mean(np.square(mean) + variance)), run.budget.signal_power
     return decibels(signal, power) if power > 0.0 < signal else None
 
 
@@ -109,11 +99,15 @@ def _as_driven_like(first: MeasuredRun, second: MeasuredRun) -> Array | None:
     further = np.cumsum(
         np.stack([np.convolve(column, response)[: len(more)] for column in more.T], axis=1), axis=0
     )
-    q = first.recording.column("ref_q")[first.track.rows]
-    jacobians = np.array([tcp_jacobian(model, q_k)[:3] for q_k in q])
-    moved = np.einsum("nij,nj->ni", jacobians, further * period)
+    moved = np.einsum("nij,nj->ni", _jacobians(first, model), further * period)
     positions: Array = second.track.p_actual - moved
     return positions
+
+
+def _jacobians(run: MeasuredRun, model: RobotModel) -> Array:
+    """From joint velocities to that of the TCP, along the reference of a run, (n, 3, 6)."""
+    q = run.recording.column("ref_q")[run.track.rows]
+    return np.array([tcp_jacobian(model, q_k)[:3] for q_k in q])
 
 
 def _nominal(run: MeasuredRun) -> RobotModel | None:

@@ -1,10 +1,12 @@
-"""The report: tables and one self-contained page, rebuilt from a folder of recordings.
+"""The report: tables and one self-contained page, rebuilt from a folder of recordings; one page of several.
 
 `report.html` needs no network: style and figures are inside it, and it holds no date, host or path, so the
 same recordings give the same page. The plotting libraries are loaded only when a report is built.
 """
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -17,7 +19,19 @@ from rich.progress import track as progress
 from pc_client.analysis.measures import PARTS, SPLIT_HZ
 from pc_client.analysis.noise_floor import LEAST_STEPS
 from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column, movement_sheet
-from pc_client.analysis.table import FLOOR, LAG, MOVEMENT, Table, build_table
+from pc_client.analysis.table import (
+    FLOOR,
+    LAG,
+    MOVEMENT,
+    PUBLISHED,
+    SHOWN,
+    SideBySide,
+    Table,
+    build_table,
+    mean_by_kind,
+    side_by_side,
+)
+from pc_client.control.controller import FIELDS
 from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
@@ -28,7 +42,7 @@ from protocol.ur_types import JOINT_NAMES
 from ur_hil.cell import NO_CELL, parse_cell
 
 TABLE_JSON, TABLE_MARKDOWN, REPORT_HTML = "table1.json", "table1.md", "report.html"
-_TEMPLATE = "analysis/report.html.j2"
+_TEMPLATE, _TOGETHER = "analysis/report.html.j2", "analysis/side_by_side.html.j2"
 _T = TypeVar("_T")
 
 _LEVEL = Column("snr_db", "speed, Eq. 10", "dB", ".1f", missing="–")
@@ -137,6 +151,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     columns += [replace(error, header="position error")]
     rows = rows.with_columns(pl.col(_PATH_ERROR.name).list.max())
     origin, several = table.provenance.origin, len(table.all_runs) > len(table.runs)
+    learned = sum(bool(run.recording.summary.get("learned_from")) for run in table.all_runs)
     definitions = [replace(MOVEMENT, header="means over the repetitions" if several else ""), *_DEFINITIONS]
     return render(
         _TEMPLATE,
@@ -165,7 +180,7 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         least_rest=LEAST_STEPS,
         seed=table.provenance.seed,
         facts=provenance_facts(table.all_runs),
-        learned=_learned(table),
+        learned=f"{learned} of {len(table.all_runs)}" if learned else "",
         left_out=list(left_out),
     )
 
@@ -206,34 +221,26 @@ def _cell_summary(text: str) -> str:
         return f"cannot be read ({one_line(error)})"
 
 
+_LOOP = {
+    # By a controller that identifies dead time and lag separately.
+    "identified loop": "dead time {dead_time_s:.1f} ms, lag {lag_s:.1f} ms, "
+    "single joints within {joint_spread_s:.1f} ms",
+    "margins of the feedback": "gain {gain_margin:.1f}, phase {phase_margin_deg:.0f}°, "
+    "delay {delay_margin_s:.0f} ms, sensitivity at most {sensitivity_peak:.2f}",
+    "learning": "up to {learning_cut_off_hz:.1f} Hz (set by the {learning_limited_by}), "
+    "contraction {learning_contraction:.2f} a run",
+}
+"""What is said of a loop, where all of it is known; times are in ms."""
+
+
 def _loop_facts(loop: Mapping[str, float | str]) -> Mapping[str, str]:
     """Return the identified loop and its margins as texts by name; nothing for old recordings."""
+    known = {k: 1e3 * v if k.endswith("_s") and not isinstance(v, str) else v for k, v in loop.items()}
     facts: dict[str, str] = {}
-    # By a controller that identifies dead time and lag separately.
-    if loop.keys() >= {"dead_time_s", "lag_s", "joint_spread_s"}:
-        facts["identified loop"] = (
-            f"dead time {1e3 * float(loop['dead_time_s']):.1f} ms, "
-            f"lag {1e3 * float(loop['lag_s']):.1f} ms, "
-            f"single joints within {1e3 * float(loop['joint_spread_s']):.1f} ms"
-        )
-    if loop.keys() >= {"gain_margin", "phase_margin_deg", "delay_margin_s", "sensitivity_peak"}:
-        facts["margins of the feedback"] = (
-            f"gain {float(loop['gain_margin']):.1f}, phase "
-            f"{float(loop['phase_margin_deg']):.0f}°, delay {1e3 * float(loop['delay_margin_s']):.0f} ms, "
-            f"sensitivity at most {float(loop['sensitivity_peak']):.2f}"
-        )
-    if loop.keys() >= {"learning_cut_off_hz", "learning_limited_by", "learning_contraction"}:
-        facts["learning"] = (
-            f"up to {float(loop['learning_cut_off_hz']):.1f} Hz (set by the {loop['learning_limited_by']}), "
-            f"contraction {float(loop['learning_contraction']):.2f} a run"
-        )
+    for name, text in _LOOP.items():
+        with suppress(KeyError):
+            facts[name] = text.format(**known)
     return facts
-
-
-def _learned(table: Table) -> str:
-    """Return which runs used what an earlier one had taught, as "3 of 9"; empty when none could."""
-    learned = sum(bool(run.recording.summary.get("learned_from")) for run in table.all_runs)
-    return f"{learned} of {len(table.all_runs)}" if learned else ""
 
 
 def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[_T]:
@@ -242,3 +249,92 @@ def _shown(items: Iterable[_T], what: str, console: Console | None) -> Iterable[
     if console is None or not console.is_terminal:
         return items
     return progress(items, description=what, console=console, transient=True)
+
+
+def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
+    """Write one page of several experiments.
+
+    Args:
+        reports: of their folders; the page links to those that have pages.
+
+    Raises:
+        RecordingError: there is no experiment, matplotlib or jinja2 is missing, or the page cannot be
+            written.
+    """
+    shown = side_by_side([report.table for report in reports])
+    require_report_libraries()
+    from pc_client.analysis import figures
+
+    folder = {id(report.table): report.paths[0].parent for report in reports}
+    experiments = list(zip(shown.labels, shown.columns, strict=True))
+    rows, (name, *columns) = shown.shown()
+    levels = [column for column in columns if column.unit == "dB"]
+    # What is compared stands together: on a narrow screen it is what is seen.
+    others = [
+        replace(figure, name=f"{figure.name}_{i}", header=f"{figure.header}, {label}")
+        for figure in SHOWN[1:]
+        for i, label in enumerate(shown.labels)
+    ]
+    text = render(
+        _TOGETHER,
+        scripts=True,
+        shown=shown,
+        n_movements=len(shown.frame),
+        cards=[(level.header, mean_by_kind(shown.frame, level.name)) for level in levels],
+        links=[_link(table, folder[id(table)], out) for table in shown.columns],
+        labels=shown.labels,
+        levels=to_html(rows, [name, *levels, Column("n_targets", "targets"), *others], bold="is_mean"),
+        levels_figure=picture(
+            figures.levels_figure(shown.frame, experiments, shown.mark),
+            "Bars of the SNR of each movement: the paper's, and those of each experiment",
+        ),
+        speeds_figure=zoomable(
+            figures.speeds_sheet(shown.frame["name"].to_list(), experiments, shown.mark),
+            "TCP speed over time of each movement, desired and actual",
+        ),
+        mark=shown.mark,
+        published=next((t for t in shown.columns if t.provenance.controller == PUBLISHED), None),
+        settings=[
+            (tables[0].label, _settings(tables))
+            for table in shown.columns
+            if (tables := shown.changes_of(table))
+        ],
+        facts=_common([provenance_facts(table.all_runs) for table in shown.columns]),
+        left_out=[f"{report.paths[0].parent.name}/{line}" for report in reports for line in report.left_out],
+    )
+    write_files(out.parent, {out.name: text})
+    return shown
+
+
+def _link(table: Table, folder: Path, out: Path) -> tuple[str, str] | None:
+    """The page of one experiment and its label; None where it has no page."""
+    page = folder / REPORT_HTML
+    return (Path(os.path.relpath(page, out.parent)).as_posix(), table.label) if page.exists() else None
+
+
+def _settings(tables: Sequence[Table]) -> str:
+    """One controller with its own and other numbers: the fields that differ, and for each what came of it."""
+    configs = [table.provenance.controller_config for table in tables]
+    fields = [name for name in FIELDS if len({config.get(name) for config in configs}) > 1]
+    kinds = tables[0].kinds
+    rows = [
+        {name: f"{x:g}" if isinstance(x := config.get(name), float) else str(x) for name in fields}
+        | {kind: table.mean_of(kind) for kind in kinds}
+        | {"n_runs": len(next(iter(table.runs.values()))), "is_own": table is tables[0]}
+        | {LAG.name: table.frame[LAG.name].mean()}
+        for table, config in zip(tables, configs, strict=True)
+    ]
+    columns = [
+        *(Column(name, unit=getattr(FIELDS.get(name), "unit", "")) for name in fields),
+        Column("n_runs", "runs of each movement"),
+        *(Column(kind, f"mean {kind}", "dB", ".2f") for kind in kinds),
+        LAG,
+    ]
+    return to_html(pl.DataFrame(rows, infer_schema_length=None), columns, bold="is_own")
+
+
+def _common(facts: Sequence[Mapping[str, str]]) -> Mapping[str, str | list[str]]:
+    """Facts of all columns by name: one text where they agree, else one for each column."""
+    names = list(dict.fromkeys(name for one in facts for name in one))
+    texts = {name: [one.get(name, "–") for one in facts] for name in names}
+    return {name: given[0] if len(set(given)) == 1 else given for name, given in texts.items()}

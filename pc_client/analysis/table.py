@@ -1,6 +1,10 @@
-"""Table I: the signal-to-noise ratio of every movement, ours beside the paper's.
+"""Table I: the signal-to-noise ratio of every movement, ours beside the paper's; several experiments.
 
 One frame, a row a movement, in three forms: `table1.json`, `table1.md` and a table for the terminal.
+
+Several experiments stand in one table: the paper's real arm, the published controller, ours. A controller
+whose numbers were changed gets no column of its own where the unchanged one has run on the same arm: it is a
+row of the table that shows how the means move with these numbers.
 """
 
 from __future__ import annotations
@@ -48,6 +52,9 @@ PAPER_ROWS = pl.DataFrame(
 
 SHARED = "Paper: own points, not published; name, kind, number of targets agree"
 """Why no differences are given."""
+
+PUBLISHED = "paper"
+"""Name of the controller with the published control law."""
 
 MOVEMENT = Column("name", "movement", align="left")
 LEVEL, PAPER = Column("mean_snr_db", "mean", format=".2f"), Column("paper_snr_db", "paper", format=".2f")
@@ -133,6 +140,18 @@ class Table:
     def provenance(self) -> Provenance:
         """Where the first run comes from; arm and controller are the same for all."""
         return self.all_runs[0].provenance
+
+    @property
+    def label(self) -> str:
+        """What its column beside others is called."""
+        controller = self.provenance.controller
+        return "published controller" if controller == PUBLISHED else controller
+
+    @property
+    def base(self) -> tuple[str, str]:
+        """The arm, and the name of the controller that the numbers of this one started from."""
+        p = self.provenance
+        return f"{p.arm} {p.pace}", str(p.controller_config.get("name", p.controller))
 
     @property
     def has_paper_rows(self) -> bool:
@@ -234,3 +253,117 @@ def _rank(run: MeasuredRun) -> tuple[int, str, int, str]:
         paper.index(name) if name in PAPER_SNR_DB else len(paper),
         name,
     )
+
+
+SHOWN = (LEVEL, LAG, ERROR)
+"""What is shown of each experiment; in the frame with the number of the experiment behind the name."""
+
+
+@dataclass(frozen=True, slots=True)
+class SideBySide:
+    """The experiments of one page.
+
+    Attributes:
+        columns: what stands beside the paper's figures, in the order given.
+        changed: the same controllers with other numbers.
+    """
+
+    columns: tuple[Table, ...]
+    changed: tuple[Table, ...]
+
+    @property
+    def frame(self) -> pl.DataFrame:
+        """A row for each movement that any experiment has, with figures of all; null where one lacks it."""
+        tables = [table.frame.with_columns(experiment=i) for i, table in enumerate(self.columns)]
+        together = pl.concat(tables, how="vertical_relaxed")
+        kinds = together["kind"].unique(maintain_order=True).to_list()
+        kinds = [*(kind for kind in KINDS if kind in kinds), *(kind for kind in kinds if kind not in KINDS)]
+        figures = [
+            pl.col(figure.name).filter(experiment=i).first().alias(f"{figure.name}_{i}")
+            for i in range(len(tables))
+            for figure in SHOWN
+        ]
+        rows = together.group_by("name", maintain_order=True).agg(
+            pl.col("kind", PAPER.name, "n_targets").first(), *figures
+        )
+        return rows.sort(pl.col("kind").cast(pl.Enum(kinds)), maintain_order=True)
+
+    def shown(self) -> tuple[pl.DataFrame, list[Column]]:
+        """The rows with the means of the levels of each kind, as people read them, and their columns."""
+        columns = [MOVEMENT]
+        if self.has_paper_rows:
+            columns.append(replace(PAPER, header="paper, real UR3", unit="dB", narrow="paper,\nreal UR3"))
+        for i, table in enumerate(self.columns):
+            label = table.label
+            narrow = label.removesuffix(" controller")
+            level, *others = (replace(figure, name=f"{figure.name}_{i}") for figure in SHOWN)
+            columns += [replace(level, header=label, unit="dB", narrow=narrow), *others]
+        levels = [column.name for column in columns if column.unit == "dB"]
+        return with_means(self.frame, *levels), columns
+
+    @property
+    def has_paper_rows(self) -> bool:
+        """Whether a movement has the name of one in the paper's Table I."""
+        return any(table.has_paper_rows for table in self.columns)
+
+    @property
+    def labels(self) -> list[str]:
+        """What the columns are called."""
+        return [table.label for table in self.columns]
+
+    @property
+    def mark(self) -> str:
+        """What the data are; every mark that any experiment has."""
+        return ", ".join(dict.fromkeys(m for table in self.columns if (m := table.provenance.origin.mark)))
+
+    @property
+    def finding(self) -> str:
+        """What the experiments show of the paper's finding, in one sentence; empty without both kinds."""
+        here = [
+            f"{better} ({label})"
+            for i, label in enumerate(self.labels)
+            if (better := _better(mean_by_kind(self.frame, f"{LEVEL.name}_{i}")))
+        ]
+        if not here or not self.has_paper_rows:
+            return ""
+        there = _better(mean_by_kind(PAPER_ROWS, PAPER.name))
+        return (
+            f"The paper found lognormal movements reproduced {there} than uniform ones (means of the SNR); "
+            f"here they are {', '.join(here)}."
+        )
+
+    @property
+    def arms(self) -> list[str]:
+        """Which arm moved, one line for each that did."""
+        arms: dict[str, list[str]] = {}
+        for table in self.columns:
+            arms.setdefault(table.provenance.arm, []).append(table.label)
+        return [f"{', '.join(labels)}: {arm}" for arm, labels in arms.items()]
+
+    def changes_of(self, table: Table) -> list[Table]:
+        """A column and the same controller with other numbers; nothing when there is none."""
+        changed = [other for other in self.changed if other.base == table.base]
+        return [table, *changed] if changed else []
+
+    def to_rich(self) -> RichTable:
+        """Return the table for the terminal."""
+        title = "\n".join(["Side by side: SNR of the TCP speed, Eq. 10, in dB", *self.arms])
+        caption = "\n".join([SHARED, self.finding] if self.has_paper_rows else [])
+        return to_rich(*self.shown(), bold="is_mean", section="kind", title=title, caption=caption)
+
+
+def side_by_side(tables: Sequence[Table]) -> SideBySide:
+    """Put experiments beside each other; RecordingError if there is none."""
+    if not tables:
+        raise RecordingError("there is no experiment to show; give at least one folder")
+    unchanged = {table.base for table in tables if table.provenance.controller == table.base[1]}
+    changed = [t for t in tables if t.provenance.controller != t.base[1] and t.base in unchanged]
+    return SideBySide(tuple(t for t in tables if t not in changed), tuple(changed))
+
+
+def _better(means: Mapping[str, float]) -> str:
+    """By how much lognormal movements came out better than uniform ones; empty where a kind is missing."""
+    if not means.keys() >= set(KINDS):
+        return ""
+    lead = means["lognormal"] - means["uniform"]
+    return f"{abs(lead):.1f} dB {'better' if lead > 0.0 else 'worse'}"

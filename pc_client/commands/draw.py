@@ -134,15 +134,13 @@ def _make(
     settings: options.RunSettings,
 ) -> list[Drawing]:
     """Extract the strokes of recordings and make them ready for the arm that answers."""
-    from rich.progress import TimeElapsedColumn
-
     from pc_client.studies.drawing.drawing import make_drawing
     from pc_client.studies.extraction.extract import extract
 
     model = reach(robot, settings.ports, settings.cell).model
     placement = replace(placement, box=model.description.working_box)
     drawings = []
-    with progress_bar("{task.description}", TimeElapsedColumn()) as bar:
+    with progress_bar() as bar:
         task = bar.add_task("", total=2 * len(recordings))
         for recording, name in zip(recordings, _names(recordings), strict=True):
             bar.update(task, description=f"{name}: strokes")

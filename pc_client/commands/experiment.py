@@ -114,9 +114,7 @@ def execute(
 @contextmanager
 def _shown(n_runs: int) -> Iterator[None]:
     """Show the log of an experiment: steps beside a bar, which begins after the question, the rest above."""
-    from rich.progress import TimeElapsedColumn
-
-    bar = progress_bar("{task.description}", TimeElapsedColumn(), live=False)
+    bar = progress_bar(live=False)
     task = bar.add_task("", total=n_runs)
 
     def show(record: logging.LogRecord) -> bool:

@@ -110,8 +110,6 @@ def _run(
     workers: int | None,
     dask: str | None,
 ) -> list[ExtractionOutcome]:
-    from rich.progress import TimeRemainingColumn
-
     from pc_client.studies.executors import open_executor, usable_cores
     from pc_client.studies.extraction.batch import extract_many
 
@@ -120,7 +118,7 @@ def _run(
     if dask is None:
         # One process more than there are recordings would only cost its start.
         workers = min(workers or usable_cores(), len(sources))
-    with progress_bar("extracting", TimeRemainingColumn()) as bar, open_executor(workers, dask) as executor:
+    with progress_bar(remaining=True) as bar, open_executor(workers, dask) as executor:
         task = bar.add_task("extracting", total=len(sources))
         return extract_many(
             sources, executor, limits, time_unit, n_pictures, lambda outcome: bar.advance(task)

@@ -20,7 +20,7 @@ from protocol.ur_types import Ports
 from ur_hil.cell import Cell
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, ProgressColumn
+    from rich.progress import Progress
 
     from pc_client.analysis.report import Report
     from pc_client.arm import Arm
@@ -35,28 +35,6 @@ PortBaseOption = Annotated[
 ]
 OutOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Folder for recordings, tables and report.")
-]
-_ControllerOption = Annotated[
-    str,
-    typer.Option(
-        "--controller",
-        metavar="NAME|FILE.toml",
-        help="paper (as published), preview (ahead by the loop delay) or best (makes up for the drives' lag "
-        "and the gears' waves, and uses ILC between runs of a movement), or a file with numbers.",
-        show_default=True,
-    ),
-]
-_GainPOption = Annotated[
-    float | None, typer.Option("--gain-p", metavar="X", help="Proportional gain, 1/s, instead of its own.")
-]
-_GainIOption = Annotated[
-    float | None, typer.Option("--gain-i", metavar="X", help="Integral gain, 1/s2, instead of its own.")
-]
-_AccelerationOption = Annotated[
-    float | None,
-    typer.Option(
-        "--acceleration", metavar="X", help="The a of the robot's speedj, rad/s2, instead of its own."
-    ),
 ]
 RepeatOption = Annotated[int, typer.Option("--repeat", min=1, max=99, help="Runs of each movement.")]
 SetOption = Annotated[
@@ -94,22 +72,6 @@ ToolOption = Annotated[
         help="Gripper on the flange, such as robotiq-2f85: its TCP, payload and shape; without: the flange.",
     ),
 ]
-_ReversePortOption = Annotated[
-    int | None,
-    typer.Option(
-        "--reverse-port",
-        metavar="N",
-        min=0,
-        max=65535,
-        help="TCP port of this computer that the robot's program calls; 0: any free one.  [default: 31000]",
-    ),
-]
-_OverwriteOption = Annotated[
-    bool, typer.Option("--overwrite", help="Replace simulated recordings of the same names.")
-]
-_DryRunOption = Annotated[
-    bool, typer.Option("--dry-run", help="Connect, check, plan and show what would happen; nothing moves.")
-]
 YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before a real arm moves.")]
 
 
@@ -118,15 +80,17 @@ def say(text: str) -> None:
     console.print(printable(text), markup=False, soft_wrap=True)
 
 
-def progress_bar(text: str, time: ProgressColumn, *, live: bool = True) -> Progress:
-    """A bar with a text, a count and a time, which is gone when all is done.
+def progress_bar(*, remaining: bool = False, live: bool = True) -> Progress:
+    """A bar with the task, a count and the time so far, or remaining, which is gone when all is done.
 
     One that is not live is drawn when it is refreshed: no thread takes the interpreter from a control loop.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich import progress
 
-    columns = (TextColumn(text), BarColumn(), MofNCompleteColumn(), time)
-    return Progress(*columns, console=console, transient=True, auto_refresh=live)
+    time = progress.TimeRemainingColumn() if remaining else progress.TimeElapsedColumn()
+    text = progress.TextColumn("{task.description}")
+    columns = (text, progress.BarColumn(), progress.MofNCompleteColumn(), time)
+    return progress.Progress(*columns, console=console, transient=True, auto_refresh=live)
 
 
 def show_report(folder: Path, *, include_aborted: bool = False) -> Report:
@@ -177,17 +141,51 @@ class RunSettings:
 
 
 def _read_settings(
-    controller: _ControllerOption = DEFAULT,
-    gain_p: _GainPOption = None,
-    gain_i: _GainIOption = None,
-    acceleration: _AccelerationOption = None,
+    controller: Annotated[
+        str,
+        typer.Option(
+            "--controller",
+            metavar="NAME|FILE.toml",
+            help="paper (as published), preview (ahead by the loop delay) or best (makes up for the drives' "
+            "lag and the gears' waves, and uses ILC between runs of a movement), or a file with numbers.",
+            show_default=True,
+        ),
+    ] = DEFAULT,
+    gain_p: Annotated[
+        float | None,
+        typer.Option("--gain-p", metavar="X", help="Proportional gain, 1/s, instead of its own."),
+    ] = None,
+    gain_i: Annotated[
+        float | None, typer.Option("--gain-i", metavar="X", help="Integral gain, 1/s2, instead of its own.")
+    ] = None,
+    acceleration: Annotated[
+        float | None,
+        typer.Option(
+            "--acceleration", metavar="X", help="The a of the robot's speedj, rad/s2, instead of its own."
+        ),
+    ] = None,
     cell: CellOption = None,
     tool: ToolOption = None,
     port_base: PortBaseOption = 0,
-    reverse_port: _ReversePortOption = None,
-    overwrite: _OverwriteOption = False,
+    reverse_port: Annotated[
+        int | None,
+        typer.Option(
+            "--reverse-port",
+            metavar="N",
+            min=0,
+            max=65535,
+            help="TCP port of this computer that the robot's program calls; 0: any free one.  "
+            "[default: 31000]",
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace simulated recordings of the same names.")
+    ] = False,
     yes: YesOption = False,
-    dry_run: _DryRunOption = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="Connect, check, plan and show what would happen; nothing moves."),
+    ] = False,
 ) -> RunSettings:
     """Make the record from what was given on the command line."""
     given = {"gain_p": gain_p, "gain_i": gain_i, "speedj_acceleration": acceleration}

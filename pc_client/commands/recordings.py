@@ -37,8 +37,7 @@ def report(
         if show_report(folders[0], include_aborted=include_aborted).left_out:
             raise typer.Exit(ExitCode.FAILED)
         return
-    from pc_client.analysis.report import build_report
-    from pc_client.analysis.side_by_side import build_side_by_side
+    from pc_client.analysis.report import build_report, build_side_by_side
 
     page = out or Path("report.html")
     reports, left_out = [], []

@@ -97,11 +97,9 @@ def _work(outcomes: Iterator[Outcome], n_cases: int, n_settled: int, *, live: bo
         live: True: the clock ticks. False: redrawn when a case is done; the thread that lets it tick would
             take the interpreter from a control loop in this process.
     """
-    from rich.progress import TimeElapsedColumn
-
     counts: Counter[str] = Counter()
     n_runs = 0
-    bar = options.progress_bar("{task.description}", TimeElapsedColumn(), live=live)
+    bar = options.progress_bar(live=live)
     task = bar.add_task("running", total=n_cases, completed=n_settled)
     try:
         with bar:

@@ -159,7 +159,11 @@ def learn(
     spectrum = np.fft.rfft(run.added, n_padded, axis=0)
     spectrum += inverse[:, None] * np.fft.rfft(slope, n_padded, axis=0)
     learned = np.fft.irfft(used[:, None] * spectrum, n_padded, axis=0)[:n]
-    return bounded(learned * _fade(n, quiet, period)[:, None], recipe.controller, period)
+    # 0 in the quiet stretches at both ends, 1 between them.
+    t = np.arange(n) * period
+    inside = np.minimum(t - quiet[0], t[::-1] - quiet[1])
+    fade = 0.5 * (1.0 - np.cos(pi * np.clip(inside / _FADE, 0.0, 1.0)))
+    return bounded(learned * fade[:, None], recipe.controller, period)
 
 
 def learnable_power(run: RunSignals, weight: LearningFilter, period: float) -> float:
@@ -180,11 +184,3 @@ def bounded(learned: Array, config: Controller, period: float) -> Array:
         last = np.clip(row, last - step, last + step)
         kept[k] = last
     return kept
-
-
-def _fade(n: int, quiet: tuple[float, float], period: float) -> Array:
-    """Weights (n,): 0 in the quiet stretches at both ends, 1 between them."""
-    since_first, until_last = np.arange(n) * period, np.arange(n)[::-1] * period
-    inside = np.minimum(since_first - quiet[0], until_last - quiet[1])
-    fade: Array = 0.5 * (1.0 - np.cos(pi * np.clip(inside / _FADE, 0.0, 1.0)))
-    return fade

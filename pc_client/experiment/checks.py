@@ -48,7 +48,7 @@ def posture_complaint(bodies: ClearanceModel, limits: PlanLimits, q: Array) -> s
             f"{JOINT_NAMES[joint]} comes to {math.degrees(q[k, joint]):.0f} deg, at least "
             f"{math.degrees(margin):.1f} deg from the end of its range is asked"
         )
-    for distances, least in zip(bodies.along(q), limits.clearances_min, strict=True):
+    for distances, least in zip(bodies.along(q), limits.clearance_min, strict=True):
         k = int(distances.least.argmin())
         if not (distance := float(distances.least[k])) >= least:
             return distances.nearest[k].says(distance, least)

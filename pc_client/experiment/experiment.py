@@ -5,7 +5,7 @@ All that can be refused is refused here, before the arm moves: plans for another
 
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +15,8 @@ import numpy as np
 from pc_client.errors import ClientError, RecordingError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import RobotModel
-from pc_client.planning.checks import PlanReport
 from pc_client.planning.plan import Plan
 from pc_client.recording.recording import load_recording
-from protocol.ur_types import JOINT_NAMES
 from ur_hil.cell import Cell
 
 _SHORTEST_HEAD = 1024
@@ -172,6 +170,8 @@ def experiment_text(experiment: Experiment) -> str:
     tightest = max(reports, key=lambda name: reports[name].joint_speed.share)
     nearest = min(reports, key=lambda name: reports[name].joint_range.value)
     joint_speed, joint_range = reports[tightest].joint_speed, reports[nearest].joint_range
+    clearances = zip(*(report.clearance for report in reports.values()), strict=True)
+    least = [min(same_kind, key=lambda one: one.extreme.value) for same_kind in clearances]
     moving = experiment.repeat * sum(report.duration for report in reports.values())
     axes = "  ".join(f"{axis} {a:.3f}..{b:.3f}" for axis, a, b in zip("xyz", low, high, strict=True))
     return "\n".join(
@@ -181,28 +181,16 @@ def experiment_text(experiment: Experiment) -> str:
             f"  box of motion   {axes} m, robot base frame",
             f"  duration        {moving:.0f} s of movement, plus a slow approach before each",
             f"  top TCP speed   {reports[fastest].tcp_speed.value:.3f} m/s ({fastest})",
-            f"  top joint speed {np.degrees(joint_speed.value):.0f} deg/s, {_joint(joint_speed.joint)} "
+            f"  top joint speed {np.degrees(joint_speed.value):.0f} deg/s, {joint_speed.joint_name} "
             f"({tightest}), {joint_speed.share:.0%} of what is allowed",
-            f"  joint range     nearest to its end: {_joint(joint_range.joint)} ({nearest}), "
+            f"  joint range     nearest to its end: {joint_range.joint_name} ({nearest}), "
             f"{np.degrees(joint_range.value):.0f} deg away",
             f"  cell            {experiment.model.cell.summary}",
-            *_clearances(reports.values()),
+            *(f"  nearest         {clearance.text}" for clearance in least if clearance.text),
             "  before the first movement all joints turn to and fro by 1 degree to find the loop's delay",
         )
     )
 
 
-def _clearances(reports: Iterable[PlanReport]) -> Iterator[str]:
-    """Yield what comes nearest in all movements: to the floor, to itself, to the cell."""
-    for same_kind in zip(*(report.clearances for report in reports), strict=True):
-        least = min(same_kind, key=lambda clearance: clearance.extreme.value)
-        if least.text:
-            yield f"  nearest         {least.text}"
-
-
 def _count(n: int, what: str) -> str:
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
-
-
-def _joint(index: int | None) -> str:
-    return "" if index is None else JOINT_NAMES[index]

@@ -116,7 +116,12 @@ def identify(driver: UrDriver, config: Controller, model: RobotModel) -> Identif
     t, q, qd_cmd = log.columns("timestamp", "actual_q")
     try:
         loop = (identify_loop if _needs_lag(config) else estimate_delay)(t, qd_cmd, q, period)
-        _check_return(driver.actual_q() - q_start)
+        most = float(np.abs(driver.actual_q() - q_start).max())
+        if not most <= _RETURN_TOLERANCE:
+            raise DriverError(
+                f"the excitation left a joint {most:.4f} rad from where it began, "
+                f"allowed is {_RETURN_TOLERANCE} rad"
+            )
     except DriverError as error:
         if late := report.late_frames + report.lost_frames:
             error.add_note(f"{late} of {len(t)} commands came late: is the computer or network too busy?")
@@ -154,16 +159,6 @@ def _excitation(q_start: Array, config: Controller) -> Excitation:
 
 def _needs_lag(config: Controller) -> bool:
     return config.compensates_lag or config.compensates_gear or config.uses_ilc
-
-
-def _check_return(drift: Array) -> None:
-    """Refuse an excitation that left a joint away from where it began, (6,) [rad]."""
-    most = float(np.abs(drift).max())
-    if not most <= _RETURN_TOLERANCE:
-        raise DriverError(
-            f"the excitation left a joint {most:.4f} rad from where it began, "
-            f"allowed is {_RETURN_TOLERANCE} rad"
-        )
 
 
 def learning_filter(recipe: RunRecipe) -> LearningFilter | None:

@@ -114,7 +114,12 @@ class LawStream:
         if qd is None:
             return LawStep(_REST, True)
         self._last = six_velocities(qd)
-        self._check_way(frame, np.array(self._last))
+        # From the faster of the two velocities, that of now and the new one, the arm must be able to stop.
+        measured = frame.actual_qd
+        fastest = np.where(np.abs(measured) > np.abs(self._last), measured, self._last)
+        way = way_to_rest(self._model, frame.actual_q, fastest)
+        if complaint := posture_complaint(self._clearance, self._limits, way):
+            raise DriverError(f"the velocity law leads out of the limits: {complaint}: the arm was stopped")
         return LawStep(self._last, False)
 
     def observe(self, stamp: float) -> LawStep:
@@ -124,11 +129,3 @@ class LawStream:
     def check_report(self, q: Sequence[float], pose: Sequence[float]) -> None:
         """See `kinematics.model.check_flange`."""
         check_flange(self._model, q, pose)
-
-    def _check_way(self, frame: RealtimeFrame, qd: Array) -> None:
-        """Refuse velocities (6,) [rad/s] from which the arm, as it moves now, cannot stop in its limits."""
-        measured = frame.actual_qd
-        fastest = np.where(np.abs(measured) > np.abs(qd), measured, qd)
-        way = way_to_rest(self._model, frame.actual_q, fastest)
-        if complaint := posture_complaint(self._clearance, self._limits, way):
-            raise DriverError(f"the velocity law leads out of the limits: {complaint}: the arm was stopped")

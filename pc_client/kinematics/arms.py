@@ -25,8 +25,8 @@ from numpy.typing import ArrayLike
 
 from pc_client.arrays import Array
 from pc_client.errors import MovementError, PlanningError
+from ur_hil.cell import Three
 
-Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
 
@@ -51,8 +51,8 @@ class JointLimits:
 class Box:
     """An axis-parallel box by its lowest and highest corner, m, in the robot's base frame."""
 
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
+    low: Three
+    high: Three
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(b - a) and a < b for a, b in zip(self.low, self.high, strict=True)):
@@ -193,11 +193,6 @@ _STOPPABLE_SPEED = 180.0
 rest within 0.3 s of the client's last command (the figures are those of `driver.receiver`)."""
 
 
-def _speeds(*rated: float) -> Six:
-    """The rated joint speeds of an arm [deg/s] as what the client asks for [rad/s]."""
-    return _six_degrees(*(min(speed, _STOPPABLE_SPEED) for speed in rated))
-
-
 def _six_degrees(*angles: float) -> Six:
     """Turn six angles [deg] into [rad]."""
     a, b, c, d, e, f = (radians(angle) for angle in angles)
@@ -230,13 +225,14 @@ def _arm(
         position_tolerance: of the reported flange.
         box: working box: x from, x to, y to both sides, z from, z to.
     """
+    qd_max = _six_degrees(*(min(speed, _STOPPABLE_SPEED) for speed in speeds))
     shoulder, elbow = accelerations
     qdd_max = (shoulder, shoulder, elbow, _WRISTS, _WRISTS, _WRISTS)
     near, far, aside, bottom, top = box
     return RobotDescription(
         name,
         lengths or f"ur_description/urdf/{name}_robot.urdf",
-        JointLimits((-2 * pi,) * 6, (2 * pi,) * 6, _speeds(*speeds), qdd_max),
+        JointLimits((-2 * pi,) * 6, (2 * pi,) * 6, qd_max, qdd_max),
         reach,
         position_tolerance,
         Box((near, -aside, bottom), (far, aside, top)),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, pi
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -71,18 +71,21 @@ class Distances(NamedTuple):
     nearest: tuple[Nearest, ...]
 
 
-class Clearance(NamedTuple):
-    """What was measured along a joint path.
+_T = TypeVar("_T")
+
+
+class Clearance(NamedTuple, Generic[_T]):
+    """What is measured, or kept, of each kind of distance.
 
     Attributes:
-        floor: forearm, wrists and tool above the floor.
-        own: links that are not neighbours, and the tool, from each other.
-        cell: moving links and tool from walls and solids of the cell.
+        floor: of forearm, wrists and tool from the floor.
+        own: of links that are not neighbours, and of the tool, from each other.
+        cell: of moving links and tool from walls and solids of the cell.
     """
 
-    floor: Distances
-    own: Distances
-    cell: Distances
+    floor: _T
+    own: _T
+    cell: _T
 
 
 class _Pairs(NamedTuple):
@@ -102,7 +105,7 @@ class ClearanceModel:
     _own: _Pairs = field(repr=False)
     _cell: _Pairs = field(repr=False)
 
-    def along(self, q: ArrayLike) -> Clearance:
+    def along(self, q: ArrayLike) -> Clearance[Distances]:
         """Measure the clearance at each posture of a joint path (n, 6) [rad]."""
         path = np.atleast_2d(np.asarray(q, dtype=np.float64))
         return Clearance(*(self._distances(pairs, path) for pairs in (self._floor, self._own, self._cell)))
@@ -247,51 +250,41 @@ def housings(arm: DhArm) -> dict[str, tuple[Array, ...]]:
     upper, half = arm.shoulder_offset / 2, arm.elbow_step / 2
     end, side, cap = arm.wrist_step / 2, arm.d5 / 2, _CAP * wrist
     return {
-        "base_link": (_about_z(0.0, 0.0, arm.foot), _about_z(0.0, arm.d1 - upper, shoulder)),
+        "base_link": (*_about_z(arm.foot, (0.0, 0.0)), *_about_z(shoulder, (0.0, arm.d1 - upper))),
         "shoulder_link": (
-            _about_z(0.0, -upper, shoulder),
-            _about_z(0.0, upper, shoulder),
-            _about_y(0.0, 0.0, shoulder),
-            _about_y(upper, 0.0, shoulder),
+            *_about_z(shoulder, (0.0, -upper), (0.0, upper)),
+            *_about_y(shoulder, (0.0, 0.0), (upper, 0.0)),
         ),
         "upper_arm_link": (
-            _about_y(-upper, 0.0, shoulder),
-            _about_y(upper, 0.0, shoulder),
-            _about_y(-half, -arm.a2, elbow),
-            _about_y(half, -arm.a2, elbow),
+            *_about_y(shoulder, (-upper, 0.0), (upper, 0.0)),
+            *_about_y(elbow, (-half, -arm.a2), (half, -arm.a2)),
         ),
         "forearm_link": (
-            _about_y(-half, 0.0, elbow),
-            _about_y(half, 0.0, elbow),
-            _about_y(-end, -arm.a3, wrist),
-            _about_y(end, -arm.a3, wrist),
+            *_about_y(elbow, (-half, 0.0), (half, 0.0)),
+            *_about_y(wrist, (-end, -arm.a3), (end, -arm.a3)),
         ),
         "wrist_1_link": (
-            _about_y(end, 0.0, wrist),
-            _about_y(arm.wrist_step + wrist, 0.0, wrist),
-            _about_z(arm.wrist_step, -cap, wrist),
-            _about_z(arm.wrist_step, side, wrist),
+            *_about_y(wrist, (end, 0.0), (arm.wrist_step + wrist, 0.0)),
+            *_about_z(wrist, (arm.wrist_step, -cap), (arm.wrist_step, side)),
         ),
         "wrist_2_link": (
-            _about_z(0.0, side, wrist),
-            _about_z(0.0, arm.d5 + wrist, wrist),
-            _about_y(-cap, arm.d5, wrist),
-            _about_y(side, arm.d5, wrist),
+            *_about_z(wrist, (0.0, side), (0.0, arm.d5 + wrist)),
+            *_about_y(wrist, (-cap, arm.d5), (side, arm.d5)),
         ),
-        "wrist_3_link": (_about_y(side, 0.0, wrist), _about_y(arm.d6, 0.0, wrist)),
+        "wrist_3_link": tuple(_about_y(wrist, (side, 0.0), (arm.d6, 0.0))),
     }
 
 
-def _about_y(y: float, z: float, radius: float) -> Array:
-    """Polygon (n, 3) around a circle about an axis along y."""
+def _about_y(radius: float, *places: tuple[float, float]) -> list[Array]:
+    """Polygons (n, 3) around circles about axes along y, centred at y, z."""
     c, s = _polygon(radius)
-    return np.column_stack((c, np.full_like(c, y), s + z))
+    return [np.column_stack((c, np.full_like(c, y), s + z)) for y, z in places]
 
 
-def _about_z(y: float, z: float, radius: float) -> Array:
-    """Polygon (n, 3) around a circle about an axis along z."""
+def _about_z(radius: float, *places: tuple[float, float]) -> list[Array]:
+    """Polygons (n, 3) around circles about axes along z, centred at y, z."""
     c, s = _polygon(radius)
-    return np.column_stack((c, s + y, np.full_like(c, z)))
+    return [np.column_stack((c, s + y, np.full_like(c, z))) for y, z in places]
 
 
 def _polygon(radius: float) -> tuple[Array, Array]:

@@ -253,23 +253,20 @@ def solve_ik(model: RobotModel, T_base_tcp: ArrayLike, q_seed: ArrayLike) -> IkS
 
 def solve_ik_se3(model: RobotModel, T_base_goal: Any, q_seed: Array) -> IkSolution:
     """Do as `solve_ik` for a goal that is already a pin.SE3: the inner call of path following."""
-    q = q_seed
+    q, damping, iterations = q_seed, 0.0, 0
     error = _pose_error(model, T_base_goal, q)
-    damping = 0.0
-    for iteration in range(_MAX_ITERATIONS):
-        if _is_small(error):
-            return _solution(q, error, iteration, converged=True)
-        step = _step(model, q, error, damping)
-        q_new = q + step
+    # With the most damping no direction improves any more: out of reach.
+    while not _is_small(error) and iterations < _MAX_ITERATIONS and damping <= _MOST_DAMPING:
+        iterations += 1
+        q_new = q + _step(model, q, error, damping)
         error_new = _pose_error(model, T_base_goal, q_new)
         if error_new @ error_new < error @ error:
             q, error = q_new, error_new
             damping = damping * _DAMPING_DOWN if damping > _LEAST_DAMPING else 0.0
         else:
             damping = max(damping * _DAMPING_UP, _FIRST_DAMPING)
-            if damping > _MOST_DAMPING:
-                break  # no direction improves any more: out of reach
-    return _solution(q, error, _MAX_ITERATIONS, converged=_is_small(error))
+    position_error, rotation_error = float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+    return IkSolution(q, position_error, rotation_error, iterations, _is_small(error))
 
 
 def nearest_posture(model: RobotModel, T_base_tcp: ArrayLike, q_near: ArrayLike) -> Array:
@@ -359,13 +356,6 @@ def _is_small(error: Array) -> bool:
     x, y, z, rx, ry, rz = error.tolist()
     off_position, off_rotation = x * x + y * y + z * z, rx * rx + ry * ry + rz * rz
     return bool(off_position <= _IK_POSITION_TOLERANCE**2 and off_rotation <= _IK_ROTATION_TOLERANCE**2)
-
-
-def _solution(q: Array, error: Array, iterations: int, *, converged: bool) -> IkSolution:
-    """Put the end of an iteration into a record."""
-    return IkSolution(
-        q, float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), iterations, converged
-    )
 
 
 ROTATION_TOLERANCE = 0.02

@@ -11,8 +11,10 @@ same seed gives the same bytes.
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -107,48 +109,34 @@ def _retimed_arcs(movement: Movement, seed: int, name: str, rule: DurationRule) 
     return retimed_twin(arcs_twin(movement, seed, movement.name), name, rule)
 
 
+def _fixed(twin: Callable[..., Movement], **options: Any) -> Callable[[Movement, int, str], Movement]:
+    """What leaves nothing to a seed."""
+    return lambda human, _, name: twin(human, name, **options)
+
+
 #: Every generator by the name that `ur-client movements generate --kind` takes, human-like ones first.
 GENERATORS: Mapping[str, Generator] = MappingProxyType(
     {
         "lognormal": Generator(
-            lambda human, _, name: human.renamed(name), "the paper's recipe: straight lognormal strokes", True
+            _fixed(Movement.renamed), "the paper's recipe: straight lognormal strokes", True
         ),
         "arcs": Generator(arcs_twin, "arcs that overlap, lognormal strokes"),
-        "isochronous": Generator(
-            lambda human, seed, name: _retimed_arcs(human, seed, name, Isochrony()),
-            "the arcs with one mu and sigma",
-        ),
-        "fitts": Generator(
-            lambda human, seed, name: _retimed_arcs(human, seed, name, Fitts()),
-            "the arcs timed by Fitts' law",
-        ),
+        "isochronous": Generator(partial(_retimed_arcs, rule=Isochrony()), "the arcs with one mu and sigma"),
+        "fitts": Generator(partial(_retimed_arcs, rule=Fitts()), "the arcs timed by Fitts' law"),
         "duplicate": Generator(_duplicate, "lognormal, varied as between repetitions", same_targets=False),
         "minimum_jerk": Generator(
-            lambda human, _, name: _minimum_jerk_twin(human, name),
-            "minimum jerk, at rest at every target point",
-            True,
+            _fixed(_minimum_jerk_twin), "minimum jerk, at rest at every target point", True
         ),
         "minimum_jerk_via": Generator(
-            lambda human, _, name: _minimum_jerk_twin(human, name, "via"),
-            "minimum jerk through the target points",
-            True,
+            _fixed(_minimum_jerk_twin, passing="via"), "minimum jerk through the target points", True
         ),
-        "power_law": Generator(
-            lambda human, _, name: _power_law_twin(human, name), "two-thirds power law on a smooth path"
-        ),
+        "power_law": Generator(_fixed(_power_law_twin), "two-thirds power law on a smooth path"),
         "power_law_3d": Generator(
-            lambda human, _, name: _power_law_twin(human, name, torsion=True),
-            "power law with the factor of torsion",
+            _fixed(_power_law_twin, torsion=True), "power law with the factor of torsion"
         ),
-        "uniform": Generator(
-            lambda human, _, name: uniform_twin(human, name),
-            "trapezoids, at rest at every target point",
-            True,
-        ),
+        "uniform": Generator(_fixed(uniform_twin), "trapezoids, at rest at every target point", True),
         "uniform_blend": Generator(
-            lambda human, _, name: uniform_twin(human, name, "blend"),
-            "levels of speed, corners blended by 30 mm",
-            True,
+            _fixed(uniform_twin, corners="blend"), "levels of speed, corners blended by 30 mm", True
         ),
     }
 )
@@ -183,9 +171,7 @@ def generate_movement(
             f'corners "{corners}" with kind "{kind}": only kind uniform has a choice of corners'
         )
     human = recipe_movement(n_targets, seed, f"lognorm_{n_targets}_seed{seed}")
-    if kind == "lognormal":
-        return human.renamed(name or human.name)
-    name = name or f"{kind}_{n_targets}_seed{seed}"
+    name = name or (human.name if kind == "lognormal" else f"{kind}_{n_targets}_seed{seed}")
     if kind == "uniform":
         return uniform_twin(human, name, corners)
     return GENERATORS[kind].make(human, seed, name)

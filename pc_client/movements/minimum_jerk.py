@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_interp_spline
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError
 from pc_client.movements.trajectory import Motion, Similarity
 
@@ -79,16 +79,14 @@ class MinimumJerk:
             raise MovementError(f'passing "{self.passing}": give "stop" or "via"')
         times = np.concatenate(([0.0], np.cumsum(durations)))
         times[-1] = math.fsum(durations)
-        object.__setattr__(self, "target_points", targets)
-        object.__setattr__(self, "stroke_durations", durations)
-        object.__setattr__(self, "_times", read_only(times))
         # The Euler-Poisson equation of the jerk says: sixth derivative zero between the points; free velocity
         # and acceleration at a point to pass make everything up to the fourth derivative continuous there. At
         # rest at both ends.
         rest = [(1, np.zeros(3)), (2, np.zeros(3))]
         is_via = self.passing == "via"
         spline = make_interp_spline(times, targets, k=5, bc_type=(rest, rest)) if is_via else None
-        object.__setattr__(self, "_spline", spline)
+        set_fields(self, target_points=targets, stroke_durations=durations)
+        set_fields(self, _times=read_only(times), _spline=spline)
 
     @property
     def duration(self) -> float:

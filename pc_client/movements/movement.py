@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError, UnknownMovementError
 from pc_client.files import FILE_KINDS
 from pc_client.movements import samples
@@ -80,8 +80,7 @@ class Movement:
                 f"movement {self.name}: stroke durations add up to {math.fsum(durations):.6f} s, "
                 f"but it lasts {self.duration:.6f} s; they must be equal"
             )
-        object.__setattr__(self, "stroke_durations", durations)
-        object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+        set_fields(self, stroke_durations=durations, provenance=MappingProxyType(dict(self.provenance)))
 
     @classmethod
     def through(

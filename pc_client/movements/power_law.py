@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 from scipy.optimize import brentq
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError
 from pc_client.movements.trajectory import Motion, Similarity
 from pc_client.movements.uniform import SmoothedSquareWave, check_ramps
@@ -83,9 +83,8 @@ class SmoothPath:
             raise MovementError("path with target points that coincide: consecutive ones must be apart")
         knots = np.concatenate(([0.0], np.cumsum(np.sqrt(lengths))))
         knots /= knots[-1]
-        object.__setattr__(self, "target_points", targets)
-        object.__setattr__(self, "knots", read_only(knots))
-        object.__setattr__(self, "_curve", _curve_through(knots, targets))
+        curve = _curve_through(knots, targets)
+        set_fields(self, target_points=targets, knots=read_only(knots), _curve=curve)
         stretch = np.linalg.norm(self.derivative(np.linspace(0.0, 1.0, 1001), 1), axis=1)
         if stretch.min() < _CUSP * stretch.mean():
             raise MovementError(
@@ -171,15 +170,14 @@ class PowerLaw:
         legs = len(path.knots) - 1
         u = np.interp(np.linspace(0.0, legs, legs * _INTERVALS + 1), np.arange(legs + 1), path.knots)
         w = self._table(path, u)
-        object.__setattr__(self, "target_points", path.target_points)
-        object.__setattr__(self, "path", path)
         slopes = 1.0 / self._cost(path, u[[0, -1]])
-        object.__setattr__(self, "_parameter", CubicSpline(w, u, bc_type=((1, slopes[0]), (1, slopes[1]))))
-        object.__setattr__(self, "_targets_at", read_only(w[::_INTERVALS]))
+        parameter = CubicSpline(w, u, bc_type=((1, slopes[0]), (1, slopes[1])))
         half = 0.5 * sum(self.ramps)
         window = np.array([[half, self.duration - half]])
         level = np.array([w[-1] / (self.duration - 2.0 * half)])
-        object.__setattr__(self, "_wave", SmoothedSquareWave(window, level, self.ramps))
+        wave = SmoothedSquareWave(window, level, self.ramps)
+        set_fields(self, target_points=path.target_points, path=path, _parameter=parameter, _wave=wave)
+        set_fields(self, _targets_at=read_only(w[::_INTERVALS]))
 
     @property
     def passages(self) -> Array:

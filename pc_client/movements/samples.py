@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError
 from pc_client.movements.trajectory import Motion, Similarity, check_duration, check_name
 
@@ -62,8 +62,6 @@ class SampledTrajectory:
 
     def __post_init__(self) -> None:
         t, points = _checked(self.t, self.points, 3, "points of x, y, z in m")
-        object.__setattr__(self, "t", t)
-        object.__setattr__(self, "points", points)
         turns = self.orientations
         if turns is not None and (turns.single or len(turns) != len(t)):
             raise MovementError(f"orientations for {len(t)} samples: give one for each")
@@ -83,8 +81,7 @@ class SampledTrajectory:
                 f"samples up to {np.abs(points).max():g} away with times from {np.diff(t).min():g} s apart: "
                 "the speed between them is no number; give metres and seconds"
             )
-        object.__setattr__(self, "_spline", spline)
-        object.__setattr__(self, "_rotations", rotations)
+        set_fields(self, t=t, points=points, _spline=spline, _rotations=rotations)
 
     @property
     def duration(self) -> float:
@@ -145,8 +142,7 @@ class JointTrajectory:
             t, q = _checked(self.t, self.q, 6, "rows of six angles in rad")
         except MovementError as error:
             raise MovementError(f"{self.name}: {error}") from None
-        object.__setattr__(self, "t", t)
-        object.__setattr__(self, "q", q)
+        set_fields(self, t=t, q=q)
         check_duration(self.duration, self.name)
 
     @property

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, Timing, evaluate_lognormals
 from pc_client.movements.trajectory import Motion, Similarity
@@ -141,11 +141,9 @@ class SigmaLognormal:
         for a, b, stroke in legs:
             timing = stroke.timing.lognormal
             columns.append([timing.t0, timing.mu, timing.sigma, stroke.length(a, b), stroke.arc_angle])
-        object.__setattr__(self, "target_points", targets)
-        object.__setattr__(self, "strokes", tuple(self.strokes))
-        object.__setattr__(self, "_columns", read_only(np.transpose(columns)))
-        object.__setattr__(self, "_chords", read_only([c for c, _ in frames]))
-        object.__setattr__(self, "_normals", read_only([m for _, m in frames]))
+        chords, normals = (read_only(vectors) for vectors in zip(*frames, strict=True))
+        set_fields(self, target_points=targets, strokes=tuple(self.strokes), _chords=chords, _normals=normals)
+        set_fields(self, _columns=read_only(np.transpose(columns)))
 
     @property
     def lengths(self) -> Array:

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError
 from pc_client.files import ALLOWED, MOST_BYTES, is_file_name
 
@@ -65,8 +65,7 @@ class Similarity:
     shift: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "R", read_only(self.R, (3, 3)))
-        object.__setattr__(self, "shift", read_only(self.shift, (3,)))
+        set_fields(self, R=read_only(self.R, (3, 3)), shift=read_only(self.shift, (3,)))
         if not (math.isfinite(self.scale) and self.scale > 0.0):
             raise MovementError(f"scale {self.scale}: a movement is scaled by a number greater than 0")
         if not np.allclose(self.R @ self.R.T, np.eye(3), atol=1e-9) or np.linalg.det(self.R) < 0.0:

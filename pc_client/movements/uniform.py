@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import fresnel
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import MovementError
 from pc_client.movements.trajectory import Motion, Similarity
 
@@ -116,10 +116,8 @@ class CornerPath:
             )
         pieces, targets_at = _build_pieces(targets, legs / lengths[:, None], lengths, self.blend)
         starts = np.concatenate(([0.0], np.cumsum([piece.length for piece in pieces])))
-        object.__setattr__(self, "target_points", targets)
-        object.__setattr__(self, "_pieces", pieces)
-        object.__setattr__(self, "_starts", read_only(starts))
-        object.__setattr__(self, "targets_at", read_only(targets_at))
+        set_fields(self, target_points=targets, targets_at=read_only(targets_at))
+        set_fields(self, _pieces=pieces, _starts=read_only(starts))
 
     @property
     def length(self) -> float:
@@ -219,8 +217,7 @@ class SmoothedSquareWave:
 
     def __post_init__(self) -> None:
         check_ramps(self.ramps)
-        object.__setattr__(self, "windows", read_only(self.windows, (-1, 2)))
-        object.__setattr__(self, "levels", read_only(self.levels, (-1,)))
+        set_fields(self, windows=read_only(self.windows, (-1, 2)), levels=read_only(self.levels, (-1,)))
 
     def evaluate(self, t: ArrayLike) -> PathMotion:
         """Length, speed and acceleration at the times t (n,), s."""
@@ -273,10 +270,8 @@ class Uniform:
                 f"stroke durations {durations.tolist()} s with ramps {list(self.ramps)} s: "
                 f"every stroke must last longer than all ramps together ({smoothing:g} s)"
             )
-        object.__setattr__(self, "target_points", path.target_points)
-        object.__setattr__(self, "stroke_durations", durations)
-        object.__setattr__(self, "path", path)
-        object.__setattr__(self, "wave", _square_wave(path, durations, self.ramps, self.corners))
+        wave = _square_wave(path, durations, self.ramps, self.corners)
+        set_fields(self, target_points=path.target_points, stroke_durations=durations, path=path, wave=wave)
 
     @property
     def duration(self) -> float:

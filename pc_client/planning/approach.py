@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from pc_client.arrays import Array
 from pc_client.errors import PlanningError
-from pc_client.kinematics.clearance import ClearanceModel, clearance_model
+from pc_client.kinematics.clearance import Clearance, ClearanceModel, clearance_model
 from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import PlanLimits
 from pc_client.planning.plan import JointPlan
@@ -99,9 +99,7 @@ class Approach:
         waypoints: a straight joint line to each, resting in between; the last is `plan.start_q` [rad].
         v: speed of the leading joint [rad/s].
         a: acceleration of the leading joint [rad/s²].
-        floor_clearance: least distance from the floor along the approach [m].
-        own_clearance: least distance of the arm and its tool from themselves along the approach [m].
-        cell_clearance: least distance from walls and solids of the cell along it [m]; infinite without any.
+        clearance: least distances along the approach [m]; infinite without anything around.
     """
 
     plan: JointPlan
@@ -109,9 +107,7 @@ class Approach:
     waypoints: tuple[Array, ...] = field(repr=False)
     v: float
     a: float
-    floor_clearance: float
-    own_clearance: float
-    cell_clearance: float
+    clearance: Clearance[float]
 
     @property
     def motion(self) -> JointLines:
@@ -147,7 +143,7 @@ def plan_approach(plan: JointPlan, q_now: ArrayLike, *, model: RobotModel) -> Ap
             if isinstance(clearance, PlanningError):
                 refusals.append(clearance)
                 continue
-            return Approach(start, q_from, waypoints, v, a, *clearance)
+            return Approach(start, q_from, waypoints, v, a, clearance)
     # The error of the direct route is the most useful one.
     raise refusals[0]
 
@@ -206,7 +202,7 @@ def _raised(q: Array) -> Array:
 
 def _check_route(
     name: str, hulls: ClearanceModel, limits: PlanLimits, postures: tuple[Array, ...]
-) -> tuple[float, float, float] | PlanningError:
+) -> Clearance[float] | PlanningError:
     """Return the least clearances on straight joint lines, or the first bad posture's error."""
     step = _CHECK_STEP / hulls.robot.reach
     lines = []
@@ -215,7 +211,7 @@ def _check_route(
         lines.append(begin + np.linspace(0.0, 1.0, n)[:, None] * (end - begin))
     q = np.concatenate(lines)
     clearance = hulls.along(q)
-    for distances, least in zip(clearance, limits.clearances_min, strict=True):
+    for distances, least in zip(clearance, limits.clearance_min, strict=True):
         bad = np.flatnonzero(distances.least < least)
         if bad.size:
             k = int(bad[0])
@@ -230,8 +226,7 @@ def _check_route(
                 " move the arm by hand to an open posture, elbow up",
                 joint=nearest.joint,
             )
-    floor, own, cell = (float(distances.least.min()) for distances in clearance)
-    return floor, own, cell
+    return Clearance(*(float(distances.least.min()) for distances in clearance))
 
 
 _ROUTES: tuple[Callable[[Array, Array], tuple[Array, ...]], ...] = (
@@ -254,9 +249,10 @@ def plan_text(plan: JointPlan) -> str:
 
 def approach_text(approach: Approach) -> str:
     """Return the approach to the start as a few lines."""
-    clear = f"{approach.floor_clearance * 1e3:.0f} mm clear of the floor"
-    if np.isfinite(approach.cell_clearance):
-        clear += f", {approach.cell_clearance * 1e3:.0f} mm of walls and solids of the cell"
+    floor, _, cell = approach.clearance
+    clear = f"{floor * 1e3:.0f} mm clear of the floor"
+    if np.isfinite(cell):
+        clear += f", {cell * 1e3:.0f} mm of walls and solids of the cell"
     title = (
         f"first, slowly (at most {np.degrees(approach.v):.0f} deg/s, about {approach.duration:.1f} s,"
         f" {clear}), joints {', '.join(JOINT_NAMES)}:"

@@ -11,7 +11,7 @@ import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.kinematics.arms import JointLimits
-from pc_client.kinematics.clearance import Distances, Nearest, clearance_model
+from pc_client.kinematics.clearance import Clearance, Distances, Nearest, clearance_model
 from pc_client.kinematics.model import RobotModel, tcp_positions
 from pc_client.planning.joint_path import JointPath
 from pc_client.planning.joint_spline import JointSpline
@@ -36,6 +36,11 @@ class Extreme(NamedTuple):
     joint: int | None
     limit: float
     share: float
+
+    @property
+    def joint_name(self) -> str:
+        """Of the joint; empty without one."""
+        return "" if self.joint is None else JOINT_NAMES[self.joint]
 
 
 class LeastClearance(NamedTuple):
@@ -80,9 +85,7 @@ class PlanReport:
         joint_acceleration: top joint acceleration relative to its limit [rad/s²].
         sigma_min: least smallest singular value of the Jacobian.
         condition_max: largest condition number.
-        floor_clearance: how near forearm, wrists and tool come to the floor.
-        own_clearance: how near the arm and its tool come to themselves.
-        cell_clearance: how near they come to walls and solids of the cell.
+        clearance: how near bodies come.
         position_error: largest error of the inverse kinematics [m].
         rotation_error: the same for the orientation [rad].
         interpolation_error: largest distance of the spline from the movement half way between samples [m].
@@ -107,17 +110,10 @@ class PlanReport:
     joint_acceleration: Extreme
     sigma_min: Extreme
     condition_max: Extreme
-    floor_clearance: LeastClearance
-    own_clearance: LeastClearance
-    cell_clearance: LeastClearance
+    clearance: Clearance[LeastClearance]
     position_error: Extreme
     rotation_error: Extreme
     interpolation_error: Extreme
-
-    @property
-    def clearances(self) -> tuple[LeastClearance, ...]:
-        """From the floor, of the arm from itself, from the cell."""
-        return self.floor_clearance, self.own_clearance, self.cell_clearance
 
     def lines(self) -> tuple[str, ...]:
         """Return the figures that matter to someone who stands beside the arm, one a line."""
@@ -129,15 +125,16 @@ class PlanReport:
             f"duration        {self.duration:.2f} s, path {self.path_length:.3f} m",
             f"top TCP speed   {self.tcp_speed.value:.3f} m/s ({_percent(self.tcp_speed)} of the"
             f" {self.limits.tcp_speed_max:g} m/s allowed)",
-            f"top joint speed {np.degrees(speed.value):.0f} deg/s, {_joint(speed)}"
+            f"top joint speed {np.degrees(speed.value):.0f} deg/s, {speed.joint_name}"
             f" ({_percent(speed)} of what is allowed)",
-            f"top joint accel {np.degrees(acceleration.value):.0f} deg/s², {_joint(acceleration)}"
+            f"top joint accel {np.degrees(acceleration.value):.0f} deg/s², {acceleration.joint_name}"
             f" ({_percent(acceleration)} of what is allowed)",
-            f"joint range     nearest to its end: {_joint(margin)}, {np.degrees(margin.value):.0f} deg away",
+            f"joint range     nearest to its end: {margin.joint_name},"
+            f" {np.degrees(margin.value):.0f} deg away",
             f"singularity     smallest singular value {self.sigma_min.value:.3f}"
             f" (at least {self.limits.sigma_min:g}), condition number up to {self.condition_max.value:.0f}",
             f"cell            {self.cell.summary}",
-            f"clearance       {'; '.join(least.text for least in self.clearances if least.text)}",
+            f"clearance       {'; '.join(least.text for least in self.clearance if least.text)}",
             f"accuracy        inverse kinematics {self.position_error.value:.1e} m,"
             f" spline {self.interpolation_error.value * 1e6:.2f} um",
         )
@@ -149,10 +146,6 @@ def _span(report: PlanReport, axis: int) -> str:
 
 def _percent(extreme: Extreme) -> str:
     return f"{extreme.share * 100:.0f} %"
-
-
-def _joint(extreme: Extreme) -> str:
-    return "" if extreme.joint is None else JOINT_NAMES[extreme.joint]
 
 
 class CartesianSamples(NamedTuple):
@@ -229,7 +222,7 @@ def check_motion(
     qd[1:] = np.maximum(qd[1:], np.abs(qd_between))
     qdd = np.abs(spline.qdd(t))  # piecewise linear: highest at a knot
     qd_max = limits.speed_fraction * np.array(model.limits.qd_max)
-    clearance = clearance_model(model).along(q)
+    distances = clearance_model(model).along(q)
     between_error = np.linalg.norm(tcp_positions(model, q_between) - samples.p_between, axis=1)
 
     report = PlanReport(
@@ -252,9 +245,7 @@ def check_motion(
         joint_acceleration=_highest(qdd, np.array(limits.qdd_max)),
         sigma_min=_lowest(path.singularity.sigma_min, limits.sigma_min),
         condition_max=_highest(path.singularity.condition, np.inf),
-        floor_clearance=_least(clearance.floor, limits.floor_clearance_min),
-        own_clearance=_least(clearance.own, limits.own_clearance_min),
-        cell_clearance=_least(clearance.cell, limits.cell_clearance_min),
+        clearance=Clearance(*map(_least, distances, limits.clearance_min)),
         position_error=_highest(path.position_error, limits.position_error_max),
         rotation_error=_highest(path.rotation_error, limits.rotation_error_max),
         interpolation_error=_highest(between_error, limits.interpolation_error_max),
@@ -274,7 +265,7 @@ def _judge(names: PathNames, report: PlanReport) -> None:
     limits = report.limits
     reach, speed, acceleration = report.joint_range, report.joint_speed, report.joint_acceleration
     spline = report.interpolation_error
-    floor, own, cell = report.floor_clearance, report.own_clearance, report.cell_clearance
+    floor, own, cell = report.clearance
     for extreme, what in (
         (
             reach,

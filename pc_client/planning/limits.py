@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pc_client.arrays import Array
 from pc_client.errors import PlanningError
 from pc_client.kinematics.arms import Six
+from pc_client.kinematics.clearance import Clearance
 from pc_client.kinematics.model import RobotModel
 from protocol.ur_types import JOINT_NAMES
 
@@ -28,9 +29,7 @@ class PlanLimits:
         position_error_max: error of the inverse kinematics at a sample [m].
         rotation_error_max: the same for the orientation [rad].
         interpolation_error_max: distance of the spline from the movement between samples [m].
-        floor_clearance_min: distance of forearm, wrists and tool from the floor [m].
-        own_clearance_min: distance between links that are not neighbours, and of the tool from links [m].
-        cell_clearance_min: distance of moving links and tool from walls and solids of the cell [m].
+        clearance_min: distances to keep [m].
         approach_speed: speed of the leading joint during the approach to the start [rad/s].
         approach_acceleration: its acceleration [rad/s²].
     """
@@ -45,16 +44,9 @@ class PlanLimits:
     position_error_max: float
     rotation_error_max: float
     interpolation_error_max: float
-    floor_clearance_min: float
-    own_clearance_min: float
-    cell_clearance_min: float
+    clearance_min: Clearance[float]
     approach_speed: float
     approach_acceleration: float
-
-    @property
-    def clearances_min(self) -> tuple[float, float, float]:
-        """Distances to keep [m], in the order of `Clearance`: from the floor, itself, the cell."""
-        return self.floor_clearance_min, self.own_clearance_min, self.cell_clearance_min
 
 
 # Speed [m/s] and acceleration [m/s²] of the TCP when the leading joint moves the stretched arm: UR's
@@ -83,9 +75,7 @@ def limits_of(arm: RobotModel) -> PlanLimits:
         # Hulls are good to a few mm, calibration and tracking add as much, and the surface under the arm is
         # seldom flat. From what stands around, 20 mm: the shoulder of a UR5 turns 24 mm above the plane that
         # it is mounted on, and that plane may be the top of a box of the cell.
-        floor_clearance_min=0.03,
-        own_clearance_min=0.01,
-        cell_clearance_min=0.02,
+        clearance_min=Clearance(floor=0.03, own=0.01, cell=0.02),
         approach_speed=_APPROACH_SPEED / arm.reach,
         approach_acceleration=_APPROACH_ACCELERATION / arm.reach,
     )

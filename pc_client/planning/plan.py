@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pc_client.arrays import Array
+from pc_client.arrays import Array, read_only
 from pc_client.errors import PlanningError
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.kinematics.model import (
@@ -52,7 +52,7 @@ class PlannableMovement(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class JointPlan:
-    """A checked motion of the joints.
+    """A checked motion of the joints; its arrays are read-only, since controller, log and report share them.
 
     Attributes:
         t: (n,) sample times [s].
@@ -112,7 +112,7 @@ class JointPlan:
         report = replace(
             report, q_min=report.q_min + offset, q_max=report.q_max + offset, joint_range=joint_range
         )
-        return replace(self, q=_frozen(q), spline=self.spline.shifted(offset), report=report)
+        return replace(self, q=read_only(q), spline=self.spline.shifted(offset), report=report)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,9 @@ def plan_movement(
     )
     spline = JointSpline(samples.t, path.q)
     report = check_motion(arm, names, samples, tcp_speed, path, spline, limits)
-    return JointPlan(movement.name, _frozen(samples.t), _frozen(samples.p), _frozen(path.q), spline, report)
+    return JointPlan(
+        movement.name, read_only(samples.t), read_only(samples.p), read_only(path.q), spline, report
+    )
 
 
 def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> Plan:
@@ -197,7 +199,7 @@ def _plan_joints(trajectory: JointTrajectory, model: RobotModel) -> Plan:
     exact = np.zeros(len(t))
     path = JointPath(q, exact, exact, measure_singularity(jacobians))
     report = check_motion(model, names, samples, check_samples(names, samples, limits), path, spline, limits)
-    return Plan(movement, JointPlan(name, _frozen(t), _frozen(p), _frozen(q), spline, report), "")
+    return Plan(movement, JointPlan(name, read_only(t), read_only(p), read_only(q), spline, report), "")
 
 
 def _sample_times(name: str, knots: Array, dt: float) -> Array:
@@ -224,9 +226,3 @@ def _sample(movement: PlannableMovement, t: Array) -> CartesianSamples:
             f" ({len(times)}, 3), not {p.shape} and {v.shape}"
         )
     return CartesianSamples(t, p[::2].copy(), v[::2].copy(), p[1::2].copy())
-
-
-def _frozen(values: Array) -> Array:
-    """Make an array read-only: plans are shared between controller, log and report."""
-    values.setflags(write=False)
-    return values

@@ -14,12 +14,13 @@ no compressor's version.
 import errno
 import json
 from collections.abc import Callable, Iterable, Mapping
+from io import FileIO
 from pathlib import Path
 from queue import Full, Queue
 from struct import Struct
 from threading import Thread
 from types import TracebackType
-from typing import IO, Protocol, Self, cast
+from typing import IO, Self, cast
 
 from mcap.writer import CompressionType, Writer
 
@@ -42,34 +43,17 @@ MOST_WAITING = 120
 """Chunks that may wait for a disk that stands still: a minute at 125 Hz, 15 s at 500 Hz, 15 MB."""
 
 
-class _RawFile(Protocol):
-    """The part of an unbuffered binary file that is used."""
-
-    def write(self, data: memoryview, /) -> int | None:
-        """Write some of the data and return how many bytes."""
-
-    def close(self) -> None:
-        """Close the file."""
-
-
-_Opener = Callable[[Path], _RawFile]
-
-
-def _open_unbuffered(path: Path) -> _RawFile:
-    """Open for writing without Python's own buffer: what `write` returned is out of this process."""
-    return open(path, "wb", buffering=0)
-
-
 class _Outbox:
-    """A stream that takes all bytes at once; a thread writes them to a file.
+    """A stream that takes all bytes at once; a thread writes them to a file without a buffer.
 
-    Whoever makes the bytes never waits for the disk and gets no error from it: the first one is kept.
+    Whoever makes the bytes never waits for the disk and gets no error from it: the first one is kept. What
+    the file has taken is out of this process.
 
     Attributes:
         error: the first one of the file, or that it is too slow; nothing is written from then on to `close`.
     """
 
-    def __init__(self, file: _RawFile) -> None:
+    def __init__(self, file: FileIO) -> None:
         self.error: OSError | None = None
         self._file = file
         self._made: list[bytes] = []  # since the last chunk was posted
@@ -181,7 +165,7 @@ class Recorder:
         *,
         arm: ArmTree | None = None,
         now: Callable[[], int] | None = None,
-        opener: _Opener = _open_unbuffered,
+        opener: Callable[[Path], FileIO] = lambda path: path.open("wb", buffering=0),
     ) -> None:
         """Create the file and write its head.
 

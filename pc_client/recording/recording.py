@@ -295,8 +295,10 @@ def export(recording: Recording, path: Path | str, format: _ExportFormat = "csv"
         whose = _mat_struct(asdict(recording.provenance))
         savemat(content, {**kept, "provenance": whose}, long_field_names=True, oned_as="column")
     else:
-        table = table_of(flat_columns(recording), recording.provenance.source)
-        units = _column_units(recording)
+        columns = flat_columns(recording)
+        table = table_of(columns, recording.provenance.source)
+        all_units = (unit for signal in recording.signals for unit in signal.units)
+        units = {name: unit for name, unit in zip(columns, all_units, strict=True) if unit}
         if format == "csv":
             table.rename({name: f"{name} [{unit}]" for name, unit in units.items()}).write_csv(content)
         else:
@@ -329,13 +331,6 @@ def table_of(columns: Mapping[str, Array], source: Source) -> polars.DataFrame:
 def flat_columns(recording: Recording) -> dict[str, Array]:
     """Return every number of the rows as its own column (n,), in file order."""
     return split_columns({signal.name: recording.column(signal.name) for signal in recording.signals})
-
-
-def _column_units(recording: Recording) -> dict[str, str]:
-    """Return the unit of every column of `flat_columns` that has one."""
-    names = iter(flat_columns(recording))
-    units = (unit for signal in recording.signals for unit in signal.units)
-    return {name: unit for name, unit in zip(names, units, strict=True) if unit}
 
 
 def split_columns(signals: Mapping[str, Array]) -> dict[str, Array]:

@@ -19,19 +19,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from pc_client.arrays import Array
-from pc_client.results.sheet import (
-    AXIS_GREY,
-    GRID_GREY,
-    LETTERS,
-    MARK_EDGE,
-    MARK_FILL,
-    RED,
-    SHADE,
-    WIDTH,
-    Curve,
-    Panel,
-    Sheet,
-)
+from pc_client.results import sheet as style
+from pc_client.results.sheet import Curve, Panel, Sheet
 
 _DPI = 110
 _FEW_GROUPS = 6
@@ -40,7 +29,12 @@ _FEW_GROUPS = 6
 
 @contextmanager
 def figure(
-    height: float, mark: str = "", *, width: float = WIDTH, title: str = "", letters: float = LETTERS
+    height: float,
+    mark: str = "",
+    *,
+    width: float = style.WIDTH,
+    title: str = "",
+    letters: float = style.LETTERS,
 ) -> Iterator[Figure]:
     """Give an empty figure in the theme, to be filled inside the block; arguments as of `Sheet`."""
     with mpl.rc_context(_style(letters)):
@@ -49,7 +43,7 @@ def figure(
         if title:
             page.text(0.1 / width, 1.0 - 0.1 / height, title, va="top", fontsize=letters + 1, weight="bold")
         if mark:
-            box = {"boxstyle": "round,pad=0.3", "fc": MARK_FILL, "ec": MARK_EDGE, "lw": 0.8}
+            box = {"boxstyle": "round,pad=0.3", "fc": style.MARK_FILL, "ec": style.MARK_EDGE, "lw": 0.8}
             place = (0.992, 1.0 - 0.08 / height)
             page.text(*place, mark, ha="right", va="top", fontsize=8.5, weight="bold", bbox=box)
 
@@ -120,7 +114,7 @@ def _draw_curve(axes: Any, curve: Curve) -> None:
 
 def _draw_plane(axes: Any, panel: Panel) -> None:
     for begin, end in panel.shaded:
-        axes.axvspan(begin, end, color=SHADE, lw=0, zorder=0)
+        axes.axvspan(begin, end, color=style.SHADE, lw=0, zorder=0)
     x = panel.ranges[0]
     for between, limit in ((x, axes.set_xlim), (panel.upwards, axes.set_ylim)):
         if between != (None, None):
@@ -200,7 +194,9 @@ def bars_of_levels(
             for place, levels in zip(places, bars.runs, strict=False):
                 axes.plot([place] * len(levels), levels, "o", ms=3.2, mfc="white", mec="black", mew=0.8)
         if floors is not None and not np.isnan(floors).all():
-            axes.hlines(floors, x - 0.44, x + 0.44, color=RED, lw=1.4, label="noise floor of the encoders")
+            axes.hlines(
+                floors, x - 0.44, x + 0.44, color=style.RED, lw=1.4, label="noise floor of the encoders"
+            )
         few = len(names) <= _FEW_GROUPS
         axes.set_xticks(x, names, rotation=0 if few else 20, ha="center" if few else "right")
         shown = max(len(names), _FEW_GROUPS)  # a single bar is no wider than one of several
@@ -213,7 +209,7 @@ def bars_of_levels(
     return page
 
 
-def _style(letters: float = LETTERS) -> dict[str, Any]:
+def _style(letters: float = style.LETTERS) -> dict[str, Any]:
     """Parameters of matplotlib (`matplotlib.rc_context`) with letters of a size [points]."""
     return {
         "font.family": "DejaVu Sans",  # comes with matplotlib, so every machine draws the same letters
@@ -228,10 +224,10 @@ def _style(letters: float = LETTERS) -> dict[str, Any]:
         "axes.spines.top": False,
         "axes.spines.right": False,
         "axes.grid": True,
-        "grid.color": GRID_GREY,
+        "grid.color": style.GRID_GREY,
         "grid.linewidth": 0.6,
         "axes.axisbelow": True,
-        "axes.edgecolor": AXIS_GREY,
+        "axes.edgecolor": style.AXIS_GREY,
         "xtick.color": "#333333",
         "ytick.color": "#333333",
         "legend.frameon": False,

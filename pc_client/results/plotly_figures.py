@@ -17,17 +17,8 @@ from typing import Any
 import numpy as np
 
 from pc_client.arrays import Array
-from pc_client.results.sheet import (
-    AXIS_GREY,
-    GRID_GREY,
-    MARK_EDGE,
-    MARK_FILL,
-    SHADE,
-    TEXT,
-    Curve,
-    Panel,
-    Sheet,
-)
+from pc_client.results import sheet as style
+from pc_client.results.sheet import Curve, Panel, Sheet
 
 Element = dict[str, Any]
 """A part of a figure as JSON."""
@@ -51,8 +42,8 @@ _LEGENDS: dict[str, tuple[float, dict[str, str]]] = {
 _MARK = {
     "xanchor": "right",
     "yanchor": "top",
-    "bgcolor": MARK_FILL,
-    "bordercolor": MARK_EDGE,
+    "bgcolor": style.MARK_FILL,
+    "bordercolor": style.MARK_EDGE,
     "borderpad": 3,
     "font": {"size": 11},
 }
@@ -74,7 +65,8 @@ def plotly_figure(sheet: Sheet) -> Element:
                 {"xref": f"x{number}", "yref": f"y{number} domain", "x0": begin, "x1": end}
                 for begin, end in panel.shaded.tolist()
             ]
-            notes += _texts(panel, number)
+            around = {"xref": f"x{number}", "yref": f"y{number}", "xanchor": "center", "yanchor": "middle"}
+            notes += [_note(text, *point.tolist()) | around for point, text in panel.texts]
         left, bottom, _, height = panel.box
         notes.append(_note(panel.title, left, bottom + height, bold=True))
         if panel.legend:
@@ -149,12 +141,6 @@ def _scene(panel: Panel) -> Element:
             for name, label, between, edge in zip("xyz", labels, panel.ranges, panel.shape, strict=True)
         },
     }
-
-
-def _texts(panel: Panel, number: str) -> list[Element]:
-    """The texts of a panel in a plane, around their points."""
-    place = {"xref": f"x{number}", "yref": f"y{number}", "xanchor": "center", "yanchor": "middle"}
-    return [_note(text, *point.tolist()) | place for point, text in panel.texts]
 
 
 def _note(text: str, x: float, y: float, *, bold: bool = False) -> Element:
@@ -257,8 +243,8 @@ def thinned(points: Array, most: int = _MOST_POINTS) -> Array:
 def _template(letters: float) -> Element:
     """The template (`layout.template`) of plotly.js with letters of a size [pixels]."""
     axis = {
-        "gridcolor": GRID_GREY,
-        "linecolor": AXIS_GREY,
+        "gridcolor": style.GRID_GREY,
+        "linecolor": style.AXIS_GREY,
         "showline": True,
         "ticks": "outside",
         "ticklen": 4,
@@ -279,14 +265,14 @@ def _template(letters: float) -> Element:
     layout = {
         "autosize": True,
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0, "autoexpand": False},
-        "font": {"family": "DejaVu Sans, Verdana, sans-serif", "size": letters, "color": TEXT},
+        "font": {"family": "DejaVu Sans, Verdana, sans-serif", "size": letters, "color": style.TEXT},
         "plot_bgcolor": "white",
         "hovermode": "x",
         "hoverlabel": {"namelength": -1, "font": {"size": letters - 1}},
         "xaxis": axis,
         "yaxis": axis,
         "scene": {"xaxis": in_space, "yaxis": in_space, "zaxis": in_space, "aspectmode": "manual"},
-        "shapedefaults": {"y0": 0, "y1": 1, "fillcolor": SHADE, "line": {"width": 0}, "layer": "below"},
+        "shapedefaults": {"y0": 0, "y1": 1, "fillcolor": style.SHADE, "line": {"width": 0}, "layer": "below"},
         "annotationdefaults": {"showarrow": False, "xanchor": "left", "yanchor": "bottom"},
     }
     return {"layout": layout}

@@ -174,7 +174,7 @@ def test_a_velocity_law_that_leads_out_of_the_limits_ends_at_rest(arm, law, comp
 def test_a_velocity_law_that_brakes_just_before_its_refusal_cannot_coast_out_of_the_limits(arm):
     """Its `speedj` brakes with .5 rad/s2: .64 rad from .8 rad/s, where the stop would need .1 rad."""
     arm.approach(ur.plan(ur.Movement.through(POINTS), arm))
-    bodies, least = clearance_model(arm.model), limits_of(arm.model).floor_clearance_min
+    bodies, least = clearance_model(arm.model), limits_of(arm.model).clearance_min.floor
     way = arm.frame().actual_q + np.linspace(0.0, 2.5, 5001)[:, None] * np.eye(6)[1]
     last_clear = way[np.argmax(bodies.along(way).floor.least < least), 1]
     reached = []

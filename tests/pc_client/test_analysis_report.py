@@ -18,10 +18,9 @@ from rich.console import Console
 
 from pc_client import cli
 from pc_client.analysis.figures import speeds_sheet
-from pc_client.analysis.report import Report, build_report, build_tables
+from pc_client.analysis.report import Report, build_report, build_side_by_side, build_tables
 from pc_client.analysis.run import MeasuredRun, analyse_run
-from pc_client.analysis.side_by_side import build_side_by_side, side_by_side
-from pc_client.analysis.table import PAPER_SNR_DB, Table, build_table
+from pc_client.analysis.table import PAPER_SNR_DB, Table, build_table, side_by_side
 from pc_client.control.controller import CONTROLLERS, Controller
 from pc_client.errors import RecordingError
 from pc_client.recording.recorder import Recorder

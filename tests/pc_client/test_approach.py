@@ -78,7 +78,7 @@ def test_no_distance_takes_no_time():
 
 UR3 = robot_model("ur3")
 PLAN = plan_movement(StraightStrokes(INSIDE_THE_BOX, 1.5), model=UR3)
-FLOOR_MARGIN, OWN_MARGIN = PLAN.report.limits.floor_clearance_min, PLAN.report.limits.own_clearance_min
+FLOOR_MARGIN, OWN_MARGIN, _ = PLAN.report.limits.clearance_min
 HOME = np.radians((0, -90, 0, -90, 0, 0))
 
 
@@ -102,8 +102,8 @@ def test_from_home_the_direct_route_is_taken():
     assert approach.plan is PLAN
     assert len(approach.waypoints) == 1
     np.testing.assert_array_equal(approach.waypoints[-1], PLAN.start_q)
-    assert approach.floor_clearance >= FLOOR_MARGIN
-    assert approach.own_clearance >= OWN_MARGIN
+    assert approach.clearance.floor >= FLOOR_MARGIN
+    assert approach.clearance.own >= OWN_MARGIN
     assert_above_the_plane(approach)
 
 
@@ -155,8 +155,8 @@ def test_when_the_direct_line_is_not_clear_the_arm_is_raised_first():
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
     fine = hulls.along(np.array(list(path(approach))))
     assert fine.own.least.min() >= OWN_MARGIN - 1e-3
-    assert approach.own_clearance == pytest.approx(fine.own.least.min(), abs=1e-3)
-    assert approach.floor_clearance == pytest.approx(fine.floor.least.min(), abs=2e-3)
+    assert approach.clearance.own == pytest.approx(fine.own.least.min(), abs=1e-3)
+    assert approach.clearance.floor == pytest.approx(fine.floor.least.min(), abs=2e-3)
     assert_above_the_plane(approach)
     np.testing.assert_array_equal(approach.motion.at(approach.duration)[0], approach.plan.start_q)
 
@@ -166,7 +166,7 @@ def test_the_elbow_takes_the_longer_route_where_the_shorter_one_is_folded():
     q_now = np.radians((-110, -140, 80, -140, -10, 170))
     approach = plan_approach(PLAN, q_now, model=UR3)
     np.testing.assert_allclose(approach.plan.start_q[2], PLAN.start_q[2])
-    assert approach.own_clearance >= OWN_MARGIN
+    assert approach.clearance.own >= OWN_MARGIN
 
 
 @pytest.mark.parametrize("turns", [(-6.2, -6.2), (6.2, 6.2), (-6.2, 6.2), (0.1, -0.1)])
@@ -195,8 +195,8 @@ def test_from_any_clear_posture_the_route_found_is_clear(seed):
     np.testing.assert_array_equal(approach.waypoints[-1], approach.plan.start_q)
     assert np.abs(approach.waypoints).max() <= 2 * np.pi
     assert_above_the_plane(approach)
-    assert approach.floor_clearance >= FLOOR_MARGIN
-    assert approach.own_clearance >= OWN_MARGIN
+    assert approach.clearance.floor >= FLOOR_MARGIN
+    assert approach.clearance.own >= OWN_MARGIN
 
 
 def test_an_arm_that_lies_on_the_table_is_refused_before_anything_moves():

@@ -317,7 +317,7 @@ def test_a_box_that_is_far_enough_is_reported_in_the_plan():
     plan = plan_movement(STROKES, model=robot_model("ur3", cell))
     text = plan_text(plan)
     assert "'bench': floor at z = -0.3 m, box 'press'; tool of 0 kg, sphere 'ball'" in text
-    least = plan.report.cell_clearance
+    least = plan.report.clearance.cell
     assert f"{least.extreme.value * 1e3:.0f} mm, tool sphere 'ball' from box 'press'" in text
     by_hand = 0.75 - max(ball_centre(q)[0] for q in plan.q) - 0.03
     assert least.extreme.value >= by_hand - 1e-6
@@ -326,7 +326,8 @@ def test_a_box_that_is_far_enough_is_reported_in_the_plan():
 
 def test_a_larger_margin_is_kept_when_asked():
     far = Cell("c", solids=(Solid("press", "boxes", (0.1, 0.1, 0.1), (0.8, 0.0, 0.25)),))
-    limits = replace(PLAN.report.limits, cell_clearance_min=1.0)
+    limits = PLAN.report.limits
+    limits = replace(limits, clearance_min=limits.clearance_min._replace(cell=1.0))
     with pytest.raises(PlanningError, match="at least 1000 mm is asked"):
         plan_movement(STROKES, model=robot_model("ur3", far), limits=limits)
 
@@ -342,7 +343,7 @@ def test_the_approach_goes_around_obstacles():
     plan = plan_movement(STROKES, model=model)
     path = plan_approach(plan, q_now, model=model)
     assert len(path.waypoints) > 1
-    assert path.cell_clearance >= plan.report.limits.cell_clearance_min
+    assert path.clearance.cell >= plan.report.limits.clearance_min.cell
     assert "of walls and solids of the cell" in approach_text(path)
 
 

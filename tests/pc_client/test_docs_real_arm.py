@@ -133,10 +133,7 @@ def test_port_margins_and_tolerances_are_those_of_the_code():
     limits = limits_of(robot_model("ur3"))
     assert f"TCP **{REVERSE_PORT}**" in PAGE
     assert PAGE.count(str(REVERSE_PORT)) >= 5
-    floor, own, around = (
-        round(1e3 * margin)
-        for margin in (limits.floor_clearance_min, limits.own_clearance_min, limits.cell_clearance_min)
-    )
+    floor, own, around = (round(1e3 * margin) for margin in limits.clearance_min)
     page = " ".join(PAGE.split())
     margins = (
         f"{floor} mm from the floor, {around} mm from walls and solids, and {own} mm between links and tool"

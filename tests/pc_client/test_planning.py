@@ -308,9 +308,10 @@ def test_too_near_the_base_plane_is_refused_with_the_link():
 
 
 def test_too_near_itself_is_refused():
-    error = refused(limits=replace(LIMITS, own_clearance_min=PLAN.report.own_clearance.extreme.value + 1e-3))
+    more = LIMITS.clearance_min._replace(own=PLAN.report.clearance.own.extreme.value + 1e-3)
+    error = refused(limits=replace(LIMITS, clearance_min=more))
     assert " comes within " in str(error)
-    assert error.joint == PLAN.report.own_clearance.nearest.joint
+    assert error.joint == PLAN.report.clearance.own.nearest.joint
 
 
 @pytest.mark.parametrize(("end", "word"), [(0, "begins"), (-1, "ends")])

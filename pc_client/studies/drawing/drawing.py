@@ -95,6 +95,7 @@ class Drawing:
 
     Attributes:
         marks: its parts and dots, in the recording's frame and time.
+        drawn: what the pen draws, dots included, in the recording's frame and unit, (n, 3).
         joined: all of it in one movement, base frame, as fast as the hand was.
         factor: how many times slower than the hand the arm is.
         movement: what the arm shall do.
@@ -102,6 +103,7 @@ class Drawing:
 
     extraction: Extraction
     marks: tuple[Mark, ...]
+    drawn: Array
     placement: Placement
     joined: Joined
     factor: float
@@ -110,17 +112,12 @@ class Drawing:
     @property
     def flat(self) -> bool:
         """Whether the recording is flat."""
-        return _is_flat(self.extraction)
+        return self.placement.plane != "space"
 
     @property
     def moving(self) -> list[int]:
         """Indices of the marks that move: those of the extraction's parts, in their order."""
         return [index for index, mark in enumerate(self.marks) if mark.trajectory is not None]
-
-    @property
-    def drawn(self) -> Array:
-        """What the pen draws, dots included, in the recording's frame and unit, (n, 3)."""
-        return _drawn(self.extraction, self.marks)
 
     @property
     def trajectory(self) -> SigmaLognormal:
@@ -174,42 +171,30 @@ def make_drawing(
         raise MovementError(f"{slower:g} times slower than the limits ask: give 1 or more")
     options = options or PlacementOptions()
     marks = marks_of(extraction)
-    drawn = _drawn(extraction, marks)
-    flat = _is_flat(extraction)
-    placement = place(marks, drawn, options, flat=flat)
+    lines = [spatial(part.p) for part in extraction.parts]
+    drawn = np.vstack([*lines, *(mark.first for mark in marks if mark.trajectory is None)])
+    placement = place(marks, drawn, options, flat=extraction.parts[0].p.shape[1] == 2)
     on_arm = [mark.transformed(placement.similarity) for mark in marks]
     size = placement.similarity.scale * float(np.ptp(drawn, axis=0).max())
     joined, need = _paced(name, on_arm, least_gaps(on_arm, size), placement.lift, arm)
     factor = slower * max(1.0, need * (1.0 + ACCURACY))
     trajectory = joined.trajectory.stretched(factor)
-    facts = {**_facts(extraction, placement, joined), "slower_than_the_hand": factor}
-    movement = Movement(name, trajectory, _between_slow_moments(trajectory), facts)
-    return Drawing(extraction, marks, placement, joined, factor, movement)
-
-
-def spatial(p: Array) -> Array:
-    """Points (n, 2) with a third coordinate 0; points (n, 3) as they are."""
-    return p if p.shape[1] == 3 else np.column_stack((p, np.zeros(len(p))))
-
-
-def _drawn(extraction: Extraction, marks: Sequence[Mark]) -> Array:
-    lines = [spatial(part.p) for part in extraction.parts]
-    return np.vstack([*lines, *(mark.first for mark in marks if mark.trajectory is None)])
-
-
-def _is_flat(extraction: Extraction) -> bool:
-    return bool(extraction.parts[0].p.shape[1] == 2)
-
-
-def _facts(extraction: Extraction, placement: Placement, joined: Joined) -> dict[str, str | int | float]:
-    return {
+    facts: dict[str, str | int | float] = {
         "drawing": extraction.name.rpartition("/")[2],
         "plane": placement.plane,
         "metres_per_unit": placement.similarity.scale,
         "rotation_deg": float(np.degrees(placement.rotation)),
         "marks": len(joined.shifts),
         "lift_m": float(np.linalg.norm(placement.lift)),
+        "slower_than_the_hand": factor,
     }
+    movement = Movement(name, trajectory, _between_slow_moments(trajectory), facts)
+    return Drawing(extraction, marks, read_only(drawn), placement, joined, factor, movement)
+
+
+def spatial(p: Array) -> Array:
+    """Points (n, 2) with a third coordinate 0; points (n, 3) as they are."""
+    return p if p.shape[1] == 3 else np.column_stack((p, np.zeros(len(p))))
 
 
 def _between_slow_moments(trajectory: SigmaLognormal) -> Array:

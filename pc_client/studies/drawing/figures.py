@@ -5,6 +5,7 @@ the person saw it, and seconds of the hand. Each of the four signals has its col
 are larger than elsewhere: these figures are shown to audiences.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,6 +38,10 @@ class Shown:
     def parts(self) -> dict[str, tuple[Trace, ...]]:
         """The four signals, each with the parts that move."""
         return signals(self.drawing, self.execution)
+
+    def moving(self, name: str) -> Iterator[tuple[int, Trace]]:
+        """The parts of a signal, each with the index of its mark."""
+        return zip(self.drawing.moving, self.parts[name], strict=True)
 
     @property
     def unit(self) -> float:
@@ -123,16 +128,13 @@ def _paths_sheet(shown: Shown) -> Sheet:
     half = _half_width(shown)
     # A path in space is shown from where it is widest.
     across, up = ("x [mm]", "y [mm]") if shown.drawing.flat else ("widest [mm]", "second widest [mm]")
-    targets = np.abs(shown.on_page(_targets(shown))).max(axis=1)
-    outside = f"; targets outside: {n}" if (n := int(np.count_nonzero(targets > half))) else ""
+    n_outside = int(np.count_nonzero(_targets(shown) > half))
+    outside = f"; targets outside: {n_outside}" if n_outside else ""
     titles = {
-        "human": ("human", across),
-        "reconstructed": (
-            f"reconstructed, {shown.drawing.extraction.n_strokes} strokes",
-            f"{across}{outside}",
-        ),
-        "planned": ("planned, with lifts", across),
-        "executed": ("executed", across),
+        "human": "human",
+        "reconstructed": f"reconstructed, {shown.drawing.extraction.n_strokes} strokes",
+        "planned": "planned, with lifts",
+        "executed": "executed",
     }
     height = 3.75
     places = boxes((_SHEET_WIDTH, height), [1] * 4, [1], margins=(0.7, 0.2, 0.6, 0.6), gaps=(0.3, 0.0))[0]
@@ -142,12 +144,12 @@ def _paths_sheet(shown: Shown) -> Sheet:
             box,
             _paths(shown, name, half),
             title,
-            (label, "" if index else up),
+            (across + outside if name == "reconstructed" else across, "" if name != "human" else up),
             page,
             equal=True,
             texts=_numbers(shown, half) if name == "human" else (),
         )
-        for index, (box, (name, (title, label))) in enumerate(zip(places, titles.items(), strict=True))
+        for box, (name, title) in zip(places, titles.items(), strict=True)
     ]
     return Sheet(height, panels, shown.mark, "", _SHEET_WIDTH, _LETTERS)
 
@@ -188,13 +190,7 @@ def _arrow(p: Array, half: float) -> Array:
 def _numbers(shown: Shown, half: float) -> list[tuple[Array, str]]:
     """The order of the marks, where there are several, beside their starts."""
     marks = shown.drawing.marks
-    begins = dict(
-        zip(
-            shown.drawing.moving,
-            (part.p[: 1 + len(part.p) // 8] for part in shown.parts["human"]),
-            strict=True,
-        )
-    )
+    begins = {index: part.p[: 1 + len(part.p) // 8] for index, part in shown.moving("human")}
     numbers = []
     for index, mark in enumerate(marks if len(marks) > 1 else ()):
         path = shown.on_page(begins.get(index, mark.first[None]))
@@ -208,13 +204,16 @@ def _half_width(shown: Shown) -> float:
     """Half the width (mm) of a square page that holds the drawing and the near virtual targets."""
     paths = [shown.on_page(part.p) for parts in shown.parts.values() for part in parts]
     reach = float(np.abs(np.vstack([*paths, shown.on_page(shown.drawing.drawn)])).max())
-    targets = np.abs(shown.on_page(_targets(shown))).max(axis=1)
+    targets = _targets(shown)
     near = targets[targets <= (1.0 + _FAR) * reach]
     return 1.1 * max(reach, float(near.max(initial=0.0)))
 
 
 def _targets(shown: Shown) -> Array:
-    return np.vstack([part.trajectory.target_points for part in shown.drawing.extraction.parts])
+    """How far each virtual target is from the middle of the page, by its larger coordinate, (n,), mm."""
+    targets = np.vstack([part.trajectory.target_points for part in shown.drawing.extraction.parts])
+    farthest: Array = np.abs(shown.on_page(targets)).max(axis=1)
+    return farthest
 
 
 def _air(shown: Shown, *, executed: bool) -> Array:
@@ -356,7 +355,6 @@ def _profile(shown: Shown, name: str) -> list[Curve]:
 
 
 def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
-    parts = zip(shown.drawing.moving, shown.parts[name], strict=True)
     return [
         Curve(
             np.c_[shown.since_pen_down(part.t, index), shown.unit * part.speed],
@@ -365,16 +363,14 @@ def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
             width,
             "--" if name == "planned" and width < 1.8 else "-",
         )
-        for count, (index, part) in enumerate(parts)
+        for count, (index, part) in enumerate(shown.moving(name))
     ]
 
 
 def _differences(shown: Shown) -> list[Curve]:
     curves = [Curve(np.array([[at, 0.0] for at in shown.span]), sheet.AXIS_GREY, width=0.7)]
     for name in ("reconstructed", "executed"):
-        for index, own, human in zip(
-            shown.drawing.moving, shown.parts[name], shown.parts["human"], strict=True
-        ):
+        for (index, own), human in zip(shown.moving(name), shown.parts["human"], strict=True):
             t = shown.since_pen_down(human.t, index)
             curves.append(Curve(np.c_[t, shown.unit * (own.speed - human.speed)], COLOURS[name], "", 1.3))
     return curves

@@ -24,7 +24,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pc_client.arrays import Array, read_only
+from pc_client.arrays import Array, read_only, set_fields
 from pc_client.errors import RecordingError
 from pc_client.files import FILE_KINDS
 from ur_hil.input_files import MIB
@@ -53,8 +53,7 @@ class PenPart:
             raise RecordingError("a part with NaN or infinity in it: give finite numbers, see ordered_part")
         if np.any(np.diff(t) <= 0.0):
             raise RecordingError("a part whose times do not rise: put it in order first, see ordered_part")
-        object.__setattr__(self, "t", t)
-        object.__setattr__(self, "p", p)
+        set_fields(self, t=t, p=p)
 
     @property
     def duration(self) -> float:

@@ -293,16 +293,14 @@ class SimulatedBox:
 @contextmanager
 def simulated_box(arm: SimulatedArm) -> Iterator[SimulatedBox]:
     """Start a box and end it on leaving; SweepError if it does not start, or dies while it is used."""
-    for _ in range(_ATTEMPTS - 1):
-        offset = _free_offset()
+    for left in reversed(range(_ATTEMPTS)):
         try:
-            with _started(arm, offset) as box:
+            with _started(arm, _free_offset()) as box:
                 yield box
                 return
         except _PortTakenError:
-            continue
-    with _started(arm, _free_offset()) as box:
-        yield box
+            if not left:
+                raise
 
 
 class _PortTakenError(SweepError):
@@ -312,17 +310,12 @@ class _PortTakenError(SweepError):
 @contextmanager
 def _started(arm: SimulatedArm, offset: int) -> Iterator[SimulatedBox]:
     folder = Path(tempfile.mkdtemp(prefix="ur-sweep-"))
-    ready, log = folder / "ready.json", folder / "box.log"
+    ready, ended, log = folder / "ready.json", folder / ENDED_FILE, folder / "box.log"
+    box = _command(arm, offset, ready)
     try:
         with log.open("wb") as errors:
             guard = subprocess.Popen(
-                [
-                    sys.executable,
-                    "-m",
-                    "pc_client.studies.sweep.guard",
-                    str(folder),
-                    *_command(arm, offset, ready),
-                ],
+                [sys.executable, "-m", "pc_client.studies.sweep.guard", str(folder), *box],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
@@ -332,47 +325,32 @@ def _started(arm: SimulatedArm, offset: int) -> Iterator[SimulatedBox]:
         shutil.rmtree(folder, ignore_errors=True)
         raise SweepError(f"a simulated box cannot be started: {error.strerror or error}") from error
     with guard:  # leaving it closes the guard's standard input and waits for it
-        _wait_until_ready(ready, folder, guard)
+        if not _comes(ready, _START_TIMEOUT, is_over=lambda: ended.exists() or guard.poll() is not None):
+            if not ended.exists() and guard.poll() is None:
+                raise SweepError(f"the simulated box is not ready after {_START_TIMEOUT:.0f} s")
+            words = _last_words(folder)
+            kind = _PortTakenError if "in use" in words else SweepError
+            raise kind(f"the simulated box does not start{words}")
         try:
             yield SimulatedBox(HOST, Ports.standard(offset), folder)
         except (ClientError, ProtocolError) as error:
-            if not _has_ended(folder):
+            # Its connections close a moment before its end is noted.
+            if not _comes(ended, _NOTICE):
                 raise
             raise SweepError(f"the simulated box died{_last_words(folder)}: {full_message(error)}") from error
 
 
 def _command(arm: SimulatedArm, offset: int, ready: Path) -> list[str]:
-    options = {
-        "--robot": arm.robot,
-        "--fidelity": arm.fidelity,
-        "--seed": str(arm.seed),
-        "--pace": "lockstep",
-        "--host": HOST,
-        "--port-base": str(offset),
-        "--ready-file": str(ready),
-    }
-    words = [word for option in options.items() for word in option]
-    return [sys.executable, "-m", "ur_emulator", "serve", *words]
+    words = [sys.executable, "-m", "ur_emulator", "serve", "--pace", "lockstep", "--host", HOST]
+    words += ["--robot", arm.robot, "--fidelity", arm.fidelity, "--seed", str(arm.seed)]
+    return [*words, "--port-base", str(offset), "--ready-file", str(ready)]
 
 
-def _wait_until_ready(ready: Path, folder: Path, guard: subprocess.Popen[bytes]) -> None:
-    """Wait for the ready file; SweepError if the box ended, or takes too long."""
-    deadline = time.monotonic() + _START_TIMEOUT
-    while not ready.exists():
-        if (folder / ENDED_FILE).exists() or guard.poll() is not None:
-            words = _last_words(folder)
-            kind = _PortTakenError if "in use" in words else SweepError
-            raise kind(f"the simulated box does not start{words}")
-        if time.monotonic() > deadline:
-            raise SweepError(f"the simulated box is not ready after {_START_TIMEOUT:.0f} s")
-        time.sleep(0.01)
-
-
-def _has_ended(folder: Path) -> bool:
-    """Whether the box is the culprit; its connections close a moment before its end is noted."""
-    deadline = time.monotonic() + _NOTICE
-    while not (folder / ENDED_FILE).exists():
-        if time.monotonic() > deadline:
+def _comes(file: Path, within: float, is_over: Callable[[], bool] = lambda: False) -> bool:
+    """Wait for a file; False if it is over before, or the time [s] has passed."""
+    deadline = time.monotonic() + within
+    while not file.exists():
+        if is_over() or time.monotonic() > deadline:
             return False
         time.sleep(0.01)
     return True
