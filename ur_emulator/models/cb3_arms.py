@@ -35,10 +35,8 @@ UR3 = RobotModel(
     name="ur3",
     title="UR3",
     generation=CB3,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.1519, a2=-0.24365, a3=-0.21325, d4=0.11235, d5=0.08535, d6=0.0819),
-    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame.
-    links=(
+    dh=dh_table(d1=0.1519, a2=-0.24365, a3=-0.21325, d4=0.11235, d5=0.08535, d6=0.0819),  # A
+    links=(  # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame
         Link(2.0, (0.0, -0.02, 0.0), (0.008093, 0.005625, 0.008093)),
         Link(3.42, (0.13, 0.0, 0.1157), (0.009619, 0.021728, 0.021728)),
         Link(1.26, (0.05, 0.0, 0.0238), (0.003544, 0.006547, 0.006547)),
@@ -73,9 +71,7 @@ UR3 = RobotModel(
     ),  # D; elbow: moving fit 6.4, static 9-11
     stop_deceleration=20.0,  # E: base, 183 deg/s in 159 ms; shoulder and elbow stop no slower
     servo_frequency=12.0,  # assumed: a position loop of 10-30 Hz fits the delays that drivers report
-    servo_damping=0.9,
-    # Joint-space inertia diagonal at a work pose by A and B plus the armature.
-    servo_inertia=(0.88, 0.95, 0.39, 0.095, 0.083, 0.08),
+    servo_inertia=(0.88, 0.95, 0.39, 0.095, 0.083, 0.08),  # A, B
     payload_max=3.0,  # UR3 data sheet
     reach=0.5,
     robot_type=3,  # client interface sheet, configuration data
@@ -101,10 +97,8 @@ UR5 = RobotModel(
     name="ur5",
     title="UR5",
     generation=CB3,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.089159, a2=-0.425, a3=-0.39225, d4=0.10915, d5=0.09465, d6=0.0823),
-    # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame.
-    links=(
+    dh=dh_table(d1=0.089159, a2=-0.425, a3=-0.39225, d4=0.10915, d5=0.09465, d6=0.0823),  # A
+    links=(  # A: mass and centre of mass. B: inertia, cylinder axis turned along the link in the DH frame
         Link(3.7, (0.0, -0.02561, 0.00193), (0.014972, 0.010406, 0.014972)),
         Link(8.393, (0.2125, 0.0, 0.11336), (0.015107, 0.133886, 0.133886)),
         Link(2.33, (0.15, 0.0, 0.0265), (0.004095, 0.031217, 0.031217)),
@@ -122,8 +116,6 @@ UR5 = RobotModel(
     ),
     tau_max=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),  # C
     qd_max=(pi,) * 6,  # C: 180 deg/s
-    q_min=(-RANGE_END,) * 6,  # safety blocks of real installations
-    q_max=(RANGE_END,) * 6,
     armature=(1.1, 1.1, 1.1, 0.20, 0.20, 0.20),  # H
     viscous=(6.24, 4.81, 7.65, 1.05, 1.59, 1.11),  # D
     coulomb=(7.23, 8.55, 8.47, 2.10, 2.02, 2.33),  # D
@@ -132,9 +124,7 @@ UR5 = RobotModel(
     torque_constant=(12.8, 12.8, 12.8, 9.95, 9.95, 9.95),  # F
     stop_deceleration=13.0,  # E: base, 183 deg/s in 244 ms
     servo_frequency=12.0,  # assumed, as for the UR3
-    servo_damping=0.9,
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(2.05, 2.84, 1.76, 0.218, 0.204, 0.200),
+    servo_inertia=(2.05, 2.84, 1.76, 0.218, 0.204, 0.200),  # A, B
     payload_max=5.0,  # UR5 data sheet
     reach=0.85,
     robot_type=1,  # client interface sheet, configuration data
@@ -159,10 +149,8 @@ UR10 = RobotModel(
     name="ur10",
     title="UR10",
     generation=CB3,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.1273, a2=-0.612, a3=-0.5723, d4=0.163941, d5=0.1157, d6=0.0922),
-    # A: mass and centre of mass. B: inertia.
-    links=(
+    dh=dh_table(d1=0.1273, a2=-0.612, a3=-0.5723, d4=0.163941, d5=0.1157, d6=0.0922),  # A
+    links=(  # A: mass and centre of mass. B: inertia
         Link(7.1, (0.021, 0.0, 0.027), (0.03408, 0.03529, 0.02156)),
         Link(12.7, (0.38, 0.0, 0.158), (0.02814, 0.77068, 0.76943)),
         Link(4.27, (0.24, 0.0, 0.068), (0.01014, 0.30928, 0.30646)),
@@ -180,8 +168,6 @@ UR10 = RobotModel(
     ),
     tau_max=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),  # C
     qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # C: 120 and 180 deg/s
-    q_min=(-RANGE_END,) * 6,  # safety blocks of real installations
-    q_max=(RANGE_END,) * 6,
     armature=(2.5, 2.5, 1.1, 0.45, 0.45, 0.45),  # H
     viscous=(12.0, 12.0, 7.6, 5.0, 5.0, 5.0),  # H
     coulomb=(16.0, 16.0, 8.5, 4.3, 4.3, 4.3),  # H
@@ -190,9 +176,7 @@ UR10 = RobotModel(
     torque_constant=(12.8, 12.8, 12.8, 12.0, 12.0, 12.0),  # F
     stop_deceleration=6.0,  # assumed: the UR5's scaled by reach and load; its manual's table was not at hand
     servo_frequency=12.0,  # assumed, as for the UR3
-    servo_damping=0.9,
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(6.2, 8.4, 3.5, 0.487, 0.455, 0.450),
+    servo_inertia=(6.2, 8.4, 3.5, 0.487, 0.455, 0.450),  # A, B
     payload_max=10.0,  # UR10 data sheet
     reach=1.3,
     robot_type=2,  # client interface sheet, configuration data

@@ -81,7 +81,6 @@ class DriveNumbers(TypedDict):
     coulomb_standstill: float
     coulomb_speed: float
     servo_frequency: float
-    servo_damping: float
 
 
 def drives(*sizes: JointSize) -> DriveNumbers:
@@ -101,7 +100,6 @@ def drives(*sizes: JointSize) -> DriveNumbers:
         coulomb_standstill=1.0,  # A
         coulomb_speed=1.0,  # without effect, as nothing is lost at standstill
         servo_frequency=25.0,  # at 12 Hz the arm is further from its target than a real UR3e
-        servo_damping=0.9,
     )
 
 
@@ -113,10 +111,8 @@ UR5E = RobotModel(
     name="ur5e",
     title="UR5e",
     generation=E_SERIES,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.1625, a2=-0.425, a3=-0.3922, d4=0.1333, d5=0.0997, d6=0.0996),
-    # A: mass and centre of mass. B: inertia.
-    links=(
+    dh=dh_table(d1=0.1625, a2=-0.425, a3=-0.3922, d4=0.1333, d5=0.0997, d6=0.0996),  # A
+    links=(  # A: mass and centre of mass. B: inertia
         Link(3.761, (0.0, -0.02561, 0.00193), (0.0070021, 0.0064809, 0.0065729), (7e-7, -1.05e-5, 4.999e-4)),
         Link(8.058, (0.2125, 0.0, 0.11336), (0.0150589, 0.333881, 0.332472), (-5.4e-5, 5.6e-6, -1.8e-6)),
         Link(2.846, (0.15, 0.0, 0.0265), (0.0039963, 0.0787925, 0.0784851), (-1.37e-5, 0.0013727, -6.6e-6)),
@@ -126,12 +122,9 @@ UR5E = RobotModel(
     ),
     outline=UR5.outline,
     qd_max=(pi,) * 6,  # B: 180 deg/s
-    q_min=(-RANGE_END,) * 6,  # capture of a UR5e
-    q_max=(RANGE_END,) * 6,
     **drives(SIZE_3, SIZE_3, SIZE_3, SIZE_1, SIZE_1, SIZE_1),  # C
     stop_deceleration=13.0,  # as for the UR5
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(3, 3.88, 2.73, 0.235, 0.217, 0.212),
+    servo_inertia=(3, 3.88, 2.73, 0.235, 0.217, 0.212),  # A, B
     payload_max=5.0,  # UR5e data sheet
     reach=0.85,
     has_point_masses=True,  # A calls the tensors of UR3e and UR5e negligible
@@ -152,10 +145,8 @@ UR3E = RobotModel(
     name="ur3e",
     title="UR3e",
     generation=E_SERIES,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.15185, a2=-0.24355, a3=-0.2132, d4=0.13105, d5=0.08535, d6=0.0921),
-    # A: mass and centre of mass. B: inertia.
-    links=(
+    dh=dh_table(d1=0.15185, a2=-0.24355, a3=-0.2132, d4=0.13105, d5=0.08535, d6=0.0921),  # A
+    links=(  # A: mass and centre of mass. B: inertia
         Link(1.98, (0.0, -0.02, 0.0), (0.0027657, 0.0021501, 0.0025626), (0.0000096, -0.0000149, 0.0001873)),
         Link(3.4445, (0.13, 0.0, 0.1157), (0.0042623, 0.0460284, 0.0448947), (-4.09e-5, -0.001496, -1.29e-5)),
         Link(1.437, (0.05, 0.0, 0.0238), (0.0010511, 0.0113396, 0.0110895), (0.0, -0.0000331, 0.0000022)),
@@ -169,8 +160,7 @@ UR3E = RobotModel(
     q_max=(*(RANGE_END,) * 5, LAST_TURN),
     **drives(_SIZE_2, _SIZE_2, SIZE_1, SIZE_0, SIZE_0, SIZE_0),  # C
     stop_deceleration=20.0,  # as for the UR3
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(0.852, 0.917, 0.377, 0.0817, 0.0733, 0.0713),
+    servo_inertia=(0.852, 0.917, 0.377, 0.0817, 0.0733, 0.0713),  # A, B
     payload_max=3.0,  # UR3e data sheet
     reach=0.5,
     has_point_masses=True,  # C: its own log
@@ -195,10 +185,8 @@ UR10E = RobotModel(
     name="ur10e",
     title="UR10e",
     generation=E_SERIES,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.1807, a2=-0.6127, a3=-0.57155, d4=0.17415, d5=0.11985, d6=0.11655),
-    # A: mass and centre of mass. B: inertia.
-    links=(
+    dh=dh_table(d1=0.1807, a2=-0.6127, a3=-0.57155, d4=0.17415, d5=0.11985, d6=0.11655),  # A
+    links=(  # A: mass and centre of mass. B: inertia
         Link(7.369, (0.021, 0.0, 0.027), (0.03408, 0.03529, 0.02156), (0.00002, -0.00425, 0.00008)),
         Link(13.051, (0.38, 0.0, 0.158), (0.02814, 0.77068, 0.76943), (0.00005, -0.01561, 0.00002)),
         Link(3.989, (0.24, 0.0, 0.068), (0.01014, 0.30928, 0.30646), (0.00008, 0.00916, 0.0)),
@@ -208,12 +196,9 @@ UR10E = RobotModel(
     ),
     outline=replace(UR10.outline, upper_arm=(0.1762, 0.075), forearm=(0.0393, 0.06)),  # G
     qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # B: 120 and 180 deg/s
-    q_min=(-RANGE_END,) * 6,
-    q_max=(RANGE_END,) * 6,
     **drives(SIZE_4, SIZE_4, SIZE_3, SIZE_2, SIZE_2, SIZE_2),  # C
     stop_deceleration=6.0,  # as for the UR10
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(8.95, 10.2, 4.26, 0.656, 0.618, 0.61),
+    servo_inertia=(8.95, 10.2, 4.26, 0.656, 0.618, 0.61),  # A, B
     payload_max=10.0,  # PolyScope X user manual; labels of newer arms say 12.5
     reach=1.3,
     robot_type=2,  # UR client library
@@ -237,10 +222,8 @@ UR16E = replace(
     UR10E,
     name="ur16e",
     title="UR16e",
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.1807, a2=-0.4784, a3=-0.36, d4=0.17415, d5=0.11985, d6=0.11655),
-    # B: mass, centre of mass and inertia.
-    links=(
+    dh=dh_table(d1=0.1807, a2=-0.4784, a3=-0.36, d4=0.17415, d5=0.11985, d6=0.11655),  # A
+    links=(  # B: mass, centre of mass and inertia
         Link(7.369, (0.0, -0.016, 0.03), (0.03351, 0.03374, 0.021), (0.00002, -0.00001, 0.00374)),
         Link(10.45, (0.302, 0.0, 0.16), (0.02796, 0.47558, 0.47635), (-0.0001, -0.0072, 0.00003)),
         Link(4.321, (0.194, 0.0, 0.065), (0.01091, 0.1206, 0.11714), (0.00006, 0.01012, 0.00001)),
@@ -249,8 +232,7 @@ UR16E = replace(
         Link(0.907, (0.0, 0.0, -0.044), (0.00117, 0.00118, 0.00084)),
     ),
     stop_deceleration=8.0,  # assumed: the UR10's, scaled by the reach
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(7.98, 9.11, 2.96, 0.657, 0.618, 0.611),
+    servo_inertia=(7.98, 9.11, 2.96, 0.657, 0.618, 0.611),  # A, B
     payload_max=16.0,  # UR16e data sheet
     reach=0.9,
     robot_type=4,  # UR client library
@@ -272,10 +254,8 @@ UR15 = RobotModel(
     name="ur15",
     title="UR15",
     generation=E_SERIES,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.2186, a2=-0.6475, a3=-0.5164, d4=0.1824, d5=0.1361, d6=0.1434),
-    # B: mass, centre of mass and inertia.
-    links=(
+    dh=dh_table(d1=0.2186, a2=-0.6475, a3=-0.5164, d4=0.1824, d5=0.1361, d6=0.1434),  # A
+    links=(  # B: mass, centre of mass and inertia
         Link(
             9.9883, (2.4e-5, -0.033309, 0.025304), (0.051334, 0.047702, 0.034263), (2.5e-5, -1.6e-5, 0.008805)
         ),
@@ -299,12 +279,9 @@ UR15 = RobotModel(
         flange=(-0.05, -0.046, 0.045),
     ),
     qd_max=(pi, pi, 4 * pi / 3, 5 * pi / 3, 5 * pi / 3, 5 * pi / 3),  # C: 180, 240, 300 deg/s
-    q_min=(-RANGE_END,) * 6,
-    q_max=(RANGE_END,) * 6,
     **drives(ELBOW_OF_UR20, ELBOW_OF_UR20, ELBOW_OF_UR15, WRIST_OF_UR15, WRIST_OF_UR15, WRIST_OF_UR15),  # C
     stop_deceleration=6.0,  # assumed: as for the UR10, of the same reach
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(12.1, 14.9, 4.99, 0.915, 0.863, 0.851),
+    servo_inertia=(12.1, 14.9, 4.99, 0.915, 0.863, 0.851),  # A, B
     payload_max=15.0,  # UR15 data sheet
     reach=1.3,
     robot_type=9,  # UR client library
@@ -321,17 +298,13 @@ UR15 = RobotModel(
 # B  physical_parameters.yaml beside it, as for the UR15.
 # C  Assumed, no list of its limits is known: drives and speeds of the UR15, whose shoulder and wrists it has;
 #    base and shoulder turn no faster than a UR20's, of the same reach.
-_SHOULDER, _, _, _WRIST_1, _WRIST_2, _WRIST_3 = UR15.links
-
 UR8LONG = replace(
     UR15,
     name="ur8long",
     title="UR8 Long",
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.2186, a2=-0.8989, a3=-0.7149, d4=0.1824, d5=0.1361, d6=0.1434),
-    # B: mass, centre of mass and inertia; shoulder and wrists are the UR15's.
-    links=(
-        _SHOULDER,
+    dh=dh_table(d1=0.2186, a2=-0.8989, a3=-0.7149, d4=0.1824, d5=0.1361, d6=0.1434),  # A
+    links=(  # B: mass, centre of mass and inertia; shoulder and wrists are the UR15's
+        UR15.links[0],
         Link(
             17.0738,
             (0.565429, -7.4e-5, 0.19542),
@@ -339,14 +312,11 @@ UR8LONG = replace(
             (2.92e-4, -0.054852, -1.4e-5),
         ),
         Link(7.6393, (0.416102, 5.8e-5, 0.065663), (0.022148, 0.633274, 0.625889), (5.2e-5, 0.019779, 3e-6)),
-        _WRIST_1,
-        _WRIST_2,
-        _WRIST_3,
+        *UR15.links[3:],
     ),
     qd_max=(2 * pi / 3, 2 * pi / 3, *UR15.qd_max[2:]),  # C
     stop_deceleration=5.0,  # assumed: the UR10's, scaled by the reach
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(16.6, 24.0, 7.13, 0.916, 0.863, 0.851),
+    servo_inertia=(16.6, 24.0, 7.13, 0.916, 0.863, 0.851),  # A, B
     payload_max=8.0,  # the name; newer lists say 10, with the load below the flange
     reach=1.75,
     robot_type=6,  # UR client library
@@ -362,17 +332,13 @@ UR8LONG = replace(
 #    table, with its hash.
 # B  physical_parameters.yaml beside it, as for the UR15.
 # C  Drives and speeds of the UR15: Universal_Robots_ROS2_Description, config/ur18/joint_limits.yaml.
-_SHOULDER, _, _, _WRIST_1, _WRIST_2, _WRIST_3 = UR15.links
-
 UR18 = replace(
     UR15,
     name="ur18",
     title="UR18",
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.2186, a2=-0.475, a3=-0.3389, d4=0.1824, d5=0.1361, d6=0.1434),
-    # B: mass, centre of mass and inertia; shoulder and wrists are the UR15's.
-    links=(
-        _SHOULDER,
+    dh=dh_table(d1=0.2186, a2=-0.475, a3=-0.3389, d4=0.1824, d5=0.1361, d6=0.1434),  # A
+    links=(  # B: mass, centre of mass and inertia; shoulder and wrists are the UR15's
+        UR15.links[0],
         Link(
             14.2009,
             (0.308664, -8.8e-5, 0.190204),
@@ -380,13 +346,10 @@ UR18 = replace(
             (1.79e-4, -0.024705, -2e-5),
         ),
         Link(5.52, (0.199652, 0.000021, 0.073101), (0.016891, 0.129732, 0.123451), (0.0, 0.009081, 0.000003)),
-        _WRIST_1,
-        _WRIST_2,
-        _WRIST_3,
+        *UR15.links[3:],
     ),
     stop_deceleration=8.0,  # assumed: the UR10's, scaled by the reach
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(10.7, 11.8, 3.81, 0.915, 0.863, 0.851),
+    servo_inertia=(10.7, 11.8, 3.81, 0.915, 0.863, 0.851),  # A, B
     payload_max=18.0,  # UR18 data sheet
     reach=0.95,
     robot_type=5,  # UR client library
@@ -406,10 +369,8 @@ UR20 = RobotModel(
     name="ur20",
     title="UR20",
     generation=E_SERIES,
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.2363, a2=-0.862, a3=-0.7287, d4=0.201, d5=0.1593, d6=0.1543),
-    # A: mass and centre of mass. B: inertia.
-    links=(
+    dh=dh_table(d1=0.2363, a2=-0.862, a3=-0.7287, d4=0.201, d5=0.1593, d6=0.1543),  # A
+    links=(  # A: mass and centre of mass. B: inertia
         Link(16.343, (0.0, -0.061, 0.0062), (0.08866, 0.07632, 0.08418), (-0.00011, -0.00011, 0.0072)),
         Link(29.632, (0.5226, 0.0, 0.2098), (0.1467, 4.6659, 4.6348), (0.00019, -0.05163, 0.00004)),
         Link(7.879, (0.3234, 0.0, 0.0604), (0.02612, 0.75763, 0.75327), (-0.00005, -0.02898, -0.00001)),
@@ -426,12 +387,9 @@ UR20 = RobotModel(
         flange=(-0.056, -0.052, 0.05),
     ),
     qd_max=(2 * pi / 3, 2 * pi / 3, 5 * pi / 6, 7 * pi / 6, 7 * pi / 6, 7 * pi / 6),  # B: 120, 150, 210 deg/s
-    q_min=(-RANGE_END,) * 6,
-    q_max=(RANGE_END,) * 6,
     **drives(BASE_OF_UR20, BASE_OF_UR20, ELBOW_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20),  # C
     stop_deceleration=5.0,  # assumed: the UR10's, scaled by the reach
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(27.6, 37.2, 14.7, 1.57, 1.46, 1.44),
+    servo_inertia=(27.6, 37.2, 14.7, 1.57, 1.46, 1.44),  # A, B
     payload_max=20.0,  # UR20 data sheet
     reach=1.75,
     robot_type=7,  # UR client library
@@ -452,10 +410,8 @@ UR30 = replace(
     UR20,
     name="ur30",
     title="UR30",
-    # A. The vendor's "a" and "d" in metres.
-    dh=dh_table(d1=0.2363, a2=-0.637, a3=-0.5037, d4=0.201, d5=0.1593, d6=0.1543),
-    # B: mass, centre of mass. D: inertia.
-    links=(
+    dh=dh_table(d1=0.2363, a2=-0.637, a3=-0.5037, d4=0.201, d5=0.1593, d6=0.1543),  # A
+    links=(  # B: mass, centre of mass. D: inertia
         Link(16.343, (-0.0001, -0.06, 0.0069), (0.08866, 0.07632, 0.08418), (-0.00011, -0.00011, 0.0072)),
         Link(28.542, (0.3894, 0.0, 0.2103), (0.1413, 2.4543, 2.4379), (0.00014, -0.03675, 0.00003)),
         Link(7.156, (0.2257, 0.0, 0.0629), (0.02372, 0.3288, 0.3269), (-0.00003, -0.01819, -0.00001)),
@@ -464,8 +420,7 @@ UR30 = replace(
         Link(0.926, (0.0, 0.0, -0.0293), (0.00101, 0.001, 0.00128)),
     ),
     stop_deceleration=6.0,  # assumed: as for the UR10, of the same reach
-    # Joint-space inertia diagonal at `home_q` by A and B plus the armature.
-    servo_inertia=(21.9, 26.2, 11.4, 1.57, 1.46, 1.44),
+    servo_inertia=(21.9, 26.2, 11.4, 1.57, 1.46, 1.44),  # A, B
     payload_max=30.0,  # UR30 data sheet
     reach=1.3,
     robot_type=8,  # UR client library

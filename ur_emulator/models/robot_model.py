@@ -143,6 +143,14 @@ class Link:
         return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
+# Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees.
+RANGE_END = 2.0 * pi + radians(3.0)
+"""[rad]"""
+
+# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
+FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
+
+
 @dataclass(frozen=True, slots=True)
 class RobotModel:
     """One type of arm.
@@ -151,7 +159,7 @@ class RobotModel:
         name: as on the command line, e.g. "ur3".
         title: as people write it, e.g. "UR3".
         generation: which one it is of: control cycle, software.
-        dh: six nominal rows.
+        dh: six nominal rows, of the vendor's "a" and "d" [m].
         links: six moving links.
         tau_max: largest joint torque [Nm].
         qd_max: rated joint speed, which moves are planned with [rad/s].
@@ -167,7 +175,8 @@ class RobotModel:
             [rad/s²].
         servo_frequency: natural frequency of the joint position loop [Hz].
         servo_damping: damping ratio of that loop.
-        servo_inertia: inertia at the joint that the loop gains are laid out for [kg m²].
+        servo_inertia: inertia at the joint that the loop gains are laid out for: the diagonal of the arm's at
+            `home_q` with the armature [kg m²].
         payload_max: rated payload [kg].
         reach: rated reach [m].
         robot_type: code in the primary interface's configuration data.
@@ -190,8 +199,6 @@ class RobotModel:
     outline: Outline
     tau_max: Vector6
     qd_max: Vector6
-    q_min: Vector6
-    q_max: Vector6
     armature: Vector6
     viscous: Vector6
     coulomb: Vector6
@@ -200,13 +207,15 @@ class RobotModel:
     torque_constant: Vector6
     stop_deceleration: float
     servo_frequency: float
-    servo_damping: float
     servo_inertia: Vector6
     payload_max: float
     reach: float
     robot_type: int
     box_type: int
     home_q: Vector6
+    q_min: Vector6 = (-RANGE_END,) * 6
+    q_max: Vector6 = (RANGE_END,) * 6
+    servo_damping: float = 0.9
     first_version: str | None = None
     reversal_speed: float = 0.012
     friction_rise: float | None = None
@@ -241,11 +250,3 @@ class RobotModel:
         if first is not None and version < self.generation.parse_version(first):
             raise ModelError(f"version {text} given: a {self.title} needs {first} or newer")
         return version
-
-
-# Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees.
-RANGE_END = 2.0 * pi + radians(3.0)
-"""[rad]"""
-
-# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
-FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
