@@ -33,14 +33,7 @@ from pc_client.driver.watchdog import conditions_text, require
 from pc_client.errors import LOG, ClientError, ControllerError, DriverError, PlanningError, printable
 from pc_client.experiment.checks import guarded
 from pc_client.experiment.experiment import Experiment, check_folder, experiment_text, scratch_folder
-from pc_client.experiment.law_stream import (
-    ACCELERATION,
-    LawStep,
-    LawStream,
-    VelocityLaw,
-    check_law,
-    rehearse,
-)
+from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw, check_law, rehearse
 from pc_client.experiment.preflight import changes, model_of, preflight
 from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, run_approach
 from pc_client.kinematics.model import RobotModel, nearest_posture, robot_model, tcp_pose

@@ -34,11 +34,7 @@ _FREQUENCY = 10.0  # packages a second to ask RTDE for
 
 
 def _watch(
-    interface: str,
-    address: str,
-    decoder: StreamDecoder | RtdeDecoder,
-    count: int,
-    names: tuple[str, ...],
+    interface: str, address: str, decoder: StreamDecoder | RtdeDecoder, count: int, names: tuple[str, ...]
 ) -> Iterator[str]:
     """Decode what a box sends, as lines of text; nothing else of this package opens a socket.
 

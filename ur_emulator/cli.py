@@ -125,8 +125,7 @@ def serve(
         ),
     ] = None,
     services: Annotated[
-        str,
-        typer.Option(help="Services of a PolyScope X box to enable: primary,rtde.", show_default="none"),
+        str, typer.Option(help="Services of a PolyScope X box to enable: primary,rtde.", show_default="none")
     ] = "",
     pendant: Annotated[
         bool, typer.Option("--pendant", help="Open a window on the box in the browser, on port 29980.")

@@ -203,10 +203,7 @@ def predict(joints: JointReference, recipe: RunRecipe, model: RobotModel) -> Pre
 
 
 def _remedy(
-    plan: JointPlan,
-    recipe: RunRecipe,
-    model: RobotModel,
-    will_do: Callable[[Prediction, Controller], bool],
+    plan: JointPlan, recipe: RunRecipe, model: RobotModel, will_do: Callable[[Prediction, Controller], bool]
 ) -> str:
     """What would do: more time for the movement, or the default controller."""
 

@@ -76,11 +76,7 @@ class ExperimentRunner:
     """
 
     def __init__(
-        self,
-        driver: UrDriver,
-        experiment: Experiment,
-        config: Controller,
-        law: ControlLaw | None = None,
+        self, driver: UrDriver, experiment: Experiment, config: Controller, law: ControlLaw | None = None
     ) -> None:
         self._law = law
         self._driver = driver

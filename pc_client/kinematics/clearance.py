@@ -214,10 +214,7 @@ def load_meshes(file: str, model: Any) -> list[Any]:
     The links are placed by the frames of the Pinocchio model of the arm's URDF.
     """
     meshes = pin.buildGeomFromUrdf(
-        model,
-        str(find_robot_file(file)),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(find_share_folder())],
+        model, str(find_robot_file(file)), pin.GeometryType.COLLISION, package_dirs=[str(find_share_folder())]
     )
     # ee_link carries a token box, not a part of the arm.
     return [mesh for mesh in meshes.geometryObjects if isinstance(mesh.geometry, pin.coal.BVHModelBase)]

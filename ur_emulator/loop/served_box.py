@@ -88,12 +88,7 @@ class ServedBox:
     """
 
     def __init__(
-        self,
-        controller: Controller,
-        identity: BoxIdentity,
-        pacer: Pacer,
-        loop: EventLoop,
-        on_failure: Failed,
+        self, controller: Controller, identity: BoxIdentity, pacer: Pacer, loop: EventLoop, on_failure: Failed
     ) -> None:
         """Serve a controller.
 

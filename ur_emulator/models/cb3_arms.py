@@ -61,14 +61,7 @@ UR3 = RobotModel(
     coulomb=(4.5, 4.2, 1.7, 0.6, 0.6, 0.6),  # D
     coulomb_standstill=0.33,  # F: a sixth to a third of the full value at rest
     coulomb_speed=0.08,  # F: full value reached within .05-.15 rad/s
-    torque_constant=(
-        11.7,
-        12.3,
-        9.0,
-        3.0,
-        3.0,
-        3.0,
-    ),  # D; elbow: moving fit 6.4, static 9-11
+    torque_constant=(11.7, 12.3, 9.0, 3.0, 3.0, 3.0),  # D; elbow: moving fit 6.4, static 9-11
     stop_deceleration=20.0,  # E: base, 183 deg/s in 159 ms; shoulder and elbow stop no slower
     servo_frequency=12.0,  # assumed: a position loop of 10-30 Hz fits the delays that drivers report
     servo_inertia=(0.88, 0.95, 0.39, 0.095, 0.083, 0.08),  # A, B

@@ -339,11 +339,7 @@ class ModbusClient:
     """All connections to Modbus units of one box."""
 
     def __init__(
-        self,
-        loop: EventLoop,
-        connect: Callable[[str, int], ScriptSocket],
-        period_s: float,
-        report: Report,
+        self, loop: EventLoop, connect: Callable[[str, int], ScriptSocket], period_s: float, report: Report
     ) -> None:
         """Prepare; nothing is connected before there is a unit. `report` gets errors of ours."""
         self._loop = loop

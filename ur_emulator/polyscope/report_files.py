@@ -157,10 +157,7 @@ def flight_report(folder: ProgramFolder, kind: str, facts: BoxFacts) -> str:
         raise ProgramFileError(f"Unknown report type: {kind}")
     place = folder.make_folder(REPORT_FOLDER)
     number = 1 + max(_flight_reports(folder, place), default=0)
-    contents = {
-        "report.json": _json({"kind": kind or REPORT_KINDS[-1], "id": number}),
-        **_contents(facts),
-    }
+    contents = {"report.json": _json({"kind": kind or REPORT_KINDS[-1], "id": number}), **_contents(facts)}
     _write_report(folder, place / f"flightreport_{number}.zip", _zip(contents, facts.time))
     return str(number)
 

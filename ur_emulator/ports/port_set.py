@@ -156,11 +156,7 @@ class SendingPorts:
 
 
 def answering_ports(
-    box: ServedBox,
-    player: ProgramPlayer,
-    reports: ReportWriter,
-    shut_down: Callable[[], None],
-    host: str,
+    box: ServedBox, player: ProgramPlayer, reports: ReportWriter, shut_down: Callable[[], None], host: str
 ) -> dict[str, Port]:
     """Make the ports that answer requests, by their names in `Ports`: those that the software has."""
     software = box.identity.software

@@ -28,9 +28,7 @@ if TYPE_CHECKING:
 
 # Signs of PolyScope's expression editor and what a script says for them; labels keep them. The last three are
 # inferred.
-_SIGNS = str.maketrans(
-    {"≟": " == ", "≠": " != ", "≤": " <= ", "≥": " >= "} | {"≔": "=", "×": "*", "÷": "/"},
-)
+_SIGNS = str.maketrans({"≟": " == ", "≠": " != ", "≤": " <= ", "≥": " >= "} | {"≔": "=", "×": "*", "÷": "/"})
 # Words of the editor for the levels of a line (manual of PolyScope).
 _WORDS = {"HI": "True", "LO": "False"}
 
@@ -166,9 +164,7 @@ LINES: Mapping[str, LineKind] = {
     "analog_out": LineKind("AO[{n}]", "get_standard_analog_out({n})"),
     "GP_bool_in": LineKind("GP_bool_in[{n}]", "read_input_boolean_register({n})"),
     "GP_bool_out": LineKind(
-        "GP_bool_out[{n}]",
-        "read_output_boolean_register({n})",
-        "write_output_boolean_register({n}, {value})",
+        "GP_bool_out[{n}]", "read_output_boolean_register({n})", "write_output_boolean_register({n}, {value})"
     ),
     "GP_int_in": LineKind("GP_int_in[{n}]", "read_input_integer_register({n})"),
     "GP_int_out": LineKind("GP_int_out[{n}]", "read_output_integer_register({n})"),

@@ -188,14 +188,8 @@ class Guard(Enum):
     AUTOMATIC = "automatic mode"
 
 
-_PRESSED = {
-    "robot": SafetyEvent.ROBOT_EMERGENCY_PRESSED,
-    "system": SafetyEvent.SYSTEM_EMERGENCY_PRESSED,
-}
-_RELEASED = {
-    "robot": SafetyEvent.ROBOT_EMERGENCY_RELEASED,
-    "system": SafetyEvent.SYSTEM_EMERGENCY_RELEASED,
-}
+_PRESSED = {"robot": SafetyEvent.ROBOT_EMERGENCY_PRESSED, "system": SafetyEvent.SYSTEM_EMERGENCY_PRESSED}
+_RELEASED = {"robot": SafetyEvent.ROBOT_EMERGENCY_RELEASED, "system": SafetyEvent.SYSTEM_EMERGENCY_RELEASED}
 
 
 class SafetyInputs:

@@ -123,11 +123,7 @@ class StateEncoder:
     """Encodes states for all ports of a box: each snapshot once, however many ports ask for it."""
 
     def __init__(
-        self,
-        software: Software,
-        arm: ArmModel,
-        safety: SafetyState,
-        masterboard: int = SIMULATED_MASTERBOARD,
+        self, software: Software, arm: ArmModel, safety: SafetyState, masterboard: int = SIMULATED_MASTERBOARD
     ) -> None:
         """Prepare what stays; clients know the box by the version of its masterboard."""
         self._software = software
