@@ -10,9 +10,9 @@ Sources of the joints, cited by letter there:
     proportional to it.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import pi
-from typing import TypedDict
+from typing import Any
 
 from ur_emulator.models.cb3_arms import UR3, UR5, UR10
 from ur_emulator.models.generations import E_SERIES
@@ -23,7 +23,6 @@ from ur_emulator.models.robot_model import (
     Link,
     Outline,
     RobotModel,
-    Vector6,
     dh_table,
     six,
 )
@@ -31,7 +30,7 @@ from ur_emulator.models.robot_model import (
 
 @dataclass(frozen=True, slots=True)
 class JointSize:
-    """What all joints of a size have in common.
+    """What all joints of a size have in common, by names of `RobotModel`.
 
     Attributes:
         tau_max: largest torque [Nm].
@@ -66,41 +65,19 @@ BASE_OF_UR20 = JointSize(738.0, 12.0, 16.4, 37.0, 55.0, 24.0)
 _REVERSAL_SPEED = 0.006  # rad/s; A: the sign has changed within .01-.015 rad/s
 
 
-class DriveNumbers(TypedDict):
-    """Those fields of `RobotModel` that follow from the sizes of its joints."""
-
-    tau_max: Vector6
-    torque_constant: Vector6
-    armature: Vector6
-    coulomb: Vector6
-    viscous: Vector6
-    viscous_kink: float
-    viscous_fast: Vector6
-    reversal_speed: float
-    friction_rise: float
-    coulomb_standstill: float
-    coulomb_speed: float
-    servo_frequency: float
-
-
-def drives(*sizes: JointSize) -> DriveNumbers:
-    """Return the numbers of the drives of an arm with joints of these six sizes, base first."""
-    return DriveNumbers(
-        tau_max=six([size.tau_max for size in sizes]),
-        torque_constant=six([size.torque_constant for size in sizes]),
-        armature=six([size.armature for size in sizes]),
-        coulomb=six([size.coulomb for size in sizes]),
-        viscous=six([size.viscous for size in sizes]),
-        viscous_kink=0.5,  # A
-        viscous_fast=six([size.viscous_fast for size in sizes]),
-        reversal_speed=_REVERSAL_SPEED,
+def drives(*sizes: JointSize) -> dict[str, Any]:
+    """Return those fields of `RobotModel` that follow from the sizes of an arm's six joints, base first."""
+    return {
+        **{one.name: six([getattr(size, one.name) for size in sizes]) for one in fields(JointSize)},
+        "viscous_kink": 0.5,  # A
+        "reversal_speed": _REVERSAL_SPEED,
         # As fast as the compensation: that would push the joint ahead wherever friction lags behind it, and
         # A, which is within .12 mrad of its target, shows no such thing.
-        friction_rise=_REVERSAL_SPEED,
-        coulomb_standstill=1.0,  # A
-        coulomb_speed=1.0,  # without effect, as nothing is lost at standstill
-        servo_frequency=25.0,  # at 12 Hz the arm is further from its target than a real UR3e
-    )
+        "friction_rise": _REVERSAL_SPEED,
+        "coulomb_standstill": 1.0,  # A
+        "coulomb_speed": 1.0,  # without effect, as nothing is lost at standstill
+        "servo_frequency": 25.0,  # at 12 Hz the arm is further from its target than a real UR3e
+    }
 
 
 # The UR5e. Sources:
