@@ -42,7 +42,7 @@ PAPER_SNR_DB = {
 }
 KINDS = ("uniform", "lognormal")
 
-PAPER_ROWS = pl.DataFrame(
+_PAPER_ROWS = pl.DataFrame(
     [
         {"kind": KINDS[name.startswith("lognorm")], "name": name, "paper_snr_db": level}
         for name, level in PAPER_SNR_DB.items()
@@ -50,7 +50,7 @@ PAPER_ROWS = pl.DataFrame(
 )
 """The paper's table as a frame."""
 
-SHARED = "Paper: own points, not published; name, kind, number of targets agree"
+_SHARED = "Paper: own points, not published; name, kind, number of targets agree"
 """Why no differences are given."""
 
 PUBLISHED = "paper"
@@ -127,13 +127,13 @@ class Table:
         """Return the content of `table1.md`."""
         notes = ["SNR of the TCP speed as in Eq. 10 of the paper, in dB: unshifted, unsmoothed."]
         floor = "floor: SNR that the noise of the arm's encoders at rest alone would leave a perfect arm."
-        after = [floor] * self.has_floor + [SHARED] * self.has_paper_rows
+        after = [floor] * self.has_floor + [_SHARED] * self.has_paper_rows
         return "\n\n".join([f"# {self.title}", *notes, to_markdown(*self.shown()), *after]) + "\n"
 
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
         caption = "SNR of the TCP speed, Eq. 10, in dB: unshifted, unsmoothed"
-        caption += f"\n{SHARED}" if self.has_paper_rows else ""
+        caption += f"\n{_SHARED}" if self.has_paper_rows else ""
         return to_rich(*self.shown(), bold="is_mean", section="kind", title=self.title, caption=caption)
 
     @property
@@ -173,7 +173,7 @@ class Table:
         """The rows with the means, as people read them, and their columns."""
         n_runs = max(map(len, self.runs.values()))
         runs = [f"r{k}" for k in range(1, n_runs + 1)]
-        frame = with_means(self.frame, LEVEL.name, PAPER.name)
+        frame = _with_means(self.frame, LEVEL.name, PAPER.name)
         frame = frame.with_columns(pl.col("snr_db").list.to_struct(fields=runs)).unnest("snr_db")
         return frame, (
             MOVEMENT,
@@ -186,7 +186,7 @@ class Table:
         )
 
 
-def with_means(frame: pl.DataFrame, *figures: str) -> pl.DataFrame:
+def _with_means(frame: pl.DataFrame, *figures: str) -> pl.DataFrame:
     """Rows by kind, and after those of a kind with several a row `mean KIND` (`is_mean`) of some figures."""
     kinds = frame["kind"].unique(maintain_order=True)
     several = frame.filter(pl.len().over("kind") > 1, pl.col("kind") != GIVEN_UP)
@@ -299,7 +299,7 @@ class SideBySide:
             level, *others = (replace(figure, name=f"{figure.name}_{i}") for figure in SHOWN)
             columns += [replace(level, header=label, unit="dB", narrow=narrow), *others]
         levels = [column.name for column in columns if column.unit == "dB"]
-        return with_means(self.frame, *levels), columns
+        return _with_means(self.frame, *levels), columns
 
     @property
     def has_paper_rows(self) -> bool:
@@ -326,7 +326,7 @@ class SideBySide:
         ]
         if not here or not self.has_paper_rows:
             return ""
-        there = _better(mean_by_kind(PAPER_ROWS, PAPER.name))
+        there = _better(mean_by_kind(_PAPER_ROWS, PAPER.name))
         return (
             f"The paper found lognormal movements reproduced {there} than uniform ones (means of the SNR); "
             f"here they are {', '.join(here)}."
@@ -348,7 +348,7 @@ class SideBySide:
     def to_rich(self) -> RichTable:
         """Return the table for the terminal."""
         title = "\n".join(["Side by side: SNR of the TCP speed, Eq. 10, in dB", *self.arms])
-        caption = "\n".join([SHARED, self.finding] if self.has_paper_rows else [])
+        caption = "\n".join([_SHARED, self.finding] if self.has_paper_rows else [])
         return to_rich(*self.shown(), bold="is_mean", section="kind", title=title, caption=caption)
 
 

@@ -77,7 +77,8 @@ def _gripper_obeys(box: BoxUnderAttack) -> Iterator[Methods]:
 
 def _go(server: Methods, width: float) -> None:
     assert server.rg_grip(0, width, 20.0) == 0
-    until(lambda: not server.rg_get_busy(0), "the fingers stand")
+    # They are at the width before they rest there.
+    until(lambda: not server.rg_get_busy(0) and abs(server.rg_get_speed(0)) < 0.1, "the fingers stand")
     now = server.rg_get_width(0)
     assert abs(now - width) < 1.0, f"the width is {now:.1f} mm instead of {width:g} mm"
 

@@ -32,6 +32,7 @@ from pc_client.experiment.experiment import (
 )
 from pc_client.experiment.identification import identify
 from pc_client.experiment.runner import ExperimentRunner, run_approach
+from pc_client.kinematics.clearance import Clearance
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import Movement, load_motion
 from pc_client.planning.approach import Approach
@@ -392,7 +393,7 @@ SPEED = 0.5  # rad/s
 
 
 def approach_to(*waypoints):
-    return Approach(None, np.zeros(6), waypoints, SPEED, 0.8, 1.0, 1.0, 1.0)
+    return Approach(None, np.zeros(6), waypoints, SPEED, 0.8, Clearance(1.0, 1.0, 1.0))
 
 
 def move(robot, *waypoints):
