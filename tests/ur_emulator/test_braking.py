@@ -17,6 +17,7 @@ from protocol.ur_types import ProgramState, SafetyMode
 from protocol.velocity_stream import VelocityMode, encode_velocity
 from ur_emulator.commands.programs import ResumeProgram, SetSpeedSlider
 from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.models.fidelity import TYPICAL
 from ur_emulator.models.robots import ROBOTS, robot_by_name
 
 # Stretched; the shoulder turns down, from upright to some 40 degrees above the horizontal.
@@ -150,6 +151,7 @@ def test_without_a_program_there_is_none():
 
 PERIOD = 0.008  # s, of a CB3
 MISSED_CYCLES = round(MISSED_ALLOWED / PERIOD)
+DEAD_CYCLES = round(TYPICAL.dead_time / PERIOD)
 ALLOWED = 0.3  # s
 WAITS_FOR_THE_READ = 1  # tick; a message may come right after the read of a cycle
 SPEED_UP, STEADY = 0.56, 0.08  # s
@@ -242,9 +244,10 @@ def test_the_ramp_begins_after_the_cycles_that_may_be_missed_and_has_its_deceler
     arm = Turning("ur3", 0)
     speeds = [arm.tick().target_qd[0] for _ in range(60)]
     fastest = CLIENT_ARMS["ur3"].limits.qd_max[0]
-    published = MISSED_CYCLES + 1  # a package shows the target of the cycle before
+    # A package shows the target of the cycle before, and what moves the target is late by the dead time.
+    published = MISSED_CYCLES + 1 + DEAD_CYCLES
     assert speeds[:published] == pytest.approx([fastest] * published)
-    drops = [before - after for before, after in pairwise(speeds[MISSED_CYCLES:])]
+    drops = [before - after for before, after in pairwise(speeds[MISSED_CYCLES + DEAD_CYCLES :])]
     ramp = [drop for drop in drops if drop > 0.0]
     assert ramp[:-1] == pytest.approx([STOP_DECELERATION * PERIOD] * (len(ramp) - 1))
     assert drops[0] == ramp[0]
@@ -262,7 +265,7 @@ def test_an_arm_that_still_speeds_up_does_not_go_on_speeding_up():
     reached = arm.now.target_qd[0]
     assert reached < 0.6
     speeds = [arm.tick().target_qd[0] for _ in range(40)]
-    assert max(speeds) <= reached + 3.0 * PERIOD * (MISSED_CYCLES + 1)
+    assert max(speeds) <= reached + 3.0 * PERIOD * (MISSED_CYCLES + 1 + DEAD_CYCLES) + 1e-9
     assert not any(speeds[10:])
 
 

@@ -39,7 +39,7 @@ def cubic(s):
 
 
 @pytest.mark.parametrize(("robot", "generation", "fidelity"), [
-    ("ur3", CB3, "typical"), ("ur3", CB3, "exact"), ("ur5e", E_SERIES, "ideal"),
+    ("ur3", CB3, "ideal"), ("ur3", CB3, "exact"), ("ur5e", E_SERIES, "ideal"),
 ])  # fmt: skip
 def test_the_target_of_a_package_is_one_step_behind_its_register(robot, generation, fidelity):
     bench = Bench(robot=robot, generation=generation, fidelity=fidelity)
@@ -72,8 +72,10 @@ def test_current_and_moment_of_a_package_are_those_of_its_target():
     for bench, cycles in ((slow, 40), (quick, 41)):
         bench.start("movej([0, -1.5, -1.8, 0, 1.2, 1.5])\n")
         bench.tick(cycles)
-    sensed, motion = slow.controller.plant.sense(), slow.controller.state.motion
-    now = quick.now
+    motion, now = slow.controller.state.motion, quick.now
+    slow.controller.plant.complete_cycle()
+    slow.controller.plant.step(motion.target)  # only to ask what was computed for the one before
+    sensed = slow.controller.plant.sense()
     assert (now.target_q, now.target_qd, now.target_qdd) == motion.target
     assert (now.target_current, now.target_moment) == (sensed.target_current, sensed.target_moment)
     assert any(now.target_qd)

@@ -81,7 +81,7 @@ class Fidelity:
         dead_time_period: of that cosine [s]; where it begins is drawn by the seed.
         drive_lag: of the drive's set-point filter: by how much a ramp trails [s].
         drive_damping: damping ratio of the filter, which is of second order then; None: of first order.
-        feedback_age: age of the measurements when they are reported [s]; at least one physics step.
+        feedback_age: age of the measurements when they are reported [s]; a cycle: that of the reported target.
         sample_jitter: sd of the moment at which all joints are sampled [s].
         encoder_sigma: sd of the white noise of each reported angle, (6,) [rad].
         encoder_step: quantisation of the reported angle [rad].
@@ -213,7 +213,6 @@ IDEAL = replace(
     name="ideal",
     dead_time=0.0,
     drive_lag=0.0,
-    feedback_age=0.002,
     sample_jitter=0.0,
     encoder_sigma=(1e-6,) * 6,
     encoder_step=1e-7,
