@@ -314,7 +314,7 @@ def test_the_arm_rests_in_time(lockstep_box, twice, tmp_path, death, phase, monk
     error, time_to_rest, at_rest = lose_client(lockstep_box, experiment, death, phase, monkeypatch)
     rests_already = phase == "pause between runs"
     assert time_to_rest <= ALLOWED
-    assert rests_already or time_to_rest >= 5 * PERIOD  # it was in motion
+    assert rests_already or time_to_rest > 4 * PERIOD  # it was in motion
     assert at_rest.runtime_state == ProgramState.STOPPED
     assert at_rest.safety_mode == SafetyMode.NORMAL
     if death == KILLED:
