@@ -24,7 +24,7 @@ OPTIONS = {
     "gears": {"ripples": (Ripple(cycles=80.0, rms=0.01, joints=(5,)),)},
     "backlash": {"backlash": 1e-3},
     "hysteresis": {"friction_presliding": 1e-3},
-    "wander": {"dead_time_wander": 0.004, "dead_time_period": 0.4},
+    "wander": {"dead_time_wander": 0.008, "dead_time_period": 0.4},
     "second order": {"drive_damping": 0.5},
 }
 OTHERWISE = [replace(TYPICAL, **changes) for changes in OPTIONS.values()]
@@ -169,7 +169,7 @@ def test_friction_with_hysteresis_follows_the_path_not_the_speed():
 
 
 def test_a_dead_time_wanders_between_its_bounds():
-    fidelity = replace(IDEAL, dead_time=0.008, dead_time_wander=0.0161, dead_time_period=0.8)
+    fidelity = replace(IDEAL, dead_time=0.008, dead_time_wander=0.016, dead_time_period=0.8)
     cycles = dead_cycles(fidelity, 4, PERIOD)
     assert len(cycles) == round(0.8 / PERIOD)
     assert set(cycles) == {1, 2, 3}

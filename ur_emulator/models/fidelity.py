@@ -76,7 +76,7 @@ class Fidelity:
 
     Attributes:
         name: as on the command line.
-        dead_time: from a streamed command to the target that it moves [s], in whole control cycles.
+        dead_time: from a streamed command to the target that it moves [s], rounded to whole control cycles.
         dead_time_wander: the dead time becomes longer by up to this and shorter again, along a cosine [s].
         dead_time_period: of that cosine [s]; where it begins is drawn by the seed.
         drive_lag: of the drive's set-point filter: by how much a ramp trails [s].
@@ -171,7 +171,7 @@ def dead_cycles(fidelity: Fidelity, seed: int, period: float) -> list[int]:
     begin = random_stream(seed, "wander").uniform()
     share = 0.5 - 0.5 * np.cos(2.0 * np.pi * (begin + np.arange(n) / n))
     dead_times = fidelity.dead_time + fidelity.dead_time_wander * share
-    return [int(cycles) for cycles in np.floor(dead_times / period + 1e-9)]
+    return [int(cycles) for cycles in np.rint(dead_times / period)]
 
 
 TYPICAL = Fidelity(
