@@ -176,7 +176,7 @@ class Controller:
         motion = ArmMotion(q, robot.stop_deceleration, generation.run_up_time)
         self.state = make_state(
             robot,
-            ArmModel(robot, draw_calibration(fidelity, seed)),
+            ArmModel(robot, draw_calibration(robot, fidelity, seed)),
             seed,
             Clock(generation, generation.cycles(BOOT_TIME)),
             motion,

@@ -13,9 +13,9 @@ Sources, cited by letter below:
  B  Delays reported for streamed motion: Universal_Robots_ROS_Driver pull 1 (aim of two cycles for speedj),
     Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms), ur_modern_driver (a gain of 50 1/s is
     stable on a UR3, so the whole loop stays below 31 ms there).
- C  Factory calibrations of three real arms, see `calibration.py`.
- D  UR3/CB3 manual (force precision ±10 N, ±5 Nm) and forum.universal-robots.com threads 229 and 4481.
+ C  Factory calibrations of 35 real arms, see `calibration.py`.
  E  assumed: no published figure; to be checked on a real arm.
+ F  Recordings of real CB3 arms (docs/fidelity.md).
 """
 
 from collections.abc import Sequence
@@ -94,15 +94,15 @@ class Fidelity:
             the path then, with hysteresis (`plant/friction.py`). 0: it depends on the speed alone.
         friction_error: sd of the relative error of the controller's friction model, per joint [1].
         mass_error: sd of the relative error of each link's mass in the controller's model [1].
-        calibration_length: sd of each length of the factory calibration [m].
-        calibration_angle: sd of each angle of the factory calibration [rad].
-        force_bias: bound of the slow drift of the measured force [N].
+        calibration: factor on the factory calibrations of the arm's type (`calibration.py`) [1].
+        force_bias: bound of the slow wander of the measured force [N].
+        force_drift: sd of its steady drift [N/s].
         force_sigma: sd of the measured force [N].
         force_offset: bound of its constant offset, which a zero takes away [N].
-        force_ratio: of these three to those of the measured moments [1/m].
-        force_friction: offset of the measured force against the direction of motion [N].
+        force_ratio: of these four to those of the measured moments [1/m].
         accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
         voltage_sigma: sd of each joint voltage [V].
+        voltage_offset: bound of its constant offset [V].
         has_physics: False: the arm is at its target, and the numbers above have no effect.
     """
 
@@ -126,15 +126,15 @@ class Fidelity:
     friction_presliding: Angle
     friction_error: Share
     mass_error: Share
-    calibration_length: Annotated[float, number(0.0, 0.01, "m")]
-    calibration_angle: Angle
+    calibration: Annotated[float, number(0.0, 10.0)]
     force_bias: Noise
+    force_drift: Noise
     force_sigma: Noise
     force_offset: Noise
     force_ratio: Annotated[float, number(0.1, 1000.0)]
-    force_friction: Noise
     accelerometer_sigma: Noise
     voltage_sigma: Noise
+    voltage_offset: Noise
     has_physics: bool = True
 
     def __post_init__(self) -> None:
@@ -190,15 +190,15 @@ TYPICAL = Fidelity(
     friction_presliding=0.0,
     friction_error=0.15,  # E: friction changes with temperature by more than that
     mass_error=0.02,  # E
-    calibration_length=0.00015,  # C: with the angles gives the observed pose errors
-    calibration_angle=0.001,  # C
-    force_bias=5.0,  # D
-    force_sigma=3.0,  # D
-    force_offset=0.0,
-    force_ratio=10.0,  # E
-    force_friction=2.0,  # D
+    calibration=1.0,  # C
+    force_bias=4.0,  # F: 2 N, which is half of the bound
+    force_drift=0.0,
+    force_sigma=0.25,  # F: .17 to .31 N, .01 to .04 Nm; .3 to .5 N in another
+    force_offset=5.0,  # F: means of the axes from -6.5 to 5.6 N at rest
+    force_ratio=10.0,  # F
     accelerometer_sigma=0.05,  # E
-    voltage_sigma=0.05,  # E
+    voltage_sigma=0.02,  # F
+    voltage_offset=0.1,  # F: joints from 47.81 to 48.02 V
 )
 
 IDEAL = replace(
@@ -216,13 +216,13 @@ IDEAL = replace(
     ripples=(Ripple(cycles=101.0, rms=0.0002), Ripple(cycles=202.0, rms=0.0002)),
     friction_error=0.0,
     mass_error=0.0,
-    calibration_length=0.0,  # like the vendor's simulator: the nominal table itself
-    calibration_angle=0.0,
+    calibration=0.0,  # like the vendor's simulator: the nominal table itself
     force_bias=0.0,
-    force_sigma=0.05,
-    force_friction=0.0,
+    force_sigma=0.01,
+    force_offset=0.0,
     accelerometer_sigma=0.001,
     voltage_sigma=0.001,
+    voltage_offset=0.0,
 )
 
 EXACT = replace(IDEAL, name="exact", has_physics=False, ripples=())
@@ -237,9 +237,9 @@ POOR = replace(
     ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
     friction_error=0.30,
     mass_error=0.04,
-    force_bias=10.0,
-    force_sigma=4.0,
-    force_friction=4.0,
+    force_bias=8.0,
+    force_sigma=0.5,
+    force_offset=10.0,
 )
 
 FIDELITIES = (EXACT, IDEAL, TYPICAL, POOR)

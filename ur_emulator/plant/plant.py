@@ -133,7 +133,7 @@ class Plant:
         self.fidelity = fidelity
         self.seed = seed
         self.period_s = generation.period_s
-        self.calibration = draw_calibration(fidelity, seed)
+        self.calibration = draw_calibration(robot, fidelity, seed)
         dead_time = draw_dead_time(fidelity, seed, generation)
         self.dead_time = dead_time.least_s
         self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, dead_time, tools)

@@ -15,41 +15,44 @@ from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, 
 
 # --- ForceDrift: the slow error of the measured force
 #
-# A CB3 arm has no force sensor. What it reports wanders by several newtons within minutes, because friction
-# and temperature do. The sensor of an e-Series arm drifts less, around an offset that the first zero takes
-# away. The white part of the error is added with the other sensor noise.
+# A CB3 arm has no force sensor. What it estimates at rest differs by several newtons between postures and
+# wanders, because friction and temperature do. The sensor of an e-Series arm has an offset that the first
+# zero takes away, and drifts steadily. The white part of the error is added with the other sensor noise.
 #
 # Source: UR3/CB3 manual (precision ±10 N, ±5 Nm); forum.universal-robots.com threads 229 and 4481 (offsets of
-# several newtons, sd 3.6 N). E-Series: see `models/generations.py`.
+# several newtons, sd 3.6 N); recordings of a real UR3. E-Series: see `models/generations.py`.
 
 _TIME_CONSTANT = 120.0  # s; assumed
 
 
 class ForceDrift:
-    """A bounded random walk of all six components, linear between the knots of successive blocks.
+    """Offset, steady drift and a bounded random walk of all six components; linear within a block.
 
     Args:
-        fidelity: gives the bounds of drift and offset.
+        fidelity: gives their sizes.
         block_time: time from knot to knot [s].
     """
 
     def __init__(self, fidelity: Fidelity, seed: int, block_time: float) -> None:
         self._rng = random_stream(seed, "force")
-        self._bound = np.repeat([fidelity.force_bias, fidelity.force_bias / fidelity.force_ratio], 3)
-        offset = np.repeat([fidelity.force_offset, fidelity.force_offset / fidelity.force_ratio], 3)
-        self._offset = offset * random_stream(seed, "force offset").uniform(-1.0, 1.0, 6)
+        shares = np.repeat([1.0, 1.0 / fidelity.force_ratio], 3)
+        self._bound = fidelity.force_bias * shares
+        self._base = fidelity.force_offset * shares * random_stream(seed, "force offset").uniform(-1.0, 1.0, 6)
+        drift = fidelity.force_drift * shares * random_stream(seed, "force drift").standard_normal(6)
+        self._drift = drift * block_time
         self._keep = exp(-block_time / _TIME_CONSTANT)
         self._spread = 0.5 * self._bound
         self._knot = np.clip(self._rng.standard_normal(6) * self._spread, -self._bound, self._bound)
 
     def next_block(self, n: int) -> NDArray[np.float64]:
-        """Return drift and offset (n, 6) [N, Nm] of n cycles; the next block begins where this one ends."""
-        start = self._knot
+        """Return the error (n, 6) [N, Nm] of n cycles, a block; the next one begins where this one ends."""
+        start, base = self._knot, self._base
+        self._base = base + self._drift
         fresh = sqrt(1.0 - self._keep**2) * self._spread * self._rng.standard_normal(6)
         self._knot = np.clip(self._keep * start + fresh, -self._bound, self._bound)
         share = np.arange(n)[:, None] / n
-        drift: NDArray[np.float64] = start + share * (self._knot - start)
-        return drift + self._offset
+        error: NDArray[np.float64] = base + start + share * (self._drift + self._knot - start)
+        return error
 
 
 # A record of true values: what `Plant` captures in a sub-step.
@@ -57,15 +60,13 @@ REC_Q = slice(0, 6)  # joint angles [rad]
 REC_QD = slice(6, 12)  # joint speeds [rad/s]
 REC_TORQUE = slice(12, 18)  # motor torques at the joint [Nm]
 REC_ACCELERATION = slice(18, 21)  # specific force at the flange, flange axes [m/s²]
-REC_VELOCITY = slice(21, 24)  # of the flange, base axes [m/s]
-REC_WRENCH = slice(24, 30)  # external, at the flange, base axes [N, Nm]
-REC_VOLTAGE = slice(30, 36)  # supply of the joints, beyond what the sensors add themselves: 0 [V]
-N_RECORD = 36
+REC_WRENCH = slice(21, 27)  # external, or the estimate of it, at the flange, base axes [N, Nm]
+REC_VOLTAGE = slice(27, 33)  # supply of the joints, beyond what the sensors add themselves: 0 [V]
+N_RECORD = 33
 REC_MOTION = slice(0, 12)  # angles and speeds
-REC_SIMULATED = slice(0, 24)  # the part that MuJoCo's sensors fill, in their order
+REC_SIMULATED = slice(0, 21)  # the part that MuJoCo's sensors fill, in their order
 
 _BLOCK = 256  # cycles of noise drawn at once
-_SLOW = 0.02  # m/s; the direction of motion is smoothed below this
 _SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
 
 # The noise has the columns of the record, then the sampling moment.
@@ -134,12 +135,12 @@ class Sensors:
         self._scale[REC_Q] = 1.0 / step
         self._scale[REC_TORQUE] = 1.0 / np.array(robot.torque_constant)
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
-        self._supply_voltage = robot.generation.electrics.joint_voltage
+        offsets = random_stream(seed, "voltage").uniform(-1.0, 1.0, 6) * fidelity.voltage_offset
+        self._supply_voltage = robot.generation.electrics.joint_voltage + offsets
         self._dead_band = fidelity.speed_dead_band
         bandwidth = robot.generation.force_sensing.bandwidth
         self._force_keep = None if bandwidth is None else exp(-2.0 * pi * bandwidth * period)
         self._force = self._next_force = np.zeros(6)
-        self._force_friction = fidelity.force_friction
         self._noise: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         self._at = _BLOCK
         self._speeds = self._next_speeds = ZERO6
@@ -171,18 +172,14 @@ class Sensors:
         np.multiply(steps, self._step, steps)
         reading: list[float] = values.tolist()
         self._next_speeds = speeds = self._filtered(record.qd.tolist(), reading[REC_QD])
-        # An estimate of the force takes some of the friction for a force against the motion.
-        ax, ay, az, vx, vy, vz, fx, fy, fz, mx, my, mz = reading[18:30]
-        if self._force_friction:
-            against = -self._force_friction / (sqrt(vx * vx + vy * vy + vz * vz) + _SLOW)
-            fx, fy, fz = fx + against * vx, fy + against * vy, fz + against * vz
+        ax, ay, az = reading[REC_ACCELERATION]
         return Reading(
             six(reading[REC_Q]),
             speeds,
             six(reading[REC_TORQUE]),
             six(reading[REC_VOLTAGE]),
             (ax, ay, az),
-            (fx, fy, fz, mx, my, mz),
+            six(reading[REC_WRENCH]),
         )
 
     def keep(self) -> None:
