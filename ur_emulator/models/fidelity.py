@@ -97,7 +97,7 @@ class Fidelity:
         calibration: factor on the factory calibrations of the arm's type (`calibration.py`) [1].
         force_bias: bound of the slow wander of the measured force [N].
         force_drift: sd of its steady drift [N/s].
-        force_sigma: sd of the measured force [N].
+        force_sigma: sd of the measured force, beside what the currents give to an estimated one [N].
         force_offset: bound of its constant offset, which a zero takes away [N].
         force_ratio: of these four to those of the measured moments [1/m].
         accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
@@ -193,7 +193,7 @@ TYPICAL = Fidelity(
     calibration=1.0,  # C
     force_bias=4.0,  # F: 2 N, which is half of the bound
     force_drift=0.0,
-    force_sigma=0.25,  # F: .17 to .31 N, .01 to .04 Nm; .3 to .5 N in another
+    force_sigma=0.0,  # F: that of the currents gives .17 to .31 N
     force_offset=5.0,  # F: means of the axes from -6.5 to 5.6 N at rest
     force_ratio=10.0,  # F
     accelerometer_sigma=0.05,  # E
@@ -218,7 +218,6 @@ IDEAL = replace(
     mass_error=0.0,
     calibration=0.0,  # like the vendor's simulator: the nominal table itself
     force_bias=0.0,
-    force_sigma=0.01,
     force_offset=0.0,
     accelerometer_sigma=0.001,
     voltage_sigma=0.001,
@@ -238,7 +237,6 @@ POOR = replace(
     friction_error=0.30,
     mass_error=0.04,
     force_bias=8.0,
-    force_sigma=0.5,
     force_offset=10.0,
 )
 

@@ -120,7 +120,7 @@ _TYPICAL = replace(
     force_ratio=30.0,  # A: .003-.005 Nm
     voltage_offset=0.15,  # A: 47.5-47.8
 )
-_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
+_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01)
 _EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
 _POOR = replace(  # C
     POOR,

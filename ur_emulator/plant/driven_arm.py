@@ -218,7 +218,7 @@ class DrivenArm:
         physics.run(drives, feedback.capture_at, feedback.captured)
         np.multiply(physics.torque, self._per_torque, self._currents)
         self.control_current = six(self._currents.tolist())
-        feedback.take(physics, drives.target_torque)
+        feedback.take(physics, drives.expected_current)
         error = self._error
         if is_free:
             error[:] = 0.0

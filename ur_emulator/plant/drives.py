@@ -147,8 +147,8 @@ class Drives:
         q_final: set-point at the end of this cycle (6,) [rad].
         coulomb: true size of the Coulomb friction at the speeds last given (6,) [Nm].
         target_moment: rigid-body torque for the present target (6,) [Nm].
-        target_torque: torque for the present target, friction included (6,) [Nm].
-        target_current: current for it (6,) [A].
+        target_current: current for the present target, friction included (6,) [A].
+        expected_current: the same, as an array.
     """
 
     def __init__(
@@ -185,8 +185,7 @@ class Drives:
         self._pressing = 0.5 * np.array(robot.coulomb)
         self._q, self._qd, self._qdd_then_deflection = path.newest
         self._moment = self._dynamics.torque
-        self._work = np.zeros(6)
-        self.target_torque = np.zeros(6)
+        self.expected_current = np.zeros(6)
         self.control = list(path.control)
         self.actual_speed = path.speeds[0]
         self.bias = self._friction.compensation
@@ -265,9 +264,10 @@ class Drives:
 
     def _expect_current(self) -> None:
         """Set the current for the model's torque and the friction at the target."""
-        np.add(self._moment, self._friction.expected, self.target_torque)
-        np.multiply(self.target_torque, self._per_torque, self._work)
-        self.target_current = six(self._work.tolist())
+        current = self.expected_current
+        np.add(self._moment, self._friction.expected, current)
+        np.multiply(current, self._per_torque, current)
+        self.target_current = six(current.tolist())
 
     def drive_freely(
         self, q: NDArray[np.float64], qd: NDArray[np.float64], extra: Vector6 | None = None
@@ -301,8 +301,8 @@ class Drives:
         self._path.control[:] = torque
         self.bias[:] = 0.0
         self.target_moment = six(moment.tolist())
-        self.target_torque[:] = torque
-        self.target_current = six((torque * self._per_torque).tolist())
+        np.multiply(torque, self._per_torque, self.expected_current)
+        self.target_current = six(self.expected_current.tolist())
 
     def are_pressing(self, q_motor: NDArray[np.float64]) -> bool:
         """True when a servo of a resting arm, motors at q_motor (6,) [rad], presses against an obstacle."""

@@ -142,7 +142,6 @@ class Feedback:
         self._read_at = 1 % len(self._records)
         self._rest = Record()
         self._has_force_sensor = generation.force_sensing.has_sensor
-        self._work = np.zeros(6)
         self.reading = self._sensors.read(self._rest)
 
     @property
@@ -155,21 +154,17 @@ class Feedback:
         """Takes what MuJoCo's sensors say at the measured moment, see `sensors.REC_SIMULATED`."""
         return self._records[0].simulated
 
-    def take(self, physics: ArmPhysics, expected: NDArray[np.float64]) -> None:
-        """Read the sensors of an arm whose cycle has been computed; the controller expects a torque (6,) [Nm].
-
-        Without a sensor the wrench is what the drives give beyond that. Source: recordings of a real UR3,
-        where it is that of the difference of actual and target current in each package (correlation 1.000).
-        """
+    def take(self, physics: ArmPhysics, expected_current: NDArray[np.float64]) -> None:
+        """Read the sensors of an arm whose cycle has been computed; the controller expects currents (6,) [A]."""
         record, loads = self._records[0], physics.loads
         self.gear.apply(record)
         if not self._has_force_sensor:
-            np.subtract(physics.torque, expected, self._work)
-            record.wrench[:] = physics.wrench_for(self._work)
-        else:
-            record.wrench[:] = loads.wrench if loads.is_unexpected else 0.0
-            if physics.n_contacts:
-                record.wrench += physics.contact_wrench
+            record.expected_current[:] = expected_current
+            self.reading = self._sensors.read(self._records[self._read_at], physics.wrench_for)
+            return
+        record.wrench[:] = loads.wrench if loads.is_unexpected else 0.0
+        if physics.n_contacts:
+            record.wrench += physics.contact_wrench
         self.reading = self._sensors.read(self._records[self._read_at])
 
     def undo(self) -> None:

@@ -5,6 +5,7 @@ comes in blocks from seeded streams, so equal seeds and equal motions give equal
 """
 
 from math import exp, pi, sqrt
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,10 @@ from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, 
 
 # --- ForceDrift: the slow error of the measured force
 #
-# A CB3 arm has no force sensor. What it estimates at rest differs by several newtons between postures and
-# wanders, because friction and temperature do. The sensor of an e-Series arm has an offset that the first
+# A CB3 arm has no force sensor: it takes what the motors give beyond its model for the work of a force at the
+# flange (see `Sensors.read`; recordings of a real UR3: of each package `actual_TCP_force` is that of
+# `actual_current` - `target_current`, correlation 1.000). At rest it is off by several newtons, otherwise in
+# each posture, because dry friction holds the joints; the drives here have none, so that stands here. The sensor of an e-Series arm has an offset that the first
 # zero takes away, and drifts steadily. The white part of the error is added with the other sensor noise.
 #
 # Source: UR3/CB3 manual (precision ±10 N, ±5 Nm); forum.universal-robots.com threads 229 and 4481 (offsets of
@@ -74,6 +77,9 @@ _N_NOISE = N_RECORD + 1
 _NOISE_MOMENT = N_RECORD
 
 
+WrenchFor = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
 class Record:
     """True values of some moment, with names for its parts.
 
@@ -84,9 +90,10 @@ class Record:
         qd: joint speeds (6,) [rad/s].
         motion: both, (12,).
         wrench: external wrench (6,) [N, Nm].
+        expected_current: of the motors, by the controller's model (6,) [A].
     """
 
-    __slots__ = ("motion", "q", "qd", "simulated", "values", "wrench")
+    __slots__ = ("expected_current", "motion", "q", "qd", "simulated", "values", "wrench")
 
     def __init__(self) -> None:
         self.values: NDArray[np.float64] = np.zeros(N_RECORD)
@@ -95,6 +102,7 @@ class Record:
         self.qd: NDArray[np.float64] = self.values[REC_QD]
         self.motion: NDArray[np.float64] = self.values[REC_MOTION]
         self.wrench: NDArray[np.float64] = self.values[REC_WRENCH]
+        self.expected_current: NDArray[np.float64] = np.zeros(6)
 
 
 class Reading(NamedTuple):
@@ -146,6 +154,8 @@ class Sensors:
         self._speeds = self._next_speeds = ZERO6
         self._values = np.zeros(N_RECORD)
         self._steps = self._values[REC_Q]
+        self._estimate = self._values[REC_WRENCH]
+        self._torque_constant = np.array(robot.torque_constant)
         self._work = np.zeros(6)
 
     def reset(self) -> None:
@@ -153,8 +163,13 @@ class Sensors:
         self._speeds = ZERO6
         self._force = np.zeros(6)
 
-    def read(self, record: Record) -> Reading:
-        """Read all sensors of an arm whose true values are `record`; the same again until `keep`."""
+    def read(self, record: Record, wrench_for: WrenchFor | None = None) -> Reading:
+        """Read all sensors of an arm whose true values are `record`; the same again until `keep`.
+
+        Args:
+            wrench_for: tells for joint torques (6,) [Nm] the wrench on the flange that asks for them; the
+                external wrench is estimated so from the currents, and added to that of the record.
+        """
         if self._at == _BLOCK:
             self._draw_noise()
         noise, moment = self._noise[self._at]
@@ -170,6 +185,10 @@ class Sensors:
         np.add(steps, work, steps)
         np.rint(steps, steps)
         np.multiply(steps, self._step, steps)
+        if wrench_for is not None:
+            np.subtract(values[REC_TORQUE], record.expected_current, work)
+            np.multiply(work, self._torque_constant, work)
+            self._estimate += wrench_for(work)
         reading: list[float] = values.tolist()
         self._next_speeds = speeds = self._filtered(record.qd.tolist(), reading[REC_QD])
         ax, ay, az = reading[REC_ACCELERATION]
