@@ -231,3 +231,49 @@ def test_the_end_of_the_owner_stops_the_arm_with_a_ramp():
     assert max(drops) <= 20.0 * DT * (1 + 1e-9)
     assert speeds[-1] == 0.0
     assert not motion.is_moving
+
+
+# What a program does in a cycle: it streams a speed, lets the stream lapse, or commands a stop.
+STREAMED = st.lists(st.one_of(joints, st.none(), st.just("stop")), min_size=1, max_size=40)
+
+
+def streamed(asked, cycles, scale=1.0):
+    """The targets of an arm that gets these commands, then nothing."""
+    motion, owner, targets = ArmMotion(ZERO6, 20.0, dead_cycles=cycles), object(), []
+    for what in [*asked, *[None] * 200]:
+        if what == "stop":
+            motion.command(owner, StopJ(2.0))
+        elif what is not None:
+            motion.command(owner, SpeedJ(what, 5.0))
+        targets.append(motion.step(DT, scale))
+    return targets
+
+
+@given(joints, st.lists(st.one_of(joints, st.none()), max_size=30), st.integers(1, 4))
+def test_a_dead_time_shifts_a_stream_its_gaps_and_its_end(first, asked, n):
+    plain, late = streamed([first, *asked], (0,)), streamed([first, *asked], (n,))
+    assert late[:n] == [JointTarget(ZERO6)] * n
+    assert late[n:] == plain[:-n]
+
+
+def test_a_stop_that_the_program_commands_has_the_dead_time_of_its_stream():
+    asked = [(0.3,) * 6] * 20 + ["stop"]
+    assert streamed(asked, (2,))[2:] == streamed(asked, (0,))[:-2]
+
+
+def test_a_stop_of_the_safety_system_acts_at_once():
+    motion, owner = ArmMotion(ZERO6, 20.0, dead_cycles=(3,)), object()
+    for _ in range(20):
+        motion.command(owner, SpeedJ((0.5,) * 6, 5.0))
+        motion.step(DT, 1.0)
+    before = motion.target.qd[0]
+    motion.interrupt()
+    assert before - motion.step(DT, 1.0).qd[0] == pytest.approx(20.0 * DT)
+
+
+@given(STREAMED, st.lists(st.integers(0, 3), min_size=1, max_size=9), st.sampled_from([1.0, 0.4]))
+def test_a_dead_time_that_wanders_keeps_speeds_continuous_and_brings_the_arm_to_rest(asked, cycles, scale):
+    targets = streamed(asked, cycles, scale)
+    speeds = np.array([target.qd for target in targets])
+    assert np.abs(np.diff(speeds, axis=0, prepend=np.zeros((1, 6)))).max() <= 5.0 * DT * (1 + 1e-9)
+    assert not speeds[-1].any()

@@ -36,7 +36,7 @@ from ur_emulator.controller.state import ControllerState, make_state
 from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import draw_calibration
-from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.fidelity import Fidelity, dead_cycles
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
@@ -173,7 +173,12 @@ class Controller:
         # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
         # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
-        motion = ArmMotion(q, robot.stop_deceleration, generation.run_up_time)
+        motion = ArmMotion(
+            q,
+            robot.stop_deceleration,
+            generation.run_up_time,
+            dead_cycles(fidelity, seed, self.period_s),
+        )
         self.state = make_state(
             robot,
             ArmModel(robot, draw_calibration(robot, fidelity, seed)),

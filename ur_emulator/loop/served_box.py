@@ -363,7 +363,7 @@ class ServedBox:
                 if not self.waits_outside:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
                 if self._loop.expect_soon():
-                    self.controller.plant.run_ahead()
+                    self.controller.plant.complete_cycle()
             return self._pacer.next_call(now)
         # While time stands still, every port repeats itself at its own rate, in real seconds: clients take
         # silence for a dead robot.

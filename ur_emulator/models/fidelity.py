@@ -10,12 +10,12 @@ Sources, cited by letter below:
  A  Logs of a real UR3e at rest and moving, 500 Hz (kevinhpham/DalESelfEBot): encoder noise, steps, the filter
     of the reported speed, speed ripple at 101 and 202 cycles a joint turn, current noise. UR's strain wave
     gears have the ratio 101 in all sizes, so that is once and twice a motor turn.
- B  Delays reported for streamed motion: Universal_Robots_ROS_Driver pull 1 (aim of two cycles for speedj),
-    Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms), ur_modern_driver (a gain of 50 1/s is
-    stable on a UR3, so the whole loop stays below 31 ms there).
+ B  Delays reported for streamed motion, from command to measurement: Universal_Robots_ROS_Driver pull 1 (aim
+    of two cycles for speedj), Universal_Robots_ROS2_Driver issue 1311 (UR5 CB3 about 35 ms),
+    ur_modern_driver (a gain of 50 1/s is stable on a UR3, so the whole loop stays below 31 ms there).
  C  Factory calibrations of 35 real arms, see `calibration.py`.
  E  assumed: no published figure; to be checked on a real arm.
- F  Recordings of real CB3 arms (docs/fidelity.md).
+ F  Recordings of a real UR3 of the CB3, RTDE at 125 Hz, 2019 (docs/fidelity.md).
 """
 
 from collections.abc import Sequence
@@ -75,8 +75,7 @@ class Fidelity:
 
     Attributes:
         name: as on the command line.
-        dead_time: from the start of a cycle until the drives act on its target [s].
-        dead_time_spread: a part uniform in [0, spread) is added, drawn once a box [s].
+        dead_time: from a streamed command to the target that it moves [s], in whole control cycles.
         dead_time_wander: the dead time becomes longer by up to this and shorter again, along a cosine [s].
         dead_time_period: of that cosine [s]; where it begins is drawn by the seed.
         drive_lag: of the drive's set-point filter: by how much a ramp trails [s].
@@ -108,7 +107,6 @@ class Fidelity:
 
     name: str
     dead_time: Time
-    dead_time_spread: Time
     dead_time_wander: Time
     dead_time_period: Annotated[float, number(0.1, 600.0, "s")]
     drive_lag: Time
@@ -166,13 +164,21 @@ def read_fidelity(path: Path, fidelities: Sequence[Fidelity]) -> Fidelity:
     return checked(Fidelity, {**own, **values}, str(path), ModelError)
 
 
+def dead_cycles(fidelity: Fidelity, seed: int, period: float) -> list[int]:
+    """Return the dead time of a box in cycles of `period` [s]; several values take turns, one a cycle."""
+    n = round(fidelity.dead_time_period / period) if fidelity.dead_time_wander else 1
+    begin = random_stream(seed, "wander").uniform()
+    share = 0.5 - 0.5 * np.cos(2.0 * np.pi * (begin + np.arange(n) / n))
+    dead_times = fidelity.dead_time + fidelity.dead_time_wander * share
+    return [int(cycles) for cycles in np.floor(dead_times / period + 1e-9)]
+
+
 TYPICAL = Fidelity(
     name="typical",
-    dead_time=0.008,  # B
-    dead_time_spread=0.008,  # B
+    dead_time=0.016,  # B: two cycles; with the rest 28 ms from command to measurement
     dead_time_wander=0.0,
     dead_time_period=5.0,
-    drive_lag=0.010,  # B: drives follow within 5-15 ms
+    drive_lag=0.0005,  # F: actual_q is .54 ms behind target_q
     drive_damping=None,
     feedback_age=0.008,  # B: the packet carries the state of one cycle before
     sample_jitter=1e-5,  # A: more would show in the differences of reported angles
@@ -204,9 +210,8 @@ TYPICAL = Fidelity(
 IDEAL = replace(
     TYPICAL,
     name="ideal",
-    dead_time=0.002,
-    dead_time_spread=0.0,
-    drive_lag=0.004,
+    dead_time=0.0,
+    drive_lag=0.0,
     feedback_age=0.002,
     sample_jitter=0.0,
     encoder_sigma=(1e-6,) * 6,
@@ -229,8 +234,8 @@ EXACT = replace(IDEAL, name="exact", has_physics=False, ripples=())
 POOR = replace(
     TYPICAL,
     name="poor",
-    dead_time=0.014,
-    drive_lag=0.014,
+    dead_time=0.024,
+    drive_lag=0.002,
     feedback_age=0.010,
     sample_jitter=5e-5,
     ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),

@@ -109,7 +109,6 @@ _E_SERIES_BUILDS: Builds = (
 _TYPICAL = replace(
     TYPICAL,
     dead_time=0.0,  # A: the drives add no dead time that shows
-    dead_time_spread=0.0,
     drive_lag=0.0005,  # A: actual_q is .50 ms behind target_q
     feedback_age=0.002,  # the package carries the state of one cycle before
     # Before the first zero; means of a resting UR5e that lie 3 to 6 N apart.
@@ -124,8 +123,7 @@ _IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_
 _EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
 _POOR = replace(  # C
     POOR,
-    dead_time=0.002,
-    dead_time_spread=0.002,
+    dead_time=0.004,
     drive_lag=0.002,
     feedback_age=0.004,
     force_bias=0.0,

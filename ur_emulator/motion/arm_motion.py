@@ -12,7 +12,7 @@ rules are the controller's behaviour as users report it:
 Must not know scripts or physics: an owner is any object, compared by identity.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from math import inf
 
 from ur_emulator.models.robot_model import Vector6, six
@@ -29,6 +29,7 @@ from ur_emulator.motion.leg import move_j
 from ur_emulator.motion.move import Move
 from ur_emulator.motion.overlay import Overlay, OverlayChain
 from ur_emulator.motion.ownership import TRANSITIONS, ArmState, Command, Event, Fate
+from ur_emulator.motion.stream_delay import StreamDelay
 
 # --- Time on the path: a pause slows it down to a standstill, and the first motion of a program runs it up
 #
@@ -119,8 +120,19 @@ class ArmMotion:
             stop, in the direction of the path's velocity; None: a stop brakes as it was asked to.
     """
 
-    def __init__(self, q: Vector6, stop_deceleration: float, run_up_time: float = 0.0) -> None:
-        """Hold the arm at `q` [rad]; the time on the path of a program's first move runs up so long [s]."""
+    def __init__(
+        self,
+        q: Vector6,
+        stop_deceleration: float,
+        run_up_time: float = 0.0,
+        dead_cycles: Sequence[int] = (0,),
+    ) -> None:
+        """Hold the arm at `q` [rad].
+
+        Args:
+            run_up_time: so long the time on the path of a program's first move runs up [s].
+            dead_cycles: of streamed commands, see `StreamDelay`.
+        """
         self.stop_deceleration = stop_deceleration
         self.path = self.target = JointTarget(q)
         self.braking: Callable[[JointTarget], float] | None = None
@@ -130,6 +142,7 @@ class ArmMotion:
         self._command: Command | None = None
         # What brings the arm to rest, or back to its path.
         self._ramp: Generator = StopJ(stop_deceleration)
+        self._delay = StreamDelay(dead_cycles)
         self._measure: Callable[[], JointTarget] = lambda: self.path
         self._has_followed_hand = False
         self._time = PathTime()
@@ -223,8 +236,10 @@ class ArmMotion:
         self._go(Event.COMMAND)
         if kind is Kind.STOP:
             self._ramp = generator
-        elif kind is Kind.TORQUE:
-            self._drop_overlays()
+        elif kind is not Kind.STREAM:
+            self._delay.clear()
+            if kind is Kind.TORQUE:
+                self._drop_overlays()
         if self._begins_program:
             self._begins_program = False
             if kind is Kind.MOVE:
@@ -260,6 +275,7 @@ class ArmMotion:
         if time.paused:
             return
         time.paused = self._is_special = True
+        self._delay.clear()
         speed = max(map(abs, self.target.qd))
         time.slowing = max(PAUSE_RATE, deceleration * time.factor / speed if speed > 0.0 else 0.0)
         if isinstance(generator, Streamed):
@@ -313,6 +329,7 @@ class ArmMotion:
     def _brake(self, event: Event) -> None:
         """Follow an event with the deceleration of every stop, also where only an overlay moved the arm."""
         ramp = StopJ(self.stop_deceleration)
+        self._delay.clear()
         self._go(event, ramp)
         if self.state in _AT_REST and any(self.path.qd):
             self._go(Event.DRIFT, ramp)
@@ -408,7 +425,9 @@ class ArmMotion:
         """The move has arrived, or the ramp has ended."""
         was, is_paused = self.state, self._time.paused
         self._go(Event.STAND if was is _BRAKING and is_paused else Event.DONE)
+        self._delay.clear()
         if was is ArmState.RETURNING:
+            self._ramp = StopJ(self.stop_deceleration)
             self._time.begin(PAUSE_RATE)
             self._is_special = True
         self._turn_back()
@@ -475,12 +494,13 @@ class ArmMotion:
             is_renewed, command.is_renewed = command.is_renewed and not self._time.paused, False
             if is_renewed and stream.fits(self.path, scale):
                 self._go(Event.RENEWED)
-                return stream.step(self.path, dt, scale)
+                return self._delay.pass_on(stream, self._ramp).step(self.path, dt, scale)
             self._go(Event.LOST, stream.when_lost())
-        ramp = self._ramp
+        ramp = self._delay.pass_on(self._ramp, self._ramp)
         if self.braking is not None and isinstance(ramp, StopJ):
             ramp.allowed = self.braking(self.path)
         self.path = ramp.step(self.path, dt, scale)
+        ramp = self._ramp
         if ramp.done and is_renewed:
             self._go(Event.RENEWED)
         elif ramp.done:

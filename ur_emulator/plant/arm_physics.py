@@ -115,7 +115,7 @@ class ArmPhysics:
 
     def _bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Take views into MuJoCo's memory: one attribute lookup each, once. The arm's six come first."""
-        self.model, self.data, self._before = model, data, mujoco.MjData(model)
+        self.model, self.data = model, data
         self.q: NDArray[np.float64] = data.qpos[:6]
         self.qd: NDArray[np.float64] = data.qvel[:6]
         self.torque: NDArray[np.float64] = data.actuator_force[:6]
@@ -339,18 +339,6 @@ class ArmPhysics:
             mujoco.mj_step(self.model, self.data)
             self.q[:] = q
             self.qd[:] = 0.0
-
-    def store_state(self) -> None:
-        """Store the present state for `restore_state`."""
-        mujoco.mj_copyData(self._before, self.model, self.data)
-        if self._presliding is not None:
-            self._presliding.store()
-
-    def restore_state(self) -> None:
-        """Return to the stored state."""
-        mujoco.mj_copyData(self.data, self.model, self._before)
-        if self._presliding is not None:
-            self._presliding.restore()
 
 
 # --- the model

@@ -1,8 +1,8 @@
 """CommandPath: from the controller's target, once a cycle, to the control of the servos, every sub-step.
 
 The path has three stages. The drives interpolate between the targets of successive cycles (cubic in
-position, so that it agrees with the target speeds; linear in speed and torque). They do so after the dead
-time. Their set-point filter is a first-order lag. The slow outer loop trims the remaining error.
+position, so that it agrees with the target speeds; linear in speed and torque). Their set-point filter is a
+first-order lag. The slow outer loop trims the remaining error.
 
 All of it is linear in the targets, and so is the law of the servos. One matrix, built once from the plain
 definition below, does a whole cycle of all joints in one product:
@@ -13,7 +13,7 @@ definition below, does a whole cycle of all joints in one product:
 | their changes              | those of a filter of second order; else these rows are missing [1/s]  |
 | trim                       | shift of the servos in the last cycle                                 |
 | error                      | of the joints at the end of the last cycle, trimmed from now on       |
-| q, qd, deflection, n times | targets, the newest first                                             |
+| q, qd, deflection, twice   | targets, the newest first                                             |
 
 | rows of the outputs        | what they are                                                         |
 |----------------------------|-----------------------------------------------------------------------|
@@ -21,15 +21,10 @@ definition below, does a whole cycle of all joints in one product:
 | control, n times           | q + lead qd + deflection + trim at the start of each sub-step         |
 | q, qd, ... trim, 0         | the first rows of the inputs of the next cycle                        |
 
-Where the dead time wanders there is one matrix for each of its values, and each cycle has its own.
-
 A torque passes the path as the deflection of the servo that gives it: torque / kp. This module does not
 know the arm.
 """
 
-from collections.abc import Sequence
-from itertools import cycle
-from math import ceil
 from struct import Struct
 
 import numpy as np
@@ -38,18 +33,17 @@ from numpy.typing import NDArray
 from ur_emulator.motion.generators import JointTarget
 
 N_SIGNALS = 3  # position, speed, deflection
+_N_KNOTS = 2  # targets between which a cycle lies
 _TRIM, _ERROR = -2, -1  # of the rows that go from a cycle to the next
 
 
 class CommandPath:
-    """The delayed and filtered set-point of all joints.
+    """The filtered set-point of all joints.
 
-    A cycle is `take`, `advance`, `keep`; the first two may be repeated, or change places where
-    `newest_acts_later`.
+    A cycle is `take`, `advance`, `keep`.
 
     Args:
         substep: length of a sub-step [s].
-        dead_substeps: dead time in sub-steps; several values take turns, one a cycle.
         lag: of the set-point filter: by how much a ramp trails [s].
         damping: damping ratio of a filter of second order; None: of first order.
         lead: gain in speed over gain in position of the servos, the same for all joints [s].
@@ -57,7 +51,6 @@ class CommandPath:
 
     Attributes:
         newest: the target of this cycle (3, 6): q [rad], qd [rad/s], deflection [rad]; see `take`.
-        newest_acts_later: the outputs of a cycle do not depend on its target.
         speeds: (3, 6) [rad/s]: the caller's row for the actual speeds; the speed of the newest target; that
             of the set-point at the start of the last sub-step.
         control: of the servos at the start of each sub-step (n_substeps, 6) [rad].
@@ -69,29 +62,16 @@ class CommandPath:
         self,
         n_substeps: int,
         substep: float,
-        dead_substeps: float | Sequence[float],
         lag: float,
         damping: float | None = None,
         lead: float = 0.0,
         trim_gain: float = 0.0,
     ) -> None:
         self._period = n_substeps * substep
-        dead_times = [dead_substeps] if isinstance(dead_substeps, float | int) else dead_substeps
-        self._delay = max(dead_times) * substep + lag
+        self._lag = lag
         n_filter = N_SIGNALS if damping is None else 2 * N_SIGNALS
         n_kept = n_filter + 2
-        n_knots = 2 + ceil(max(dead_times) / n_substeps)
-        matrices = {
-            dead: _cycle_matrix(
-                path_responses(n_substeps, substep, dead, lag, damping, n_knots), lead, trim_gain
-            )
-            for dead in set(dead_times)
-        }
-        self._matrix = matrices[dead_times[0]]
-        self._turns = cycle([matrices[dead] for dead in dead_times]) if len(matrices) > 1 else None
-        self.newest_acts_later = not any(
-            matrix[:, n_kept : n_kept + N_SIGNALS].any() for matrix in matrices.values()
-        )
+        self._matrix = _cycle_matrix(path_responses(n_substeps, substep, lag, damping), lead, trim_gain)
         n_outputs, n_inputs = self._matrix.shape
         self._inputs = np.zeros((n_inputs, 6))
         self._kept = self._inputs[:n_kept]
@@ -129,11 +109,10 @@ class CommandPath:
             qd: speed of the target (6,) [rad/s]; None for rest.
         """
         speed = np.zeros(6) if qd is None else qd
-        n_knots = len(self._targets) // N_SIGNALS
         self._targets[:] = np.concatenate(
-            [[q - k * self._period * speed, speed, deflection] for k in range(n_knots)]
+            [[q - k * self._period * speed, speed, deflection] for k in range(_N_KNOTS)]
         )
-        set_point = q - self._delay * speed
+        set_point = q - self._lag * speed
         self._final[:N_SIGNALS] = set_point, speed, deflection
         self._changes[:] = 0.0
         self._changes[:1] = speed
@@ -158,8 +137,6 @@ class CommandPath:
         """
         self._kept[:] = self._final
         self._older[:] = self._younger
-        if self._turns is not None:
-            self._matrix = next(self._turns)
         if error is not None:
             self._error[:] = error
 
@@ -167,9 +144,7 @@ class CommandPath:
 _PACK = Struct("18d").pack_into
 
 
-def path_responses(
-    n_substeps: int, substep: float, dead_substeps: float, lag: float, damping: float | None, n_knots: int
-) -> NDArray[np.float64]:
+def path_responses(n_substeps: int, substep: float, lag: float, damping: float | None) -> NDArray[np.float64]:
     """Return the response of one joint's set-point to each input of its path; arguments as `trace_cycle`.
 
     Returns:
@@ -177,14 +152,14 @@ def path_responses(
         by input: the filter's rows, then q, qd, deflection of each of the targets, newest first.
     """
     n_filter = N_SIGNALS if damping is None else 2 * N_SIGNALS
-    n_inputs = n_filter + N_SIGNALS * n_knots
+    n_inputs = n_filter + N_SIGNALS * _N_KNOTS
     responses = np.empty((n_filter, n_substeps + 1, n_inputs))
     # Column by column: the response to a unit in one input while all others are zero.
     for column in range(n_inputs):
         unit = np.zeros(n_inputs)
         unit[column] = 1.0
-        filtered, knots = unit[:n_filter], unit[n_filter:].reshape(n_knots, N_SIGNALS)
-        rows = trace_cycle(filtered, knots, n_substeps, substep, dead_substeps, lag, damping)
+        filtered, knots = unit[:n_filter], unit[n_filter:].reshape(_N_KNOTS, N_SIGNALS)
+        rows = trace_cycle(filtered, knots, n_substeps, substep, lag, damping)
         responses[:, :, column] = rows.T
     return responses
 
@@ -205,7 +180,6 @@ def trace_cycle(
     knots: NDArray[np.float64],
     n_substeps: int,
     substep: float,
-    dead_substeps: float,
     lag: float,
     damping: float | None = None,
 ) -> NDArray[np.float64]:
@@ -214,9 +188,8 @@ def trace_cycle(
     Args:
         filtered: filter state at the start of the cycle: q, qd, deflection, then of a filter of second order
             their changes [1/s].
-        knots: targets (n, 3), newest first; the newest is for the end of this cycle.
+        knots: targets (2, 3), newest first; the newest is for the end of this cycle.
         substep: [s].
-        dead_substeps: dead time in sub-steps.
         lag: of the filter [s].
         damping: of a filter of second order; None: of first order.
 
@@ -226,13 +199,7 @@ def trace_cycle(
     period = n_substeps * substep
     rows = [filtered]
     for i in range(1, n_substeps + 1):
-        back, offset = divmod(i - dead_substeps - n_substeps, n_substeps)
-        cycles_back = int(back)
-        newer = -cycles_back - 1 if offset else -cycles_back
-        share = offset / n_substeps
-        arrived = knots[newer]
-        if offset:
-            arrived = _interpolate(knots[newer + 1], knots[newer], share, period)
+        arrived = _interpolate(knots[1], knots[0], i / n_substeps, period)
         rows.append(_filter(rows[-1], arrived, substep, lag, damping))
     return np.array(rows)
 

@@ -1,6 +1,6 @@
 """DrivenArm: an arm with its drives, brakes and sensors, and what a command does to it in a cycle.
 
-A cycle is: target -> controller's model torque -> command path (delay, interpolation, lag) -> joint servos
+A cycle is: target -> controller's model torque -> command path (interpolation, lag) -> joint servos
 and physics in sub-steps -> a record of true values -> sensors.
 
 The arm has four control modes (`ControlMode`): position; force, with the slow outer loop of the servos held;
@@ -11,7 +11,6 @@ gear's transmission error. Links move with the hinge: collisions leave out that 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from operator import ge, truediv
 from typing import NamedTuple
 
@@ -22,7 +21,6 @@ from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.models.calibration import Calibration, calibrated_dh
 from ur_emulator.models.fidelity import Fidelity, random_stream
-from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6, six
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.arm_physics import ArmPhysics
@@ -30,43 +28,6 @@ from ur_emulator.plant.drives import TARGET_MAX, Drives, ServoGains
 from ur_emulator.plant.feedback import Feedback
 from ur_emulator.plant.hand import FingerCommand
 from ur_hil.tools import ToolModel
-
-# --- the dead time of an arm's drives: drawn once a box, or another one every cycle
-
-_WANDER_LEVELS = 64
-"""A dead time that wanders goes through so many values: steps of 30 us for 2 ms."""
-
-
-@dataclass(frozen=True, slots=True)
-class DeadTime:
-    """From the start of a cycle to the drives acting on its target.
-
-    Attributes:
-        least_s: where it wanders, its least value [s].
-        substeps: in steps of the physics; several values take turns, one a cycle.
-    """
-
-    least_s: float
-    substeps: int | list[float]
-
-
-def draw_dead_time(fidelity: Fidelity, seed: int, generation: RobotGeneration) -> DeadTime:
-    """Draw the dead time of a box.
-
-    Args:
-        generation: has the cycle and the physics step.
-    """
-    substep = generation.substep_us * 1e-6
-    spread = fidelity.dead_time_spread * float(random_stream(seed, "delay").uniform())
-    least = int((fidelity.dead_time + spread) / substep + 1e-9)
-    if not fidelity.dead_time_wander:
-        return DeadTime(least * substep, least)
-    n = round(fidelity.dead_time_period / generation.period_s)
-    begin = random_stream(seed, "wander").uniform()
-    share = 0.5 - 0.5 * np.cos(2.0 * np.pi * (begin + np.arange(n) / n))
-    levels = np.rint(share * _WANDER_LEVELS) / _WANDER_LEVELS
-    return DeadTime(least * substep, (least + fidelity.dead_time_wander / substep * levels).tolist())
-
 
 # Control modes in which no joint holds a position.
 _FREE = (ControlMode.TEACH, ControlMode.TORQUE)
@@ -94,8 +55,8 @@ class DrivenArm:
 
     Attributes:
         physics: masses, joints and contacts.
-        moves_later: targets act within their own cycle, and measurements are a cycle old when they are
-            reported: what is reported of a cycle does not need its motion.
+        moves_later: measurements are a cycle old when they are reported: what is reported of a cycle does
+            not need its motion.
         control_current: what the drives ask for at the end of the cycle (6,) [A].
     """
 
@@ -105,7 +66,6 @@ class DrivenArm:
         calibration: Calibration,
         fidelity: Fidelity,
         seed: int,
-        dead_time: DeadTime,
         tools: Sequence[ToolModel],
     ) -> None:
         generation = robot.generation
@@ -115,9 +75,9 @@ class DrivenArm:
         dh, presliding = calibrated_dh(robot, calibration), fidelity.friction_presliding
         self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding, tools)
         self._period, self._n_substeps = period, generation.n_substeps
-        self.drives = Drives(robot, calibration, fidelity, seed, gains, dead_time.substeps, substep, period)
+        self.drives = Drives(robot, calibration, fidelity, seed, gains, substep, period)
         age_substeps = max(1, round(fidelity.feedback_age / substep))
-        self.moves_later = age_substeps >= generation.n_substeps and not self.drives.target_acts_later
+        self.moves_later = age_substeps >= generation.n_substeps
         if self.moves_later:
             age_substeps -= generation.n_substeps
         self.feedback = Feedback(robot, fidelity, seed, age_substeps)
@@ -133,8 +93,6 @@ class DrivenArm:
         self._is_braked = True
         self._saturated_before = self._saturated_now = False
         self.control_current = ZERO6
-        # The next cycle is computed, but not completed.
-        self._is_ahead = False
 
     @property
     def is_saturated(self) -> bool:
@@ -185,31 +143,10 @@ class DrivenArm:
                 f"target {target} in cycle {cycle}: finite numbers below {TARGET_MAX:g} are needed",
                 cycle=cycle,
             )
-        if self._is_ahead:
-            self.drives.evaluate_friction()  # again, for the current that is expected at the target
-        else:
-            self._run()
-        self._is_ahead = False
-        self._keep(cycle)
+        self._run(cycle)
 
-    def run_ahead(self) -> None:
-        """Compute the next cycle, if no target that is still unknown acts in it; `advance` completes it."""
-        if not self.drives.target_acts_later or self._is_braked or self._is_ahead or self.physics.hands:
-            return
-        if self._mode not in _FREE and not self.physics.loads.is_unexpected:
-            self.physics.store_state()
-            self._run()
-            self._is_ahead = True
-
-    def undo_run_ahead(self) -> None:
-        """Undo `run_ahead`."""
-        if self._is_ahead:
-            self._is_ahead = False
-            self.physics.restore_state()
-            self.feedback.undo()
-
-    def _run(self) -> None:
-        """Advance the arm by a cycle and read its sensors; `_keep` completes the cycle."""
+    def _run(self, cycle: int) -> None:
+        """Advance the arm by a cycle and read its sensors."""
         physics, drives, feedback = self.physics, self.drives, self.feedback
         is_free = self._mode in _FREE
         if not is_free:
@@ -219,16 +156,7 @@ class DrivenArm:
         np.multiply(physics.torque, self._per_torque, self._currents)
         self.control_current = six(self._currents.tolist())
         feedback.take(physics, drives.expected_current)
-        error = self._error
-        if is_free:
-            error[:] = 0.0
-        else:
-            np.add(physics.q, self.feedback.gear.error, error)
-            np.subtract(drives.q_final, error, error)
-
-    def _keep(self, cycle: int) -> None:
-        """Complete the cycle that was computed."""
-        physics, currents = self.physics, self.control_current
+        currents = self.control_current
         if physics.has_diverged:
             raise PlantError(
                 f"the simulation diverged in cycle {cycle}: joint speeds {physics.qd.tolist()} rad/s; "
@@ -239,10 +167,15 @@ class DrivenArm:
         self._saturated_now = not (max(currents) < self._unsaturated > -min(currents)) and any(
             map(ge, map(abs, physics.torque.tolist()), self._tau_max)
         )
-        if self._mode not in _FREE:
+        error = self._error
+        if is_free:
+            error[:] = 0.0
+        else:
+            np.add(physics.q, feedback.gear.error, error)
+            np.subtract(drives.q_final, error, error)
             trims = not (self._saturated_now or (self._trim_is_held and self._is_pressing))
-            self.drives.keep(self._error if trims else None)
-        self.feedback.keep()
+            drives.keep(error if trims else None)
+        feedback.keep()
 
     @property
     def _is_pressing(self) -> bool:
@@ -253,7 +186,6 @@ class DrivenArm:
 
     def _switch(self, mode: ControlMode, target: JointTarget) -> None:
         """Change the control mode without a jump of the torques."""
-        self.undo_run_ahead()
         was_free, self._mode = self._mode in _FREE, mode
         self.physics.set_free(mode in _FREE)
         if was_free:
@@ -264,7 +196,6 @@ class DrivenArm:
 
     def _stand_still(self) -> None:
         """Advance by a cycle with the brakes on."""
-        self.undo_run_ahead()
         if not self._is_braked:
             self._engage_brakes()
         if self.physics.has_company:

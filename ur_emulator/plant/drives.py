@@ -129,17 +129,13 @@ class Drives:
     """The six drives and the controller's torque model that feeds them.
 
     A cycle is `command`, `advance`, `keep`, or for free joints `drive_freely` or `drive_by_torque` alone.
-    Only `keep` ends a cycle: the others may be repeated. Where `target_acts_later`, `advance` may come first;
-    `command` is followed by `evaluate_friction` then, for `target_current`.
 
     Args:
         gains: of the servos, as in the actuators.
-        dead_substeps: dead time of the command path in sub-steps, or its values cycle by cycle.
         substep: [s].
         period: control cycle [s].
 
     Attributes:
-        target_acts_later: by the dead time, the target of a cycle does not act in it.
         actual_speed: (6,) [rad/s], for the caller to fill before `advance`: it sets the true friction.
         control: n_substeps rows (6,), what to write to MuJoCo's `ctrl` before each sub-step of this cycle:
             angles for the servos [rad], torques while the joints are free [Nm].
@@ -158,7 +154,6 @@ class Drives:
         fidelity: Fidelity,
         seed: int,
         gains: ServoGains,
-        dead_substeps: float | Sequence[float],
         substep: float,
         period: float,
     ) -> None:
@@ -168,14 +163,12 @@ class Drives:
         self._path = path = CommandPath(
             n_substeps,
             substep,
-            dead_substeps,
             fidelity.drive_lag,
             fidelity.drive_damping,
             gains.lead,
             period / _INTEGRAL_TIME,
         )
         self._friction = Friction(robot, fidelity, seed)
-        self.target_acts_later = path.newest_acts_later
         self._period = period
         self._kp = gains.kp
         self._per_kp = 1.0 / gains.kp
@@ -235,12 +228,8 @@ class Drives:
         return True
 
     def advance(self) -> None:
-        """Fill `control` and `q_final`, and do what `evaluate_friction` does."""
+        """Fill `control` and `q_final`, and what depends on friction: `bias`, `coulomb`, `target_current`."""
         self._path.advance()
-        self.evaluate_friction()
-
-    def evaluate_friction(self) -> None:
-        """Fill `bias`, `coulomb` and `target_current`: all that depends on friction."""
         self._friction.evaluate(self._path.speeds)
         self._expect_current()
 

@@ -70,7 +70,7 @@ class ExactPlant(Plant):
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
 
-    def run_ahead(self) -> None:
+    def complete_cycle(self) -> None:
         """Do nothing: the position depends on the target alone."""
 
     def sense(self) -> PlantState:

@@ -67,9 +67,6 @@ class GearRipple:
         np.multiply(self.slope, record.qd, self.slope)
         np.add(record.motion, self._sum, record.motion)
 
-    def undo(self) -> None:
-        """Take back the last `apply`."""
-
     def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """Invert the gear: motor positions (6,) that put the joints at q_joint (6,) [rad]."""
         q_motor = np.array(q_joint, dtype=np.float64)
@@ -89,9 +86,8 @@ class GearWithPlay(GearRipple):
     def __init__(self, fidelity: Fidelity, seed: int) -> None:
         super().__init__(fidelity, seed)
         self._half = 0.5 * fidelity.backlash
-        # The joint without its waves, and what it was before the last record.
+        # The joint without its waves.
         self._held = np.zeros(6)
-        self._held_before = np.zeros(6)
 
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
         """See `GearRipple`; a joint in the gap has the slope -1, which is no motion."""
@@ -104,12 +100,7 @@ class GearWithPlay(GearRipple):
         """See `GearRipple`; the joint is carried along."""
         q_motor = record.q.copy()
         super().apply(record)
-        self._held_before[:] = self._held
         np.clip(self._held, q_motor - self._half, q_motor + self._half, out=self._held)
-
-    def undo(self) -> None:
-        """Take back the last `apply`."""
-        self._held[:] = self._held_before
 
     def motor_position(self, q_joint: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `GearRipple`; the joints are then in the middle of their gaps."""
@@ -120,7 +111,7 @@ class GearWithPlay(GearRipple):
 class Feedback:
     """Gears and sensors of one arm.
 
-    A cycle is `take` or `take_rest`, then `keep`. Before `keep` a cycle may be taken again, after `undo`.
+    A cycle is `take` or `take_rest`, then `keep`.
 
     Args:
         age_substeps: from the measured moment to the end of the cycle's physics.
@@ -166,10 +157,6 @@ class Feedback:
         if physics.n_contacts:
             record.wrench += physics.contact_wrench
         self.reading = self._sensors.read(self._records[self._read_at])
-
-    def undo(self) -> None:
-        """Take back `take`."""
-        self.gear.undo()
 
     def take_rest(self) -> None:
         """Read the sensors of an arm that the brakes hold."""

@@ -124,7 +124,6 @@ class Presliding:
         self._angle = angle
         self._last = np.zeros(6)
         self._bristles = np.zeros(6)
-        self._stored = (self._last.copy(), self._bristles.copy())
 
     def bind(self, q: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
         """Follow positions (6,) [rad] from now on, and give the friction (6,) [Nm]."""
@@ -143,11 +142,3 @@ class Presliding:
         self._bristles += (ahead - self._bristles) * -np.expm1(-np.abs(moved) / self._angle)
         self._last[:] = self._now
         np.multiply(self._bristles, -size, self._torque)
-
-    def store(self) -> None:
-        """Store the present state for `restore`."""
-        self._stored = (self._last.copy(), self._bristles.copy())
-
-    def restore(self) -> None:
-        """Return to the stored state."""
-        self._last[:], self._bristles[:] = self._stored

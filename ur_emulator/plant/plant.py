@@ -3,14 +3,9 @@
 The plant knows nothing of programs, modes or safety; it follows its targets or raises `PlantError`. It reads
 no clock, and all randomness comes from the seed: equal seeds and equal targets give bit-identical states.
 
-Part of the work need not wait for the next target: `run_ahead` does it while a client computes that target.
-
-| arm                                               | what runs ahead                                        |
-|---------------------------------------------------|--------------------------------------------------------|
-| no target acts within its own cycle (dead time)   | the next cycle; a change of the loads meanwhile        |
-|                                                   | undoes it                                              |
-| `DrivenArm.moves_later`: measurements are a cycle | the present cycle: its report did not need it, so the  |
-| old when they are reported, targets act at once   | step of the next cycle computes it, or `run_ahead`     |
+Where measurements are a cycle old when they are reported (`DrivenArm.moves_later`), the report of a cycle
+does not need its motion: the step of the next cycle computes it, or `complete_cycle` does while a client
+computes the next target.
 """
 
 from collections.abc import Sequence
@@ -29,7 +24,7 @@ from ur_emulator.models.robot_generation import RobotGeneration
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
 from ur_emulator.models.things import BodyShape, Contact, Thing
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
-from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm, draw_dead_time
+from ur_emulator.plant.driven_arm import ArmCommand, DrivenArm
 from ur_emulator.plant.hand import FingerCommand, FingerState
 from ur_emulator.plant.obstacles import Obstacles
 from ur_emulator.plant.scene import Scene
@@ -116,13 +111,11 @@ class Plant:
     Args:
         robot: type of the arm; its generation has the control cycle and the physics step.
         fidelity: how imperfect it is.
-        seed: of calibration, gear phases, delays and noise.
+        seed: of calibration, gear phases and noise.
         tools: on the flange, fingers half open.
 
     Attributes:
         calibration: the factory calibration of this arm, for the controller's kinematics.
-        dead_time: the delay drawn for this box, from the start of a cycle to the drives acting on it [s];
-            where it wanders, its least value.
     """
 
     def __init__(
@@ -134,9 +127,7 @@ class Plant:
         self.seed = seed
         self.period_s = generation.period_s
         self.calibration = draw_calibration(robot, fidelity, seed)
-        dead_time = draw_dead_time(fidelity, seed, generation)
-        self.dead_time = dead_time.least_s
-        self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, dead_time, tools)
+        self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, tools)
         self._physics, self._drives, self._feedback = arm.physics, arm.drives, arm.feedback
         self._thermometers = Thermometers(generation)
         self._reports_control_as_target = generation.reports_control_as_target
@@ -151,25 +142,25 @@ class Plant:
     @property
     def obstacles(self) -> Obstacles:
         """Obstacles around the arm."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.obstacles
 
     @property
     def scene(self) -> Scene:
         """Things around the arm that can be moved."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.scene
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """Where bodies touch."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.contacts
 
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
         """Shapes around the arm and on its flange."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.shapes
 
     def furnish(self, surroundings: Cell | Path) -> None:
@@ -183,33 +174,33 @@ class Plant:
     @property
     def q_true(self) -> NDArray[np.float64]:
         """True joint angles (6,) now [rad]; no real controller knows them."""
-        self._be_current()
+        self.complete_cycle()
         self._feedback.gear.evaluate(self._physics.q)
         return self._physics.q + self._feedback.gear.error
 
     @property
     def qd_true(self) -> NDArray[np.float64]:
         """True joint speeds (6,) now [rad/s]."""
-        self._be_current()
+        self.complete_cycle()
         self._feedback.gear.evaluate(self._physics.q)
         return self._physics.qd * (1.0 + self._feedback.gear.slope)
 
     @property
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.n_contacts
 
     @property
     def flange_position(self) -> NDArray[np.float64]:
         """True position of the flange (3,) in the base frame [m], at the start of the last sub-step."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.flange_position.copy()
 
     @property
     def contact_wrench(self) -> NDArray[np.float64]:
         """True contact wrench of table and base on the arm (6,), at the flange in base axes [N, Nm]."""
-        self._be_current()
+        self.complete_cycle()
         return self._physics.contact_wrench
 
     def reset(self, q: Sequence[float]) -> None:
@@ -220,7 +211,7 @@ class Plant:
         angles = np.array(q, dtype=np.float64)
         if angles.shape != (6,) or not np.isfinite(angles).all():
             raise PlantError(f"joint angles {list(q)} given: six finite numbers are needed")
-        self._be_current()
+        self.complete_cycle()
         self.cycle = 0
         self._arm.reset(angles)
         self._state = None
@@ -234,13 +225,13 @@ class Plant:
 
         Arguments as in `set_payload_body`; PlantError when the mass is negative or a number is not finite.
         """
-        self._be_current()
+        self.complete_cycle()
         self._physics.loads.declare(mass, cog, inertia)
         self._drives.set_payload(mass, cog, inertia)
 
     def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
         """Set the joint ranges that freedrive keeps [rad]."""
-        self._be_current()
+        self.complete_cycle()
         self._drives.set_range(q_min, q_max)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
@@ -249,7 +240,7 @@ class Plant:
         From now on `set_payload` only declares. The mass is in kg, the centre of gravity in the flange frame
         [m]. PlantError when the mass is negative or a number is not finite.
         """
-        self._be_current()
+        self.complete_cycle()
         self._physics.loads.attach(mass, cog)
 
     def hold_trim(self) -> None:
@@ -257,7 +248,7 @@ class Plant:
 
         Otherwise its integral would raise the contact force more and more.
         """
-        self._be_current()
+        self.complete_cycle()
         self._arm.hold_trim()
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
@@ -266,7 +257,7 @@ class Plant:
         The force (3,) is in base axes [N]; the point where it acts in the flange frame [m], None for its
         origin. PlantError when a number is not finite.
         """
-        self._be_current()
+        self.complete_cycle()
         self._physics.loads.push(force, point)
 
     @property
@@ -289,8 +280,8 @@ class Plant:
         """Advance one control cycle.
 
         Args:
-            target: set-point for the end of this cycle; the drives act on it from the beginning of the cycle
-                plus the dead time. None puts or keeps the brakes on: the joints stand still.
+            target: set-point for the end of this cycle. None puts or keeps the brakes on: the joints stand
+                still.
             mode: control mode. In TEACH (freedrive) and TORQUE the target has no effect, but the first one
                 afterwards should be at the measured position.
             torque: of the joints; in TORQUE, and in TEACH where something holds the arm beside the hand [Nm].
@@ -305,18 +296,11 @@ class Plant:
         if not self._arm.moves_later:
             self._finish()
 
-    def run_ahead(self) -> None:
-        """Compute what the next target cannot change; the results are the same to the last bit."""
-        self.sense()  # before the arm moves
-        self._finish()
-        self._arm.run_ahead()
-
-    def _be_current(self) -> None:
-        """Let the arm be where the commands so far have moved it: neither behind nor ahead."""
+    def complete_cycle(self) -> None:
+        """Let the arm move by the command that waits; the results are the same to the last bit."""
         if self._command is not None:
             self.sense()  # before the arm moves
             self._finish()
-        self._arm.undo_run_ahead()
 
     def _finish(self) -> None:
         """Let the arm move by the command that waits, if one does."""
