@@ -133,7 +133,8 @@ class ArmPhysics:
         self.bias: NDArray[np.float64] = self._law[:, 0]
         if self._presliding is not None:
             self._presliding.bind(self.q, data.qfrc_applied[:6])
-        self._jacobian = np.zeros((6, model.nv))
+        jacobian = np.zeros((6, model.nv))
+        self._jacobian = (jacobian[:3], jacobian[3:], jacobian[:, :6], jacobian[:, :6].T)
         self._flange_site = site
         self.loads.bind(model, data)
         self.obstacles.bind(model, data.qpos)
@@ -191,10 +192,9 @@ class ArmPhysics:
 
         The least one, by a damped inverse.
         """
-        jacobian = self._jacobian
-        mujoco.mj_jacSite(self.model, self.data, jacobian[:3], jacobian[3:], self._flange_site)
-        arm = jacobian[:, :6]
-        square, wrench = arm.dot(arm.T) + _DAMPING, np.zeros(6)
+        linear, angular, arm, transposed = self._jacobian
+        mujoco.mj_jacSite(self.model, self.data, linear, angular, self._flange_site)
+        square, wrench = arm.dot(transposed) + _DAMPING, np.zeros(6)
         mujoco.mju_cholFactor(square, 0.0)
         mujoco.mju_cholSolve(wrench, square, arm.dot(torque))
         return np.negative(wrench, wrench)
