@@ -36,8 +36,10 @@ JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 
 
 JOINT_ACCELERATION = radians(80.0)
-"""Default of moves of the joints [rad/s²], 1.4 in the manual. Source: moves with `t` of a real UR3, which stretch
-the profile of the defaults; configuration data of captures."""
+"""Default of moves of the joints [rad/s²], 1.4 in the manual.
+
+Source: moves with `t` of a real UR3, which stretch the profile of the defaults; captured configuration data.
+"""
 JOINT_SPEED = radians(60.0)
 """Likewise [rad/s], 1.05 in the manual."""
 

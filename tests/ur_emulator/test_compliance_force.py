@@ -42,9 +42,8 @@ def test_pressing_is_stable(fidelity, scaling):
         fidelity=fidelity,
     )
     forces, places = truth(bench, 1000)
-    last = forces[-300:, 2]
-    assert last.min() > 20.0  # never lets go, never hammers
-    assert last.max() < 40.0
+    last, allowed = forces[-300:, 2], {"typical": 10.0, "poor": 15.0}[fidelity]
+    assert np.abs(last - 30.0).max() < allowed  # never lets go, never hammers
     assert np.ptp(places[-300:, 2]) < 5e-5
     assert reported(bench) == []
 
@@ -88,8 +87,8 @@ def test_what_is_pressed_against_at_the_start_counts_as_contact():
 # --- moves on top
 
 
-@pytest.mark.parametrize("fidelity", ["ideal", "poor"])
-def test_a_move_on_top_follows_its_path_and_keeps_the_force(fidelity):
+@pytest.mark.parametrize(("fidelity", "error"), [("ideal", 3.0), ("poor", 10.0)])  # CB3 manual: ±10 N
+def test_a_move_on_top_follows_its_path_and_keeps_the_force(fidelity, error):
     bench = above_table(
         pressing(20)
         + "  sleep(3.5)\n  movel(pose_add(get_target_tcp_pose(), p[0.08,0,0,0,0,0]), a=0.5, v=0.05)\n"
@@ -99,7 +98,7 @@ def test_a_move_on_top_follows_its_path_and_keeps_the_force(fidelity):
     forces, places = truth(bench, 750)
     assert bench.texts == ["there"]
     sliding = forces[520:660, 2]
-    assert sliding.mean() == pytest.approx(20.0, abs=3.0)
+    assert sliding.mean() == pytest.approx(20.0, abs=error)
     assert (sliding > 0.0).all()
     assert places[-1][:2] - places[0][:2] == pytest.approx([0.08, 0.0], abs=2e-3)
     assert reported(bench) == []

@@ -5,6 +5,7 @@ The command path is held against its definition: its one matrix, its delay, its 
 
 from __future__ import annotations
 
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,7 @@ from plant_support import dh_frames
 from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
 from ur_emulator.models.cb3_arms import UR3
 from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.mjcf import GRAVITY
+from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.motion.generators import JointTarget
 from ur_emulator.plant.command_path import CommandPath, trace_cycle
 from ur_emulator.plant.drives import ServoGains
@@ -31,7 +31,7 @@ STILL = np.zeros(6)
 def potential_energy(rows, q):
     frames = dh_frames(rows, q)
     heights = [(frame @ (*link.com, 1.0))[2] for frame, link in zip(frames, UR3.links, strict=True)]
-    return GRAVITY * sum(link.mass * z for link, z in zip(UR3.links, heights, strict=True))
+    return CB3.gravity * sum(link.mass * z for link, z in zip(UR3.links, heights, strict=True))
 
 
 def kinetic_energy(rows, q, qd, h=1e-5):
@@ -48,7 +48,7 @@ def kinetic_energy(rows, q, qd, h=1e-5):
 
 
 @pytest.mark.parametrize(
-    "calibration", [NOMINAL, draw_calibration(TYPICAL, 3)], ids=["nominal", "calibrated"]
+    "calibration", [NOMINAL, draw_calibration(UR3, TYPICAL, 3)], ids=["nominal", "calibrated"]
 )
 def test_gravity_torque_is_the_slope_of_potential_energy(calibration):
     rows = calibrated_dh(UR3, calibration)
@@ -85,7 +85,7 @@ def test_a_declared_payload_is_in_the_model():
     def height(q):
         return (dh_frames(UR3.dh, q)[5] @ (0.0, 0.0, 0.1, 1.0))[2]
 
-    slope = [2.0 * GRAVITY * (height(Q + h * e) - height(Q - h * e)) / (2 * h) for e in np.eye(6)]
+    slope = [2.0 * CB3.gravity * (height(Q + h * e) - height(Q - h * e)) / (2 * h) for e in np.eye(6)]
     assert loaded - alone == pytest.approx(slope, abs=1e-6)
     dynamics.set_payload(0.0, (0.0, 0.0, 0.0))
     assert dynamics.evaluate(Q, STILL, STILL) == pytest.approx(alone, abs=1e-12)
@@ -149,13 +149,27 @@ def test_gear_phases_come_from_the_seed_and_sizes_do_not():
     assert np.abs(tables[0] - tables[1]).max() > expected
 
 
-def test_force_drift_stays_in_its_bounds_without_jumps():
-    drift = ForceDrift(TYPICAL, 4, 2.0)
+def test_force_wander_stays_in_its_bounds_without_jumps():
+    drift = ForceDrift(replace(TYPICAL, force_offset=0.0), 4, 2.0)
     blocks = np.concatenate([drift.next_block(256) for _ in range(400)])
     assert np.all(np.abs(blocks[:, :3]) <= TYPICAL.force_bias)
     assert np.all(np.abs(blocks[:, 3:]) <= TYPICAL.force_bias / 10)
     assert np.abs(np.diff(blocks, axis=0)).max() < 0.02
     assert blocks[:, :3].std() > 1.0
+
+
+def test_force_drift_is_a_line_without_a_bound():
+    """A real UR10e: -10 N in 1,800 s, along a line."""
+    (typical,) = (it for it in E_SERIES.fidelities if it.name == "typical")
+    ends = []
+    for seed in range(100):
+        drift = ForceDrift(typical, seed, 60.0)
+        blocks = np.concatenate([drift.next_block(4) for _ in range(30)])
+        times = np.arange(len(blocks))[:, None]
+        assert blocks - blocks[0] == pytest.approx((blocks[1] - blocks[0]) * times, abs=1e-9)
+        ends.append(blocks[-1, :3] - blocks[0, :3])
+        assert np.abs(blocks[0, :3]).max() <= typical.force_offset
+    assert np.std(ends) == pytest.approx(10.8, rel=0.15)
 
 
 def test_motors_warm_up_with_work_and_slowly():

@@ -57,8 +57,8 @@ _SHAPES: dict[int, tuple[str, Callable[..., tuple[float, ...]]]] = {
     int(mujoco.mjtGeom.mjGEOM_MESH): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
 }
 
-# Chosen: changes a wrench by 1 % where the least singular value of the Jacobian is .047, which the recordings of
-# a real UR3 reach without a sign of damping, and bounds it at a singularity.
+# Chosen: bounds a wrench at a singularity, and changes it by 1 % where the least singular value of the
+# Jacobian is .047; recordings of a real UR3 go there and show no damping.
 _DAMPING = 0.005**2 * np.eye(6)
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 

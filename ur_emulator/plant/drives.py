@@ -238,17 +238,15 @@ class Drives:
         self._path.keep(error)
 
     def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:
-        """Set `target_moment` and `target_current` for a target, (6,) each, that the arm follows by itself.
+        """Set `target_moment` for a target, (6,) each, that the arm follows by itself.
 
         Returns:
             False when the target is not finite or far too large; nothing has changed then.
         """
         if not hypot(*q, *qd, *qdd) < TARGET_MAX:
             return False
-        speeds = np.array([qd, qd, qd], dtype=np.float64)
-        self.target_moment = six(self._dynamics.evaluate(np.array(q), speeds[0], np.array(qdd)).tolist())
-        self._friction.evaluate(speeds)
-        self._expect_current()
+        moment = self._dynamics.evaluate(np.array(q), np.array(qd, dtype=np.float64), np.array(qdd))
+        self.target_moment = six(moment.tolist())
         return True
 
     def _expect_current(self) -> None:

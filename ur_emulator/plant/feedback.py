@@ -146,7 +146,11 @@ class Feedback:
         return self._records[0].simulated
 
     def take(self, physics: ArmPhysics, expected_current: NDArray[np.float64]) -> None:
-        """Read the sensors of an arm whose cycle has been computed; the controller expects currents (6,) [A]."""
+        """Read the sensors of an arm whose cycle has been computed.
+
+        Args:
+            expected_current: of the motors, by the controller's model (6,) [A].
+        """
         record, loads = self._records[0], physics.loads
         self.gear.apply(record)
         if not self._has_force_sensor:

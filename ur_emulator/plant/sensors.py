@@ -4,8 +4,8 @@ Input is a record of true values of some moment (see the REC slices); output are
 comes in blocks from seeded streams, so equal seeds and equal motions give equal bits.
 """
 
-from math import exp, pi, sqrt
 from collections.abc import Callable
+from math import exp, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +16,10 @@ from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, 
 
 # --- ForceDrift: the slow error of the measured force
 #
-# A CB3 arm has no force sensor: it takes what the motors give beyond its model for the work of a force at the
-# flange (see `Sensors.read`; recordings of a real UR3: of each package `actual_TCP_force` is that of
-# `actual_current` - `target_current`, correlation 1.000). At rest it is off by several newtons, otherwise in
-# each posture, because dry friction holds the joints; the drives here have none, so that stands here. The sensor of an e-Series arm has an offset that the first
-# zero takes away, and drifts steadily. The white part of the error is added with the other sensor noise.
+# A CB3 arm has no force sensor: a force at the flange is what the motors give beyond the controller's model.
+# At rest that is off by several newtons, in each posture by others, because dry friction holds the joints.
+# The drives here have none, so the error is added here. The sensor of an e-Series arm has an offset that the
+# first zero takes away, and drifts steadily. The white part is added with the other sensor noise.
 #
 # Source: UR3/CB3 manual (precision ±10 N, ±5 Nm); forum.universal-robots.com threads 229 and 4481 (offsets of
 # several newtons, sd 3.6 N); recordings of a real UR3. E-Series: see `models/generations.py`.
@@ -40,7 +39,9 @@ class ForceDrift:
         self._rng = random_stream(seed, "force")
         shares = np.repeat([1.0, 1.0 / fidelity.force_ratio], 3)
         self._bound = fidelity.force_bias * shares
-        self._base = fidelity.force_offset * shares * random_stream(seed, "force offset").uniform(-1.0, 1.0, 6)
+        self._base = (
+            fidelity.force_offset * shares * random_stream(seed, "force offset").uniform(-1.0, 1.0, 6)
+        )
         drift = fidelity.force_drift * shares * random_stream(seed, "force drift").standard_normal(6)
         self._drift = drift * block_time
         self._keep = exp(-block_time / _TIME_CONSTANT)
@@ -167,8 +168,9 @@ class Sensors:
         """Read all sensors of an arm whose true values are `record`; the same again until `keep`.
 
         Args:
-            wrench_for: tells for joint torques (6,) [Nm] the wrench on the flange that asks for them; the
-                external wrench is estimated so from the currents, and added to that of the record.
+            wrench_for: tells for joint torques (6,) [Nm] the wrench on the flange that asks for them. Of an
+                arm without a sensor the wrench is that of measured less expected currents. Source:
+                recordings of a real UR3, of each package (correlation 1.000 of joint torques).
         """
         if self._at == _BLOCK:
             self._draw_noise()
