@@ -46,8 +46,8 @@ class CalibrationSpread:
 # the number of arms stands at the row. A mean below twice its standard error is 0, and the spread is that
 # about 0. Tilts have mean 0; what some types have in common, up to 1.3 mrad at wrists 2 and 3, is in the rms.
 # A DH row has no pitch: that of forearm and wrist 1 is in their roll, as root of the sum of squares. Real
-# tables split the distance between the parallel axes 2, 3 and 4 into huge offsets that cancel; here the offsets stay
-# small; the arm is the same.
+# tables split the distance between the parallel axes 2, 3 and 4 into huge offsets that cancel; here they
+# stay small; the arm is the same.
 # Columns: mean, sd (d1, a2, a3, d4, d5, d6 [mm]), tilt (alpha 1 to 6 [mrad]), zero [mrad].
 _UR3 = CalibrationSpread(  # 3
     (0.06, 0.0, 0.0, 0.0, 0.0, 0.45),
