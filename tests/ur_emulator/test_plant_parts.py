@@ -116,7 +116,7 @@ def test_a_typical_controller_is_wrong_about_friction_as_much_as_stated():
 
 
 def test_gear_slope_is_the_derivative_of_its_error():
-    gear = GearRipple(TYPICAL, 9)
+    gear = GearRipple(UR3, TYPICAL, 9)
     h = 1e-7
     gear.evaluate(Q)
     slope = gear.slope.copy()
@@ -127,7 +127,7 @@ def test_gear_slope_is_the_derivative_of_its_error():
 
 
 def test_gear_inverts_exactly():
-    gear = GearRipple(TYPICAL, 9)
+    gear = GearRipple(UR3, TYPICAL, 9)
     motor = gear.motor_position(Q)
     gear.evaluate(motor)
     assert motor + gear.error == pytest.approx(Q, abs=1e-15)
@@ -138,7 +138,7 @@ def test_gear_phases_come_from_the_seed_and_sizes_do_not():
     q = np.linspace(0, 2 * np.pi, 5000)
     tables = []
     for seed in (1, 2):
-        gear = GearRipple(TYPICAL, seed)
+        gear = GearRipple(UR3, TYPICAL, seed)
         rows = []
         for angle in q:
             gear.evaluate(np.full(6, angle))

@@ -16,10 +16,13 @@ Sources, cited by letter below:
  C  Factory calibrations of three real arms, see `calibration.py`.
  D  UR3/CB3 manual (force precision ±10 N, ±5 Nm) and forum.universal-robots.com threads 229 and 4481.
  E  assumed: no published figure; to be checked on a real arm.
+ F  Record files of a real UR3 (CB3) at rest and moving, 125 Hz (mkrssg/UniversalRobots), measured by us.
+ G  Free-drive demonstrations with a real UR5e, public h5 files, measured by us.
 """
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from math import pi
 from pathlib import Path
 from typing import Annotated
 from zlib import crc32
@@ -46,6 +49,7 @@ Time = Annotated[float, number(0.0, 0.2, "s")]
 Noise = Annotated[float, number(0.0, 1000.0)]
 SixAngles = tuple[Angle, Angle, Angle, Angle, Angle, Angle]
 SixNoises = tuple[Noise, Noise, Noise, Noise, Noise, Noise]
+Step = Annotated[float, number(1e-9, 1.0, "A")]
 Pole = Annotated[float, number(0.1, 10_000.0, "Hz")]
 
 
@@ -88,7 +92,11 @@ class Fidelity:
         speed_filter_hz: pole of the one-pole filter of each reported speed, (6,) [Hz].
         speed_dead_band: below this joint speed the filter's input is gated to zero [rad/s].
         speed_sigma: sd of the white noise of the reported speed while moving [rad/s].
-        current_sigma: sd of the reported current, (6,) [A].
+        speed_least: a reported speed that decays to less than this is 0 [rad/s].
+        current_sigma: sd of the white noise of the reported current, (6,) [A].
+        current_step: quantisation of the reported current, (6,) [A].
+        current_ripple: rms of the motors' ripple in the reported current, 404 cycles a joint turn, (6,) [A].
+        servo_dead_band: error of a joint that its servo does not trim away [rad].
         backlash: play of each gear [rad]; within it the joint stands still while the motor turns.
         friction_presliding: angle over which the friction of a joint follows a reversal [rad]: it depends on
             the path then, with hysteresis (`plant/friction.py`). 0: it depends on the speed alone.
@@ -120,7 +128,11 @@ class Fidelity:
     speed_filter_hz: tuple[Pole, Pole, Pole, Pole, Pole, Pole]
     speed_dead_band: Annotated[float, number(0.0, 1.0, "rad/s")]
     speed_sigma: Annotated[float, number(0.0, 1.0, "rad/s")]
+    speed_least: Annotated[float, number(0.0, 1.0, "rad/s")]
     current_sigma: SixNoises
+    current_step: tuple[Step, Step, Step, Step, Step, Step]
+    current_ripple: SixNoises
+    servo_dead_band: Angle
     ripples: Annotated[tuple[Ripple, ...], Items(0, 20)]
     backlash: Angle
     friction_presliding: Angle
@@ -166,6 +178,21 @@ def read_fidelity(path: Path, fidelities: Sequence[Fidelity]) -> Fidelity:
     return checked(Fidelity, {**own, **values}, str(path), ModelError)
 
 
+def _ripples(scale: float) -> tuple[Ripple, ...]:
+    """Waves of a UR3's gears, times `scale`: a slow one, then once and twice a motor turn.
+
+    F: the first is .15 to .2 mrad rms of all joints; all together the speed ripple is .3 to .5 % of the base,
+    .5 to .7 of the shoulder, .8 to 1.2 of the others.
+    """
+    slow = Ripple(cycles=20.0, rms=0.0037 * scale)
+    parts = (((0,), 0.001), ((1,), 0.005), ((2, 3, 4, 5), 0.008))
+    return slow, *(
+        Ripple(cycles=cycles, rms=share * rms * scale, joints=joints)
+        for cycles, share in ((101.0, 0.8), (202.0, 0.6))
+        for joints, rms in parts
+    )
+
+
 TYPICAL = Fidelity(
     name="typical",
     dead_time=0.008,  # B
@@ -176,16 +203,17 @@ TYPICAL = Fidelity(
     drive_damping=None,
     feedback_age=0.008,  # B: the packet carries the state of one cycle before
     sample_jitter=1e-5,  # A: more would show in the differences of reported angles
-    encoder_sigma=(1.1e-5, 1.1e-5, 1.45e-5, 1.45e-5, 1.75e-5, 1.75e-5),  # A
-    encoder_step=3.6e-6,  # A: 3.3-3.9e-6
-    speed_filter_hz=(368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # A: by joint size 2, 1, 0
+    encoder_sigma=(2.2e-5,) * 6,  # F: with the step 2.0 to 2.4e-5
+    encoder_step=2.0 * pi / 2**19,  # F, G
+    speed_filter_hz=(40.0,) * 6,  # F: 2.6 ms behind the target, of which the angles are .5
     speed_dead_band=1e-3,  # E
-    speed_sigma=1e-3,  # A: what is left of 2-6 mrad/s after the ripple
-    current_sigma=(0.015, 0.015, 0.012, 0.010, 0.010, 0.010),  # A: 7-20 mA
-    ripples=(
-        Ripple(cycles=101.0, rms=0.008),
-        Ripple(cycles=202.0, rms=0.006),
-    ),  # A: .5-1.5 % rms, both together
+    speed_sigma=5e-4,  # F: what is left of 2 to 7 mrad/s after the ripple
+    speed_least=1e-5,  # F: exactly 0 at rest, or single values above this
+    current_sigma=(0.0035, 0.007, 0.004, 0.0045, 0.0045, 0.0045),  # F: the mean of three files
+    current_step=(0.002243, 0.002243, 0.001525, 0.001119, 0.001119, 0.001119),  # F
+    current_ripple=(0.055, 0.053, 0.06, 0.06, 0.055, 0.055),  # F
+    ripples=_ripples(1.0),
+    servo_dead_band=7.5e-5,  # F: resting joints are up to that off their targets, each by its own constant
     backlash=0.0,  # of strain wave gears; E
     friction_presliding=0.0,
     friction_error=0.15,  # E: friction changes with temperature by more than that
@@ -213,7 +241,11 @@ IDEAL = replace(
     encoder_step=1e-7,
     speed_sigma=1e-5,
     current_sigma=(0.001,) * 6,
+    current_step=(1e-6,) * 6,
+    current_ripple=(0.0,) * 6,
+    speed_filter_hz=(368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # A: by joint size 2, 1, 0
     ripples=(Ripple(cycles=101.0, rms=0.0002), Ripple(cycles=202.0, rms=0.0002)),
+    servo_dead_band=0.0,
     friction_error=0.0,
     mass_error=0.0,
     calibration_length=0.0,  # like the vendor's simulator: the nominal table itself
@@ -234,7 +266,8 @@ POOR = replace(
     drive_lag=0.014,
     feedback_age=0.010,
     sample_jitter=5e-5,
-    ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
+    ripples=_ripples(2.0),
+    servo_dead_band=1.5e-4,
     friction_error=0.30,
     mass_error=0.04,
     force_bias=10.0,

@@ -29,14 +29,8 @@ from ur_hil.tools import ToolModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
-# MuJoCo's Coulomb friction is a soft constraint. These numbers make it set in like a steep viscous friction,
-# over some hundredths of a radian a second, instead of holding the joint against its servo: measured friction
-# rises from small values at rest, and real arms neither stick nor hunt around a target. Arms whose model of
-# friction changes its sign faster say over which speed it sets in, see `RobotModel.friction_rise`.
-_FRICTION_SOLREF = (0.02, 1.0)
-_FRICTION_SOLIMP = (0.1, 0.1, 0.001, 0.5, 2.0)
-
-# In freedrive a joint would creep with the soft constraint above. There the friction holds, up to its size.
+# MuJoCo's Coulomb friction is a soft constraint, see `_set_friction_rise`. In freedrive a joint would creep
+# with it. There the friction holds, up to its size.
 _STICTION_SOLIMP = (0.999, 0.999, 0.001, 0.5, 2.0)
 
 # Contacts give like a tool and a table of some elasticity: 0.1 mm under 20 N, 0.4 mm under 120 N. Harder ones
@@ -435,8 +429,7 @@ def physics_spec(
 def compile_physics(spec: mujoco.MjSpec, robot: RobotModel) -> mujoco.MjModel:
     """Compile the specification of the plant's model."""
     model = spec.compile()
-    if robot.friction_rise is not None:
-        _set_friction_rise(model, robot.friction_rise)
+    _set_friction_rise(model, robot.friction_rise)
     return model
 
 
@@ -458,10 +451,8 @@ def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
     for i, name in enumerate(JOINTS):
         joint = spec.joint(name)
         joint.armature = robot.armature[i]
-        joint.damping = [robot.viscous_beyond_kink[i], 0.0, 0.0]
+        joint.damping = [robot.viscous_fast[i], 0.0, 0.0]
         joint.frictionloss = robot.coulomb[i]
-        joint.solref_friction = _FRICTION_SOLREF
-        joint.solimp_friction = _FRICTION_SOLIMP
 
 
 def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:

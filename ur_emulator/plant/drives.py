@@ -8,6 +8,7 @@ gives
 with lead = kv / kp. The law itself lives in MuJoCo's actuators (`arm_physics.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
 at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
+An error within `Fidelity.servo_dead_band` stays: friction holds the joint there.
 
 In freedrive there is no set-point: see `Freedrive`.
 """
@@ -185,6 +186,8 @@ class Drives:
         self._q, self._qd, self._qdd_then_deflection = path.newest
         self._moment = self._dynamics.torque
         self._work = np.zeros(6)
+        band = fidelity.servo_dead_band
+        self._dead_band = np.array([[-band] * 6, [band] * 6]) if band else None
         self.control = list(path.control)
         self.actual_speed = path.speeds[0]
         self.bias = self._friction.compensation
@@ -245,6 +248,12 @@ class Drives:
 
     def keep(self, error: NDArray[np.float64] | None) -> None:
         """End the cycle; the servos are trimmed by the joints' error (6,) [rad] unless that is None."""
+        if error is not None and self._dead_band is not None:
+            low, high = self._dead_band
+            inside = self._work
+            np.maximum(error, low, out=inside)
+            np.minimum(inside, high, out=inside)
+            error = np.subtract(error, inside, inside)
         self._path.keep(error)
 
     def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:
