@@ -5,10 +5,6 @@ Links are rows of mass, centre of mass, inertia and products of inertia, see `Li
 +x), forearm (from wrist 1 back to the elbow along +x), wrist 1 (from the forearm along +y to the axis of
 wrist 2), wrist 2 (from wrist 1 along -y to the axis of wrist 3), wrist 3 (the tool flange at the origin,
 facing +z).
-
-Dry friction holds resting joints of all of them: a real UR3 has three quarters of it at .002 rad/s; resting
-arms carry currents beyond gravity (sd .26 A of a UR5, .08 A of a UR3) and stand up to 75 microradians off
-their targets (O).
 """
 
 from math import pi
@@ -23,8 +19,6 @@ from ur_emulator.models.robot_model import (
     RobotModel,
     dh_table,
 )
-
-_FRICTION_RISE = 3e-5  # rad/s; chosen: what friction carries at rest fades within 4 (base) to 11 s (wrists)
 
 # The UR3 of the CB3 generation. Sources:
 # A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR3 table).
@@ -68,7 +62,6 @@ UR3 = RobotModel(
     viscous=(4.5, 5.1, 3.3, 0.5, 1.3, 0.8),  # D
     viscous_fast=(2.4, 2.7, 1.9, 0.3, 0.7, 0.4),  # D
     coulomb=(2.7, 2.7, 1.4, 0.7, 0.7, 0.9),  # D
-    friction_rise=_FRICTION_RISE,
     torque_constant=(11.48, 11.51, 8.44, 4.13, 3.9, 4.2),  # D
     stop_deceleration=20.0,  # E: base, 183 deg/s in 159 ms; shoulder and elbow stop no slower
     servo_inertia=(0.879, 0.909, 0.371, 0.0851, 0.0752, 0.0716),  # A, B
@@ -123,7 +116,6 @@ UR5 = RobotModel(
     viscous=(31.0, 31.0, 31.0, 3.3, 3.3, 3.3),  # D, H
     viscous_fast=(16.5, 16.5, 16.5, 1.9, 1.9, 1.9),  # D, H
     coulomb=(8.9, 8.9, 8.9, 1.4, 1.4, 1.4),  # D, H
-    friction_rise=_FRICTION_RISE,
     torque_constant=(13.6, 13.6, 13.6, 7.7, 7.7, 7.7),  # D, F
     stop_deceleration=13.0,  # E: base, 183 deg/s in 244 ms
     servo_inertia=(2.88, 3.67, 2.59, 0.23, 0.216, 0.212),  # A, B
@@ -176,7 +168,6 @@ UR10 = RobotModel(
     viscous=(30.0, 30.0, 31.0, 2.75, 2.75, 2.75),  # D, H
     viscous_fast=(15.7, 15.7, 16.5, 2.6, 2.6, 2.6),  # D, H
     coulomb=(5.8, 5.8, 8.9, 2.75, 2.75, 2.75),  # D, H
-    friction_rise=_FRICTION_RISE,
     torque_constant=(13.58, 14.3, 11.37, 11.24, 11.77, 11.77),  # F
     stop_deceleration=6.0,  # assumed: the UR5's scaled by reach and load; its manual's table was not at hand
     servo_inertia=(9.67, 11.9, 4.33, 0.647, 0.615, 0.61),  # A, B

@@ -43,6 +43,10 @@ _FILE = FileKind(MIB, ModelError, "all fields have less than 0.01 MiB")
 _LARGEST_SLOPE = 0.5
 """Of all waves of a gear together: beyond it the joint might turn back while its motor goes on."""
 
+# Logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
+REVERSAL_SPEED = 0.006
+"""Friction changes its sign over about this in the controller's model, fully by .01 to .015 [rad/s]."""
+
 Share = Annotated[float, number(0.0, 1.0)]
 Angle = Annotated[float, number(0.0, 0.1, "rad")]
 Time = Annotated[float, number(0.0, 0.2, "s")]
@@ -100,6 +104,9 @@ class Fidelity:
         backlash: play of each gear [rad]; within it the joint stands still while the motor turns.
         friction_presliding: angle over which the friction of a joint follows a reversal [rad]: it depends on
             the path then, with hysteresis (`plant/friction.py`). 0: it depends on the speed alone.
+        friction_rise: speed over which the true dry friction grows from zero to its size [rad/s]. Far below
+            `REVERSAL_SPEED` it holds resting joints; above it the controller's compensation would push slow
+            joints ahead.
         friction_error: sd of the relative error of the controller's friction model, per joint [1].
         mass_error: sd of the relative error of each link's mass in the controller's model [1].
         calibration_length: sd of each length of the factory calibration [m].
@@ -136,6 +143,7 @@ class Fidelity:
     ripples: Annotated[tuple[Ripple, ...], Items(0, 20)]
     backlash: Angle
     friction_presliding: Angle
+    friction_rise: Annotated[float, number(1e-7, 1.0, "rad/s")]
     friction_error: Share
     mass_error: Share
     calibration_length: Annotated[float, number(0.0, 0.01, "m")]
@@ -216,6 +224,9 @@ TYPICAL = Fidelity(
     servo_dead_band=7.5e-5,  # F: resting joints are up to that off their targets, each by its own constant
     backlash=0.0,  # of strain wave gears; E
     friction_presliding=0.0,
+    # F: three quarters are there at .002 rad/s. Resting arms carry currents beyond gravity, sd .08 A of a
+    # UR3, .26 A of a UR5: what friction carries at rest fades within 4 s (base) to 11 s (wrists) (E).
+    friction_rise=3e-5,
     friction_error=0.15,  # E: friction changes with temperature by more than that
     mass_error=0.02,  # E
     calibration_length=0.00015,  # C: with the angles gives the observed pose errors
@@ -246,6 +257,7 @@ IDEAL = replace(
     speed_filter_hz=(368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # A: by joint size 2, 1, 0
     ripples=(Ripple(cycles=101.0, rms=0.0002), Ripple(cycles=202.0, rms=0.0002)),
     servo_dead_band=0.0,
+    friction_rise=REVERSAL_SPEED,
     friction_error=0.0,
     mass_error=0.0,
     calibration_length=0.0,  # like the vendor's simulator: the nominal table itself

@@ -20,7 +20,7 @@ from protocol.realtime.layout import COLUMNS, VERSIONS
 from protocol.robot_api import CALLS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.fidelity import EXACT, FIDELITIES, IDEAL, POOR, TYPICAL, Ripple
+from ur_emulator.models.fidelity import EXACT, FIDELITIES, IDEAL, POOR, REVERSAL_SPEED, TYPICAL, Ripple
 from ur_emulator.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
 from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
@@ -114,8 +114,9 @@ _SIGNALS: dict[str, Any] = {
     "speed_filter_hz": (368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # by joint size 2, 1, 0
     "speed_least": _SMALLEST_SPEED,
     "current_sigma": (0.026, 0.026, 0.026, 0.0075, 0.0075, 0.0075),  # a UR5e at rest
-    "current_ripple": (0.0,) * 6,  # chosen, as the next: none is known
+    "current_ripple": (0.0,) * 6,  # chosen, as the next two: nothing is known of them
     "servo_dead_band": 0.0,
+    "friction_rise": REVERSAL_SPEED,
 }
 _TYPICAL = replace(
     TYPICAL,

@@ -143,11 +143,9 @@ class Link:
         return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
-# Friction of every arm: logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
+# Of every arm: logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
 VISCOUS_KINK = 0.5
 """Joint speed beyond which viscous friction has another slope [rad/s]."""
-REVERSAL_SPEED = 0.006
-"""Friction changes its sign over about this in the controller's model, fully by .01 to .015 [rad/s]."""
 
 # Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees.
 RANGE_END = 2.0 * pi + radians(3.0)
@@ -188,8 +186,6 @@ class RobotModel:
         box_type: code of the control box, as above.
         home_q: a pose clear of the table, away from singularities [rad].
         first_version: oldest software that the maker has released for it; None: the generation's first.
-        friction_rise: speed over which the true dry friction grows from zero to its size [rad/s]. Far below
-            `REVERSAL_SPEED` it holds resting joints; above it the compensation would push slow joints ahead.
         has_point_masses: the controller's model takes the links for points, without inertia tensors.
     """
 
@@ -218,7 +214,6 @@ class RobotModel:
     servo_frequency: float = 25.0  # chosen: at 12 Hz an arm is further from its target than a real one
     servo_damping: float = 0.9
     first_version: str | None = None
-    friction_rise: float = REVERSAL_SPEED
     has_point_masses: bool = False
 
     @property

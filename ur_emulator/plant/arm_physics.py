@@ -29,7 +29,7 @@ from ur_hil.tools import ToolModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
-# MuJoCo's Coulomb friction is a soft constraint, see `_set_friction_rise`. In freedrive a joint would creep
+# MuJoCo's Coulomb friction is a soft constraint, see `compile_physics`. In freedrive a joint would creep
 # with it. There the friction holds, up to its size.
 _STICTION_SOLIMP = (0.999, 0.999, 0.001, 0.5, 2.0)
 
@@ -63,6 +63,7 @@ class ArmPhysics:
         substep: physics time step [s].
         presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
             memory of the path.
+        friction_rise: speed over which MuJoCo's grows from zero to its size [rad/s].
         tools: on the flange.
 
     Attributes:
@@ -85,10 +86,11 @@ class ArmPhysics:
         gains: ServoGains,
         substep: float,
         presliding: float,
+        friction_rise: float,
         tools: Sequence[ToolModel] = (),
     ) -> None:
         self._spec = spec = physics_spec(robot, dh, mass_scale, gains, substep, tools)
-        model = compile_physics(spec, robot)
+        model = compile_physics(spec, friction_rise)
         self._size = _Sizes(model.nbody, model.ngeom, model.nv, model.nu)
         self._presliding = Presliding(presliding) if presliding else None
         self.loads = Loads(tools)
@@ -426,25 +428,22 @@ def physics_spec(
     return spec
 
 
-def compile_physics(spec: mujoco.MjSpec, robot: RobotModel) -> mujoco.MjModel:
-    """Compile the specification of the plant's model."""
-    model = spec.compile()
-    _set_friction_rise(model, robot.friction_rise)
-    return model
+def compile_physics(spec: mujoco.MjSpec, speed: float) -> mujoco.MjModel:
+    """Compile the plant's model.
 
-
-def _set_friction_rise(model: mujoco.MjModel, speed: float) -> None:
-    """Let dry friction grow from zero to its size over a speed [rad/s], by backward Euler.
+    Dry friction grows from zero to its size over a speed [rad/s], by backward Euler.
 
     With w a joint's inverse inertia, MuJoCo solves f (w + R) = -2 v / (d t) - a for the force f, where a is
     the acceleration without it, R = w (1 - d) / d, and d, t are the impedance and time constant set here.
     R = speed / (size step) and d t = 2 step make that f = -size / speed times the speed after the step.
     """
+    model = spec.compile()
     step = model.opt.timestep
     slope = step * model.dof_invweight0[:6] * model.dof_frictionloss[:6] / speed
     impedance = slope / (1.0 + slope)
     model.dof_solimp[:6, :2] = impedance[:, None]
     model.dof_solref[:6, 0] = 2.0 * step / impedance
+    return model
 
 
 def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:

@@ -8,7 +8,8 @@ gives
 with lead = kv / kp. The law itself lives in MuJoCo's actuators (`arm_physics.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
 at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
-An error within `Fidelity.servo_dead_band` stays: friction holds the joint there.
+It counts errors in whole dead bands (`Fidelity.servo_dead_band`): a smaller one stays, where friction holds
+the joint.
 
 In freedrive there is no set-point: see `Freedrive`.
 """
@@ -172,7 +173,7 @@ class Drives:
             fidelity.drive_lag,
             fidelity.drive_damping,
             gains.lead,
-            period / _INTEGRAL_TIME,
+            period / _INTEGRAL_TIME * (fidelity.servo_dead_band or 1.0),
         )
         self._friction = Friction(robot, fidelity, seed)
         self.target_acts_later = path.newest_acts_later
@@ -187,7 +188,7 @@ class Drives:
         self._moment = self._dynamics.torque
         self._work = np.zeros(6)
         band = fidelity.servo_dead_band
-        self._dead_band = np.array([[-band] * 6, [band] * 6]) if band else None
+        self._per_dead_band = np.full(6, 1.0 / band) if band else None
         self.control = list(path.control)
         self.actual_speed = path.speeds[0]
         self.bias = self._friction.compensation
@@ -248,12 +249,9 @@ class Drives:
 
     def keep(self, error: NDArray[np.float64] | None) -> None:
         """End the cycle; the servos are trimmed by the joints' error (6,) [rad] unless that is None."""
-        if error is not None and self._dead_band is not None:
-            low, high = self._dead_band
-            inside = self._work
-            np.maximum(error, low, out=inside)
-            np.minimum(inside, high, out=inside)
-            error = np.subtract(error, inside, inside)
+        if error is not None and self._per_dead_band is not None:
+            error = np.multiply(error, self._per_dead_band, self._work)
+            np.trunc(error, error)
         self._path.keep(error)
 
     def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:

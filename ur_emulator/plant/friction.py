@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.models.fidelity import Fidelity, random_stream
-from ur_emulator.models.robot_model import REVERSAL_SPEED, VISCOUS_KINK, RobotModel
+from ur_emulator.models.fidelity import REVERSAL_SPEED, Fidelity, random_stream
+from ur_emulator.models.robot_model import VISCOUS_KINK, RobotModel
 
 # Share of the modelled viscous friction that a full scale of direct_torque compensates [1]: the rest damps
 # the free joints. Inferred: in the maker's example wrist 3 gets 2.5 Nm at 0.2 Hz with full scales; above 0.5
