@@ -6,13 +6,13 @@ Sources of the electrics and fidelities of the e-Series, cited by letter below:
  C  Chosen.
  D  Universal_Robots_ROS_Driver issue 633: 1.3 and 4.1 N within five minutes; ROS2_Driver issue 447: a few
     newtons.
-Noise of encoders, speeds and currents: as in `fidelity.py`, whose source is a UR3e at 500 Hz.
 """
 
 from dataclasses import replace
 from datetime import datetime
 from math import radians
 from types import MappingProxyType
+from typing import Any
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import SUB_PACKAGES
@@ -20,7 +20,7 @@ from protocol.realtime.layout import COLUMNS, VERSIONS
 from protocol.robot_api import CALLS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.fidelity import EXACT, FIDELITIES, IDEAL, POOR, TYPICAL
+from ur_emulator.models.fidelity import EXACT, FIDELITIES, IDEAL, POOR, REVERSAL_SPEED, TYPICAL, Ripple
 from ur_emulator.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
 from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
@@ -105,10 +105,23 @@ _E_SERIES_BUILDS: Builds = (
     (SoftwareVersion(5, 24), 1214860, datetime(2025, 10, 4, 0, 25, 33)),  # date: UR client library's bytes
 )
 
+# The signals of a UR3e at 500 Hz (A of `fidelity.py`), of a UR5e where said (G there).
+_SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
+_SIGNALS: dict[str, Any] = {
+    "encoder_sigma": (1.9e-5,) * 6,  # a UR5e: with the step 1.8 to 2.1e-5; the UR3e's log has 1.1 to 1.8e-5
+    "speed_sigma": 1e-3,  # what is left of 2-6 mrad/s after the ripple
+    "speed_filter_hz": (368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # by joint size 2, 1, 0
+    "speed_least": _SMALLEST_SPEED,
+    "current_sigma": (0.026, 0.026, 0.026, 0.0075, 0.0075, 0.0075),  # a UR5e at rest
+    "current_ripple": (0.0,) * 6,  # chosen, as the next two: nothing is known of them
+    "servo_dead_band": 0.0,
+    "friction_rise": REVERSAL_SPEED,
+}
 _TYPICAL = replace(
     TYPICAL,
     dead_time=0.0,  # A: the drives add no dead time that shows
     drive_lag=0.0005,  # A: actual_q is .50 ms behind target_q
+    ripples=(Ripple(cycles=101.0, rms=0.008), Ripple(cycles=202.0, rms=0.006)),
     feedback_age=0.002,  # the package carries the state of one cycle before
     # Before the first zero; means of a resting UR5e that lie 3 to 6 N apart.
     force_offset=5.0,
@@ -117,12 +130,16 @@ _TYPICAL = replace(
     force_sigma=0.15,  # A
     force_ratio=30.0,  # A: .003-.005 Nm
     voltage_offset=0.15,  # A: 47.5-47.8
+    **_SIGNALS,
 )
-_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01)
+_IDEAL = replace(
+    IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01, speed_least=_SMALLEST_SPEED
+)
 _EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
 _POOR = replace(  # C
     POOR,
     dead_time=0.004,
+    ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
     drive_lag=0.002,
     feedback_age=0.004,
     force_bias=0.0,
@@ -130,6 +147,7 @@ _POOR = replace(  # C
     force_sigma=0.3,
     force_ratio=30.0,
     voltage_offset=0.15,
+    **_SIGNALS,
 )
 
 E_SERIES = RobotGeneration(

@@ -8,6 +8,8 @@ gives
 with lead = kv / kp. The law itself lives in MuJoCo's actuators (`arm_physics.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
 at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
+It counts errors in whole dead bands (`Fidelity.servo_dead_band`): a smaller one stays, where friction holds
+the joint.
 
 In freedrive there is no set-point: see `Freedrive`.
 """
@@ -166,7 +168,7 @@ class Drives:
             fidelity.drive_lag,
             fidelity.drive_damping,
             gains.lead,
-            period / _INTEGRAL_TIME,
+            period / _INTEGRAL_TIME * (fidelity.servo_dead_band or 1.0),
         )
         self._friction = Friction(robot, fidelity, seed)
         self._period = period
@@ -178,7 +180,10 @@ class Drives:
         self._pressing = 0.5 * np.array(robot.coulomb)
         self._q, self._qd, self._qdd_then_deflection = path.newest
         self._moment = self._dynamics.torque
+        self._work = np.zeros(6)
         self.expected_current = np.zeros(6)
+        band = fidelity.servo_dead_band
+        self._per_dead_band = np.full(6, 1.0 / band) if band else None
         self.control = list(path.control)
         self.actual_speed = path.speeds[0]
         self.bias = self._friction.compensation
@@ -235,6 +240,9 @@ class Drives:
 
     def keep(self, error: NDArray[np.float64] | None) -> None:
         """End the cycle; the servos are trimmed by the joints' error (6,) [rad] unless that is None."""
+        if error is not None and self._per_dead_band is not None:
+            error = np.multiply(error, self._per_dead_band, self._work)
+            np.trunc(error, error)
         self._path.keep(error)
 
     def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:

@@ -67,11 +67,11 @@ REC_ACCELERATION = slice(18, 21)  # specific force at the flange, flange axes [m
 REC_WRENCH = slice(21, 27)  # external, or the estimate of it, at the flange, base axes [N, Nm]
 REC_VOLTAGE = slice(27, 33)  # supply of the joints, beyond what the sensors add themselves: 0 [V]
 N_RECORD = 33
-REC_MOTION = slice(0, 12)  # angles and speeds
+REC_DRIVEN = slice(0, 18)  # angles, speeds and torques
 REC_SIMULATED = slice(0, 21)  # the part that MuJoCo's sensors fill, in their order
 
 _BLOCK = 256  # cycles of noise drawn at once
-_SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
+_SPEED_STEP = 2.0**-40  # rad/s; far below any noise: speeds are rounded in one call with angles and currents
 
 # The noise has the columns of the record, then the sampling moment.
 _N_NOISE = N_RECORD + 1
@@ -89,19 +89,19 @@ class Record:
         simulated: the part that MuJoCo's sensors fill.
         q: joint angles (6,) [rad].
         qd: joint speeds (6,) [rad/s].
-        motion: both, (12,).
+        driven: angles, speeds and torques of the motors, (18,).
         wrench: external wrench (6,) [N, Nm].
         expected_current: of the motors, by the controller's model (6,) [A].
     """
 
-    __slots__ = ("expected_current", "motion", "q", "qd", "simulated", "values", "wrench")
+    __slots__ = ("driven", "expected_current", "q", "qd", "simulated", "values", "wrench")
 
     def __init__(self) -> None:
         self.values: NDArray[np.float64] = np.zeros(N_RECORD)
         self.simulated: NDArray[np.float64] = self.values[REC_SIMULATED]
         self.q: NDArray[np.float64] = self.values[REC_Q]
         self.qd: NDArray[np.float64] = self.values[REC_QD]
-        self.motion: NDArray[np.float64] = self.values[REC_MOTION]
+        self.driven: NDArray[np.float64] = self.values[REC_DRIVEN]
         self.wrench: NDArray[np.float64] = self.values[REC_WRENCH]
         self.expected_current: NDArray[np.float64] = np.zeros(6)
 
@@ -129,24 +129,26 @@ class Sensors:
         self._rng = random_stream(seed, "sensors")
         self._drift = ForceDrift(fidelity, seed, _BLOCK * period)
         step = fidelity.encoder_step
-        self._step = np.full(6, step)
+        self._step = np.repeat([step, _SPEED_STEP, 1.0], 6)
+        self._step[REC_TORQUE] = fidelity.current_step
         sigmas = np.zeros(_N_NOISE)
-        sigmas[REC_Q] = np.array(fidelity.encoder_sigma) / step
+        sigmas[REC_Q] = fidelity.encoder_sigma
         sigmas[REC_QD] = fidelity.speed_sigma
         sigmas[REC_TORQUE] = fidelity.current_sigma
+        sigmas[REC_DRIVEN] /= self._step
         sigmas[REC_ACCELERATION] = fidelity.accelerometer_sigma
         sigmas[REC_WRENCH] = np.repeat([fidelity.force_sigma, fidelity.force_sigma / fidelity.force_ratio], 3)
         sigmas[REC_VOLTAGE] = fidelity.voltage_sigma
         sigmas[_NOISE_MOMENT] = fidelity.sample_jitter / step
         self._sigmas = sigmas
-        # From the record's units to those of the sensors: encoder steps and amperes.
+        # From the record's units to steps of the sensors.
         self._scale = np.ones(N_RECORD)
-        self._scale[REC_Q] = 1.0 / step
         self._scale[REC_TORQUE] = 1.0 / np.array(robot.torque_constant)
+        self._scale[REC_DRIVEN] /= self._step
         self._keep = [exp(-2.0 * pi * pole * period) for pole in fidelity.speed_filter_hz]
         offsets = random_stream(seed, "voltage").uniform(-1.0, 1.0, 6) * fidelity.voltage_offset
         self._supply_voltage = robot.generation.electrics.joint_voltage + offsets
-        self._dead_band = fidelity.speed_dead_band
+        self._dead_band, self._least_speed = fidelity.speed_dead_band, fidelity.speed_least
         bandwidth = robot.generation.force_sensing.bandwidth
         self._force_keep = None if bandwidth is None else exp(-2.0 * pi * bandwidth * period)
         self._force = self._next_force = np.zeros(6)
@@ -154,7 +156,7 @@ class Sensors:
         self._at = _BLOCK
         self._speeds = self._next_speeds = ZERO6
         self._values = np.zeros(N_RECORD)
-        self._steps = self._values[REC_Q]
+        self._angles, self._steps = self._values[REC_Q], self._values[REC_DRIVEN]
         self._estimate = self._values[REC_WRENCH]
         self._torque_constant = np.array(robot.torque_constant)
         self._work = np.zeros(6)
@@ -175,8 +177,8 @@ class Sensors:
         if self._at == _BLOCK:
             self._draw_noise()
         noise, moment = self._noise[self._at]
-        values, steps, work = self._values, self._steps, self._work
-        # In the sensors' units and noisy; angles also sampled a moment early or late, in whole encoder steps.
+        values, angles, steps, work = self._values, self._angles, self._steps, self._work
+        # In the sensors' units and noisy; angles also sampled a moment early or late; all in whole steps.
         np.multiply(record.values, self._scale, values)
         if self._force_keep is not None:
             # One pole, as for the speeds.
@@ -184,7 +186,7 @@ class Sensors:
             values[REC_WRENCH] = self._next_force
         np.add(values, noise, values)
         np.multiply(record.qd, moment, work)
-        np.add(steps, work, steps)
+        np.add(angles, work, angles)
         np.rint(steps, steps)
         np.multiply(steps, self._step, steps)
         if wrench_for is not None:
@@ -211,10 +213,10 @@ class Sensors:
 
     def _filtered(self, true_qd: list[float], measured: list[float]) -> Vector6:
         """One pole a joint: y = u + keep (y - u), whose input u is gated to zero at rest."""
-        band = self._dead_band
+        band, least = self._dead_band, self._least_speed
         return six(
             [
-                (keep * before if abs(keep * before) >= _SMALLEST_SPEED else 0.0)
+                (keep * before if abs(keep * before) >= least else 0.0)
                 if -band < true < band
                 else speed + keep * (before - speed)
                 for true, speed, before, keep in zip(true_qd, measured, self._speeds, self._keep, strict=True)
