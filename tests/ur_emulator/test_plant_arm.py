@@ -102,7 +102,7 @@ def test_slow_signals_are_in_their_range(resting):
 
 def test_the_force_is_what_the_motors_give_beyond_the_target_current():
     """In each package, as on a real UR3 (correlation 1.000); so its noise at rest is that of the currents."""
-    fidelity = replace(TYPICAL, force_bias=0.0, force_offset=0.0)
+    fidelity = TYPICAL
     plant, arm = Plant(UR3, fidelity, 4), ArmModel(UR3, draw_calibration(UR3, fidelity, 4))
     hold(plant, HOME, 100)
     for state in SpeedRamp(HOME, 2.0).run(plant, (0.5, 0.3, -0.4, 0.2, 0.0, 0.1), 120)[1]:
@@ -112,7 +112,7 @@ def test_the_force_is_what_the_motors_give_beyond_the_target_current():
 
 
 def test_near_a_singularity_the_error_of_the_force_grows_and_stays_finite():
-    plant = Plant(UR3, replace(TYPICAL, force_bias=0.0, force_offset=0.0), 4)
+    plant = Plant(UR3, TYPICAL, 4)
     sizes = []
     for wrist in (-1.57, -0.05, 0.0):
         q = (*HOME[:4], wrist, HOME[5])

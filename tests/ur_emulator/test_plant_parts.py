@@ -153,21 +153,12 @@ def test_gear_phases_come_from_the_seed_and_sizes_do_not():
     assert np.abs(tables[0] - tables[1]).max() > max(expected)
 
 
-def test_force_wander_stays_in_its_bounds_without_jumps():
-    drift = ForceDrift(replace(TYPICAL, force_offset=0.0), 4, 2.0)
-    blocks = np.concatenate([drift.next_block(256) for _ in range(400)])
-    assert np.all(np.abs(blocks[:, :3]) <= TYPICAL.force_bias)
-    assert np.all(np.abs(blocks[:, 3:]) <= TYPICAL.force_bias / 10)
-    assert np.abs(np.diff(blocks, axis=0)).max() < 0.02
-    assert blocks[:, :3].std() > 1.0
-
-
 def test_force_drift_is_a_line_without_a_bound():
     """A real UR10e: -10 N in 1,800 s, along a line."""
     (typical,) = (it for it in E_SERIES.fidelities if it.name == "typical")
     ends = []
     for seed in range(100):
-        drift = ForceDrift(typical, seed, 60.0)
+        drift = ForceDrift(typical, seed, 15.0)
         blocks = np.concatenate([drift.next_block(4) for _ in range(30)])
         times = np.arange(len(blocks))[:, None]
         assert blocks - blocks[0] == pytest.approx((blocks[1] - blocks[0]) * times, abs=1e-9)

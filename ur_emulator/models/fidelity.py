@@ -108,11 +108,10 @@ class Fidelity:
         friction_error: sd of the relative error of the controller's friction model, per joint [1].
         mass_error: sd of the relative error of each link's mass in the controller's model [1].
         calibration: factor on the factory calibrations of the arm's type (`calibration.py`) [1].
-        force_bias: bound of the slow wander of the measured force [N].
-        force_drift: sd of its steady drift [N/s].
+        force_drift: sd of the steady drift of the measured force [N/s].
         force_sigma: sd of the measured force, beside what the currents give to an estimated one [N].
         force_offset: bound of its constant offset, which a zero takes away [N].
-        force_ratio: of these four to those of the measured moments [1/m].
+        force_ratio: of these three to those of the measured moments [1/m].
         accelerometer_sigma: sd of each axis of the tool accelerometer [m/s²].
         voltage_sigma: sd of each joint voltage [V].
         voltage_offset: bound of its constant offset [V].
@@ -144,7 +143,6 @@ class Fidelity:
     friction_error: Share
     mass_error: Share
     calibration: Annotated[float, number(0.0, 10.0)]
-    force_bias: Noise
     force_drift: Noise
     force_sigma: Noise
     force_offset: Noise
@@ -235,11 +233,10 @@ TYPICAL = Fidelity(
     friction_error=0.15,  # E: friction changes with temperature by more than that
     mass_error=0.02,  # E
     calibration=1.0,  # C
-    force_bias=4.0,  # F: 2 N, which is half of the bound
     force_drift=0.0,
     force_sigma=0.0,  # F: that of the currents gives .17 to .31 N
-    force_offset=5.0,  # F: means of the axes from -6.5 to 5.6 N at rest
-    force_ratio=10.0,  # F
+    force_offset=0.0,  # F: what friction bears at rest gives means of the axes from -6.5 to 5.6 N
+    force_ratio=10.0,
     accelerometer_sigma=0.05,  # E
     voltage_sigma=0.02,  # F
     voltage_offset=0.1,  # F: joints from 47.81 to 48.02 V
@@ -265,8 +262,6 @@ IDEAL = replace(
     friction_error=0.0,
     mass_error=0.0,
     calibration=0.0,  # like the vendor's simulator: the nominal table itself
-    force_bias=0.0,
-    force_offset=0.0,
     accelerometer_sigma=0.001,
     voltage_sigma=0.001,
     voltage_offset=0.0,
@@ -285,8 +280,6 @@ POOR = replace(
     servo_dead_band=1.5e-4,
     friction_error=0.30,
     mass_error=0.04,
-    force_bias=8.0,
-    force_offset=10.0,
 )
 
 FIDELITIES = (EXACT, IDEAL, TYPICAL, POOR)

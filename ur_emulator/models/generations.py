@@ -67,10 +67,10 @@ CB3 = RobotGeneration(
         contact_force=40.0,  # recordings: in moves without contact the estimate of a real UR3 rises to 39 N
         least_averaging=0.2,  # chosen: the drives settle after a motion
         most_averaging=1.0,  # chosen
-        filter_time=0.024,  # chosen: errors of accelerations in 10 to 100 ms reach 39 N
-        # The whole loop takes about 60 ms (poor fidelity 75): 8 * .075 leaves more than 50 degrees of phase,
-        # and scaling 2 is still stable.
-        control_rate=8.0,
+        filter_time=0.008,  # chosen: a resting arm's estimate has .2 to .4 N of noise
+        # The whole loop takes about 30 ms: 16 * .03 leaves more than 60 degrees of phase, and scaling 2 is
+        # stable. At half of it an impact at 50 mm/s keeps a wrist at its torque limit until C157.
+        control_rate=16.0,
     ),
     execution_time=0.0,  # chosen: the unit is not known
     run_up_time=0.16,  # recordings of a real UR3 and of the maker's simulator: .05 in each of 20 cycles
@@ -125,7 +125,6 @@ _TYPICAL = replace(
     feedback_age=0.002,  # the package carries the state of one cycle before
     # Before the first zero; means of a resting UR5e that lie 3 to 6 N apart.
     force_offset=5.0,
-    force_bias=0.0,
     force_drift=0.006,  # -10 N in 1,800 s on a UR10e, linear; D
     force_sigma=0.15,  # A
     force_ratio=30.0,  # A: .003-.005 Nm
@@ -142,7 +141,7 @@ _POOR = replace(  # C
     ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
     drive_lag=0.002,
     feedback_age=0.004,
-    force_bias=0.0,
+    force_offset=10.0,
     force_drift=0.012,
     force_sigma=0.3,
     force_ratio=30.0,
@@ -186,8 +185,8 @@ E_SERIES = RobotGeneration(
         contact_force=5.0,  # C: more than noise and drift make of it
         least_averaging=0.02,  # C
         most_averaging=0.1,  # C
-        filter_time=0.008,  # C: a third of a CB3's, whose estimate errs with accelerations
-        control_rate=24.0,  # C: the loop takes a third of the time of a CB3's, about 20 ms
+        filter_time=0.008,  # C
+        control_rate=24.0,  # C: the loop takes about 20 ms
     ),
     execution_time=0.82,  # A: mean while a program runs; .59 to 1.04
     run_up_time=0.0,  # chosen: no recording shows the start of a program

@@ -5,7 +5,7 @@ comes in blocks from seeded streams, so equal seeds and equal motions give equal
 """
 
 from collections.abc import Callable
-from math import exp, pi, sqrt
+from math import exp, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -16,47 +16,32 @@ from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, 
 
 # --- ForceDrift: the slow error of the measured force
 #
-# A CB3 arm has no force sensor: a force at the flange is what the motors give beyond the controller's model.
-# At rest that is off by several newtons, in each posture by others, because dry friction holds the joints.
-# The drives here have none, so the error is added here. The sensor of an e-Series arm has an offset that the
-# first zero takes away, and drifts steadily. The white part is added with the other sensor noise.
-#
-# Source: UR3/CB3 manual (precision ±10 N, ±5 Nm); forum.universal-robots.com threads 229 and 4481 (offsets of
-# several newtons, sd 3.6 N); recordings of a real UR3. E-Series: see `models/generations.py`.
-
-_TIME_CONSTANT = 120.0  # s; assumed
+# The sensor of an e-Series arm has an offset that the first zero takes away, and drifts steadily. A CB3 arm
+# has none: what it estimates follows from its currents, also at rest, where dry friction holds the joints.
+# Source: see `models/generations.py`.
 
 
 class ForceDrift:
-    """Offset, steady drift and a bounded random walk of all six components; linear within a block.
+    """Offset and steady drift of all six components.
 
     Args:
         fidelity: gives their sizes.
-        block_time: time from knot to knot [s].
+        period: control cycle [s].
     """
 
-    def __init__(self, fidelity: Fidelity, seed: int, block_time: float) -> None:
-        self._rng = random_stream(seed, "force")
+    def __init__(self, fidelity: Fidelity, seed: int, period: float) -> None:
         shares = np.repeat([1.0, 1.0 / fidelity.force_ratio], 3)
-        self._bound = fidelity.force_bias * shares
-        self._base = (
+        self._error = (
             fidelity.force_offset * shares * random_stream(seed, "force offset").uniform(-1.0, 1.0, 6)
         )
-        drift = fidelity.force_drift * shares * random_stream(seed, "force drift").standard_normal(6)
-        self._drift = drift * block_time
-        self._keep = exp(-block_time / _TIME_CONSTANT)
-        self._spread = 0.5 * self._bound
-        self._knot = np.clip(self._rng.standard_normal(6) * self._spread, -self._bound, self._bound)
+        rates = fidelity.force_drift * shares * random_stream(seed, "force drift").standard_normal(6)
+        self._step = rates * period
 
     def next_block(self, n: int) -> NDArray[np.float64]:
-        """Return the error (n, 6) [N, Nm] of n cycles, a block; the next one begins where this one ends."""
-        start, base = self._knot, self._base
-        self._base = base + self._drift
-        fresh = sqrt(1.0 - self._keep**2) * self._spread * self._rng.standard_normal(6)
-        self._knot = np.clip(self._keep * start + fresh, -self._bound, self._bound)
-        share = np.arange(n)[:, None] / n
-        error: NDArray[np.float64] = base + start + share * (self._drift + self._knot - start)
-        return error
+        """Return the error (n, 6) [N, Nm] of n cycles; the next block begins where this one ends."""
+        errors: NDArray[np.float64] = self._error + np.arange(n)[:, None] * self._step
+        self._error = self._error + n * self._step
+        return errors
 
 
 # A record of true values: what `Plant` captures in a sub-step.
@@ -127,7 +112,7 @@ class Sensors:
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int, period: float) -> None:
         self._rng = random_stream(seed, "sensors")
-        self._drift = ForceDrift(fidelity, seed, _BLOCK * period)
+        self._drift = ForceDrift(fidelity, seed, period)
         step = fidelity.encoder_step
         self._step = np.repeat([step, _SPEED_STEP, 1.0], 6)
         self._step[REC_TORQUE] = fidelity.current_step
