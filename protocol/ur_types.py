@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
+from math import radians
 from typing import NamedTuple
 
 from protocol.errors import LocalProtocolError
 
 __all__ = [
+    "JOINT_ACCELERATION",
     "JOINT_NAMES",
+    "JOINT_SPEED",
     "LOCKSTEP_MASTERBOARD",
     "SIMULATED_MASTERBOARD",
     "SIMULATOR_CHECKSUM",
@@ -30,6 +33,15 @@ __all__ = [
 
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 """Joints in the order of every six-vector on the wire."""
+
+
+JOINT_ACCELERATION = radians(80.0)
+"""Default of moves of the joints [rad/s²], 1.4 in the manual.
+
+Source: moves with `t` of a real UR3, which stretch the profile of the defaults; captured configuration data.
+"""
+JOINT_SPEED = radians(60.0)
+"""Likewise [rad/s], 1.05 in the manual."""
 
 
 class RobotMode(IntEnum):

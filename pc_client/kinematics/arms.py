@@ -123,6 +123,10 @@ class DhArm:
         return self.d4 - self.elbow_offset
 
 
+_CALIBRATION_SHARE = 0.012
+"""Of the reach: 34 real arms are off by .3 to .8 % of it at most, a UR10 by 1.15 % (docs/fidelity.md)."""
+
+
 @dataclass(frozen=True, slots=True)
 class RobotDescription:
     """The data in which the arms of the family differ.
@@ -131,7 +135,6 @@ class RobotDescription:
         name: short name, e.g. `ur3`.
         geometry: file below `example-robot-data/robots/`, or the lengths of the arm.
         reach: distance from the base axis to the flange of the stretched arm [m].
-        position_tolerance: between the flange that a real arm reports and this model's [m].
         working_box: where the tool at RPY(0, 3/4 pi, 0) runs .35 m/s in every direction below the joint speed
             limits, in one branch of the inverse kinematics, clear of the arm and of the table.
         q_branch: a posture on the IK branch that is preferred for drawing in front of the arm [rad].
@@ -142,7 +145,6 @@ class RobotDescription:
     geometry: str | DhArm
     limits: JointLimits
     reach: float
-    position_tolerance: float
     working_box: Box
     q_branch: Six
     tcp_speed_max: float
@@ -152,6 +154,11 @@ class RobotDescription:
         """The name for people, as robots report it, e.g. `UR5e`."""
         kind = self.name.removeprefix("ur")
         return f"UR{kind if kind.endswith('e') else kind.upper()}"
+
+    @property
+    def position_tolerance(self) -> float:
+        """Between the flange that a real arm reports and this model's [m]."""
+        return _CALIBRATION_SHARE * self.reach
 
     @property
     def library_shift(self) -> Array:
@@ -214,7 +221,6 @@ def _arm(
     speeds: Six,
     accelerations: tuple[float, float],
     reach: float,
-    position_tolerance: float,
     box: tuple[float, float, float, float, float],
 ) -> RobotDescription:
     """A row of the table, in SI units but for the rated speeds [deg/s].
@@ -222,7 +228,6 @@ def _arm(
     Args:
         lengths: None: its URDF is in example-robot-data.
         accelerations: of shoulder and elbow.
-        position_tolerance: of the reported flange.
         box: working box: x from, x to, y to both sides, z from, z to.
     """
     qd_max = _six_degrees(*(min(speed, _STOPPABLE_SPEED) for speed in speeds))
@@ -234,7 +239,6 @@ def _arm(
         lengths or f"ur_description/urdf/{name}_robot.urdf",
         JointLimits((-2 * pi,) * 6, (2 * pi,) * 6, qd_max, qdd_max),
         reach,
-        position_tolerance,
         Box((near, -aside, bottom), (far, aside, top)),
         _ELBOW_UP,
         _TCP_SPEED,
@@ -261,36 +265,35 @@ _WRISTS = 40.0
 
 # Working range: +-360 deg of all joints, by UR's user manuals CB3 3.13, technical specifications, and UR's
 # ROS description of the others (wrist 3 of UR3 and UR3e turns without end, streaming needs no more). Reach:
-# the data sheets. Position tolerances: twice what three real UR3e calibrations come to, 2.7 mm, in proportion
-# to the reach; a choice, docs/fidelity.md. Working boxes: a search for the largest box on a grid (UR3 25 mm,
+# the data sheets. Working boxes: a search for the largest box on a grid (UR3 25 mm,
 # others 50 mm) with the nominal kinematics; a UR3e has the UR3's, for the movements that lie in it.
 _ROWS = (
     # (56 - 19 gravity - 10 friction) Nm over .95 kg m²; elbow (28 - 7 - 4) over .4.
-    _arm("ur3", None, _UR3_SPEEDS, (28.0, 40.0), 0.5, 0.005, (0.275, 0.425, 0.2, 0.15, 0.35)),
+    _arm("ur3", None, _UR3_SPEEDS, (28.0, 40.0), 0.5, (0.275, 0.425, 0.2, 0.15, 0.35)),
     # (150 - 55 - 14) Nm over 3.7 kg m²; elbow (150 - 17 - 17) over 2.6.
-    _arm("ur5", None, _UR5_SPEEDS, (22.0, 40.0), 0.85, 0.009, (0.3, 0.65, 0.4, 0.15, 0.55)),
+    _arm("ur5", None, _UR5_SPEEDS, (22.0, 40.0), 0.85, (0.3, 0.65, 0.4, 0.15, 0.55)),
     # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 17) over 4.3.
-    _arm("ur10", None, _UR10_SPEEDS, (15.0, 21.0), 1.3, 0.014, (0.4, 0.85, 0.7, 0.15, 0.8)),
+    _arm("ur10", None, _UR10_SPEEDS, (15.0, 21.0), 1.3, (0.4, 0.85, 0.7, 0.15, 0.8)),
     # (54 - 19 - 6) Nm over 1.1 kg m²; elbow (28 - 7 - 3) over .4.
-    _arm("ur3e", _UR3E, _UR3_SPEEDS, (26.0, 40.0), 0.5, 0.005, (0.275, 0.425, 0.2, 0.15, 0.35)),
+    _arm("ur3e", _UR3E, _UR3_SPEEDS, (26.0, 40.0), 0.5, (0.275, 0.425, 0.2, 0.15, 0.35)),
     # (150 - 62 - 16) Nm over 3.6 kg m²; elbow (150 - 20 - 16) over 2.7.
-    _arm("ur5e", _UR5E, _UR5_SPEEDS, (20.0, 40.0), 0.85, 0.009, (0.35, 0.65, 0.45, 0.1, 0.6)),
-    _arm("ur7e", _UR5E, _UR5_SPEEDS, (20.0, 40.0), 0.85, 0.009, (0.35, 0.65, 0.45, 0.1, 0.6)),
+    _arm("ur5e", _UR5E, _UR5_SPEEDS, (20.0, 40.0), 0.85, (0.35, 0.65, 0.45, 0.1, 0.6)),
+    _arm("ur7e", _UR5E, _UR5_SPEEDS, (20.0, 40.0), 0.85, (0.35, 0.65, 0.45, 0.1, 0.6)),
     # (330 - 125 - 34) Nm over 11.8 kg m²; elbow (150 - 43 - 16) over 4.3.
-    _arm("ur10e", _UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, 0.014, (0.4, 0.95, 0.65, 0.15, 0.8)),
-    _arm("ur12e", _UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, 0.014, (0.4, 0.95, 0.65, 0.15, 0.8)),
+    _arm("ur10e", _UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, (0.4, 0.95, 0.65, 0.15, 0.8)),
+    _arm("ur12e", _UR10E, _UR10_SPEEDS, (14.0, 21.0), 1.3, (0.4, 0.95, 0.65, 0.15, 0.8)),
     # (330 - 91 - 34) Nm over 8.4 kg m²; elbow (150 - 29 - 16) over 2.8.
-    _arm("ur16e", _UR16E, _UR10_SPEEDS, (24.0, 37.0), 0.9, 0.01, (0.45, 0.7, 0.5, 0.15, 0.6)),
+    _arm("ur16e", _UR16E, _UR10_SPEEDS, (24.0, 37.0), 0.9, (0.45, 0.7, 0.5, 0.15, 0.6)),
     # (433 - 233 - 46) Nm over 24 kg m²; elbow (204 - 64 - 22) over 7.1.
-    _arm("ur8long", _UR8LONG, _UR8LONG_SPEEDS, (6.0, 16.0), 1.75, 0.019, (0.55, 1.3, 0.9, 0.15, 1.0)),
+    _arm("ur8long", _UR8LONG, _UR8LONG_SPEEDS, (6.0, 16.0), 1.75, (0.55, 1.3, 0.9, 0.15, 1.0)),
     # (433 - 149 - 46) Nm over 15 kg m²; elbow (204 - 44 - 22) over 5.
-    _arm("ur15", _UR15, _UR15_SPEEDS, (16.0, 27.0), 1.3, 0.014, (0.5, 1.0, 0.65, 0.15, 0.75)),
+    _arm("ur15", _UR15, _UR15_SPEEDS, (16.0, 27.0), 1.3, (0.5, 1.0, 0.65, 0.15, 0.75)),
     # (433 - 103 - 46) Nm over 12 kg m²; elbow (204 - 29 - 22) over 3.8.
-    _arm("ur18", _UR18, _UR15_SPEEDS, (24.0, 40.0), 0.95, 0.011, (0.5, 0.75, 0.45, 0.2, 0.6)),
+    _arm("ur18", _UR18, _UR15_SPEEDS, (24.0, 40.0), 0.95, (0.5, 0.75, 0.45, 0.2, 0.6)),
     # (738 - 314 - 76) Nm over 32 kg m²; elbow (433 - 90 - 45) over 13.7.
-    _arm("ur20", _UR20, _UR20_SPEEDS, (10.0, 21.0), 1.75, 0.019, (0.55, 1.3, 0.85, 0.2, 1.05)),
+    _arm("ur20", _UR20, _UR20_SPEEDS, (10.0, 21.0), 1.75, (0.55, 1.3, 0.85, 0.2, 1.05)),
     # (738 - 221 - 76) Nm over 22 kg m²; elbow (433 - 62 - 45) over 10.6.
-    _arm("ur30", _UR30, _UR20_SPEEDS, (20.0, 30.0), 1.3, 0.014, (0.6, 1.05, 0.6, 0.15, 0.75)),
+    _arm("ur30", _UR30, _UR20_SPEEDS, (20.0, 30.0), 1.3, (0.6, 1.05, 0.6, 0.15, 0.75)),
 )
 ROBOTS = MappingProxyType({arm.name: arm for arm in _ROWS})
 

@@ -358,9 +358,9 @@ def _is_small(error: Array) -> bool:
     return bool(off_position <= _IK_POSITION_TOLERANCE**2 and off_rotation <= _IK_ROTATION_TOLERANCE**2)
 
 
-ROTATION_TOLERANCE = 0.02
-"""Between the reported flange and the model's [rad]: twice what three real UR3e calibrations come to, 8 mrad.
-That of the position stands in the arm's row. A choice: docs/fidelity.md."""
+ROTATION_TOLERANCE = 0.045
+"""Between the reported flange and the model's [rad]: 34 real arms are off by 7 to 17 mrad at most, a UR10 by
+41 mrad. That of the position is the arm's."""
 
 _FARTHEST = 1e3
 """No angle [rad] and no coordinate [m, rad] of a pose is larger."""

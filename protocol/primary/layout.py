@@ -16,6 +16,8 @@ from typing import ClassVar
 
 from protocol.primary.framing import SubPackage
 from protocol.ur_types import (
+    JOINT_ACCELERATION,
+    JOINT_SPEED,
     LOCKSTEP_MASTERBOARD,
     SIMULATED_MASTERBOARD,
     SIMULATOR_CHECKSUM,
@@ -131,8 +133,8 @@ class ConfigurationData(SubPackage):
     joint_max_acceleration: tuple[float, ...] = wire(
         "d", count=6, unit="rad/s2", interleaved="rates", default=40.0, origin=_CONSTANT
     )
-    v_joint_default: float = wire("d", unit="rad/s", default=1.0471975511965976, origin=_CONSTANT)
-    a_joint_default: float = wire("d", unit="rad/s2", default=1.3962634015954636, origin=_CONSTANT)
+    v_joint_default: float = wire("d", unit="rad/s", default=JOINT_SPEED, origin=_CONSTANT)
+    a_joint_default: float = wire("d", unit="rad/s2", default=JOINT_ACCELERATION, origin=_CONSTANT)
     v_tool_default: float = wire("d", unit="m/s", default=0.25, origin=_CONSTANT)
     a_tool_default: float = wire("d", unit="m/s2", default=1.2, origin=_CONSTANT)
     eq_radius: float = wire("d", unit="m", default=0.25, origin=_CONSTANT)

@@ -50,7 +50,7 @@ SECOND = RobotGeneration(
     ),
     execution_time=1.5,
     run_up_time=0.2,
-    gravity=9.82,
+    gravity=9.83,
     reports_control_as_target=True,
     has_operational_modes=True,
     has_remote_control=True,

@@ -26,6 +26,7 @@ from ur_emulator.controller.safety.limit_checks import clamping_gap
 from ur_emulator.kinematics.arm_model import ArmModel
 from ur_emulator.models.calibration import NOMINAL
 from ur_emulator.models.e_series_arms import UR5E, UR10E
+from ur_emulator.models.fidelity import REVERSAL_SPEED
 from ur_emulator.models.generations import E_SERIES
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robots import ROBOTS, robot_by_name
@@ -251,7 +252,7 @@ def test_friction_grows_less_beyond_the_kink(robot):
         assert friction.expected == pytest.approx(expected, rel=1e-6)
         assert friction.compensation == pytest.approx(expected, rel=1e-6)
         # The true friction in the physics: dry part by the sign of the speed, and a damping.
-        true = np.sign(qd) * friction.coulomb + np.array(robot.viscous_beyond_kink) * qd
+        true = np.sign(qd) * friction.coulomb + np.array(robot.viscous_fast) * qd
         assert true == pytest.approx(expected, rel=1e-9)
 
 
@@ -318,7 +319,8 @@ def test_true_friction_rises_as_fast_as_the_compensation(robot, share):
     """Servos without gains press with a share of the dry friction: joints creep at that share of the speed."""
     no_gains = ServoGains(np.zeros(6), 0.0)
     model = compile_physics(
-        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, robot.generation.substep_us * 1e-6, ()), robot
+        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, robot.generation.substep_us * 1e-6, ()),
+        TYPICAL.friction_rise,
     )
     model.opt.gravity[:] = 0.0
     model.dof_damping[:] = 0.0
@@ -327,7 +329,7 @@ def test_true_friction_rises_as_fast_as_the_compensation(robot, share):
     model.actuator_biasprm[:, 0] = share * np.array(robot.coulomb)
     for _ in range(50):
         mujoco.mj_step(model, data)
-    assert data.qvel == pytest.approx(share * robot.reversal_speed, rel=0.05)
+    assert data.qvel == pytest.approx(share * REVERSAL_SPEED, rel=0.05)
 
 
 def follow_small(robot, fidelity, qd):

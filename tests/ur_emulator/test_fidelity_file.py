@@ -116,7 +116,7 @@ def test_the_same_seed_is_the_same_arm_also_where_it_runs_ahead(fidelity):
 
 def test_a_wave_has_the_joints_the_order_and_the_phase_of_its_row():
     ripple = Ripple(cycles=80.0, rms=0.01, phase=0.3, joints=(1, 5))
-    gear = GearRipple(replace(TYPICAL, ripples=(ripple,)), 9)
+    gear = GearRipple(UR3, replace(TYPICAL, ripples=(ripple,)), 9)
     for angle in np.linspace(-3.0, 3.0, 50):
         gear.evaluate(np.full(6, angle))
         wave = np.sqrt(2) * 0.01 / 80 * np.sin(80 * angle + 0.3)
@@ -124,13 +124,13 @@ def test_a_wave_has_the_joints_the_order_and_the_phase_of_its_row():
 
 
 def test_an_arm_without_waves():
-    gear = GearRipple(replace(TYPICAL, ripples=()), 9)
+    gear = GearRipple(UR3, replace(TYPICAL, ripples=()), 9)
     assert gear.motor_position(HOME) == pytest.approx(HOME, abs=0)
 
 
 def test_play_lets_the_joint_trail_its_motor_by_half_of_it():
     half = 5e-4
-    gear = GearWithPlay(replace(IDEAL, ripples=(), backlash=2 * half), 0)
+    gear = GearWithPlay(UR3, replace(IDEAL, ripples=(), backlash=2 * half), 0)
     gear.motor_position(np.zeros(6))
     record, seen = Record(), []
     for motor in [*np.linspace(0, 0.01, 50), *np.linspace(0.01, 0, 50)]:

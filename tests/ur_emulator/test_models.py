@@ -68,23 +68,54 @@ def test_fidelities_are_ordered():
     assert {it.name for it in FIDELITIES} == {"exact", "ideal", "typical", "poor"}
     for better, worse in ((IDEAL, TYPICAL), (TYPICAL, POOR)):
         for field in fields(TYPICAL):
-            if field.name in ("name", "speed_filter_hz", "has_physics", "drive_damping", "ripples"):
+            if field.name in (
+                "name",
+                "speed_filter_hz",
+                "friction_rise",
+                "has_physics",
+                "drive_damping",
+                "ripples",
+            ):
                 continue
             assert np.all(np.less_equal(getattr(better, field.name), getattr(worse, field.name))), field.name
     assert [ripple.rms for ripple in POOR.ripples] == [2 * ripple.rms for ripple in TYPICAL.ripples]
     assert POOR.friction_error == 2 * TYPICAL.friction_error
 
 
-def test_calibration_comes_from_the_seed_and_has_mean_zero():
-    assert draw_calibration(TYPICAL, 7) == draw_calibration(TYPICAL, 7)
-    assert draw_calibration(TYPICAL, 7) != draw_calibration(TYPICAL, 8)
+def test_calibration_comes_from_the_seed():
+    assert draw_calibration(UR3, TYPICAL, 7) == draw_calibration(UR3, TYPICAL, 7)
+    assert draw_calibration(UR3, TYPICAL, 7) != draw_calibration(UR3, TYPICAL, 8)
     assert calibrated_dh(UR3, NOMINAL) == UR3.dh
-    drawn = [draw_calibration(TYPICAL, seed) for seed in range(400)]
-    lengths = np.array([(c.delta_a, c.delta_d) for c in drawn])
-    angles = np.array([(c.delta_theta, c.delta_alpha) for c in drawn])
-    for values, sigma in ((lengths, TYPICAL.calibration_length), (angles, TYPICAL.calibration_angle)):
-        assert values.std() == pytest.approx(sigma, rel=0.05)
-        assert abs(values.mean()) < 0.1 * sigma
+    for fidelity in (it for it in FIDELITIES if it.name in ("exact", "ideal")):
+        assert calibrated_dh(UR3, draw_calibration(UR3, fidelity, 7)) == UR3.dh
+
+
+@pytest.mark.parametrize(
+    ("name", "a2", "d6", "scatter"),
+    [
+        ("ur3e", -0.23, 0.06, 0.35),
+        ("ur5e", -0.20, 0.0, 0.44),
+        ("ur10e", 0.43, -0.94, 0.53),
+        ("ur20", 0.0, 0.0, 0.53),
+    ],
+)
+def test_lengths_of_a_calibration_have_what_real_arms_of_the_type_have_in_common(name, a2, d6, scatter):
+    """Differences in the mean [mm], and root of the sum of squares of what scatters about it."""
+    drawn = [draw_calibration(ROBOTS[name], TYPICAL, seed) for seed in range(400)]
+    a, d = (1e3 * np.array([getattr(c, field) for c in drawn]) for field in ("delta_a", "delta_d"))
+    assert (a[:, 1].mean(), d[:, 5].mean()) == pytest.approx((a2, d6), abs=0.03)
+    about = np.hstack((a - a.mean(axis=0), d - d.mean(axis=0)))
+    assert np.sqrt((about**2).sum(axis=1).mean()) == pytest.approx(scatter, rel=0.1)
+
+
+def test_angles_of_a_calibration_are_tilts_of_the_axes():
+    """The zeros of the joints are right within .01 mrad on e-Series arms, within .05 mrad on CB3."""
+    for name, zero in (("ur3", 5e-5), ("ur5e", 1e-5)):
+        drawn = [draw_calibration(ROBOTS[name], TYPICAL, seed) for seed in range(400)]
+        assert np.std([c.delta_theta for c in drawn]) == pytest.approx(zero, rel=0.1)
+        tilts = 1e3 * np.median(np.abs([c.delta_alpha for c in drawn]), axis=0)
+        assert 3.0 < tilts[2] < 5.4
+        assert tilts[[0, 3, 4, 5]].max() < 1.3
 
 
 def test_random_streams_are_independent_by_name():

@@ -18,12 +18,14 @@ from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import EmulatorError, ModelError, PlantError
 from ur_emulator.kinematics.arm_model import ArmModel
+from ur_emulator.models.calibration import draw_calibration
 from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.e_series_arms import UR5E
+from ur_emulator.models.e_series_arms import UR3E, UR5E
 from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
 from ur_emulator.models.generations import CB3, E_SERIES
 from ur_emulator.plant.exact import ExactPlant
 from ur_emulator.plant.plant import Plant
+from ur_emulator.plant.sensors import Record, Sensors
 
 IN_ARM_PLANE = np.cos(HOME[0])  # share of a lever along x that the shoulder feels
 
@@ -36,16 +38,18 @@ def resting():
     return plant, hold(plant, HOME, 1500)
 
 
-def test_at_rest_actual_equals_target_to_encoder_noise(resting):
+def test_at_rest_the_arm_stands_within_the_dead_band_of_its_servos(resting):
     plant, states = resting
-    assert np.abs(plant.q_true - HOME).max() < 2e-6
-    assert np.abs(column(states, "actual_q").mean(axis=0) - HOME).max() < 2e-6
+    assert np.abs(plant.q_true - HOME).max() < TYPICAL.servo_dead_band
+    standing = column(states, "actual_q").mean(axis=0) - HOME
+    assert standing == pytest.approx(plant.q_true - HOME, abs=5e-6)
 
 
 def test_encoder_noise_is_white_and_of_the_measured_size(resting):
     _, states = resting
     noise = column(states, "actual_q") - HOME
-    assert noise.std(axis=0) == pytest.approx(TYPICAL.encoder_sigma, rel=0.1)
+    # Source: a real UR3.
+    assert np.all((noise.std(axis=0) > 2.0e-5) & (noise.std(axis=0) < 2.4e-5))
     for joint in noise.T:
         assert abs(np.corrcoef(joint[1:], joint[:-1])[0, 1]) < 0.13
 
@@ -55,7 +59,7 @@ def test_encoder_reads_whole_steps(resting):
     steps = column(states, "actual_q") / TYPICAL.encoder_step
     assert np.abs(steps - np.rint(steps)).max() < 1e-6
     for joint in steps.T:
-        assert 15 <= len(np.unique(np.rint(joint))) <= 45
+        assert 10 <= len(np.unique(np.rint(joint))) <= 18
 
 
 def test_reported_speed_is_exactly_zero(resting):
@@ -68,9 +72,13 @@ def test_currents_carry_the_gravity_torque(resting):
     current = column(states, "actual_current")
     moment = np.array(states[0].target_moment)
     assert moment[1] > 5.0
-    assert current.mean(axis=0) * UR3.torque_constant == pytest.approx(moment, abs=0.05 * moment[1])
+    beyond = current.mean(axis=0) * UR3.torque_constant - moment
+    assert np.all(np.abs(beyond) < np.array(UR3.coulomb) + np.multiply(UR3.torque_constant, 0.1))
     assert column(states, "target_current")[0] * UR3.torque_constant == pytest.approx(moment, abs=1e-9)
-    assert current.std(axis=0) == pytest.approx(TYPICAL.current_sigma, rel=0.1)
+    # Friction that holds the joints fades slowly.
+    assert np.diff(current, axis=0).std(axis=0) / np.sqrt(2) == pytest.approx(TYPICAL.current_sigma, rel=0.1)
+    steps = current / TYPICAL.current_step
+    assert np.abs(steps - np.rint(steps)).max() < 1e-6
 
 
 def test_accelerometer_shows_gravity_along_the_tool(resting):
@@ -83,14 +91,36 @@ def test_accelerometer_shows_gravity_along_the_tool(resting):
 
 def test_slow_signals_are_in_their_range(resting):
     _, states = resting
-    assert column(states, "joint_voltage").mean() == pytest.approx(48.0, abs=0.1)
+    voltages = column(states, "joint_voltage")
+    assert np.abs(voltages.mean(axis=0) - 47.92).max() <= 0.105  # real joints: 47.81 to 48.02 V, sd .02
+    assert voltages.std(axis=0) == pytest.approx([0.02] * 6, rel=0.1)
     temperatures = column(states, "joint_temperatures")
     assert temperatures.min() >= 28.0
     assert temperatures.max() <= 45.0
     assert np.all(np.abs(np.diff(temperatures, axis=0)) <= 1 / 16)
-    force = column(states, "tcp_force")
-    assert np.all(np.abs(force[:, :3].mean(axis=0)) <= TYPICAL.force_bias)
-    assert force[:, :3].std(axis=0) == pytest.approx([3.0] * 3, rel=0.25)
+
+
+def test_the_force_is_what_the_motors_give_beyond_the_target_current():
+    """In each package, as on a real UR3 (correlation 1.000); so its noise at rest is that of the currents."""
+    fidelity = TYPICAL
+    plant, arm = Plant(UR3, fidelity, 4), ArmModel(UR3, draw_calibration(UR3, fidelity, 4))
+    hold(plant, HOME, 100)
+    for state in SpeedRamp(HOME, 2.0).run(plant, (0.5, 0.3, -0.4, 0.2, 0.0, 0.1), 120)[1]:
+        beyond = np.subtract(state.actual_current, state.target_current) * UR3.torque_constant
+        wrench = -np.linalg.solve(arm.jacobian(state.actual_q).T, beyond)
+        assert state.tcp_force == pytest.approx(wrench, rel=0.02, abs=0.05)
+
+
+def test_near_a_singularity_the_error_of_the_force_grows_and_stays_finite():
+    plant = Plant(UR3, TYPICAL, 4)
+    sizes = []
+    for wrist in (-1.57, -0.05, 0.0):
+        q = (*HOME[:4], wrist, HOME[5])
+        plant.reset(q)
+        forces = column(hold(plant, q, 300)[100:], "tcp_force")[:, :3]
+        sizes.append(np.linalg.norm(forces, axis=1).max())
+    assert 2.0 * sizes[0] < sizes[1] < 200.0
+    assert sizes[2] < 200.0
 
 
 def test_everything_is_plain_python(resting):
@@ -247,7 +277,7 @@ def test_reported_positions_follow_a_smooth_move_after_that_delay():
 
 
 @pytest.mark.parametrize("speed", [0.4, 1.0])
-def test_speed_ripple_is_about_one_percent(speed):
+def test_speed_ripple_is_that_of_a_real_arm(speed):
     plant = Plant(UR3, TYPICAL, 1)
     plant.reset(RAISED)
     n = int(1.0 / speed / PERIOD)
@@ -257,7 +287,9 @@ def test_speed_ripple_is_about_one_percent(speed):
     assert plant.n_contacts == 0
     ripple = (column(states, "actual_qd") - speed) / speed
     assert np.all(np.abs(ripple.mean(axis=0)) < 0.004)
-    assert np.all((ripple.std(axis=0) > 0.005) & (ripple.std(axis=0) < 0.015))
+    # Source: a real UR3.
+    least, most = (0.003, 0.005, *(0.008,) * 4), (0.005, 0.007, *(0.012,) * 4)
+    assert np.all((ripple.std(axis=0) > least) & (ripple.std(axis=0) < most))
 
 
 def test_ripple_has_the_periods_of_the_gear():
@@ -273,9 +305,10 @@ def test_ripple_has_the_periods_of_the_gear():
         errors.append(plant.sense().position_error[5])
     grid = np.linspace(q[0], q[0] + 2 * np.pi, 2048, endpoint=False)
     lines = np.abs(np.fft.rfft(np.interp(grid, q, errors))) / 1024
-    assert sorted(np.argsort(lines[5:400])[-2:] + 5) == [101, 202]
+    waves = [ripple for ripple in TYPICAL.ripples if 5 in ripple.joints]
+    assert sorted(np.argsort(lines[5:400])[-3:] + 5) == [ripple.cycles for ripple in waves]
     # Amplitude of the angle error from the rms share of speed; the outer loop takes a little off.
-    for ripple in TYPICAL.ripples:
+    for ripple in waves:
         size = np.sqrt(2) * ripple.rms / ripple.cycles
         assert lines[round(ripple.cycles)] == pytest.approx(size, rel=0.2)
 
@@ -312,22 +345,24 @@ def test_after_a_stop_the_arm_settles_on_its_target():
     # 0.2 s after the target stopped: within the arm's repeatability of 0.1 mm at 0.4 m.
     assert np.abs(plant.q_true - ramp.q).max() < 3e-4
     _, states = ramp.run(plant, 0.0, 100)
-    assert np.abs(plant.q_true - ramp.q).max() < 5e-6
+    # Source: a real UR3, up to .2 mrad for .9 s.
+    assert np.abs(plant.q_true - ramp.q).max() < 1.5e-4
     speeds = column(states, "actual_qd")
     assert np.all(speeds[-60:] == 0.0)
 
 
-def test_reported_speed_decays_through_the_float32_denormals_to_exactly_zero():
-    plant = Plant(UR3, TYPICAL, 1)
-    ramp = SpeedRamp(HOME)
-    ramp.run(plant, 0.5, 60)
-    _, states = ramp.run(plant, 0.0, 120)
-    speeds = np.abs(column(states, "actual_qd"))
-    tiny = (speeds > 0) & (speeds < 1e-6)
-    # Wrists (size 0) have the slowest pole and show the longest tail, base and shoulder the shortest.
-    assert tiny[:, 5].sum() > tiny[:, 2].sum() > 0
-    assert np.all(speeds[-20:] == 0.0)
-    assert speeds[speeds > 0].min() >= 1.4e-45
+@pytest.mark.parametrize(("robot", "least"), [(UR3, 1e-5), (UR3E, 1.4e-45)])
+def test_reported_speed_decays_to_exactly_zero(robot, least):
+    """Source: a real UR3 has no speeds below its step at rest, a real UR3e goes through the float32 denormals."""
+    sensors = Sensors(robot, robot.generation.fidelity("typical"), 1, robot.generation.period_s)
+    record, speeds = Record(), []
+    for k in range(150):
+        record.qd[:] = 0.5 if k < 10 else 0.0
+        speeds.append(sensors.read(record).actual_qd)
+        sensors.keep()
+    decaying = np.abs(speeds[10:])
+    assert np.all(decaying[-20:] == 0.0)
+    assert least <= decaying[decaying > 0].min() < 100 * least
 
 
 def test_hard_reversals_stay_in_hand():
@@ -353,7 +388,7 @@ def test_another_seed_is_another_arm_of_the_same_kind():
     assert first.calibration != second.calibration
     assert one != other
     gap = column(one, "actual_q")[-100:] - column(other, "actual_q")[-100:]
-    assert np.abs(gap.mean(axis=0)).max() < 1e-4
+    assert np.abs(gap.mean(axis=0)).max() < 4e-4
 
 
 def test_currents_never_exceed_the_torque_limits():
@@ -367,13 +402,13 @@ def test_currents_never_exceed_the_torque_limits():
 
 
 def test_the_arm_accelerates_as_its_torque_allows():
-    # 56 Nm less friction on .28 kg m² of links and .45 of the rotor.
+    # 56 Nm less friction on .28 kg m² of links and .61 of the rotor.
     plant = Plant(UR3, IDEAL, 0)
     hold(plant, HOME, 5)
     before = plant.qd_true[0]
     hold(plant, HOME + np.array([1.0, 0, 0, 0, 0, 0]), 2)
     faster = (plant.qd_true[0] - before) / (1.5 * PERIOD)
-    assert 60 < faster < 85
+    assert 50 < faster < 65
 
 
 def press_down(plant, n):
@@ -390,7 +425,7 @@ def test_the_table_stops_the_arm_and_is_felt():
     assert plant.q_true[1] < 0.7
     last = states[-1]
     assert last.torque_saturated
-    assert last.position_error[1] > 0.05
+    assert last.position_error[1] > 0.01
     assert last.tcp_force[2] > 50.0
     assert not states[20].torque_saturated
     # The wrist yields, the table does not.

@@ -242,7 +242,7 @@ def test_slots_name_the_source_of_each_parameter():
     assert CB3_3_15.static_bind("movej", 1, ["r", "a"]) == [
         ("arg", 0),
         ("kw", "a"),
-        ("default", 1.05),
+        ("default", math.radians(60.0)),
         ("default", 0),
         ("kw", "r"),
     ]

@@ -336,7 +336,9 @@ def test_wrong_options_say_what_is_allowed(run, words, allowed):
 def test_without_a_robot_it_only_writes_down(run, monkeypatch):
     monkeypatch.setattr(urscript.commands.run_command, "find_makers", list)
     result = run(program_of(f"movej({HOME})"))
-    assert result.stdout == "    0.000 s  p: movej([0, -1.5708, 0, -1.5708, 0, 0], 1.4, 1.05, 0, 0)\n"
+    assert (
+        result.stdout == "    0.000 s  p: movej([0, -1.5708, 0, -1.5708, 0, 0], 1.396263, 1.047198, 0, 0)\n"
+    )
     assert result.stderr == "finished after 0.024 s of robot time (no robot)\n"
     assert result.stdout == run(program_of(f"movej({HOME})"), "--robot", "none").stdout
 

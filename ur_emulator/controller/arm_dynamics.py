@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ur_emulator.controller.settings import Payload, ToolSettings
 from ur_emulator.models.calibration import Calibration
-from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.models.robot_model import VISCOUS_KINK, RobotModel
 from ur_emulator.motion.generators import REST_SPEED, JointTarget
 from ur_emulator.plant.inverse_dynamics import InverseDynamics
 
@@ -85,9 +85,9 @@ class ArmDynamics:
     def _friction(self, qd: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the dry friction of joints at rest, in either direction, and that of moving joints [Nm]."""
         robot, speed = self._robot, np.abs(qd)
-        slow = speed if robot.viscous_kink is None else np.minimum(speed, robot.viscous_kink)
+        slow = np.minimum(speed, VISCOUS_KINK)
         dry = np.array(robot.coulomb)
-        drag = dry + np.array(robot.viscous) * slow + np.array(robot.viscous_beyond_kink) * (speed - slow)
+        drag = dry + np.array(robot.viscous) * slow + np.array(robot.viscous_fast) * (speed - slow)
         return np.where(speed > REST_SPEED, 0.0, dry), np.sign(qd) * drag
 
     def _torque(

@@ -181,7 +181,7 @@ class Controller:
         )
         self.state = make_state(
             robot,
-            ArmModel(robot, draw_calibration(fidelity, seed)),
+            ArmModel(robot, draw_calibration(robot, fidelity, seed)),
             seed,
             Clock(generation, generation.cycles(BOOT_TIME)),
             motion,

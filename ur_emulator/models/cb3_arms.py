@@ -25,10 +25,12 @@ from ur_emulator.models.robot_model import (
 # B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur3/physical_parameters.yaml: cylinder
 #    estimates, because the vendor publishes no inertia tensors for the UR3 and calls its sisters' negligible.
 # C  UR3/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
-# D  Least-squares fit of a current model to a logged move of a real UR3e (kevinhpham/DalESelfEBot); R² .995.
-#    All such figures are good to about 30 %; size 0 joints could not be separated and assume 3 Nm/A.
+# D  Record files of a real UR3, 125 Hz (mkrssg/UniversalRobots, 2019): fits of the controller's own drive
+#    model, `target_current` against `target_moment` and `target_qd`, residual below .005 A; rotors from
+#    `target_moment`. Inferred: the slopes beyond the kink of shoulder, wrists 1 and 3, which no move reaches:
+#    as much smaller as the base's. The arm itself: base and wrist 2 need .54 and .36 A at .8 and .88 rad/s,
+#    the model says .50 and .40.
 # E  UR3/CB3 user manual 3.10, stopping times and distances of category 0 (183 deg/s, arm stretched, 3 kg).
-# F  UR5 friction set in kejianhong/UR5-External-Force-Estimation: friction falls towards standstill.
 # G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 # H  Safety blocks of six real installations (3.5, 3.13, 3.15.8, 5.11).
 UR3 = RobotModel(
@@ -56,17 +58,16 @@ UR3 = RobotModel(
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # C: 180 and 360 deg/s
     q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # H: wrist 3 has no position limit
     q_max=(*(RANGE_END,) * 5, LAST_TURN),
-    armature=(0.45, 0.45, 0.20, 0.08, 0.08, 0.08),  # D
-    viscous=(5.0, 5.0, 2.0, 0.9, 0.9, 0.9),  # D
-    coulomb=(4.5, 4.2, 1.7, 0.6, 0.6, 0.6),  # D
-    coulomb_standstill=0.33,  # F: a sixth to a third of the full value at rest
-    coulomb_speed=0.08,  # F: full value reached within .05-.15 rad/s
-    torque_constant=(11.7, 12.3, 9.0, 3.0, 3.0, 3.0),  # D; elbow: moving fit 6.4, static 9-11
+    armature=(0.6121, 0.6121, 0.2118, 0.0714, 0.0714, 0.0714),  # D
+    viscous=(4.5, 5.1, 3.3, 0.5, 1.3, 0.8),  # D
+    viscous_fast=(2.4, 2.7, 1.9, 0.3, 0.7, 0.4),  # D
+    coulomb=(2.7, 2.7, 1.4, 0.7, 0.7, 0.9),  # D
+    torque_constant=(11.48, 11.51, 8.44, 4.13, 3.9, 4.2),  # D
     stop_deceleration=20.0,  # E: base, 183 deg/s in 159 ms; shoulder and elbow stop no slower
-    servo_frequency=12.0,  # assumed: a position loop of 10-30 Hz fits the delays that drivers report
-    servo_inertia=(0.88, 0.95, 0.39, 0.095, 0.083, 0.08),  # A, B
+    servo_inertia=(0.879, 0.909, 0.371, 0.0851, 0.0752, 0.0716),  # A, B
     payload_max=3.0,  # UR3 data sheet
     reach=0.5,
+    has_point_masses=True,  # D
     robot_type=3,  # client interface sheet, configuration data
     box_type=6,
     # Elbow-up branch over the middle of the recommended work box, flange at about (.35, 0, .25) m.
@@ -80,12 +81,14 @@ UR3 = RobotModel(
 # B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur5/physical_parameters.yaml: cylinder
 #    estimates, and where the links lie along the joint axes.
 # C  UR5/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
-# D  kejianhong/UR5-External-Force-Estimation, UR5SimulationModel.cpp: friction set of a real UR5.
+# D  A public script that fits runs at constant speed of a real UR5's base, .02 to .2 rad/s: 8.7 to 9.1 Nm and
+#    30 to 32.5 Nm s/rad, 13.6 Nm/A (O). Inferred: the same for shoulder and elbow, which have the same size;
+#    beyond the kink the share of the UR3's.
 # E  UR5/CB3 user manual 3.4.5, stopping times of category 0 (183 deg/s, arm stretched, 5 kg).
-# F  A printed state packet of a UR arm before 3.0: target torque per target current of joints.
+# F  Static currents of a real UR5 against gravity: 7.5 to 7.9 Nm/A of the wrists (O).
 # G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
-# H  Assumed: rotor inertia for the joint sizes (3 for base, shoulder, elbow; 1 for the wrists), where the fit
-#    of the UR3 gives .20 kg m² for size 1 and grows with the rated torque: .0075 kg m² per Nm.
+# H  Inferred from the joint sizes (3 for base, shoulder, elbow; 1 for the wrists): rotors as in the e-Series,
+#    which the UR3's equal; the wrists' friction is that of the UR3's elbow.
 UR5 = RobotModel(
     name="ur5",
     title="UR5",
@@ -109,17 +112,16 @@ UR5 = RobotModel(
     ),
     tau_max=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),  # C
     qd_max=(pi,) * 6,  # C: 180 deg/s
-    armature=(1.1, 1.1, 1.1, 0.20, 0.20, 0.20),  # H
-    viscous=(6.24, 4.81, 7.65, 1.05, 1.59, 1.11),  # D
-    coulomb=(7.23, 8.55, 8.47, 2.10, 2.02, 2.33),  # D
-    coulomb_standstill=0.33,  # D: a sixth to a third of the full value at rest
-    coulomb_speed=0.08,  # D: full value reached within .05-.15 rad/s
-    torque_constant=(12.8, 12.8, 12.8, 9.95, 9.95, 9.95),  # F
+    armature=(1.93, 1.93, 1.93, 0.2118, 0.2118, 0.2118),  # H
+    viscous=(31.0, 31.0, 31.0, 3.3, 3.3, 3.3),  # D, H
+    viscous_fast=(16.5, 16.5, 16.5, 1.9, 1.9, 1.9),  # D, H
+    coulomb=(8.9, 8.9, 8.9, 1.4, 1.4, 1.4),  # D, H
+    torque_constant=(13.6, 13.6, 13.6, 7.7, 7.7, 7.7),  # D, F
     stop_deceleration=13.0,  # E: base, 183 deg/s in 244 ms
-    servo_frequency=12.0,  # assumed, as for the UR3
-    servo_inertia=(2.05, 2.84, 1.76, 0.218, 0.204, 0.200),  # A, B
+    servo_inertia=(2.88, 3.67, 2.59, 0.23, 0.216, 0.212),  # A, B
     payload_max=5.0,  # UR5 data sheet
     reach=0.85,
+    has_point_masses=True,  # inferred, as the UR3 and the UR5e
     robot_type=1,  # client interface sheet, configuration data
     box_type=4,
     # Elbow up, tool forward and 45 degrees down, flange at about (.55, 0, .35) m.
@@ -133,11 +135,12 @@ UR5 = RobotModel(
 #    vendor took from its own simulator (here without their small products of inertia), and where the links
 #    lie along the joint axes.
 # C  UR10/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
-# F  A printed state packet of a UR arm before 3.0: target torque per target current of large joints. Size 2
-#    (wrists) as for the UR3.
+# D  Currents of a real UR10 at .2, .5 and 1 rad/s: base .87 1.53 2.11, wrist 2 .28 .35 .46 A (O). Inferred:
+#    the same for the other joints of the size.
+# F  Drive gains identified on a real UR10 (unisa-acg/inverse-dynamics-solver) (O).
 # G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
-# H  Assumed: rotor inertia and friction for the joint sizes (4 for base and shoulder, 3 for the elbow, 2 for
-#    the wrists). Sizes 2 and 3 as in the UR3 and the UR5; size 4 by its rated torque.
+# H  Inferred from the joint sizes (4 for base and shoulder, 3 for the elbow, 2 for the wrists): rotors as in
+#    the e-Series, which the UR3's equal; the elbow's friction is that of the UR5.
 UR10 = RobotModel(
     name="ur10",
     title="UR10",
@@ -161,15 +164,13 @@ UR10 = RobotModel(
     ),
     tau_max=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),  # C
     qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # C: 120 and 180 deg/s
-    armature=(2.5, 2.5, 1.1, 0.45, 0.45, 0.45),  # H
-    viscous=(12.0, 12.0, 7.6, 5.0, 5.0, 5.0),  # H
-    coulomb=(16.0, 16.0, 8.5, 4.3, 4.3, 4.3),  # H
-    coulomb_standstill=0.33,  # as for the UR5
-    coulomb_speed=0.08,
-    torque_constant=(12.8, 12.8, 12.8, 12.0, 12.0, 12.0),  # F
+    armature=(5.95, 5.95, 1.93, 0.61, 0.61, 0.61),  # H
+    viscous=(30.0, 30.0, 31.0, 2.75, 2.75, 2.75),  # D, H
+    viscous_fast=(15.7, 15.7, 16.5, 2.6, 2.6, 2.6),  # D, H
+    coulomb=(5.8, 5.8, 8.9, 2.75, 2.75, 2.75),  # D, H
+    torque_constant=(13.58, 14.3, 11.37, 11.24, 11.77, 11.77),  # F
     stop_deceleration=6.0,  # assumed: the UR5's scaled by reach and load; its manual's table was not at hand
-    servo_frequency=12.0,  # assumed, as for the UR3
-    servo_inertia=(6.2, 8.4, 3.5, 0.487, 0.455, 0.450),  # A, B
+    servo_inertia=(9.67, 11.9, 4.33, 0.647, 0.615, 0.61),  # A, B
     payload_max=10.0,  # UR10 data sheet
     reach=1.3,
     robot_type=2,  # client interface sheet, configuration data

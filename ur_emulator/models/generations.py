@@ -6,13 +6,13 @@ Sources of the electrics and fidelities of the e-Series, cited by letter below:
  C  Chosen.
  D  Universal_Robots_ROS_Driver issue 633: 1.3 and 4.1 N within five minutes; ROS2_Driver issue 447: a few
     newtons.
-Noise of encoders, speeds and currents: as in `fidelity.py`, whose source is a UR3e at 500 Hz.
 """
 
 from dataclasses import replace
 from datetime import datetime
 from math import radians
 from types import MappingProxyType
+from typing import Any
 
 from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import SUB_PACKAGES
@@ -20,7 +20,7 @@ from protocol.realtime.layout import COLUMNS, VERSIONS
 from protocol.robot_api import CALLS
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.fidelity import EXACT, FIDELITIES, IDEAL, POOR, TYPICAL
+from ur_emulator.models.fidelity import EXACT, FIDELITIES, IDEAL, POOR, REVERSAL_SPEED, TYPICAL, Ripple
 from ur_emulator.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
 from ur_emulator.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
@@ -53,29 +53,28 @@ CB3 = RobotGeneration(
         brakes_within_torque=False,
     ),
     electrics=Electrics(
-        main_voltage=48.0,  # captures of resting arms
-        robot_voltage=48.0,
-        joint_voltage=48.0,  # its drop along the arm's cable is small and left out
-        idle_current=0.25,  # chosen from the same captures
+        main_voltage=48.13,  # recordings of a resting arm
+        robot_voltage=48.13,
+        joint_voltage=47.92,  # the same: 47.81 to 48.02
+        # Chosen: with a tenth of the joints' currents a resting UR3 takes .29 A, as in the same recordings.
+        idle_current=0.13,
         joint_temperatures=(28.0, 29.0, 31.0, 36.0, 38.0, 39.0),  # production log of a UR3 (plant.py)
     ),
     force_sensing=ForceSensing(
         has_sensor=False,
         bandwidth=None,
         precision=(10.0, 5.0),  # UR3/CB3 manual
-        # The friction offset of the estimate changes its sign with the motion, by 8 N for a poor arm, and
-        # noise leaves 2 N in the mean of a contact.
-        contact_force=15.0,
-        least_averaging=0.2,  # leaves 0.6 N of 3 N
-        most_averaging=1.0,  # leaves 0.3 N
-        filter_time=0.024,  # leaves little of 3 N of noise
-        # The whole loop takes about 60 ms (poor fidelity 75): 8 * .075 leaves more than 50 degrees of phase,
-        # and scaling 2 is still stable.
-        control_rate=8.0,
+        contact_force=40.0,  # recordings: in moves without contact the estimate of a real UR3 rises to 39 N
+        least_averaging=0.2,  # chosen: the drives settle after a motion
+        most_averaging=1.0,  # chosen
+        filter_time=0.008,  # chosen: a resting arm's estimate has .2 to .4 N of noise
+        # The whole loop takes about 30 ms: 16 * .03 leaves more than 60 degrees of phase, and scaling 2 is
+        # stable. At half of it an impact at 50 mm/s keeps a wrist at its torque limit until C157.
+        control_rate=16.0,
     ),
     execution_time=0.0,  # chosen: the unit is not known
     run_up_time=0.16,  # recordings of a real UR3 and of the maker's simulator: .05 in each of 20 cycles
-    gravity=9.81,
+    gravity=9.82,  # recordings of a real UR3: `target_moment` at rest
     reports_control_as_target=False,
     has_operational_modes=False,
     has_remote_control=False,
@@ -106,29 +105,48 @@ _E_SERIES_BUILDS: Builds = (
     (SoftwareVersion(5, 24), 1214860, datetime(2025, 10, 4, 0, 25, 33)),  # date: UR client library's bytes
 )
 
+# The signals of a UR3e at 500 Hz (A of `fidelity.py`), of a UR5e where said (G there).
+_SMALLEST_SPEED = 1.4e-45  # smallest float32: the joints filter in float32, whose decay ends there
+_SIGNALS: dict[str, Any] = {
+    "encoder_sigma": (1.9e-5,) * 6,  # a UR5e: with the step 1.8 to 2.1e-5; the UR3e's log has 1.1 to 1.8e-5
+    "speed_sigma": 1e-3,  # what is left of 2-6 mrad/s after the ripple
+    "speed_filter_hz": (368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # by joint size 2, 1, 0
+    "speed_least": _SMALLEST_SPEED,
+    "current_sigma": (0.026, 0.026, 0.026, 0.0075, 0.0075, 0.0075),  # a UR5e at rest
+    "current_ripple": (0.0,) * 6,  # chosen, as the next two: nothing is known of them
+    "servo_dead_band": 0.0,
+    "friction_rise": REVERSAL_SPEED,
+}
 _TYPICAL = replace(
     TYPICAL,
     dead_time=0.0,  # A: the drives add no dead time that shows
     drive_lag=0.0005,  # A: actual_q is .50 ms behind target_q
+    ripples=(Ripple(cycles=101.0, rms=0.008), Ripple(cycles=202.0, rms=0.006)),
     feedback_age=0.002,  # the package carries the state of one cycle before
-    force_offset=5.0,  # C: before the first zero
-    force_bias=4.0,  # D
+    # Before the first zero; means of a resting UR5e that lie 3 to 6 N apart.
+    force_offset=5.0,
+    force_drift=0.006,  # -10 N in 1,800 s on a UR10e, linear; D
     force_sigma=0.15,  # A
     force_ratio=30.0,  # A: .003-.005 Nm
-    force_friction=0.0,
+    voltage_offset=0.15,  # A: 47.5-47.8
+    **_SIGNALS,
 )
-_IDEAL = replace(IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01)
+_IDEAL = replace(
+    IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01, speed_least=_SMALLEST_SPEED
+)
 _EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
 _POOR = replace(  # C
     POOR,
     dead_time=0.004,
+    ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
     drive_lag=0.002,
     feedback_age=0.004,
     force_offset=10.0,
-    force_bias=8.0,
+    force_drift=0.012,
     force_sigma=0.3,
     force_ratio=30.0,
-    force_friction=0.0,
+    voltage_offset=0.15,
+    **_SIGNALS,
 )
 
 E_SERIES = RobotGeneration(
@@ -167,8 +185,8 @@ E_SERIES = RobotGeneration(
         contact_force=5.0,  # C: more than noise and drift make of it
         least_averaging=0.02,  # C
         most_averaging=0.1,  # C
-        filter_time=0.008,  # C: a third of a CB3's, whose noise is twenty times as great
-        control_rate=24.0,  # C: the loop takes a third of the time of a CB3's, about 20 ms
+        filter_time=0.008,  # C
+        control_rate=24.0,  # C: the loop takes about 20 ms
     ),
     execution_time=0.82,  # A: mean while a program runs; .59 to 1.04
     run_up_time=0.0,  # chosen: no recording shows the start of a program

@@ -143,6 +143,10 @@ class Link:
         return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
+# Of every arm: logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
+VISCOUS_KINK = 0.5
+"""Joint speed beyond which viscous friction has another slope [rad/s]."""
+
 # Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees.
 RANGE_END = 2.0 * pi + radians(3.0)
 """[rad]"""
@@ -166,10 +170,9 @@ class RobotModel:
         q_min: lower end of the joint range of the safety system [rad].
         q_max: upper end of the joint range of the safety system [rad].
         armature: rotor and gear inertia as felt at the joint [kg m²].
-        viscous: viscous friction [Nm s/rad]; its slope at low speed where it has a kink.
-        coulomb: Coulomb friction at speed [Nm].
-        coulomb_standstill: share of the Coulomb friction that is left at standstill [1].
-        coulomb_speed: speed over which friction rises from that share to the full value [rad/s].
+        viscous: viscous friction up to the kink [Nm s/rad].
+        viscous_fast: its slope beyond the kink [Nm s/rad].
+        coulomb: Coulomb friction [Nm].
         torque_constant: joint torque per motor current, gear included [Nm/A].
         stop_deceleration: of the leading axis when the safety system or the end of a program stops the arm
             [rad/s²].
@@ -183,11 +186,6 @@ class RobotModel:
         box_type: code of the control box, as above.
         home_q: a pose clear of the table, away from singularities [rad].
         first_version: oldest software that the maker has released for it; None: the generation's first.
-        reversal_speed: friction changes its sign over about this, in the controller's model [rad/s].
-        friction_rise: speed over which the true dry friction grows from zero to its size [rad/s]; None: over
-            what suits MuJoCo's friction (`arm_physics.py`), slower than the model.
-        viscous_kink: joint speed beyond which viscous friction has another slope [rad/s]; None: it has one.
-        viscous_fast: that slope [Nm s/rad].
         has_point_masses: the controller's model takes the links for points, without inertia tensors.
     """
 
@@ -201,12 +199,10 @@ class RobotModel:
     qd_max: Vector6
     armature: Vector6
     viscous: Vector6
+    viscous_fast: Vector6
     coulomb: Vector6
-    coulomb_standstill: float
-    coulomb_speed: float
     torque_constant: Vector6
     stop_deceleration: float
-    servo_frequency: float
     servo_inertia: Vector6
     payload_max: float
     reach: float
@@ -215,18 +211,10 @@ class RobotModel:
     home_q: Vector6
     q_min: Vector6 = (-RANGE_END,) * 6
     q_max: Vector6 = (RANGE_END,) * 6
+    servo_frequency: float = 25.0  # chosen: at 12 Hz an arm is further from its target than a real one
     servo_damping: float = 0.9
     first_version: str | None = None
-    reversal_speed: float = 0.012
-    friction_rise: float | None = None
-    viscous_kink: float | None = None
-    viscous_fast: Vector6 = ZERO6
     has_point_masses: bool = False
-
-    @property
-    def viscous_beyond_kink(self) -> Vector6:
-        """Slope of the viscous friction at high speed [Nm s/rad]."""
-        return self.viscous if self.viscous_kink is None else self.viscous_fast
 
     @property
     def qd_safety(self) -> Vector6:

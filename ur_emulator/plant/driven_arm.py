@@ -73,7 +73,9 @@ class DrivenArm:
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
         gains = ServoGains.of(robot)
         dh, presliding = calibrated_dh(robot, calibration), fidelity.friction_presliding
-        self.physics = ArmPhysics(robot, dh, mass_scale.tolist(), gains, substep, presliding, tools)
+        self.physics = ArmPhysics(
+            robot, dh, mass_scale.tolist(), gains, substep, presliding, fidelity.friction_rise, tools
+        )
         self._period, self._n_substeps = period, generation.n_substeps
         self.drives = Drives(robot, calibration, fidelity, seed, gains, substep, period)
         age_substeps = max(1, round(fidelity.feedback_age / substep))
@@ -155,7 +157,7 @@ class DrivenArm:
         physics.run(drives, feedback.capture_at, feedback.captured)
         np.multiply(physics.torque, self._per_torque, self._currents)
         self.control_current = six(self._currents.tolist())
-        feedback.take(physics)
+        feedback.take(physics, drives.expected_current)
         currents = self.control_current
         if physics.has_diverged:
             raise PlantError(

@@ -8,6 +8,8 @@ gives
 with lead = kv / kp. The law itself lives in MuJoCo's actuators (`arm_physics.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
 at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
+It counts errors in whole dead bands (`Fidelity.servo_dead_band`): a smaller one stays, where friction holds
+the joint.
 
 In freedrive there is no set-point: see `Freedrive`.
 """
@@ -144,6 +146,7 @@ class Drives:
         coulomb: true size of the Coulomb friction at the speeds last given (6,) [Nm].
         target_moment: rigid-body torque for the present target (6,) [Nm].
         target_current: current for the present target, friction included (6,) [A].
+        expected_current: the same, as an array.
     """
 
     def __init__(
@@ -165,7 +168,7 @@ class Drives:
             fidelity.drive_lag,
             fidelity.drive_damping,
             gains.lead,
-            period / _INTEGRAL_TIME,
+            period / _INTEGRAL_TIME * (fidelity.servo_dead_band or 1.0),
         )
         self._friction = Friction(robot, fidelity, seed)
         self._period = period
@@ -178,6 +181,9 @@ class Drives:
         self._q, self._qd, self._qdd_then_deflection = path.newest
         self._moment = self._dynamics.torque
         self._work = np.zeros(6)
+        self.expected_current = np.zeros(6)
+        band = fidelity.servo_dead_band
+        self._per_dead_band = np.full(6, 1.0 / band) if band else None
         self.control = list(path.control)
         self.actual_speed = path.speeds[0]
         self.bias = self._friction.compensation
@@ -234,25 +240,26 @@ class Drives:
 
     def keep(self, error: NDArray[np.float64] | None) -> None:
         """End the cycle; the servos are trimmed by the joints' error (6,) [rad] unless that is None."""
+        if error is not None and self._per_dead_band is not None:
+            error = np.multiply(error, self._per_dead_band, self._work)
+            np.trunc(error, error)
         self._path.keep(error)
 
     def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:
-        """Set `target_moment` and `target_current` for a target, (6,) each, that the arm follows by itself.
+        """Set `target_moment` for a target, (6,) each, that the arm follows by itself.
 
         Returns:
             False when the target is not finite or far too large; nothing has changed then.
         """
         if not hypot(*q, *qd, *qdd) < TARGET_MAX:
             return False
-        speeds = np.array([qd, qd, qd], dtype=np.float64)
-        self.target_moment = six(self._dynamics.evaluate(np.array(q), speeds[0], np.array(qdd)).tolist())
-        self._friction.evaluate(speeds)
-        self._expect_current()
+        moment = self._dynamics.evaluate(np.array(q), np.array(qd, dtype=np.float64), np.array(qdd))
+        self.target_moment = six(moment.tolist())
         return True
 
     def _expect_current(self) -> None:
         """Set the current for the model's torque and the friction at the target."""
-        current = self._work
+        current = self.expected_current
         np.add(self._moment, self._friction.expected, current)
         np.multiply(current, self._per_torque, current)
         self.target_current = six(current.tolist())
@@ -289,7 +296,8 @@ class Drives:
         self._path.control[:] = torque
         self.bias[:] = 0.0
         self.target_moment = six(moment.tolist())
-        self.target_current = six((torque * self._per_torque).tolist())
+        np.multiply(torque, self._per_torque, self.expected_current)
+        self.target_current = six(self.expected_current.tolist())
 
     def are_pressing(self, q_motor: NDArray[np.float64]) -> bool:
         """True when a servo of a resting arm, motors at q_motor (6,) [rad], presses against an obstacle."""

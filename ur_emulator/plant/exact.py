@@ -1,11 +1,13 @@
 """ExactPlant: an arm without physics, always at its target, as in the maker's simulator.
 
 What is measured equals the target to the last bit, in the cycle of the target; both are published in the
-next. Currents and torques are those that the controller's model expects. Nothing acts on the arm: no load but
+next. Torques are those that the controller's model expects, currents these over a constant, without friction.
+Nothing acts on the arm: no load but
 the declared payload, no push, no contact, no hand. The accelerometer reads gravity alone, also in motion.
 """
 
 from collections.abc import Sequence
+from operator import truediv
 from pathlib import Path
 
 import mujoco
@@ -23,6 +25,10 @@ from ur_emulator.plant.plant import Plant, PlantState
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
 
+# Joint torque per current [Nm/A] of a UR3 in recordings of the maker's simulator; of other arms it is not
+# known, and taken from the arm.
+_TORQUE_CONSTANTS = {"ur3": (13.13, 13.13, 9.312, 4.545, 4.545, 4.545)}
+
 
 class ExactPlant(Plant):
     """An arm that follows exactly; arguments and the rest of the interface as `Plant`."""
@@ -30,6 +36,7 @@ class ExactPlant(Plant):
     def __init__(
         self, robot: RobotModel, fidelity: Fidelity, seed: int, tools: Sequence[ToolModel] = ()
     ) -> None:
+        self._torque_constant = _TORQUE_CONSTANTS.get(robot.name, robot.torque_constant)
         super().__init__(robot, fidelity, seed, tools)
         self._physics.obstacles = _NoObstacles()
 
@@ -66,19 +73,23 @@ class ExactPlant(Plant):
             )
         for hand, command in zip(self._physics.hands, self._finger_commands, strict=True):
             hand.place(command, self.period_s)
-        self._thermometers.step(self._drives.target_current)
+        self._thermometers.step(self._current)
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
 
     def complete_cycle(self) -> None:
         """Do nothing: the position depends on the target alone."""
 
+    @property
+    def _current(self) -> Vector6:
+        return six(list(map(truediv, self._drives.target_moment, self._torque_constant)))
+
     def sense(self) -> PlantState:
         """Read the sensors; asking again before the next step gives the same state."""
         if self._state is None:
             mujoco.mj_kinematics(self._physics.model, self._physics.data)
             x, y, z = (GRAVITY * self._physics.flange_rotation[2]).tolist()
-            current, moment = self._drives.target_current, self._drives.target_moment
+            current = self._current
             self._state = PlantState(
                 actual_q=self._q,
                 actual_qd=self._qd,
@@ -88,7 +99,7 @@ class ExactPlant(Plant):
                 tcp_force=ZERO6,
                 joint_temperatures=self._thermometers.reading,
                 target_current=current,
-                target_moment=moment,
+                target_moment=self._drives.target_moment,
                 joint_control_output=current,
                 torque_saturated=False,
                 position_error=ZERO6,

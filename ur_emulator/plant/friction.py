@@ -1,9 +1,7 @@
 """Joint friction: the true one, and the controller's model of it, which is not exact.
 
-Viscous friction is a joint damping in MuJoCo, dry friction its frictionloss, whose size follows the speed:
-joints of a CB3 lose two thirds of it towards standstill (see the robot's numbers), so they do not stick and
-slip. On an e-Series arm the viscous friction grows faster up to a kink: the damping is the slope beyond it,
-the rest is part of the dry friction. The controller compensates friction in its feed-forward with parameters
+Viscous friction grows faster up to a kink: the slope beyond it is a joint damping in MuJoCo, the rest is part
+of the dry friction, its frictionloss. The controller compensates friction in its feed-forward with parameters
 that are off by what `Fidelity.friction_error` says.
 """
 
@@ -12,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.models.fidelity import Fidelity, random_stream
-from ur_emulator.models.robot_model import RobotModel
+from ur_emulator.models.fidelity import REVERSAL_SPEED, Fidelity, random_stream
+from ur_emulator.models.robot_model import VISCOUS_KINK, RobotModel
 
 # Share of the modelled viscous friction that a full scale of direct_torque compensates [1]: the rest damps
 # the free joints. Inferred: in the maker's example wrist 3 gets 2.5 Nm at 0.2 Hz with full scales; above 0.5
@@ -25,7 +23,7 @@ _VISCOUS_IN_TORQUE_CONTROL = 1.0 / 3.0
 class Friction:
     """Evaluates true dry friction and the controller's compensation together, once a cycle.
 
-        size(qd) = coulomb - lost exp(-|qd| / coulomb speed) + excess min(|qd|, kink)
+        size(qd) = coulomb + excess min(|qd|, kink)
         model(qd) = size(qd) tanh(qd / reversal speed) + viscous qd
 
     `viscous` is the slope beyond the kink, `excess` by how much the one before it is greater.
@@ -40,21 +38,17 @@ class Friction:
         errors = 1.0 + fidelity.friction_error * random_stream(seed, "friction").standard_normal((2, 6))
         # Greatest error of the model [1]: a worse one would be found at commissioning.
         errors = errors.clip(0.3, 1.7)
-        viscous = np.array(robot.viscous_beyond_kink) * errors[0]
+        viscous = np.array(robot.viscous_fast) * errors[0]
         believed = np.array(robot.coulomb) * errors[1]
         # One row a use: the true size at the actual speed, the model at the speeds of target and set-point.
         # Constants have the full shape: broadcasting costs twice the arithmetic at this size.
         self._coulomb = np.array([robot.coulomb, believed, believed])
-        self._lost = self._coulomb * (1.0 - robot.coulomb_standstill)
         self._believed_viscous = np.array([viscous, viscous])
-        self._per_speed = np.full((3, 6), -1.0 / robot.coulomb_speed)
-        self._per_reversal = np.full((2, 6), 1.0 / robot.reversal_speed)
-        self._excess: NDArray[np.float64] | None = None
-        if robot.viscous_kink is not None:
-            excess = np.array(robot.viscous) - robot.viscous_beyond_kink
-            self._excess = np.array([excess, excess * errors[0], excess * errors[0]])
-            self._kinks = np.full((3, 6), robot.viscous_kink)
-            self._slow = np.zeros((3, 6))
+        self._per_reversal = np.full((2, 6), 1.0 / REVERSAL_SPEED)
+        excess = np.array(robot.viscous) - robot.viscous_fast
+        self._excess = np.array([excess, excess * errors[0], excess * errors[0]])
+        self._kinks = np.full((3, 6), VISCOUS_KINK)
+        self._slow = np.zeros((3, 6))
         self._sizes = np.zeros((3, 6))
         self._beliefs = np.zeros((2, 6))
         self._viscous = np.zeros((2, 6))
@@ -72,26 +66,19 @@ class Friction:
     def share(self, viscous: Sequence[float], coulomb: Sequence[float]) -> NDArray[np.float64]:
         """Return what torque control compensates with these scales of direct_torque, 0..1 each (6,) [Nm]."""
         wet, dry = self._viscous[1], self.dry_compensation
-        if self._excess is not None:
-            slow = np.sign(dry) * self._slow[2]
-            wet, dry = wet + slow, dry - slow
+        slow = np.sign(dry) * self._slow[2]
+        wet, dry = wet + slow, dry - slow
         part: NDArray[np.float64] = viscous * (_VISCOUS_IN_TORQUE_CONTROL * wet) + coulomb * dry
         return part
 
     def evaluate(self, speeds: NDArray[np.float64]) -> None:
         """Set the attributes for speeds (3, 6) [rad/s]: actual, of the target, of the set-point."""
         sizes, beliefs, viscous, believed_speeds = self._sizes, self._beliefs, self._viscous, speeds[1:]
-        np.abs(speeds, sizes)
-        excess = self._excess
-        if excess is not None:
-            np.minimum(sizes, self._kinks, out=self._slow)
-            np.multiply(self._slow, excess, self._slow)
-        np.multiply(sizes, self._per_speed, sizes)
-        np.exp(sizes, sizes)
-        np.multiply(sizes, self._lost, sizes)
-        np.subtract(self._coulomb, sizes, sizes)
-        if excess is not None:
-            np.add(sizes, self._slow, sizes)
+        slow = self._slow
+        np.abs(speeds, slow)
+        np.minimum(slow, self._kinks, out=slow)
+        np.multiply(slow, self._excess, slow)
+        np.add(self._coulomb, slow, sizes)
         np.multiply(believed_speeds, self._per_reversal, beliefs)
         np.tanh(beliefs, beliefs)
         np.multiply(beliefs, self._believed_sizes, beliefs)
@@ -101,8 +88,8 @@ class Friction:
 
 # --- presliding: joint friction with hysteresis, as the contacts of gears and seals have it
 #
-# The model is Dahl's with the size of the Stribeck curve, LuGre without its micro-damping: bristles of mean
-# deflection z in [-1, 1] follow the motion over the presliding angle,
+# The model is Dahl's, LuGre without its micro-damping: bristles of mean deflection z in [-1, 1] follow the
+# motion over the presliding angle,
 #
 #     dz/dq = (sign(dq) - z) / angle,    torque = -size z
 #

@@ -126,7 +126,7 @@ class Plant:
         self.fidelity = fidelity
         self.seed = seed
         self.period_s = generation.period_s
-        self.calibration = draw_calibration(fidelity, seed)
+        self.calibration = draw_calibration(robot, fidelity, seed)
         self._arm = arm = DrivenArm(robot, self.calibration, fidelity, seed, tools)
         self._physics, self._drives, self._feedback = arm.physics, arm.drives, arm.feedback
         self._thermometers = Thermometers(generation)

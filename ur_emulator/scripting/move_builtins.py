@@ -6,6 +6,7 @@ from typing import Any
 
 from protocol.pose import Pose as ToolPose
 from protocol.primary.messages import ReportLevel
+from protocol.ur_types import JOINT_ACCELERATION, JOINT_SPEED
 from ur_emulator.controller.events import ErrorReported, EventQueue
 from ur_emulator.controller.settings import PlanningSettings, ToolWrenchLimit
 from ur_emulator.controller.world_model import BASE, WorldModel, WorldModelError
@@ -30,7 +31,7 @@ from urscript import NEXT_CYCLE, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
 
 # Acceleration and speed of moves that give none. Source: URScript manual, module variables of motion.
-JOINT_DEFAULTS = (1.4, 1.05)  # rad/s^2, rad/s
+JOINT_DEFAULTS = (JOINT_ACCELERATION, JOINT_SPEED)
 TOOL_DEFAULTS = (1.2, 0.25)  # m/s^2, m/s
 # The controller's number of the warning "Overlapping Blends" is not known: it goes out with the text alone.
 OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blends")

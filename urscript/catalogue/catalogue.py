@@ -28,6 +28,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+from protocol.ur_types import JOINT_ACCELERATION, JOINT_SPEED
 from urscript.catalogue import types
 from urscript.catalogue.calls import Fitting, Slot, compile_fitting, static_bind
 from urscript.catalogue.methods import ValueMethod, methods_of
@@ -45,6 +46,8 @@ _SOURCES: Final = {
     "POLYSCOPE_EXPORT": "written by PolyScope into exported programs",
     "FIELD_USE": "called by field scripts and public clients",
 }
+
+_NAMED: Final = {"a_joint_default": JOINT_ACCELERATION, "v_joint_default": JOINT_SPEED}
 
 _TYPES: Final = {kind.name.lower().replace("_or_", "|"): kind for kind in types.ParamType}
 _WORDS: Final[dict[str, tuple[str, Any]]] = {
@@ -126,6 +129,8 @@ def _params(text: str, head: str) -> Iterator[Param]:
 
 
 def _value(text: str) -> Any:
+    if text in _NAMED:
+        return _NAMED[text]
     return Pose(*literal_eval(text[1:])) if text[0] == "p" else literal_eval(text)
 
 
@@ -164,9 +169,9 @@ ALL_ROWS: tuple[Builtin, ...] = (
 VARIABLES: tuple[ModuleVariable, ...] = tuple(
     ModuleVariable(name, value, unit, "motion", "URScript API Reference CB3 3.15.4, module motion, Variables")
     for name, value, unit in (
-        ("a_joint_default", 1.4, "rad/s^2"),
+        ("a_joint_default", JOINT_ACCELERATION, "rad/s^2"),
         ("a_tool_default", 1.2, "m/s^2"),
-        ("v_joint_default", 1.05, "rad/s"),
+        ("v_joint_default", JOINT_SPEED, "rad/s"),
         ("v_tool_default", 0.25, "m/s"),
     )
 )

@@ -223,6 +223,8 @@ def default_text(value: object) -> str:
     """A default as the manual prints it."""
     if isinstance(value, str):
         return f'"{value}"'
+    if isinstance(value, float):
+        return f"{value:.3g}"
     return str_form(value) if isinstance(value, (list, Pose)) else str(value)
 
 
