@@ -193,7 +193,7 @@ def _ripples(scale: float) -> tuple[Ripple, ...]:
     .5 to .7 of the shoulder, .8 to 1.2 of the others.
     """
     slow = Ripple(cycles=17.0, rms=0.0032 * scale)
-    parts = (((0,), 0.001), ((1,), 0.005), ((2, 3, 4, 5), 0.008))
+    parts = (((0,), 0.0015), ((1,), 0.005), ((2, 3, 4, 5), 0.008))
     return slow, *(
         Ripple(cycles=cycles, rms=share * rms * scale, joints=joints)
         for cycles, share in ((101.0, 0.8), (202.0, 0.6))
