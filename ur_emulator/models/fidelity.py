@@ -192,7 +192,7 @@ def _ripples(scale: float) -> tuple[Ripple, ...]:
     F: the first is .15 to .2 mrad rms of all joints; all together the speed ripple is .3 to .5 % of the base,
     .5 to .7 of the shoulder, .8 to 1.2 of the others.
     """
-    slow = Ripple(cycles=17.0, rms=0.0032 * scale)
+    slow = Ripple(cycles=17.0, rms=0.0034 * scale)
     parts = (((0,), 0.0015), ((1,), 0.005), ((2, 3, 4, 5), 0.008))
     return slow, *(
         Ripple(cycles=cycles, rms=share * rms * scale, joints=joints)
