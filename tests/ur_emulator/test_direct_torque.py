@@ -83,7 +83,7 @@ def test_friction_brakes_what_is_not_compensated():
     assert moved["all"] > moved["default"] > moved["none"] == moved["old"] > 0.0
 
 
-@pytest.mark.parametrize(("robot", "speed", "way"), [("ur5e", 2.5, 3.5), ("ur3e", 5.8, 9.2)])
+@pytest.mark.parametrize(("robot", "speed", "way"), [("ur5e", 3.1, 4.5), ("ur3e", 5.8, 9.2)])
 def test_the_example_of_the_maker_swings_wrist_3(robot, speed, way):
     """Universal_Robots_Client_Library, examples/direct_torque_control.cpp: full scales at wrist 3, one period of ten."""
     bench = ESeriesBench(robot=robot, fidelity="ideal")

@@ -75,7 +75,7 @@ def drives(*sizes: JointSize) -> dict[str, Any]:
 # D  Its own viscous friction: joint self-calibration of a real UR5e, warm, no load (INTO-CPS-Association/
 #    aurt): base .62 to .82 A at .07, .94 at .5, 1.36 at 1.5, 1.77 at 3.2 rad/s; wrist 2 likewise (O).
 _SIZE_3 = replace(SIZE_3, viscous=5.6, viscous_fast=3.3)  # D
-_SIZE_1 = replace(SIZE_1, viscous=1.5, viscous_fast=0.8)  # D
+_SIZE_1 = replace(SIZE_1, viscous=1.7, viscous_fast=1.0)  # D
 
 UR5E = RobotModel(
     name="ur5e",

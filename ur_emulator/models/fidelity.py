@@ -196,8 +196,8 @@ def _ripples(scale: float) -> tuple[Ripple, ...]:
     F: the first is .15 to .2 mrad rms of all joints; all together the speed ripple is .3 to .5 % of the base,
     .5 to .7 of the shoulder, .8 to 1.2 of the others.
     """
-    slow = Ripple(cycles=17.0, rms=0.0032 * scale)
-    parts = (((0,), 0.001), ((1,), 0.005), ((2, 3, 4, 5), 0.008))
+    slow = Ripple(cycles=17.0, rms=0.0034 * scale)
+    parts = (((0,), 0.0015), ((1,), 0.005), ((2, 3, 4, 5), 0.008))
     return slow, *(
         Ripple(cycles=cycles, rms=share * rms * scale, joints=joints)
         for cycles, share in ((101.0, 0.8), (202.0, 0.6))
@@ -217,7 +217,7 @@ TYPICAL = Fidelity(
     encoder_sigma=(2.2e-5,) * 6,  # F: with the step 2.0 to 2.4e-5
     encoder_step=2.0 * pi / 2**19,  # F, G
     speed_filter_hz=(40.0,) * 6,  # F: 2.6 ms behind the target, of which the angles are .5
-    speed_dead_band=1e-3,  # E
+    speed_dead_band=1e-4,  # F: larger ones are reported at rest, too
     speed_sigma=5e-4,  # F: what is left of 2 to 7 mrad/s after the ripple
     speed_least=1e-5,  # F: exactly 0 at rest, or single values above this
     current_sigma=(0.0035, 0.007, 0.004, 0.0045, 0.0045, 0.0045),  # F: the mean of three files

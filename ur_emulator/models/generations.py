@@ -111,6 +111,7 @@ _SIGNALS: dict[str, Any] = {
     "encoder_sigma": (1.9e-5,) * 6,  # a UR5e: with the step 1.8 to 2.1e-5; the UR3e's log has 1.1 to 1.8e-5
     "speed_sigma": 1e-3,  # what is left of 2-6 mrad/s after the ripple
     "speed_filter_hz": (368.0, 368.0, 217.0, 138.0, 138.0, 138.0),  # by joint size 2, 1, 0
+    "speed_dead_band": 1e-3,  # chosen
     "speed_least": _SMALLEST_SPEED,
     "current_sigma": (0.026, 0.026, 0.026, 0.0075, 0.0075, 0.0075),  # a UR5e at rest
     "current_ripple": (0.0,) * 6,  # chosen, as the next two: nothing is known of them

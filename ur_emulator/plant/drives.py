@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_emulator.models.calibration import Calibration
-from ur_emulator.models.fidelity import Fidelity
+from ur_emulator.models.fidelity import REVERSAL_SPEED, Fidelity
 from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 from ur_emulator.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.plant.command_path import CommandPath
@@ -175,9 +175,10 @@ class Drives:
         self._kp = gains.kp
         self._per_kp = 1.0 / gains.kp
         self._per_torque = 1.0 / np.array(robot.torque_constant)
-        # A servo that gives more than this at rest presses against something: more than its joint's friction
-        # at rest, and a few parts in a hundred of wrong masses, can ask for.
-        self._pressing = 0.5 * np.array(robot.coulomb)
+        # A servo that gives more than this at rest presses against something: more than a few parts in a
+        # hundred of wrong masses, and friction where it holds the joint, can ask for.
+        held = 1.0 if fidelity.friction_rise < REVERSAL_SPEED else 0.0
+        self._pressing = (0.5 + held) * np.array(robot.coulomb)
         self._q, self._qd, self._qdd_then_deflection = path.newest
         self._moment = self._dynamics.torque
         self._work = np.zeros(6)
