@@ -87,7 +87,8 @@ class Fidelity:
         dead_time_period: of that cosine [s]; where it begins is drawn by the seed.
         drive_lag: of the drive's set-point filter: by how much a ramp trails [s].
         drive_damping: damping ratio of the filter, which is of second order then; None: of first order.
-        feedback_age: age of the measurements when they are reported [s]; a cycle: that of the reported target.
+        feedback_age: age of the measurements when they are reported [s]; a cycle or less: as old as the
+            reported target.
         sample_jitter: sd of the moment at which all joints are sampled [s].
         encoder_sigma: sd of the white noise of each reported angle, (6,) [rad].
         encoder_step: quantisation of the reported angle [rad].

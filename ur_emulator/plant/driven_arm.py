@@ -55,8 +55,6 @@ class DrivenArm:
 
     Attributes:
         physics: masses, joints and contacts.
-        moves_later: measurements are a cycle old when they are reported: what is reported of a cycle does
-            not need its motion.
         control_current: what the drives ask for at the end of the cycle (6,) [A].
     """
 
@@ -78,11 +76,9 @@ class DrivenArm:
         )
         self._period, self._n_substeps = period, generation.n_substeps
         self.drives = Drives(robot, calibration, fidelity, seed, gains, substep, period)
-        age_substeps = max(1, round(fidelity.feedback_age / substep))
-        self.moves_later = age_substeps >= generation.n_substeps
-        if self.moves_later:
-            age_substeps -= generation.n_substeps
-        self.feedback = Feedback(robot, fidelity, seed, age_substeps)
+        # Of the plant's cycle, which comes a cycle later, see `Plant`.
+        age_substeps = round(fidelity.feedback_age / substep) - generation.n_substeps
+        self.feedback = Feedback(robot, fidelity, seed, max(0, age_substeps))
         self._tau_max = robot.tau_max
         self._per_torque = 1.0 / np.array(robot.torque_constant)
         self._currents = np.zeros(6)
@@ -177,7 +173,6 @@ class DrivenArm:
             np.subtract(drives.q_final, error, error)
             trims = not (self._saturated_now or (self._trim_is_held and self._is_pressing))
             drives.keep(error if trims else None)
-        feedback.keep()
 
     @property
     def _is_pressing(self) -> bool:
@@ -203,7 +198,6 @@ class DrivenArm:
         if self.physics.has_company:
             self.physics.run_beside(self._n_substeps)
         self.feedback.take_rest()
-        self.feedback.keep()
 
     def _engage_brakes(self) -> None:
         """Stand still at once, wherever the arm is."""

@@ -14,7 +14,7 @@ from ur_emulator.models.fidelity import Fidelity, random_stream
 from ur_emulator.models.mjcf import GRAVITY
 from ur_emulator.models.robot_model import RobotModel
 from ur_emulator.plant.arm_physics import ArmPhysics
-from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors
+from ur_emulator.plant.sensors import REC_ACCELERATION, Record, Sensors, WrenchFor
 
 # --- GearRipple: the kinematic transmission error of the strain wave gears; GearWithPlay: their backlash, too
 #
@@ -130,7 +130,7 @@ class GearWithPlay(GearRipple):
 class Feedback:
     """Gears and sensors of one arm.
 
-    A cycle is `take` or `take_rest`, then `keep`.
+    A cycle is `take` or `take_rest`.
 
     Args:
         age_substeps: from the measured moment to the end of the cycle's physics.
@@ -174,22 +174,22 @@ class Feedback:
         self.gear.apply(record)
         if not self._has_force_sensor:
             record.expected_current[:] = expected_current
-            self.reading = self._sensors.read(self._records[self._read_at], physics.wrench_for)
+            self._read(physics.wrench_for)
             return
         record.wrench[:] = loads.wrench if loads.is_unexpected else 0.0
         if physics.n_contacts:
             record.wrench += physics.contact_wrench
-        self.reading = self._sensors.read(self._records[self._read_at])
+        self._read()
 
     def take_rest(self) -> None:
         """Read the sensors of an arm that the brakes hold."""
         self._records[0].values[:] = self._rest.values
-        self.reading = self._sensors.read(self._records[self._read_at])
+        self._read()
 
-    def keep(self) -> None:
-        """End the cycle."""
+    def _read(self, wrench_for: WrenchFor | None = None) -> None:
+        """Read the oldest record, and make room for the next."""
+        self.reading = self._sensors.read(self._records[self._read_at], wrench_for)
         self._records.rotate(-1)
-        self._sensors.keep()
 
     def stop(self, physics: ArmPhysics) -> None:
         """The arm comes to rest where it is: see `take_rest`."""

@@ -3,9 +3,9 @@
 The plant knows nothing of programs, modes or safety; it follows its targets or raises `PlantError`. It reads
 no clock, and all randomness comes from the seed: equal seeds and equal targets give bit-identical states.
 
-Where measurements are a cycle old when they are reported (`DrivenArm.moves_later`), the report of a cycle
-does not need its motion: the step of the next cycle computes it, or `complete_cycle` does while a client
-computes the next target.
+Measurements are a cycle old, or older, when they are reported: the report of a cycle does not need its
+motion. The step of the next cycle computes it, or `complete_cycle` does, while a client computes the next
+target.
 """
 
 from collections.abc import Sequence
@@ -293,8 +293,6 @@ class Plant:
         self._state = None
         self.cycle += 1
         self._command = ArmCommand(self.cycle, target, mode, torque, self._finger_commands)
-        if not self._arm.moves_later:
-            self._finish()
 
     def complete_cycle(self) -> None:
         """Let the arm move by the command that waits; the results are the same to the last bit."""
@@ -324,18 +322,10 @@ class Plant:
         return self._state
 
     def report(self, before: PlantState) -> PlantState:
-        """Return the state of the arm as the box publishes it: that of about the beginning of the cycle.
-
-        Measurements are that old already; target current and moment are those of the cycle `before`, from
-        `sense`.
-        """
+        """Return the state of the arm as the box publishes it: that of about the beginning of the cycle."""
         now = self.sense()
-        if self._arm.moves_later:
-            before = now
-        current = before.target_current
-        control = current if self._reports_control_as_target else now.joint_control_output
-        return now._replace(
-            target_current=current, target_moment=before.target_moment, joint_control_output=control
+        return (
+            now._replace(joint_control_output=now.target_current) if self._reports_control_as_target else now
         )
 
 

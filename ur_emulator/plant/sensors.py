@@ -136,10 +136,10 @@ class Sensors:
         self._dead_band, self._least_speed = fidelity.speed_dead_band, fidelity.speed_least
         bandwidth = robot.generation.force_sensing.bandwidth
         self._force_keep = None if bandwidth is None else exp(-2.0 * pi * bandwidth * period)
-        self._force = self._next_force = np.zeros(6)
+        self._force = np.zeros(6)
         self._noise: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
         self._at = _BLOCK
-        self._speeds = self._next_speeds = ZERO6
+        self._speeds = ZERO6
         self._values = np.zeros(N_RECORD)
         self._angles, self._steps = self._values[REC_Q], self._values[REC_DRIVEN]
         self._estimate = self._values[REC_WRENCH]
@@ -152,7 +152,7 @@ class Sensors:
         self._force = np.zeros(6)
 
     def read(self, record: Record, wrench_for: WrenchFor | None = None) -> Reading:
-        """Read all sensors of an arm whose true values are `record`; the same again until `keep`.
+        """Read all sensors of an arm whose true values are `record`, once a cycle.
 
         Args:
             wrench_for: tells for joint torques (6,) [Nm] the wrench on the flange that asks for them. Of an
@@ -162,13 +162,14 @@ class Sensors:
         if self._at == _BLOCK:
             self._draw_noise()
         noise, moment = self._noise[self._at]
+        self._at += 1
         values, angles, steps, work = self._values, self._angles, self._steps, self._work
         # In the sensors' units and noisy; angles also sampled a moment early or late; all in whole steps.
         np.multiply(record.values, self._scale, values)
         if self._force_keep is not None:
             # One pole, as for the speeds.
-            self._next_force = record.wrench + self._force_keep * (self._force - record.wrench)
-            values[REC_WRENCH] = self._next_force
+            self._force = record.wrench + self._force_keep * (self._force - record.wrench)
+            values[REC_WRENCH] = self._force
         np.add(values, noise, values)
         np.multiply(record.qd, moment, work)
         np.add(angles, work, angles)
@@ -179,7 +180,7 @@ class Sensors:
             np.multiply(work, self._torque_constant, work)
             self._estimate += wrench_for(work)
         reading: list[float] = values.tolist()
-        self._next_speeds = speeds = self._filtered(record.qd.tolist(), reading[REC_QD])
+        self._speeds = speeds = self._filtered(record.qd.tolist(), reading[REC_QD])
         ax, ay, az = reading[REC_ACCELERATION]
         return Reading(
             six(reading[REC_Q]),
@@ -189,12 +190,6 @@ class Sensors:
             (ax, ay, az),
             six(reading[REC_WRENCH]),
         )
-
-    def keep(self) -> None:
-        """Advance to the next cycle."""
-        self._at += 1
-        self._speeds = self._next_speeds
-        self._force = self._next_force
 
     def _filtered(self, true_qd: list[float], measured: list[float]) -> Vector6:
         """One pole a joint: y = u + keep (y - u), whose input u is gated to zero at rest."""
