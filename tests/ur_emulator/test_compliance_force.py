@@ -375,19 +375,19 @@ def test_a_pause_holds_the_arm_and_the_force():
 
 
 def test_a_stiff_axis_that_is_pushed_too_far_stops_the_arm():
-    def run(limit):
+    def run(limit, force):
         bench = above_table(
             WAIT
             + f"  force_mode({BASE}, [0,0,1,0,0,0], [0,0,0,0,0,0], 2, [{limit},{limit},0.2,0.5,0.5,0.5])\n  sleep(100)",
             z=0.2,
         )
         bench.tick(50)
-        push(bench, 0.0, 200.0, 0.0)
+        push(bench, 0.0, force, 0.0)
         bench.tick(100)
         return reported(bench)
 
-    assert [code for code, _ in run(0.002)] == [153]
-    assert run(0.02) == []
+    assert [code for code, _ in run(0.002, 200.0)] == [153]
+    assert run(0.02, 120.0) == []
 
 
 def test_an_arm_that_is_led_out_of_its_reach_stops():

@@ -427,11 +427,8 @@ def test_the_sensor_drifts_by_newtons_within_minutes():
     for seed in range(4):
         bench = Bench(robot="ur5e", generation=E_SERIES, fidelity="typical", seed=seed)
         plant = bench.controller.plant
-        early = plant._feedback._sensors._drift.next_block(1)[0]
-        late = [plant._feedback._sensors._drift.next_block(1)[0] for _ in range(round(300 / (256 * 0.002)))][
-            -1
-        ]
-        changes.append(np.abs(late - early)[:3].max())
+        errors = plant._feedback._sensors._drift.next_block(round(300 / 0.002))
+        changes.append(np.abs(errors[-1] - errors[0])[:3].max())
     assert 1.0 < max(changes) < 9.0
 
 
@@ -484,7 +481,9 @@ def test_the_zero_is_a_mean_over_measurements_with_the_present_payload(make_benc
         "  sleep(100)\nend\n"
     )
     bench.tick(bench.controller.generation.cycles(1.0))
-    assert bench.now.actual_tcp_force == pytest.approx((0.0,) * 6, abs=0.2)
+    # What a CB3 arm estimates still changes: its drives settle with the other payload.
+    allowed = 0.2 if make_bench is ESeriesBench else 0.5
+    assert bench.now.actual_tcp_force == pytest.approx((0.0,) * 6, abs=allowed)
 
 
 def test_the_wrench_is_that_at_the_flange_and_force_mode_still_takes_the_one_at_the_tcp():

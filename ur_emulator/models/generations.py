@@ -57,7 +57,7 @@ CB3 = RobotGeneration(
         robot_voltage=48.13,
         joint_voltage=47.92,  # the same: 47.81 to 48.02
         # Chosen: with a tenth of the joints' currents a resting UR3 takes .29 A, as in the same recordings.
-        idle_current=0.13,
+        idle_current=0.11,
         joint_temperatures=(28.0, 29.0, 31.0, 36.0, 38.0, 39.0),  # production log of a UR3 (plant.py)
     ),
     force_sensing=ForceSensing(
