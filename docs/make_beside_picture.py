@@ -6,6 +6,7 @@ draws. The recorded side is the table of figures in tests/ur_emulator/recorded_a
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -99,6 +100,9 @@ def print_tables(ours: dict[tuple[str, int], list[Any]], still: list[list[Any]])
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "img" / "beside.png")
+    out = parser.parse_args().out
     records = {motion: [record(seed, motion) for seed in SEEDS] for motion in MOTIONS}
     ours = {key: [moving(one, key[1]) for one in records[key[0]]] for key in MOVING}
     still = [
@@ -127,7 +131,7 @@ def main() -> None:
             bbox_to_anchor=(0.1, 0.365),
             ncols=3,
         )
-    (ROOT / "docs" / "img" / "beside.png").write_bytes(image_bytes(page))
+    out.write_bytes(image_bytes(page))
 
 
 if __name__ == "__main__":
