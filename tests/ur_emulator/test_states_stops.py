@@ -160,7 +160,7 @@ def test_a_safeguard_pauses_on_the_path_and_the_program_goes_on_by_itself():
     ]
     # The path is a line in joint space: it never was left, whatever the time on it.
     path = np.array([s.target_q for s in bench.snapshots[first:]])
-    assert np.ptp(path[:, 1:], axis=0).max() < 1e-6
+    assert np.ptp(path[:, 1:], axis=0).max() < 1e-5  # it begins where the arm was measured
     assert any(speeds(bench)[-100:, 0])
 
 

@@ -188,7 +188,7 @@ class Story(Bench):
         self.tick(10)
         self.controller.state.io.digital_in = 0
         self.tick(10)
-        self.tick(2500, Push((0.0, 0.0, -40.0), (0.0, 0.2, 0.0)))  # until the wrist is warm
+        self.tick(2500, Push((0.0, 0.0, -30.0), (0.0, 0.3, 0.0)))  # until the wrist is warm
         self.tick(20, Push((12.0, 15.0, -18.0)))
         self.tick(20, Push((0.0, 0.0, 0.0)))
 

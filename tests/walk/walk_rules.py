@@ -15,11 +15,14 @@ from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, 
 from ur_emulator.controller.events import ErrorReported, Event
 from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
 from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.motion.generators import SpeedL, StopL
+from ur_emulator.motion.move import Move
 from ur_emulator.motion.ownership import ArmState
 
 # No set-point accelerates a joint more than this [rad/s²]: the hardest of the programs' commands (6 rad/s², the
-# run-up of a CB3 box adds .38 of it), a stop, and a ramp of the time scaling; and what may be added by a path near a
-# singularity, and by force mode, in which a servoj that starts at the target of the joints is away from its path.
+# run-up of a CB3 box adds .38 of it), a stop, and a ramp of the time scaling; and what may be added near a singularity by
+# whatever moves the tool, and by force mode, in which a servoj that starts at the target of the joints is away from its
+# path.
 MOST, OF_PATHS, OF_FORCE = 36.0, 500.0, 110.0
 STILL = 150  # cycles of 8 ms, after which a stopped arm stands still
 STUCK = 12.0  # s of robot time without progress in which a program should have got on
@@ -82,7 +85,9 @@ class Rules:
         if is_driven and is_on and not self._placed:
             change = np.abs(np.subtract(now.target_qd, before.target_qd)).max() / self._dt
             most = self._most + (OF_FORCE if now.control_mode == ControlMode.FORCE else 0.0)
-            most += OF_PATHS if self._box.controller.state.motion.move is not None else 0.0
+            command = self._box.controller.state.motion._command
+            if command is not None and isinstance(command.generator, Move | SpeedL | StopL):
+                most += OF_PATHS
             self._claim(change <= most, f"set-point accelerates with {change:.1f} rad/s²")
             mean = 0.5 * np.add(now.target_qd, before.target_qd) * self._dt
             jump = np.abs(np.subtract(now.target_q, before.target_q) - mean).max()

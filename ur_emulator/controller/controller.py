@@ -128,7 +128,7 @@ def make_snapshot(
 # Controller time at start [s]: a public client library does not trust a controller clock below 40 s.
 BOOT_TIME = 60.0
 # Time after the last activity until the simulation may pause in lockstep, so that the arm comes to rest [s].
-SETTLE_TIME = 0.2
+SETTLE_TIME = 1.0  # joints of a CB3 creep for .9 s, as recorded
 
 
 class Controller:
