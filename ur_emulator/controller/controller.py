@@ -128,7 +128,7 @@ def make_snapshot(
 # Controller time at start [s]: a public client library does not trust a controller clock below 40 s.
 BOOT_TIME = 60.0
 # Time after the last activity until the simulation may pause in lockstep, so that the arm comes to rest [s].
-# Joints of a CB3 creep for up to .9 s, by less than 1 mrad/s: more time would let clients begin in cycles that
+# Joints of a CB3 creep for up to .9 s, below 1 mrad/s: more time would let clients begin in cycles that
 # depend on the speed of the machine.
 SETTLE_TIME = 0.2
 
