@@ -271,7 +271,8 @@ def draw_freedrive(out):
     lower.set_ylabel("tool speed [mm/s]")
     assert set(mode) == {ControlMode.TEACH, ControlMode.POSITION}
     print(
-        f"freedrive: moved {moved:.1f} mm, top speed {speed.max():.0f} mm/s, "
+        f"freedrive: moved {displacement[round(1.3 / PERIOD)]:.1f} mm when the push ends, {moved:.1f} mm "
+        f"in the end, top speed {speed.max():.0f} mm/s, "
         f"held within {held:.2f} mm afterwards"
     )
     save(figure, out / "contact_freedrive.png")
@@ -307,13 +308,13 @@ def draw_force_mode(out):
     )
     upper.axhspan(0.9 * asked, 1.1 * asked, color=GREEN, alpha=0.15, lw=0)
     upper.axhline(asked, color=GREEN, lw=0.8)
-    upper.plot(t, felt, color=GREY, lw=0.5, label="as the box feels it (actual_TCP_force, with its bias)")
+    upper.plot(t, felt, color=GREY, lw=0.5, label="as the box feels it (actual_TCP_force)")
     upper.plot(t, true, color=BLUE, lw=1.3, label="true contact force")
     upper.set_ylim(-12, 45)
     upper.annotate(f"impact at 50 mm/s:\n{true.max():.0f} N for {(true > 45).sum() * 8} ms",
-                   (t[true.argmax()], 44), (0.15, 31), fontsize=8)  # fmt: skip
+                   (t[true.argmax()], 44), (3.0, 36), fontsize=8)  # fmt: skip
     upper.set_ylabel("force along z [N]")
-    upper.legend(fontsize=8, loc="lower right", framealpha=0.9)
+    upper.legend(fontsize=8, loc="lower center", framealpha=0.9)
     lower.plot(t, 1e3 * (place[:, 2] - TABLE_HEIGHT), color=BLUE, label="height of the tool above the table")
     lower.plot(t, 1e3 * place[:, 1], color=RED, label="with the displacement of the move")
     lower.set_ylabel("[mm]")

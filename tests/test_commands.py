@@ -29,6 +29,7 @@ TARGETS = {
 }
 # Commands of pages, and what ends them soon.
 ALONE = {
+    "python -m docs.make_beside_picture": "--out picture.png",
     "python -m docs.make_extraction_picture": "--out picture.png",
     "python -m pc_client.movements.generate": "library",
     "python -m pydoc": "pc_client.Arm protocol.realtime.layout ur_emulator.ControlBox urscript.compile_program",

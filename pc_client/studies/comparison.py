@@ -8,8 +8,8 @@ robot did and by nothing else.
 
 The second derivative of the speed is the third of the position: the encoders' noise, some micrometres at the
 TCP, would drown it. So a Butterworth filter of second order is run forwards and backwards over the positions,
-which shifts nothing in time and halves the amplitude at 5 Hz. Of noise of 5 micrometres it leaves less than
-.05 m/s^3, where executed movements have .3 to 6; what is lost are the corners of trapezoids, and they are
+which shifts nothing in time and halves the amplitude at 5 Hz. Of noise of 8 micrometres it leaves less than
+.05 m/s^3, where executed movements have .2 to 2; what is lost are the corners of trapezoids, and they are
 lost from the plan, too. 5 Hz is far above the movements themselves: the speed profiles of a robot's strokes
 last a second or more.
 """
