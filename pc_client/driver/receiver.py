@@ -27,7 +27,7 @@ MISSED_ALLOWED = 0.016
 From the last command to rest, at the fastest speed that is commanded (180 deg/s, `kinematics.arms`),
 on a CB3: 8 ms until it is read, 24 ms until the ramp begins, 157 ms ramp, the dead time (16 ms on the
 emulated arm), and the time in which the joints follow. On the emulated arms that makes at most 0.21 s, with
-the loop of `poor` 0.22 s."""
+the loop of `poor` 0.23 s."""
 
 READ_TIMEOUT = 0.5
 """Silence of ours after which the program ends [s]: the arm has come to rest by then, and stays there."""
