@@ -25,9 +25,9 @@ MISSED_ALLOWED = 0.016
 """For so long the last velocity is repeated when we are late [s]. UR's client library waits 20 ms.
 
 From the last command to rest, at the fastest speed that is commanded (180 deg/s, `kinematics.arms`),
-on a CB3: 8 ms until it is read, 24 ms until the ramp begins, 157 ms ramp, and the time in which the joints
-follow and the feedback shows it. On the emulated arms that makes at most 0.28 s, with the loop of `poor`
-0.34 s."""
+on a CB3: 8 ms until it is read, 24 ms until the ramp begins, 157 ms ramp, the dead time (16 ms on the
+emulated arm), and the time in which the joints follow. On the emulated arms that makes at most 0.21 s, with
+the loop of `poor` 0.23 s."""
 
 READ_TIMEOUT = 0.5
 """Silence of ours after which the program ends [s]: the arm has come to rest by then, and stays there."""

@@ -11,9 +11,9 @@ from pc_client.errors import MovementError
 from pc_client.movements.movement import Movement
 from pc_client.movements.sigma_lognormal import SigmaLognormal
 
-#: Loop delays (s) for which the expected SNR is given: command to motion alone, and the whole loop, of a CB3
-#: arm.
-_DELAYS = (0.022, 0.035)
+#: Loop delays (s) for which the expected SNR is given: command to motion alone, and the whole loop, of an
+#: emulated CB3 arm.
+_DELAYS = (0.020, 0.028)
 _N_SAMPLES = 8001
 
 

@@ -224,7 +224,7 @@ def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(lockstep_bo
 
 def push(box):
     """A shove [N] of so many seconds: more than the joints hold."""
-    return box.push((0.0, 240.0, 0.0), duration=0.05)
+    return box.push((0.0, 200.0, 0.0), duration=0.05)
 
 
 def test_a_push_ends_the_run_before_the_box_protects_itself(lockstep_box, tmp_path):

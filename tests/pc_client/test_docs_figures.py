@@ -386,8 +386,8 @@ def test_the_row_of_a_movement_is_what_it_is(name: str) -> None:
         f"{report.joint_speed.value:.2f}",
         f"{report.joint_acceleration.value:.1f}",
         f"{figures['speed_rms_frequency_rad_s']:.2f}",
-        f"{snr['22 ms']:.1f}, {snr['35 ms']:.1f}",
-        f"{vector['22 ms']:.1f}, {vector['35 ms']:.1f}",
+        f"{snr['20 ms']:.1f}, {snr['28 ms']:.1f}",
+        f"{vector['20 ms']:.1f}, {vector['28 ms']:.1f}",
     ]
     assert row[1:] == wanted
 
@@ -436,7 +436,7 @@ def test_what_corners_cost(label: str, setback: float) -> None:
         for m in twins
     ]
     assert float(missed.split()[0]) == pytest.approx(1e3 * max(off), abs=0.51)
-    for printed, delay in zip(snr.removesuffix(" dB").split(", "), (0.022, 0.035), strict=True):
+    for printed, delay in zip(snr.removesuffix(" dB").split(", "), (0.020, 0.028), strict=True):
         assert float(printed) == pytest.approx(np.mean([snr_of_delay(m, delay) for m in twins]), abs=0.051)
 
 

@@ -256,7 +256,7 @@ def test_description_is_plain_data() -> None:
     assert human["stroke_durations_s"] == robot["stroke_durations_s"]
     assert len(human["strokes"]) == 4
     assert "strokes" not in robot
-    assert human["expected_snr_db"]["22 ms"] > human["expected_snr_db"]["35 ms"]
+    assert human["expected_snr_db"]["20 ms"] > human["expected_snr_db"]["28 ms"]
     assert human["provenance"] == dict(load_movement("lognorm_5_2").provenance)
     assert human["provenance"]["seed"] == 4
 

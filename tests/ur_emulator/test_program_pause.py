@@ -177,7 +177,7 @@ def test_time_may_stand_still_while_paused_at_rest(bench):
     assert bench.controller.waits_outside
     bench.tick(1, PAUSE)
     assert bench.controller.is_active
-    bench.tick(150)
+    bench.tick(60)
     assert not bench.controller.is_active
     assert not bench.controller.waits_outside
     bench.tick(2, RESUME)
@@ -193,7 +193,7 @@ def test_time_does_not_stand_still_while_the_arm_pauses(bench):
         bench.tick()
     assert at_rest(bench)
     assert bench.now.runtime_state == ProgramState.PAUSED
-    assert bench.now.actual_qd == (0.0,) * 6
+    assert max(map(abs, bench.now.actual_qd)) < 1e-3  # joints creep to their targets
 
 
 def test_outputs_that_follow_the_program_take_a_pause_as_not_running(bench):

@@ -128,7 +128,9 @@ def make_snapshot(
 # Controller time at start [s]: a public client library does not trust a controller clock below 40 s.
 BOOT_TIME = 60.0
 # Time after the last activity until the simulation may pause in lockstep, so that the arm comes to rest [s].
-SETTLE_TIME = 1.0  # joints of a CB3 creep for .9 s, as recorded
+# Joints of a CB3 creep for up to .9 s, below 1 mrad/s: more time would let clients begin in cycles that
+# depend on the speed of the machine.
+SETTLE_TIME = 0.2
 
 
 class Controller:
