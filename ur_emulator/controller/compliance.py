@@ -17,7 +17,7 @@ from ur_emulator.controller.robot_mode import RobotModeMachine
 from ur_emulator.controller.safety.inputs import OperationalModeChoice
 from ur_emulator.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
 from ur_emulator.controller.safety.safety_state import ConfiguredLimits, SafetyState
-from ur_emulator.models.robot_model import ZERO6, Vector6
+from ur_emulator.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.motion.arm_motion import ArmMotion
 from ur_emulator.motion.axis_hold import AxisHold
 from ur_emulator.motion.force_mode import ForceMode
@@ -25,9 +25,10 @@ from ur_emulator.motion.generators import TorqueCommand
 from ur_emulator.motion.ownership import ArmState
 from ur_emulator.plant.plant import PlantState
 
-# An external force above this when freedrive begins means a wrong payload or a push [N]. It is twice the
-# stated precision of the estimate.
-UNEXPECTED_FORCE = 20.0
+# An external force above this when freedrive begins means a wrong payload or a push. Chosen: of a sensor six
+# times its precision. An arm without one takes for a force what friction bears at rest, a second after a
+# motion up to 25 N on a UR3 and 56 N on a UR5: 13 N per kg of the rated payload.
+_OF_SENSOR, _OF_ESTIMATE = 20.0, 13.0  # N, N/kg
 
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -50,6 +51,7 @@ class Compliance:
         operational: OperationalModeChoice,
         inputs: IoConfiguration,
         past: PastCycles,
+        robot: RobotModel,
     ) -> None:
         """Begin with an arm that is driven by position.
 
@@ -58,6 +60,8 @@ class Compliance:
         self._motion = motion
         self._robot_mode = mode
         self._safety = safety
+        has_sensor = robot.generation.force_sensing.has_sensor
+        self._unexpected_force = _OF_SENSOR if has_sensor else _OF_ESTIMATE * robot.payload_max
         self._operational = operational
         self._inputs = inputs
         self._past = past
@@ -116,7 +120,7 @@ class Compliance:
         self.by_program = self.by_program or by_program
         self.by_client = self.by_client or by_client
         if not self.is_in_freedrive:
-            self._is_refused = hypot(*wrench[:3]) > UNEXPECTED_FORCE
+            self._is_refused = hypot(*wrench[:3]) > self._unexpected_force
         self._hand_over()
 
     def end_freedrive_by_program(self) -> None:

@@ -153,7 +153,7 @@ def make_state(
         encoders=Encoders(),
         modbus=modbus,
         modbus_map=MapMemory(version),
-        compliance=Compliance(motion, mode, safety, operational, io_configuration, past),
+        compliance=Compliance(motion, mode, safety, operational, io_configuration, past, robot),
         force_sense=ForceSense(clock.generation, tool),
         pendant=Pendant(),
         interpreter=InterpreterQueue(),
