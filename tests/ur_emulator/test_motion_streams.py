@@ -277,3 +277,23 @@ def test_a_dead_time_that_wanders_keeps_speeds_continuous_and_brings_the_arm_to_
     speeds = np.array([target.qd for target in targets])
     assert np.abs(np.diff(speeds, axis=0, prepend=np.zeros((1, 6)))).max() <= 5.0 * DT * (1 + 1e-9)
     assert not speeds[-1].any()
+
+
+def test_one_program_after_the_other_is_one_stream():
+    """As drivers of old send it: a program of one line in each cycle, each of its own thread."""
+
+    def targets(cycles):
+        motion, owner = ArmMotion(ZERO6, 20.0, dead_cycles=cycles), None
+        for _ in range(30):
+            motion.release(owner)
+            owner = object()
+            motion.command(owner, SpeedJ((0.2,) * 6, 5.0))
+            yield motion.step(DT, 1.0)
+        motion.release(owner)
+        for _ in range(30):
+            yield motion.step(DT, 1.0)
+
+    plain, late = list(targets((0,))), list(targets((2,)))
+    assert late[2:] == plain[:-2]
+    assert plain[28].qd == (0.2,) * 6
+    assert not any(late[-1].qd)

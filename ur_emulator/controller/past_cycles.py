@@ -16,7 +16,7 @@ from ur_emulator.plant.plant import PlantState
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.
 HISTORY_TIME = 1.0
 # Measured accelerations are those of a parabola through the positions of this time [s]. Chosen: encoder noise
-# of 15 urad leaves 0.25 rad/s^2, and the value is 10 ms old.
+# of 22 urad leaves 0.4 rad/s^2, and the value is 10 ms old.
 PARABOLA_TIME = 0.02
 
 

@@ -141,7 +141,7 @@ class ProgramRunner:
         if self._primary is not None:
             self._primary.kill()
             self._end(unscheduled=unscheduled)
-        self._state.motion.stop()
+        self._state.motion.stop(at_once=unscheduled)
 
     def pause(self, deceleration: float = 0.0) -> None:
         """Pause the primary program; the arm comes to rest on its path.

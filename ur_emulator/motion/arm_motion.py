@@ -258,7 +258,7 @@ class ArmMotion:
         if isinstance(command.generator, Move) and command.generator.returned:
             command.owner = None
         else:
-            self._brake(Event.TAKEN)
+            self._brake(Event.TAKEN, at_once=False)
 
     # --- programs: they begin, pause, go on and end
 
@@ -318,18 +318,23 @@ class ArmMotion:
         if (move := self.move) is not None and not move.leg.process:
             self._brake(Event.TAKEN)
 
-    def stop(self) -> None:
-        """Take the arm from its owner and ramp it to rest; all overlays and a pause end."""
+    def stop(self, *, at_once: bool = False) -> None:
+        """Take the arm from its owner and ramp it to rest; all overlays and a pause end.
+
+        Unless it is at once, the ramp has the dead time of a stream: a program that replaces another one in
+        this cycle continues its stream without a gap.
+        """
         self._begins_program = False
         self._drop_overlays()
-        self._brake(Event.TAKEN)
+        self._brake(Event.TAKEN, at_once=at_once)
         self._time = PathTime()
         self._go(Event.RESUME)
 
-    def _brake(self, event: Event) -> None:
+    def _brake(self, event: Event, *, at_once: bool = True) -> None:
         """Follow an event with the deceleration of every stop, also where only an overlay moved the arm."""
         ramp = StopJ(self.stop_deceleration)
-        self._delay.clear()
+        if at_once:
+            self._delay.clear()
         self._go(event, ramp)
         if self.state in _AT_REST and any(self.path.qd):
             self._go(Event.DRIFT, ramp)

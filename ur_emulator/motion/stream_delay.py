@@ -1,10 +1,11 @@
 """The dead time of a streamed command: it moves the target of the arm some cycles after it was given.
 
 Recordings of a real UR3 of the CB3 show its joints half a millisecond behind their target, so what users
-measure from a streamed command to the motion, 20 to 35 ms, lies before the target. Chosen: whatever moves the
-path passes the same queue, the stream, the ramp after a lost command, and the stop that a program commands; a
-stop of the safety system, a pause and the end of a program act at once. Moves have no dead time: it could not
-be told from that of the program. A recording of `speedj` with the times of its commands would decide it.
+measure from a streamed command to the motion, 20 to 35 ms, lies before the target. Chosen: whatever moves
+the path passes the same queue, the stream, the ramp after a lost command or the end of a program, and the
+stop that a program commands; a stop of the safety system and a pause act at once. Moves have no dead time:
+it could not be told from that of the program. A recording of `speedj` with the times of its commands would
+decide it.
 """
 
 from collections import deque
