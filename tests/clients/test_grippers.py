@@ -117,7 +117,6 @@ def test_ur_rtde(box):
         (("setUnit", POSITION, DEVICE), None),
         (("getCurrentPosition",), 20),
         (("open", -1, -1, START), 0),
-        (("objectDetectionStatus",), 0),
         (("waitForMotionComplete",), 3),
         (("isOpen",), True),
         (("getVars", "STA", "OBJ", "ACT", "POS", "SPE", "FOR"), [3, 3, 1, 3, 255, 64]),
