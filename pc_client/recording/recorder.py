@@ -16,7 +16,7 @@ import json
 from collections.abc import Callable, Iterable, Mapping
 from io import FileIO
 from pathlib import Path
-from queue import Full, Queue
+from queue import SimpleQueue
 from struct import Struct
 from threading import Thread
 from types import TracebackType
@@ -58,7 +58,8 @@ class _Outbox:
         self._file = file
         self._made: list[bytes] = []  # since the last chunk was posted
         self._n_taken = 0
-        self._posted: Queue[bytes | None] = Queue(MOST_WAITING)
+        # Not `queue.Queue`: where a signal interrupts its `put`, the thread may wait for ever.
+        self._posted: SimpleQueue[bytes | None] = SimpleQueue()
         self._left = memoryview(b"")  # what the file did not take
         self._thread = Thread(target=self._work, name="recording", daemon=True)
 
@@ -91,11 +92,9 @@ class _Outbox:
     def post(self) -> None:
         """Give the thread what was taken since the last call; keep it if there is an error, or no room."""
         if self.error is None:
-            chunk = self._take()
-            try:
-                self._posted.put_nowait(chunk)
-            except Full:
-                self._made.append(chunk)
+            if self._posted.qsize() < MOST_WAITING:
+                self._posted.put(self._take())
+            else:
                 self.error = OSError(errno.EIO, f"the disk is too slow, {MOST_WAITING} chunks wait for it")
 
     def close(self) -> None:
