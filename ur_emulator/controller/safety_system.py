@@ -19,7 +19,7 @@ from ur_emulator.controller.state import ControllerState
 from ur_emulator.motion.arm_motion import SCALING_RATE
 from ur_emulator.plant.plant import Plant, PlantState
 
-# The drives lag behind their targets by 30 to 50 ms. The brakes wait for them, at most the second time [s].
+# Joints settle behind their targets. The brakes wait for them, at most the second time (chosen) [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
 
 
