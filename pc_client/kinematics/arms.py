@@ -258,8 +258,8 @@ _UR20_SPEEDS: Six = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
 # (Universal_Robots_Client_Library, external_control.urscript); no joint gets more. For the large joints it
 # is less, from torque: what UR's "max joint torques" leave after gravity of the bare arm in its worst
 # posture and friction at 1 rad/s, over the inertia of the arm before its base with the rotor. Masses: UR's
-# DH article; rotor inertia and friction: identified sets of real arms (.45 kg m² for joints of size 2 on a
-# UR3, .61 on a UR3e, 1.93 for size 3, 5.9 for size 4; the larger ones assumed, in proportion to the torque).
+# DH article; rotor inertia and friction: identified sets of real arms (.61 kg m² for joints of size 2, 1.93 for
+# size 3, 5.9 for size 4, on CB3 and e-Series; the larger ones assumed, in proportion to the torque).
 # The base gets what the shoulder gets.
 _WRISTS = 40.0
 
@@ -268,12 +268,12 @@ _WRISTS = 40.0
 # the data sheets. Working boxes: a search for the largest box on a grid (UR3 25 mm,
 # others 50 mm) with the nominal kinematics; a UR3e has the UR3's, for the movements that lie in it.
 _ROWS = (
-    # (56 - 19 gravity - 10 friction) Nm over .95 kg m²; elbow (28 - 7 - 4) over .4.
-    _arm("ur3", None, _UR3_SPEEDS, (28.0, 40.0), 0.5, (0.275, 0.425, 0.2, 0.15, 0.35)),
-    # (150 - 55 - 14) Nm over 3.7 kg m²; elbow (150 - 17 - 17) over 2.6.
-    _arm("ur5", None, _UR5_SPEEDS, (22.0, 40.0), 0.85, (0.3, 0.65, 0.4, 0.15, 0.55)),
-    # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 17) over 4.3.
-    _arm("ur10", None, _UR10_SPEEDS, (15.0, 21.0), 1.3, (0.4, 0.85, 0.7, 0.15, 0.8)),
+    # (56 - 19 gravity - 7 friction) Nm over 1.1 kg m²; elbow (28 - 7 - 4) over .4.
+    _arm("ur3", None, _UR3_SPEEDS, (27.0, 40.0), 0.5, (0.275, 0.425, 0.2, 0.15, 0.35)),
+    # (150 - 55 - 33) Nm over 3.7 kg m²; elbow (150 - 17 - 33) over 2.6.
+    _arm("ur5", None, _UR5_SPEEDS, (17.0, 38.0), 0.85, (0.3, 0.65, 0.4, 0.15, 0.55)),
+    # (330 - 122 - 29) Nm over 11.8 kg m²; elbow (150 - 41 - 33) over 4.3.
+    _arm("ur10", None, _UR10_SPEEDS, (15.0, 18.0), 1.3, (0.4, 0.85, 0.7, 0.15, 0.8)),
     # (54 - 19 - 6) Nm over 1.1 kg m²; elbow (28 - 7 - 3) over .4.
     _arm("ur3e", _UR3E, _UR3_SPEEDS, (26.0, 40.0), 0.5, (0.275, 0.425, 0.2, 0.15, 0.35)),
     # (150 - 62 - 16) Nm over 3.6 kg m²; elbow (150 - 20 - 16) over 2.7.
