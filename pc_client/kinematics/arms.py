@@ -258,8 +258,8 @@ _UR20_SPEEDS: Six = (120.0, 120.0, 150.0, 210.0, 210.0, 210.0)
 # (Universal_Robots_Client_Library, external_control.urscript); no joint gets more. For the large joints it
 # is less, from torque: what UR's "max joint torques" leave after gravity of the bare arm in its worst
 # posture and friction at 1 rad/s, over the inertia of the arm before its base with the rotor. Masses: UR's
-# DH article; rotor inertia and friction: identified sets of real arms (.61 kg m² for joints of size 2, 1.93 for
-# size 3, 5.9 for size 4, on CB3 and e-Series; the larger ones assumed, in proportion to the torque).
+# DH article; rotor inertia and friction: identified sets of real arms (.61 kg m² for joints of size 2, 1.93
+# for size 3, 5.9 for size 4, on CB3 and e-Series; the larger ones assumed, in proportion to the torque).
 # The base gets what the shoulder gets.
 _WRISTS = 40.0
 
