@@ -9,11 +9,11 @@ from functools import partial
 
 from bench.length import FULL, Length
 from bench.script import SYNC_THREADS
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.controller import Controller
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import CompiledProgram, compile_program
 from urscript.syntax.parser import prepare
 

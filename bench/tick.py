@@ -8,10 +8,10 @@ import mujoco
 
 from bench.length import FULL, Length
 from bench.limit import best_of
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.controller import Controller
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.syntax.parser import prepare

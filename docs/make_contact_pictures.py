@@ -19,16 +19,16 @@ import mujoco
 import numpy as np
 
 from protocol.ur_types import ControlMode, SafetyMode
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.commands.surroundings import Push
-from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import ErrorReported
-from ur_emulator.models.calibration import calibrated_dh
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import TYPICAL
-from ur_emulator.models.mjcf import LINKS, arm_spec, to_body
-from ur_emulator.plant.arm_physics import TABLE_HEIGHT
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.commands.surroundings import Push
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.controller.events import ErrorReported
+from ur_emulator.machine.models.calibration import calibrated_dh
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import TYPICAL
+from ur_emulator.machine.models.mjcf import LINKS, arm_spec, to_body
+from ur_emulator.machine.plant.arm_physics import TABLE_HEIGHT
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
 mpl.use("agg")

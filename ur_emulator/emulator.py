@@ -18,16 +18,16 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self, overload
 
 from protocol.ur_types import Ports
-from ur_emulator.box_log import LogEntry
-from ur_emulator.box_options import BoxOptions, ServedAt, check_count, counted_up
-from ur_emulator.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
-from ur_emulator.control_api.operations import BoxOperations
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.box_log import LogEntry
+from ur_emulator.host.box_options import BoxOptions, ServedAt, check_count, counted_up
+from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
+from ur_emulator.host.control_api.operations import BoxOperations
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.command import Command, Done
-    from ur_emulator.loop.pacing import Pace
-    from ur_emulator.models.robot_generation import RobotGeneration
+    from ur_emulator.host.pacing import Pace
+    from ur_emulator.machine.controller.command import Command, Done
+    from ur_emulator.machine.models.robot_generation import RobotGeneration
 
 
 class Rack(Protocol):
@@ -77,10 +77,10 @@ def make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
     """
     check_count(len(options))
     if in_process:
-        from ur_emulator.rack import LoopRack
+        from ur_emulator.host.rack import LoopRack
 
         return LoopRack(options)
-    from ur_emulator.box_process import ProcessRack
+    from ur_emulator.host.box_process import ProcessRack
 
     return ProcessRack(options)
 
@@ -144,7 +144,7 @@ class BoxControl(BoxOperations):
         """Ask for something as a client of the box would; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
+            command: one of `ur_emulator.machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
             done: called when it was applied, in another thread: with its result and None, or with None and
                 the error, a `RefusedError` if it was refused.
 

@@ -27,7 +27,7 @@ from ur_emulator.errors import ControlError, EmulatorError, ModelError, PortErro
 
 if TYPE_CHECKING:
     from ur_emulator import ControlBox
-    from ur_emulator.models.robot_model import RobotModel
+    from ur_emulator.machine.models.robot_model import RobotModel
 
 # What `@pytest.mark.ur(...)` and `ur_box_factory(...)` take.
 OPTIONS = (
@@ -165,7 +165,7 @@ def _defaults(config: pytest.Config, robot: str | None) -> dict[str, Any]:
 
 def _robot(name: str, version: str | None) -> RobotModel:
     """Return an arm that runs a version of the software; ModelError if there is none."""
-    from ur_emulator.models.robots import robot_by_name
+    from ur_emulator.machine.models.robots import robot_by_name
 
     robot = robot_by_name(name, version)
     robot.software_version(version)

@@ -14,16 +14,16 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
-from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram, StopProgram
-from ur_emulator.controller import events as ev
-from ur_emulator.controller.command import Command
-from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import ArgumentError
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.move import Move
-from ur_emulator.outgoing.loop_network import LoopNetwork
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.script_network.loop_network import LoopNetwork
+from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, StartProgram, StopProgram
+from ur_emulator.machine.controller import events as ev
+from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
 if TYPE_CHECKING:

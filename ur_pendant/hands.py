@@ -23,8 +23,8 @@ from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import ClientError
 from protocol.rtde.types import RtdeValue
 from protocol.ur_types import ProgramState, RobotMode, SoftwareVersion
-from ur_emulator.control_api.http_client import ControlClient
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.control_api.http_client import ControlClient
 from ur_pendant.robot import Robot
 
 

@@ -27,9 +27,9 @@ from pc_client.arrays import Array
 from pc_client.kinematics.model import RobotModel, solve_ik
 from protocol.pose import pose_inv, pose_to_T
 from protocol.ur_types import JOINT_NAMES, ProgramState, RobotMode, SafetyStatus
-from ur_emulator.commands.surroundings import MAX_FORCE, SIZES, THING_SIZES
-from ur_emulator.control_api.box_state import Question
-from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
+from ur_emulator.host.control_api.box_state import Question
+from ur_emulator.machine.commands.surroundings import MAX_FORCE, SIZES, THING_SIZES
+from ur_emulator.machine.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
 from ur_pendant.hands import ACCELERATION, KEYS, SPEED, HandError, Hands
 from ur_pendant.robot import PLOTTED, RATE, Robot, Sample, Signal

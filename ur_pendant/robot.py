@@ -34,9 +34,9 @@ from protocol.primary.messages import (
 )
 from protocol.primary.values import TypedValue
 from protocol.ur_types import JOINT_NAMES, Ports
-from ur_emulator.control_api.box_state import BoxState, Question
-from ur_emulator.control_api.http_client import AttachedBox
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.control_api.box_state import BoxState, Question
+from ur_emulator.host.control_api.http_client import AttachedBox
 
 RATE = 30.0
 """Packages a second that RTDE is asked for: a screen shows twice as many at best."""

@@ -19,7 +19,7 @@ from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from ur_emulator.control_api.http_client import ControlClient
+from ur_emulator.host.control_api.http_client import ControlClient
 from ur_pendant.server import MOST_PAGES
 
 WINDOW = Section("The window of a box")

@@ -33,15 +33,15 @@ from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.studies.extraction.pen import contents, parse_pen, pen_sources
 from pc_client.studies.sweep.settings import read_config
-from ur_emulator.controller.clock import Clock
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.models.generations import CB3
-from ur_emulator.outgoing.loop_network import LoopNetwork
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.script_network.loop_network import LoopNetwork
+from ur_emulator.machine.controller.clock import Clock
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.program_files.compiling import load_and_compile
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
-from ur_emulator.scripting.rpc_builtins import RpcBuiltins
 from ur_hil.cell import load_cell
 from urscript.errors import ScriptRuntimeError
 

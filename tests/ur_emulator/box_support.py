@@ -12,14 +12,14 @@ from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.command import Submitted
-from ur_emulator.controller.controller import SETTLE_TIME, Controller
-from ur_emulator.loop.pacing import RealtimePacer
-from ur_emulator.loop.served_box import BoxIdentity, ServedBox
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.host.pacing import RealtimePacer
+from ur_emulator.host.served_box import BoxIdentity, ServedBox
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.command import Submitted
+from ur_emulator.machine.controller.controller import SETTLE_TIME, Controller
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
 VERSION = SoftwareVersion(3, 15, 8)

@@ -3,7 +3,7 @@
 import numpy as np
 from box_support import Bench
 
-from ur_emulator.controller.events import ErrorReported
+from ur_emulator.machine.controller.events import ErrorReported
 
 TABLE = -0.02  # m, height of the table
 DOWN = "p[0.3,0,{z},3.14159265,0,0]"  # tool down, far from singularities

@@ -10,16 +10,16 @@ from plant_support import HOME, hold, target
 from states_support import infos
 
 from protocol.ur_types import ControlMode, SafetyMode
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.safety import UnlockProtectiveStop
-from ur_emulator.commands.surroundings import AddObstacle, RemoveObstacle
-from ur_emulator.controller.events import ErrorReported
 from ur_emulator.errors import EmulatorError
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.plant.obstacles import SLOTS
-from ur_emulator.plant.plant import Plant
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.commands.safety import UnlockProtectiveStop
+from ur_emulator.machine.commands.surroundings import AddObstacle, RemoveObstacle
+from ur_emulator.machine.controller.events import ErrorReported
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.machine.plant.obstacles import SLOTS
+from ur_emulator.machine.plant.plant import Plant
 
 DEEP = DOWN.format(z=-0.15)
 

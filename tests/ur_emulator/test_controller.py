@@ -10,12 +10,12 @@ from plant_support import dh_frames
 from protocol.pose import pose_to_T
 from protocol.realtime.layout import SNAPSHOT_FIELDS
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.commands.programs import AnswerRequest, ClosePopup, SetSpeedSlider, StopProgram
-from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION
-from ur_emulator.controller.settings import ErrorSettings
-from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ArgumentError
-from ur_emulator.models.calibration import calibrated_dh
+from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, SetSpeedSlider, StopProgram
+from ur_emulator.machine.controller.safety.limit_checks import MAX_POSITION_DEVIATION
+from ur_emulator.machine.controller.settings import ErrorSettings
+from ur_emulator.machine.controller.snapshot import Snapshot
+from ur_emulator.machine.models.calibration import calibrated_dh
 
 MOVE = "def move():\n  movej([0.6,-1.2,-1.9,-0.5,1.0,1.2], a=1.4, v=1.05)\nend\n"
 

@@ -11,18 +11,18 @@ from e_series_support import ESeriesBench
 from protocol.robotiq import Fault, Objects, Status
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.controller.grippers.robotiq import RobotiqGripper
-from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
-from ur_emulator.models.generations import E_SERIES
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.things import Thing
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.hand import FingerCommand, FingerState
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.scene import load_scene
-from ur_emulator.ports.robotiq import RobotiqPort
-from ur_emulator.ports.tool_line import ToolLinePort
+from ur_emulator.host.ports.robotiq import RobotiqPort
+from ur_emulator.host.ports.tool_line import ToolLinePort
+from ur_emulator.machine.controller.io.lines import InputOutput
+from ur_emulator.machine.models.generations import E_SERIES
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.models.things import Thing
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.hand import FingerCommand, FingerState
+from ur_emulator.machine.plant.plant import Plant
+from ur_emulator.machine.plant.scene import load_scene
+from ur_emulator.machine.tools.robotiq import RobotiqGripper
 from ur_hil.tools import TOOLS, tools_by_name
 
 PERIOD = 0.008

@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, Swing, at, line, run_cycles
 
 from protocol.pose import pose_add, pose_inv, pose_sub, pose_trans, rotvec_to_matrix
-from ur_emulator.controller.io.encoders import RANGES, Encoder
-from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.generators import SpeedJ
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.overlay import (
+from ur_emulator.machine.controller.io.encoders import RANGES, Encoder
+from ur_emulator.machine.motion.arm_motion import ArmMotion
+from ur_emulator.machine.motion.generators import SpeedJ
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.overlay import (
     CATCH_UP_ACCELERATION,
     BeltEstimate,
     Conveyor,

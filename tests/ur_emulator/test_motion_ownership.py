@@ -12,8 +12,8 @@ import pytest
 from motion_support import DT, HOME, START, TOOL, Swing, line, run_cycles
 
 from protocol.pose import pose_trans
-from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
-from ur_emulator.motion.generators import (
+from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
+from ur_emulator.machine.motion.generators import (
     DirectTorque,
     JointTarget,
     Kind,
@@ -23,9 +23,9 @@ from ur_emulator.motion.generators import (
     StopJ,
     TorqueCommand,
 )
-from ur_emulator.motion.leg import move_j
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.ownership import TABLE, TRANSITIONS, ArmState, Event, Fate
+from ur_emulator.machine.motion.leg import move_j
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.ownership import TABLE, TRANSITIONS, ArmState, Event, Fate
 
 SIX = (0.0,) * 6
 QD = (0.4, -0.3, 0.2, 0.1, 0.0, 0.5)

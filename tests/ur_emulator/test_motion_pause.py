@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, Swing, at, distance_to_polyline, line, positions, run_cycles
 
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.generators import PAUSE_DECELERATION, ServoJ, SpeedJ
-from ur_emulator.motion.leg import move_j, move_tool
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.ownership import Fate
-from ur_emulator.motion.path import arc_through
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.arm_motion import ArmMotion
+from ur_emulator.machine.motion.generators import PAUSE_DECELERATION, ServoJ, SpeedJ
+from ur_emulator.machine.motion.leg import move_j, move_tool
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.ownership import Fate
+from ur_emulator.machine.motion.path import arc_through
 
 CORNERS = [START, at(0.06, 0, 0), at(0.06, 0.06, 0)]
 

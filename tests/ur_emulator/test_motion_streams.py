@@ -10,12 +10,20 @@ from hypothesis import strategies as st
 from motion_support import ARM, DT, HOME, START, TOOL, tool_accelerations, tool_velocities
 
 from protocol.pose import pose_sub
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
-from ur_emulator.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedJ, SpeedL, StopJ, StopL
-from ur_emulator.motion.leg import move_j
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.tool import Tool
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
+from ur_emulator.machine.motion.generators import (
+    LOST_DECELERATION,
+    JointTarget,
+    ServoJ,
+    SpeedJ,
+    SpeedL,
+    StopJ,
+    StopL,
+)
+from ur_emulator.machine.motion.leg import move_j
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.tool import Tool
 
 FAST = (math.inf,) * 6  # no joint is too slow
 

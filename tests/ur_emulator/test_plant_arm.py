@@ -17,15 +17,15 @@ from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import EmulatorError, ModelError, PlantError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.calibration import draw_calibration
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.e_series_arms import UR3E, UR5E
-from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.plant.exact import ExactPlant
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.sensors import Record, Sensors
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.calibration import draw_calibration
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.e_series_arms import UR3E, UR5E
+from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.plant.exact import ExactPlant
+from ur_emulator.machine.plant.plant import Plant
+from ur_emulator.machine.plant.sensors import Record, Sensors
 
 IN_ARM_PLANE = np.cos(HOME[0])  # share of a lever along x that the shoulder feels
 

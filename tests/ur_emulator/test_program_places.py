@@ -17,8 +17,10 @@ from dashboard_support import Dashboard, script_line, urp, write_programs
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.polyscope import report_files
-from ur_emulator.polyscope.report_files import (
+from ur_emulator.host.ports import robot_api_files
+from ur_emulator.host.ports.robot_api_files import KINDS, StoreResult, write_program
+from ur_emulator.host.reports import report_files
+from ur_emulator.host.reports.report_files import (
     BoxFacts,
     TemporaryFolder,
     flight_report,
@@ -26,8 +28,6 @@ from ur_emulator.polyscope.report_files import (
     save_log,
     support_file,
 )
-from ur_emulator.ports import robot_api_files
-from ur_emulator.ports.robot_api_files import KINDS, StoreResult, write_program
 from ur_emulator.program_files.folder import PART_NAME, FoundFile, ProgramFolder
 from ur_emulator.program_files.loading import load_program
 
@@ -286,7 +286,7 @@ def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
 def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     code = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}\n" + (
-        "import os, signal\nfrom ur_emulator.polyscope.report_files import TemporaryFolder\n"
+        "import os, signal\nfrom ur_emulator.host.reports.report_files import TemporaryFolder\n"
         "folder = TemporaryFolder()\n(folder.path / 'log_history.txt').touch()\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], check=False)

@@ -6,11 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from ur_emulator.commands.programs import SetSpeedSlider
-from ur_emulator.commands.safety import TriggerFault
-from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import SafetyModeChanged
-from ur_emulator.loop.pacing import (
+from ur_emulator.host.pacing import (
     FIRST_READ_LIMIT,
     HANG_LIMIT,
     MAX_BACKLOG,
@@ -18,10 +14,14 @@ from ur_emulator.loop.pacing import (
     LockstepPacer,
     RealtimePacer,
 )
-from ur_emulator.loop.served_box import ServedBox
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.host.served_box import ServedBox
+from ur_emulator.machine.commands.programs import SetSpeedSlider
+from ur_emulator.machine.commands.safety import TriggerFault
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.controller.events import SafetyModeChanged
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 
 PERIOD = 0.008
 

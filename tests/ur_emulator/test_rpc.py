@@ -17,11 +17,11 @@ from box_support import TIMEOUT, Bench, MessageReader, connect, inside, listenin
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.programs import StopProgram
 from ur_emulator.emulator import ControlBox
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.outgoing import xmlrpc as module
-from ur_emulator.scripting import rpc_builtins
+from ur_emulator.host.script_network import xmlrpc as module
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.scripting import rpc_builtins
 
 
 class FakeCall:

@@ -19,8 +19,8 @@ from protocol.rtde.types import TextLevel
 from protocol.ur_types import ProgramState, SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.models.generations import CB3
-from ur_emulator.ports.rtde import RtdePort
+from ur_emulator.host.ports.rtde import RtdePort
+from ur_emulator.machine.models.generations import CB3
 
 V3_15 = SoftwareVersion(3, 15, 8)
 

@@ -10,15 +10,21 @@ from states_support import BRAKING, COMMANDS, ENDLESS, ENTRY, infos, moving
 
 from docs.generate import states_page
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
-from ur_emulator.commands.safety import (
+from ur_emulator.machine.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.machine.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
+from ur_emulator.machine.commands.safety import (
     PressEmergencyStop,
     SafeguardStop,
     TriggerProtectiveStop,
 )
-from ur_emulator.controller.robot_mode import JOINT_MODES, POWERED, TRANSITIONS, ModeCommand, RobotModeMachine
-from ur_emulator.controller.safety.modes import (
+from ur_emulator.machine.controller.robot_mode import (
+    JOINT_MODES,
+    POWERED,
+    TRANSITIONS,
+    ModeCommand,
+    RobotModeMachine,
+)
+from ur_emulator.machine.controller.safety.modes import (
     EVENTS,
     MODES,
     MOVING_MODES,

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ur_emulator.box import Box
-from ur_emulator.box_options import BoxOptions
-from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import Event
-from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import EmulatorError
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.pacing import Situation
-from ur_emulator.loop.steps import Steps
+from ur_emulator.host.box import Box
+from ur_emulator.host.box_options import BoxOptions
+from ur_emulator.host.pacing import Situation
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.steps import Steps
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.controller.events import Event
+from ur_emulator.machine.controller.snapshot import Snapshot
 
 _HANG = 30.0  # s of real time; no walk waits for it
 

@@ -1,0 +1,287 @@
+"""Port 29999, the dashboard server: the lines of a client are answered in order, one after the other.
+
+What the commands do is each a method; how they are spelt stands in `protocol`. An answer is a reply, or steps
+that end in one (see `loop.steps`).
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+
+from protocol.dashboard.commands import OPERATIONAL_MODES, REMOTE_CONTROL_ONLY, USER_ROLES, DashboardCommand
+from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection
+from protocol.errors import ProtocolError
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
+from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
+from ur_emulator.host.player.player import MissingFileRefusal, ProgramPlayer
+from ur_emulator.host.ports.session import Session, SessionPort
+from ur_emulator.host.reports.report_writer import ReportWriter
+from ur_emulator.host.runtime.connection import Connection
+from ur_emulator.host.served_box import ServedBox
+from ur_emulator.host.steps import Steps
+from ur_emulator.machine.commands import power, programs, safety
+from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.controller.events import LogAdded
+from ur_emulator.machine.controller.safety.inputs import OperationalMode
+
+# Name that a simulator gives when nothing is loaded. Source: replies of URSim 3.14 as the public client
+# library expects them.
+UNNAMED = "<unnamed>"
+
+Answer = str | Steps[str]
+
+
+class DashboardAnswers:
+    """Finds the answer to a command."""
+
+    def __init__(
+        self, box: ServedBox, player: ProgramPlayer, reports: ReportWriter, shut_down: Callable[[], None]
+    ) -> None:
+        """Bind the commands to a box."""
+        self._box = box
+        self._player = player
+        self._shut_down = shut_down
+        self._reports = reports
+        self._user_role = "NONE"
+        self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
+            "load": self._load,
+            "play": lambda row, _, client: self._done(row, player.play(client)),
+            "stop": lambda row, *_: self._done(row, player.stop()),
+            "pause": lambda row, *_: self._done(row, player.pause()),
+            "quit": lambda row, *_: row.reply(),
+            "shutdown": self._shutdown,
+            "running": lambda row, *_: row.reply(running=str(player.is_running).lower()),
+            "robotmode": lambda row, *_: row.reply(mode=RobotMode(box.snapshot.robot_mode).name),
+            "get loaded program": self._loaded_program,
+            "popup": lambda row, text, _: self._applied(row, programs.ShowPopup(text)),
+            "close popup": lambda row, *_: self._applied(row, programs.ClosePopup()),
+            "addToLog": self._add_to_log,
+            "isProgramSaved": lambda row, *_: row.reply(saved="true", program=self._file_name),
+            "programState": lambda row, *_: row.reply(state=self._state_word(), program=self._file_name),
+            "PolyscopeVersion": lambda row, *_: row.reply(
+                version=str(box.identity.software.version), date=box.identity.software.day
+            ),
+            "version": lambda row, *_: row.reply(version=str(box.identity.software.version)),
+            "setUserRole": self._set_user_role,
+            "getUserRole": lambda row, *_: row.reply(role=self._user_role),
+            "set operational mode": self._set_operational_mode,
+            "get operational mode": lambda row, *_: row.reply(mode=self._operational_mode()),
+            "clear operational mode": self._clear_operational_mode,
+            "is in remote control": lambda row, *_: row.reply(
+                remote=str(bool(box.controller.state.pendant.remote_period)).lower()
+            ),
+            "power on": lambda row, *_: self._applied(row, power.PowerOn()),
+            "power off": lambda row, *_: self._applied(row, power.PowerOff()),
+            "brake release": lambda row, *_: self._applied(row, power.ReleaseBrakes()),
+            "safetymode": lambda row, *_: row.reply(mode=SafetyMode(box.snapshot.safety_mode).name),
+            "safetystatus": lambda row, *_: row.reply(status=SafetyStatus(box.snapshot.safety_status).name),
+            "unlock protective stop": self._unlock,
+            "close safety popup": lambda row, *_: row.reply(),
+            "load installation": self._load_installation,
+            "restart safety": lambda row, *_: self._applied(row, safety.RestartSafety()),
+            "get serial number": lambda row, *_: row.reply(serial=box.identity.serial_number),
+            "get robot model": lambda row, *_: row.reply(model=box.identity.wire_model),
+            "generate flight report": self._flight_report,
+            "generate support file": self._support_file,
+            "saveLog": self._save_log,
+        }
+
+    def answer(self, event: CommandReceived, client: str) -> Answer:
+        """Return the answer to a command; `client` is the address of who asks."""
+        return self._methods[event.command.name](event.command, event.argument, client)
+
+    # --- programs
+
+    @property
+    def _file_name(self) -> str:
+        return self._player.loaded.file_name if self._player.loaded else UNNAMED
+
+    def _state_word(self) -> str:
+        if self._box.snapshot.runtime_state == ProgramState.PAUSED:
+            return "PAUSED"
+        return "PLAYING" if self._player.is_running else "STOPPED"
+
+    def _loaded_program(self, row: DashboardCommand, *_: str) -> str:
+        loaded = self._player.loaded
+        return row.reply(path=loaded.wire_path) if loaded else row.reply("none")
+
+    def _load(self, row: DashboardCommand, name: str, _: str) -> Answer:
+        loading = self._player.load(name)
+        if row.replies_when_done(self._box.identity.software.version):
+            return self._loaded(row, loading, name, lambda: _path_of(self._player.loaded))
+        try:
+            path = self._player.folder.find(name).wire_path
+        except FileMissingError:
+            return row.reply("not_found", name=name)
+        self._box.start_alone(loading)
+        return row.reply(path=path)
+
+    def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Answer:
+        loading = self._player.load_installation(name)
+        return self._loaded(row, loading, name, lambda: _path_of(self._player.installation))
+
+    def _loaded(
+        self, row: DashboardCommand, loading: Steps[None], name: str, path: Callable[[], str]
+    ) -> Steps[str]:
+        """Answer when a file is loaded, or is not."""
+        try:
+            yield from loading
+        except RefusedError as refusal:
+            return row.reply("not_found" if isinstance(refusal, MissingFileRefusal) else "failed", name=name)
+        return row.reply(path=path(), installation=_path_of(self._player.installation))
+
+    def _done(self, row: DashboardCommand, action: Steps[None]) -> Steps[str]:
+        """Answer when an action is done, or, in older software, when it has begun."""
+        try:
+            if row.replies_when_done(self._box.identity.software.version):
+                yield from action
+                return row.reply("ok")
+            next(action)
+        except StopIteration:
+            return row.reply("ok")
+        except RefusedError:
+            return row.reply("failed")
+        self._box.start_alone(action)
+        return row.reply()
+
+    # --- the box
+
+    def _applied(self, row: DashboardCommand, command: Command) -> Steps[str]:
+        with suppress(RefusedError):
+            yield from self._box.apply(command)
+        return row.reply()
+
+    def _unlock(self, row: DashboardCommand, *_: str) -> Answer:
+        state, now = self._box.controller.state.safety, self._box.snapshot.timestamp
+        if state.mode is SafetyMode.PROTECTIVE_STOP and not state.may_unlock(now):
+            return row.reply("too_early")
+        return self._applied(row, safety.UnlockProtectiveStop())
+
+    def _operational_mode(self) -> str:
+        return self._box.controller.state.operational.mode.name
+
+    def _set_operational_mode(self, row: DashboardCommand, mode: str, _: str) -> Steps[str]:
+        try:
+            if mode.upper() not in OPERATIONAL_MODES:
+                raise RefusedError(f"operational mode {mode}: choose from {', '.join(OPERATIONAL_MODES)}")
+            yield from self._box.apply(power.ChooseModeByDashboard(OperationalMode[mode.upper()]))
+        except RefusedError:
+            return row.reply("failed", mode=mode)
+        return row.reply(mode=self._operational_mode())
+
+    def _clear_operational_mode(self, row: DashboardCommand, *_: str) -> Steps[str]:
+        yield from self._box.apply(power.ChooseModeByDashboard(None))
+        return row.reply(mode=self._operational_mode())
+
+    def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps[str]:
+        self._box.note(f"Shut down by {client}")
+        yield from self._box.apply(power.PowerOff())
+        self._shut_down()
+        return row.reply()
+
+    def _add_to_log(self, row: DashboardCommand, text: str, _: str) -> str:
+        if not text:
+            return row.reply("empty")
+        self._box.announce(LogAdded("Dashboard", text))
+        return row.reply()
+
+    def _set_user_role(self, row: DashboardCommand, role: str, _: str) -> str:
+        if role.upper() not in USER_ROLES:
+            return row.reply("failed", role=role)
+        self._user_role = role.upper()
+        return row.reply(role=role)
+
+    # --- files
+
+    def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps[str]:
+        try:
+            return row.reply(id=(yield from self._reports.flight_report(kind)))
+        except EmulatorError as error:
+            return row.reply("failed", reason=error)
+
+    def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps[str]:
+        try:
+            return row.reply(file=(yield from self._reports.support_file(directory)))
+        except EmulatorError as error:
+            return row.reply("failed", reason=error)
+
+    def _save_log(self, row: DashboardCommand, *_: str) -> Steps[str]:
+        try:
+            path = yield from self._reports.save_log()
+        except EmulatorError as error:
+            self._box.note(f"saveLog failed: {error}")
+            return row.reply("failed")
+        self._box.note(f"Log saved to {path}")
+        return row.reply()
+
+
+def _path_of(thing: object) -> str:
+    return getattr(thing, "wire_path", "")
+
+
+# Units of work for a line, and for so many bytes of it.
+_LINE_COST, _BYTES_PER_UNIT = 2, 1024
+
+
+class DashboardPort(SessionPort["_DashboardSession"]):
+    """Answers dashboard lines."""
+
+    def __init__(self, box: ServedBox, answers: DashboardAnswers) -> None:
+        """Serve a box."""
+        super().__init__(box)
+        self._answers = answers
+
+    def _begin(self, connection: Connection) -> "_DashboardSession":
+        # A client that has closed its sending side still gets its answers.
+        connection.allow_half_close(self.ended)
+        session = _DashboardSession(connection, self._box, self._answers)
+        connection.send(session.lines.greet())
+        return session
+
+    def ended(self, connection: Connection) -> None:
+        """A client sends nothing more: close it when all its lines are answered."""
+        self._sessions[connection].answer_requests()
+
+
+class _DashboardSession(Session):
+    """A client; `lines` is what it has sent, and how answers are written."""
+
+    # Programs send `pause` and `popup` to their own box and close at once, without reading an answer.
+    most_of_the_gone = 4
+
+    def __init__(self, connection: Connection, box: ServedBox, answers: DashboardAnswers) -> None:
+        super().__init__(connection, box)
+        self.lines = DashboardConnection(box.identity.software.dashboard)
+        self._answers = answers
+        self._remote_period = self._period_now()
+
+    def _period_now(self) -> int:
+        return self._box.controller.state.pendant.remote_period
+
+    def _take(self, data: bytes) -> None:
+        try:
+            self.lines.receive_data(data)
+        except ProtocolError:
+            self.connection.close()
+
+    def _answer_next(self) -> Steps[int]:
+        event = self.lines.next_event()
+        if event is None:
+            return 0
+        if not isinstance(event, CommandReceived):
+            text = event.answer
+        elif event.command.needs_remote and not 0 < self._remote_period == self._period_now():
+            text = REMOTE_CONTROL_ONLY
+        else:
+            answer = self._answers.answer(event, self.connection.host)
+            text = answer if isinstance(answer, str) else (yield from answer)
+        self._reply(text)
+        return _LINE_COST + len(text) // _BYTES_PER_UNIT
+
+    def _reply(self, text: str) -> None:
+        # A reply may repeat what the client sent, and must stay one line of allowed length.
+        line = text.replace("\r", " ").replace("\n", " ")[: MAX_LINE - 1]
+        self.connection.send(self.lines.reply(line))
+        if self.connection.dropped:
+            self.connection.close()  # it does not read, and a reply less would shift all that follow
+        if self.lines.is_closed:
+            self.connection.close_when_sent()

@@ -1,0 +1,228 @@
+"""The blend between two moves: a curve from r before the waypoint to r behind it, tangent to both.
+
+There are three shapes. Between two moves of the tool it is a cubic in position and orientation relative to
+the waypoint; between straight lines that is a parabola, the path of a constant acceleration. Between two
+straight process moves (movep) it is a circular arc, on which the speed stays constant. If one of the moves is
+a joint move, it is a cubic in joint space.
+Source: URScript manual CB3 3.15, `r` of the moves, "circular blends" of movep; the other shapes are chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import acos, cos, dist, hypot, pi, sin, sqrt, tan
+
+from protocol.pose import Pose, pose_add, pose_sub
+from ur_emulator.machine.models.robot_model import Vector6
+from ur_emulator.machine.motion.leg import Leg
+from ur_emulator.machine.motion.path import (
+    Cubic,
+    JointCurve,
+    JointLine,
+    JointPath,
+    PoseLine,
+    PosePath,
+    ToolPath,
+    Vector,
+    measure,
+    times,
+)
+from ur_emulator.machine.motion.path_samples import Sample, reaches_end, sample_path
+from ur_emulator.machine.motion.tool import UnreachableError
+
+# Above this angle the arc of a movep would be too narrow: the cubic is used [rad].
+_SHARPEST_ARC = 0.9 * pi
+_STRAIGHT = 1e-6  # m/m
+_SAMPLES = 8  # intervals of a blend, for its greatest speed
+# Where the lengths before and behind the waypoint differ by a greater factor, a blend of two joint moves is
+# shaped as if they differed by this one: else the curve overshoots.
+_GREATEST_RATIO = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Blend:
+    """A blend; it begins and ends with the velocities of the two moves.
+
+    Attributes:
+        path: the curve, in units of the first move.
+        leave: where on the first move it begins.
+        enter: where on the second move it ends.
+        scale: units of the first move per unit of the second.
+        v: greatest speed, in units of the first move.
+        a: greatest acceleration of what `path.rate` and `path.bend` measure.
+        samples: of a path of the tool.
+    """
+
+    path: JointPath
+    leave: float
+    enter: float
+    scale: float
+    v: float
+    a: float
+    samples: tuple[Sample, ...] = ()
+
+
+def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
+    """Return the blend of two moves around the waypoint between them.
+
+    None when there is no length to blend, or the arm cannot follow the curve.
+
+    Args:
+        r: radius [m]; reduced where it covers more than half of the second move.
+        most: how much of the end of the first move it may replace.
+    """
+    before = first.last_part(r, most)
+    after = second.first_part(r, 0.5 * second.path.length)
+    if before <= 0.0 or after <= 0.0 or first.goal is None:
+        return None
+    a, b = first.path, second.path
+    if isinstance(a, ToolPath) and isinstance(b, ToolPath):
+        # As long before the waypoint as behind it, so the speed is the same at both ends of the curve.
+        before = after = min(before, after)
+    leave = first.path.length - before
+    if isinstance(a, ToolPath) and isinstance(b, ToolPath):
+        curve = _tool_curve(first, second, a, b, leave, after)
+        v = max(first.v, second.v)
+        samples = sample_path(curve, first.tool, first.near(leave), v)
+        if not reaches_end(samples, curve.length, first.tool.arm.robot):
+            return None
+        return Blend(
+            ToolPath(curve, first.tool), leave, after, 1.0, v / curve.rate, min(first.a, second.a), samples
+        )
+    if isinstance(b, ToolPath) and (not second.samples or second.samples[-1].s < after):
+        return None
+    try:
+        start_q, slope = a.at(leave, first.near(leave))
+        end_q, end_slope = b.at(after, second.near(after))
+    except UnreachableError:
+        return None
+    if isinstance(a, ToolPath) or isinstance(b, ToolPath):
+        scale, length, end_length = before / after, 2.0 * before, 2.0 * after
+    else:
+        scale, length = 1.0, min(before + after, _GREATEST_RATIO * min(before, after))
+        end_length = length
+    cubic = Cubic.between(start_q, times(length, slope), end_q, times(end_length, end_slope))
+    joint_curve = JointCurve(cubic, length)
+    v = max(first.v, scale * second.v)
+    if scale == 1.0 and isinstance(a, JointLine):
+        v /= joint_curve.rate
+    limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
+    return Blend(joint_curve, leave, after, scale, v, limit)
+
+
+def _tool_curve(
+    first: Leg, second: Leg, a: ToolPath, b: ToolPath, leave: float, enter: float
+) -> PoseCurve | PoseCorner:
+    lines = isinstance(a.path, PoseLine) and isinstance(b.path, PoseLine)
+    if lines and first.process and second.process:
+        corner = _corner(a.path, b.path, first, leave, enter)
+        if corner is not None:
+            return corner
+    start, slope = a.path.at(leave)
+    end, end_slope = b.path.at(enter)
+    waypoint = first.goal_pose
+    length = 2.0 * enter
+    cubic = Cubic.between(
+        pose_sub(start, waypoint), times(length, slope), pose_sub(end, waypoint), times(length, end_slope)
+    )
+    return PoseCurve(cubic, waypoint, length)
+
+
+class PoseCurve:
+    """A cubic in position and rotation vector relative to a waypoint; s is proportional to its parameter."""
+
+    def __init__(self, cubic: Cubic, waypoint: Pose, length: float) -> None:
+        self._cubic = cubic
+        self._waypoint = waypoint
+        self.length = length
+        self.rate = _fastest(self)
+        self.bend = max(map(measure, cubic.bends())) / length**2
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """See PosePath."""
+        value, slope = self._cubic.at(s / self.length)
+        twist = (*slope[:3], *_turn_rate(value[3:], slope[3:]))
+        return pose_add(value, self._waypoint), times(1.0 / self.length, twist)
+
+
+class PoseCorner:
+    """A circular arc between two lines; the orientation follows a cubic."""
+
+    def __init__(
+        self, start: Pose, u: Vector, w: Vector, radius: float, angle: float, turn: Cubic, waypoint: Pose
+    ) -> None:
+        self._start = start
+        self._u, self._w = u, w  # unit vectors: along the first line, and towards the centre
+        self._radius, self._angle = radius, angle
+        self._turn = turn
+        self._waypoint = waypoint
+        self.length = radius * angle
+        self.rate = _fastest(self)
+        turning = max(measure((0.0, 0.0, 0.0, *bend)) for bend in turn.bends())
+        self.bend = max(1.0 / radius, turning / self.length**2)
+
+    def at(self, s: float) -> tuple[Pose, Vector6]:
+        """See PosePath."""
+        phi = s / self._radius
+        sine, rise = self._radius * sin(phi), self._radius * (1.0 - cos(phi))
+        x, y, z = (p + sine * u + rise * w for p, u, w in zip(self._start[:3], self._u, self._w, strict=True))
+        vx, vy, vz = (cos(phi) * u + sin(phi) * w for u, w in zip(self._u, self._w, strict=True))
+        value, slope = self._turn.at(s / self.length)
+        turned = pose_add((0.0, 0.0, 0.0, *value), (0.0, 0.0, 0.0, *self._waypoint[3:]))
+        rx, ry, rz = (k / self.length for k in _turn_rate(value, slope))
+        return (x, y, z, turned[3], turned[4], turned[5]), (vx, vy, vz, rx, ry, rz)
+
+
+def _fastest(path: PosePath) -> float:
+    """Return the greatest speed of the pose on a path when s moves at 1."""
+    return max(measure(path.at(path.length * k / _SAMPLES)[1]) for k in range(_SAMPLES + 1))
+
+
+def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
+    """Return the arc tangent to two lines; None if it would be too narrow, or a line is mainly a rotation."""
+    start, slope = first.at(leave)
+    end, end_slope = second.at(enter)
+    waypoint = leg.goal_pose
+    d1, d2 = slope[:3], end_slope[:3]
+    r, r2 = dist(start[:3], waypoint[:3]), dist(end[:3], waypoint[:3])
+    # The speed is constant only where s is the path length of the tool on both lines.
+    if abs(hypot(*d1) - 1.0) > _STRAIGHT or abs(hypot(*d2) - 1.0) > _STRAIGHT or min(r, r2) <= 0.0:
+        return None
+    if abs(r - r2) > 1e-6 * min(r, r2):
+        return None
+    cosine = sum(x * y for x, y in zip(d1, d2, strict=True))
+    angle = acos(max(-1.0, min(1.0, cosine)))
+    if angle < 1e-4 or angle > _SHARPEST_ARC:
+        return None
+    w = tuple((y - cosine * x) / sin(angle) for x, y in zip(d1, d2, strict=True))
+    radius = min(r, r2) / tan(0.5 * angle)
+    length = radius * angle
+    turn = Cubic.between(
+        pose_sub(start, waypoint)[3:],
+        [length * k for k in slope[3:]],
+        pose_sub(end, waypoint)[3:],
+        [length * k for k in end_slope[3:]],
+    )
+    return PoseCorner(start, d1, w, radius, angle, turn, waypoint)
+
+
+def _turn_rate(rotvec: Sequence[float], slope: Sequence[float]) -> tuple[float, float, float]:
+    """Return the angular velocity in base axes of a rotation vector that changes at `slope`.
+
+    The left Jacobian of SO(3).
+    """
+    x, y, z = rotvec
+    theta2 = x * x + y * y + z * z
+    if theta2 < 1e-8:
+        b, c = 0.5 - theta2 / 24.0, 1.0 / 6.0 - theta2 / 120.0
+    else:
+        theta = sqrt(theta2)
+        b, c = (1.0 - cos(theta)) / theta2, (theta - sin(theta)) / (theta2 * theta)
+    i, j, k = slope
+    px, py, pz = y * k - z * j, z * i - x * k, x * j - y * i
+    return (
+        i + b * px + c * (y * pz - z * py),
+        j + b * py + c * (z * px - x * pz),
+        k + b * pz + c * (x * py - y * px),
+    )
