@@ -59,17 +59,21 @@ MACHINE_ORDER = (
     {"controller"},
     {"scripting"},
     {"commands"},
+    {"machine"},
+    {"records"},
 )
 HOST_ORDER = (
     {"box_log"},
     {"runtime"},
-    {"pacing", "served_box", "steps"},
     {"script_network"},
+    {"pacing", "served_box", "steps"},
     {"player", "reports"},
     {"ports"},
     {"box_options"},
     {"control_api"},
+    {"journal"},
     {"box"},
+    {"replay"},
     {"rack"},
     {"box_process"},
 )

@@ -143,6 +143,10 @@ def serve(
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
+    journal: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the inputs of each cycle here, for `ur-emulator replay`."),
+    ] = None,
     log: Annotated[
         bool,
         typer.Option("--log", "-v", help="Show the log of the box on stderr: programs, errors, clients."),
@@ -188,6 +192,7 @@ def serve(
             skip_unknown_nodes=skip_unknown_nodes,
             remote_control=remote_control,
             services=services.replace(",", " ").split(),
+            journal=journal,
         )
         options = counted_up(boxes, first)
         tokens |= {} if token is None else {TOKEN_VARIABLE: token}
@@ -235,6 +240,33 @@ def serve(
             signal.signal(name, signal.SIG_DFL)
         out.close()
         err.close()
+
+
+@app.command(
+    epilog=examples(
+        "ur-emulator serve --journal session.journal", "ur-emulator replay session.journal --until 75"
+    )
+)
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A journal, as `serve --journal` writes it.")],
+    until: Annotated[
+        float | None, typer.Option(metavar="T", help="Time of the robot at which to end [s].")
+    ] = None,
+) -> None:
+    """Feed a bare machine with the inputs of a journal; each cycle must give the same, bit for bit."""
+    os.environ.setdefault("MUJOCO_GL", "disabled")
+    from ur_emulator.host.replay import replay as run
+
+    try:
+        found = run(file, until)
+    except EmulatorError as error:
+        _complain(str(error))
+        raise typer.Exit(ExitCode.WRONG_USAGE) from None
+    for note in found.notes:
+        _complain(note)
+    typer.echo(str(found))
+    if found.difference is not None or found.end:
+        raise typer.Exit(ExitCode.FAILED)
 
 
 class _CtlCommand(TyperCommand):

@@ -144,7 +144,7 @@ class BoxControl(BoxOperations):
         """Ask for something as a client of the box would; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
+            command: one of `machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
             done: called when it was applied, in another thread: with its result and None, or with None and
                 the error, a `RefusedError` if it was refused.
 
@@ -222,6 +222,7 @@ class ControlBox(_Running, BoxControl):
         services: of a PolyScope X box, closed until they are enabled: "primary" and "rtde".
         tool: on the flange, such as "robotiq-2f85", or a file (docs/grippers.md).
         scene: what stands around the arm, and things to grip: a cell file (TOML) or a fragment of MJCF.
+        journal: file for the inputs of each cycle, to be replayed (docs/journal.md).
         in_process: run in a thread of this process. A client that holds Python's lock while it waits for the
             box then waits for ever.
 
@@ -247,6 +248,7 @@ class ControlBox(_Running, BoxControl):
         services: Collection[str] = (),
         tool: str | PathLike[str] = "none",
         scene: str | PathLike[str] | None = None,
+        journal: str | PathLike[str] | None = None,
         *,
         in_process: bool = False,
         generation: RobotGeneration | None = None,
@@ -270,6 +272,7 @@ class ControlBox(_Running, BoxControl):
             generation,
             tool,
             scene,
+            journal,
         )
         super().__init__(make_rack([options], in_process=in_process))
 

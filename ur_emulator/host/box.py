@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Collection
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt, parse_pace, stand
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.runner import OperationRunner
 from ur_emulator.host.control_api.step_operations import Context
+from ur_emulator.host.journal import Journal
 from ur_emulator.host.pacing import Pace, make_pacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
 from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, SendingPorts, answering_ports
@@ -30,20 +30,18 @@ from ur_emulator.host.script_network.addresses import close_to_scripts, give_bac
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
 from ur_emulator.machine.controller.command import Command, Done
-from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import RobotModel
 from ur_emulator.machine.models.robots import robot_by_name
 from ur_emulator.machine.plant.scene import load_scene
-from ur_emulator.machine.scripting.network import Network
-from ur_emulator.machine.scripting.robot_host import robot_hosts
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel, tools_by_name
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class _Choice:
+class Choice:
     """What the arguments of a box amount to; the ports in `closed` stay closed."""
 
     model: RobotModel
@@ -56,7 +54,7 @@ class _Choice:
     scene: Cell | Path | None
 
     @classmethod
-    def of(cls, options: BoxOptions) -> _Choice:
+    def of(cls, options: BoxOptions) -> Choice:
         """Check the arguments, and look up what they name; EmulatorError for one that is not allowed."""
         model = robot_by_name(str(options.robot), options.version)
         if options.generation is not None:
@@ -95,20 +93,17 @@ class _Choice:
             f"--services {','.join(generation.services)} enables them",
         )
 
-    def make_controller(self, options: BoxOptions, network: Network) -> Controller:
-        """Return the box without its ports; `network` is for its programs."""
-        controller = Controller(
+    def make_machine(self, options: BoxOptions) -> Machine:
+        """Return the box without its ports."""
+        return Machine(
             self.model,
             self.fidelity,
             options.seed,
-            partial(robot_hosts, network=network),
             version=(self.version.major, self.version.minor),
             tools=self.tools,
+            scene=self.scene,
+            remote_control=options.remote_control,
         )
-        controller.state.pendant.set_remote_control(options.remote_control)
-        if self.scene is not None:
-            controller.plant.furnish(self.scene)
-        return controller
 
     def served_at(self, options: BoxOptions, ports: Collection[str]) -> ServedAt:
         """Return where a box with these ports is to be found; they are not open yet.
@@ -147,26 +142,30 @@ class Box:
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
         """
-        choice = _Choice.of(options)
+        choice = Choice.of(options)
         prepare_children(Role.WORKER)  # the compiler is loaded while the box is assembled
         period = choice.model.generation.period_s
         folder = ProgramFolder(None if options.programs is None else Path(options.programs))
         self._options = options
         self._choice = choice
         self._loop = loop
-        self._network = LoopNetwork(loop, period, self._report, options.host)
+        machine = choice.make_machine(options)
         self._box = ServedBox(
-            choice.make_controller(options, self._network),
+            machine,
             choice.identity,
             make_pacer(choice.pace, period, options.speed, phase, lead),
             loop,
             self._fail,
+        )
+        self._network = self._box.network = LoopNetwork(
+            loop, machine.network, period, self._box.arrive, self._box.report, options.host
         )
         self._intake = ProgramIntake(loop.tasks, self._box)
         self._player = ProgramPlayer(
             self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
         )
         self._reports = ReportWriter(self._box, self._player)
+        self._journal = self._open_journal()
         self.operations = OperationRunner(loop, Context(self._box, self._player, self._identity_now, make))
         sending = SendingPorts.make(self._box, self._intake)
         ports = (
@@ -193,7 +192,7 @@ class Box:
         """Ask for something as a client of the box would, from any thread; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
+            command: one of `machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
             done: called in that cycle, in the thread of the box: with its result and None, or with
                 None and the error, a `RefusedError` if it was refused.
         """
@@ -202,6 +201,15 @@ class Box:
     def watch_memory(self, watch: MemoryWatch) -> None:
         """Have the memory of the process measured after each cycle; before the box runs."""
         self._box.watch = watch
+
+    def _open_journal(self) -> Journal | None:
+        options = self._options
+        if options.journal is None:
+            return None
+        waits = self._choice.pace is Pace.LOCKSTEP
+        journal = Journal(Path(options.journal), options, self._box.notice, waits=waits)
+        self._box.keep = journal.write
+        return journal
 
     def _identity_now(self) -> dict[str, Any]:
         options, identity, at = self._options, self._choice.identity, self.served_at
@@ -283,9 +291,6 @@ class Box:
         self._box.log.write(self._box.snapshot.tick, "Controller", text, ReportLevel.FAULT)
         self.on_end()
 
-    def _report(self, what: str, error: Exception) -> None:
-        self._box.report(what, error)
-
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
@@ -295,4 +300,6 @@ class Box:
         self._reports.close()
         self._network.close()
         self._port_set.close()
+        if self._journal is not None:
+            self._journal.close()
         give_back(self)

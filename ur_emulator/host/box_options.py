@@ -54,6 +54,7 @@ class BoxOptions:
     generation: RobotGeneration | None = None
     tool: str | PathLike[str] = "none"
     scene: str | PathLike[str] | None = None
+    journal: str | PathLike[str] | None = None
 
     def check(self) -> None:
         """Check the arguments that need no table; EmulatorError for one that is not allowed."""
@@ -152,6 +153,8 @@ def counted_up(count: int, first: BoxOptions) -> list[BoxOptions]:
         EmulatorError: the host is not an address from which `count` can be counted.
     """
     check_count(count)
+    if count > 1 and first.journal is not None:
+        raise EmulatorError(f"a journal given for {count} boxes: it is that of one box")
     one_host = count == 1 or first.port_base is None
     hosts = [first.host] * count if one_host else _hosts_from(first.host, count)
     return [replace(first, host=host, seed=first.seed + k) for k, host in enumerate(hosts)]

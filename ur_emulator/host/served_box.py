@@ -1,11 +1,11 @@
-"""One box in the loop: its controller, its pacer and its ports.
+"""One box in the loop: its machine, its pacer and its ports.
 
 It decides when to tick and publishes. For its ports it is the whole box: they read its state, submit
 commands, write into its log, and have work done in steps and in the worker process.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -24,16 +24,18 @@ from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.runtime.listener import Listener
 from ur_emulator.host.runtime.memory import MemoryWatch
 from ur_emulator.host.runtime.worker import Ticket
+from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.steps import StepRunner, Steps, settle
 from ur_emulator.machine.commands.power import PowerOff
 from ur_emulator.machine.commands.programs import StartProgram, StopProgram
 from ur_emulator.machine.commands.safety import PressEmergencyStop, UnlockProtectiveStop
-from ur_emulator.machine.controller.command import Command, Done, Result, Submitted
-from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.controller.command import Command, Done, Result
 from ur_emulator.machine.controller.events import Event, LogAdded
 from ur_emulator.machine.controller.safety.modes import MOVING_MODES
 from ur_emulator.machine.controller.snapshot import Snapshot
+from ur_emulator.machine.machine import Answer, Input, Machine
 from ur_emulator.machine.models.robot_generation import Software
+from ur_emulator.machine.scripting.network import Arrival
 from urscript import CompiledProgram
 from urscript.run.waits import Outside
 
@@ -73,10 +75,13 @@ class Publisher(Protocol):
 
 
 class ServedBox:
-    """Advances a controller in an event loop and publishes what it does.
+    """Advances a machine in an event loop and publishes what it does.
 
     Attributes:
-        controller: the box without its ports; ports ask for its state and never change it directly.
+        machine: the box without its ports.
+        controller: its parts; ports read them and never change them.
+        network: carries out what scripts want of the outside; set before the box runs.
+        keep: called with inputs and answer of each cycle, for a journal; None without one.
         identity: names and numbers by which clients know the box.
         steps: advances what takes several cycles; the last of the publishers.
         log: programs, errors, modes, text messages, clients.
@@ -88,25 +93,31 @@ class ServedBox:
     """
 
     def __init__(
-        self, controller: Controller, identity: BoxIdentity, pacer: Pacer, loop: EventLoop, on_failure: Failed
+        self, machine: Machine, identity: BoxIdentity, pacer: Pacer, loop: EventLoop, on_failure: Failed
     ) -> None:
-        """Serve a controller.
+        """Serve a machine.
 
         The loop expects bytes that a script waits for, and has the worker process. `on_failure` gets the
         error that has ended a cycle; there will be no further one.
         """
-        self.controller = controller
+        self.machine = machine
+        self.controller = machine.controller
         self.identity = identity
         self.steps = StepRunner(partial(self.report, "an answer is lost"))
         self._loop = loop
-        self.log = BoxLog(controller.generation)
+        self.log = BoxLog(self.controller.generation)
+        self.network: LoopNetwork | None = None
+        self.keep: Callable[[Sequence[Input], Answer], None] | None = None
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._has_noted_input = False
         self._publishers: tuple[Publisher, ...] = ()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
-        # By the name that replaces them, or by something that nothing else has.
-        self._commands: dict[object, Command] = {}
+        # Commands for the next cycle, by the name under which a later one replaces them, or by an object.
+        self._commands: dict[object, tuple[Command, Done]] = {}
+        # Those that are no reason for a cycle, and what has arrived for scripts.
+        self._quiet: list[Command] = []
+        self._arrived: list[Arrival] = []
         # What is to act in a later cycle: its number, then the order in which they came.
         self._scheduled: list[tuple[int, int, Command, Done]] = []
         self._n_scheduled = 0
@@ -155,14 +166,23 @@ class ServedBox:
     def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
         """Take a command for the next cycle; `done` is called then with the result or the error.
 
-        It takes the place of one with the same name `in_place_of` that still waits.
+        A command that still waits under the same name `in_place_of` is dropped.
         """
         is_stopped = self.snapshot.safety_mode not in MOVING_MODES
         if isinstance(command, _STOPS) or (is_stopped and isinstance(command, UnlockProtectiveStop)):
             self.stops += 1
         name = in_place_of or object()
         self._commands.pop(name, None)
-        self._commands[name] = Submitted(command, done or self._report_error)
+        self._commands[name] = command, done or self._report_error
+
+    def submit_quietly(self, command: Command) -> None:
+        """Take a command for the next cycle, whenever that is: it is no reason for time to pass."""
+        self._quiet.append(command)
+
+    def arrive(self, arrival: Arrival) -> None:
+        """Take what has arrived for a script; it is one of the inputs of the next cycle."""
+        self.machine.take(arrival)
+        self._arrived.append(arrival)
 
     def schedule(self, tick: int, command: Command, done: Done) -> None:
         """Take a command for the cycle of that number; in lockstep it is no reason for time to pass.
@@ -289,7 +309,7 @@ class ServedBox:
     @property
     def is_active(self) -> bool:
         """True while there is a reason for time to pass."""
-        return bool(self._commands) or self._is_awake or self.controller.is_active
+        return bool(self._commands) or self._is_awake or self.machine.is_active
 
     @property
     def _is_awake(self) -> bool:
@@ -302,7 +322,7 @@ class ServedBox:
 
         Who waits for a time does not wait for the operator.
         """
-        waits = self.controller.waits_outside
+        waits = self.machine.waits_outside
         return bool(waits and not self._commands and not (waits is Outside.OPERATOR and self._is_awake))
 
     @property
@@ -346,15 +366,14 @@ class ServedBox:
             self._publish(self.snapshot, now)
         elif self._pacer.may_tick(now, self):
             self._submit_due()
-            commands, self._commands = self._commands, {}
-            snapshot = self.controller.tick(commands.values())
+            answer = self._tick()
+            snapshot = answer.snapshot
             if self.watch is not None:
-                self.watch.look(self.controller.programs, now)
+                self.watch.look(self, now)
             # Events first, also before a cycle that is held: an error must have arrived before any state or
             # answer that shows its effect.
-            if self.controller.state.events:
-                for event in self.controller.state.events.take():
-                    self.announce(event)
+            for event in answer.events:
+                self.announce(event)
             if now < self._pacer.publish_at:
                 self._is_held = True
                 return self._pacer.publish_at
@@ -363,13 +382,29 @@ class ServedBox:
                 if not self.waits_outside:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
                 if self._loop.expect_soon():
-                    self.controller.plant.complete_cycle()
+                    self.machine.use_idle_time()
             return self._pacer.next_call(now)
         # While time stands still, every port repeats itself at its own rate, in real seconds: clients take
         # silence for a dead robot.
         if self._repeats and now - self._last_frame >= self.controller.period_s:
             self._publish(self.snapshot, now)
         return self._pacer.next_call(now)
+
+    def _tick(self) -> Answer:
+        """Advance the machine by a cycle, and do what it asks for."""
+        arrived, self._arrived = self._arrived, []
+        quiet, self._quiet = self._quiet, []
+        submitted, self._commands = self._commands, {}
+        commands = [*((command, self._report_error) for command in quiet), *submitted.values()]
+        inputs: list[Input] = [command for command, _ in commands]
+        answer = self.machine.tick(inputs)
+        if self.keep is not None:
+            self.keep((*arrived, *inputs), answer)
+        for (_, done), (result, error) in zip(commands, answer.outcomes, strict=True):
+            done(result, error)
+        if answer.requests and self.network is not None:
+            self.network.carry_out(answer.requests)
+        return answer
 
     def _submit_due(self) -> None:
         """Add the commands that are scheduled for the cycle that begins."""

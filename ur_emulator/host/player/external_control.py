@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
+from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.steps import Steps
-from ur_emulator.machine.scripting.network import Network
 from ur_emulator.program_files.installation import ExternalControlPc
 from ur_emulator.program_files.script_writer import one_line
 
@@ -25,7 +25,7 @@ QUIET = 0.1
 
 
 def request_program(
-    network: Network, pc: ExternalControlPc, clock: Callable[[], float] = time.monotonic
+    network: LoopNetwork, pc: ExternalControlPc, clock: Callable[[], float] = time.monotonic
 ) -> Steps[str]:
     """Ask a PC for its program, in steps; return what it has sent, one character a byte.
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 from protocol.ur_types import ProgramState, RobotMode
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError, WorkerError
 from ur_emulator.host.player.external_control import request_program
+from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.commands.programs import (
@@ -26,7 +27,6 @@ from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 from ur_emulator.machine.controller.safety.safety_state import limits_of
 from ur_emulator.machine.controller.snapshot import RUNNING_STATES
-from ur_emulator.machine.scripting.network import Network
 from ur_emulator.program_files.compiling import (
     CompileResult,
     compile_loaded,
@@ -68,7 +68,7 @@ class ProgramPlayer:
     """
 
     def __init__(
-        self, box: ServedBox, folder: ProgramFolder, network: Network, *, skip_unknown: bool = False
+        self, box: ServedBox, folder: ProgramFolder, network: LoopNetwork, *, skip_unknown: bool = False
     ) -> None:
         """Begin with no program; the network connects to the PCs of External Control."""
         self._skip_unknown = skip_unknown

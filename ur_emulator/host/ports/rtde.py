@@ -17,6 +17,7 @@ from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.programs import ReportLine
 from ur_emulator.machine.controller.events import LogAdded
 from ur_emulator.machine.controller.snapshot import Snapshot
 
@@ -35,6 +36,7 @@ class RtdePort(SessionPort["_RtdeSession"]):
         super().__init__(box)
         self._streams: tuple[_RtdeSession, ...] = ()
         self._owners: dict[str, Connection] = {}
+        self._reports_line = False
 
     def _begin(self, connection: Connection) -> _RtdeSession:
         return _RtdeSession(connection, self._box, self._answer)
@@ -76,7 +78,10 @@ class RtdePort(SessionPort["_RtdeSession"]):
     def _find_streams(self) -> None:
         sessions = self._sessions.values()
         self._streams = tuple(s for s in sessions if s.encode is not None)
-        self._box.controller.programs.reports_line = any(s.wants_line for s in sessions)
+        wants_line = any(s.wants_line for s in sessions)
+        if wants_line is not self._reports_line:
+            self._reports_line = wants_line
+            self._box.submit_quietly(ReportLine(wants_line))
 
 
 class _RtdeSession(Session):

@@ -21,9 +21,12 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Protocol
 
 from ur_emulator.budgets import BUDGETS, MIB
+from ur_emulator.machine.commands.programs import EndPrograms
 
 if TYPE_CHECKING:
+    from ur_emulator.machine.controller.command import Command
     from ur_emulator.machine.controller.program_runner import ProgramRunner
+    from ur_emulator.machine.machine import Machine
 
 # In a process of the user: collect rarely, a full collection over a large heap costs more than a cycle has to
 # spare; and let threads take short turns, one with long work shares the interpreter with the loop.
@@ -118,6 +121,16 @@ class Tasks(Protocol):
         ...
 
 
+class Box(Protocol):
+    """A box whose programs hold memory."""
+
+    machine: Machine
+
+    def submit_quietly(self, command: Command) -> None:
+        """Take a command for the next cycle."""
+        ...
+
+
 class MemoryWatch:
     """Watches the memory of a process that only serves boxes."""
 
@@ -127,17 +140,17 @@ class MemoryWatch:
         # What it holds when nothing can be given back.
         self._floor = 0
         # How much each box has made it grow since it held half of what is allowed.
-        self._grown: dict[ProgramRunner, int] = {}
-        # The programs that had to end last, until what they held is given back.
-        self._ended: ProgramRunner | None = None
+        self._grown: dict[Box, int] = {}
+        # The box whose programs had to end last, until what they held is given back.
+        self._ended: Box | None = None
         self._next_look = 0.0
 
-    def look(self, programs: ProgramRunner, now: float) -> None:
-        """Measure, after a cycle of the box whose programs are given; let pay who must."""
+    def look(self, box: Box, now: float) -> None:
+        """Measure, after a cycle of a box; let pay who must."""
         if gc.get_count()[0] > _NEW or self._now - self._collected > _GROWN:
             gc.collect(1)
             self._collected = self._now
-        if now < self._next_look or any(one.is_releasing for one in (programs, *self._grown)):
+        if now < self._next_look or any(_programs(one).is_releasing for one in (box, *self._grown)):
             return
         if self._ended is not None:
             self._give_back(self._ended)
@@ -148,11 +161,11 @@ class MemoryWatch:
         if 2 * held < BUDGETS.memory:
             self._next_look = now + _PERIOD
             self._grown.clear()
-            if held - self._floor > _WORTH_IT and not programs.is_any_running:
-                self._give_back(programs)
+            if held - self._floor > _WORTH_IT and not _programs(box).is_any_running:
+                self._give_back(box)
             held = max(0, held)
         else:
-            self._grown[programs] = self._grown.get(programs, 0) + self._now - before
+            self._grown[box] = self._grown.get(box, 0) + self._now - before
         tasks = self._tasks.memory()
         if held + tasks > BUDGETS.memory:
             self._end_somebody(held, tasks)
@@ -161,17 +174,21 @@ class MemoryWatch:
         if tasks > held:
             self._tasks.end_for_memory()
             return
-        programs = max(self._grown, key=lambda one: (one.is_any_running, self._grown[one]))
+        box = max(self._grown, key=lambda one: (_programs(one).is_any_running, self._grown[one]))
         text = f"the program was ended: box and programs hold more than {BUDGETS.memory // MIB} MiB of memory"
-        programs.end_for_memory(text)
-        self._ended = programs
+        box.submit_quietly(EndPrograms(text))
+        self._ended = box
 
-    def _give_back(self, programs: ProgramRunner) -> None:
+    def _give_back(self, box: Box) -> None:
         """Give back what programs held that have ended."""
-        programs.forget()
+        box.machine.forget_ended()
         gc.collect(_ALL)
         with suppress(OSError, AttributeError):  # only some systems can
             ctypes.CDLL(None).malloc_trim(0)
         self._grown.clear()
         self._now = resident()
         self._floor = self._now - self._at_rest
+
+
+def _programs(box: Box) -> ProgramRunner:
+    return box.machine.controller.programs

@@ -37,7 +37,10 @@ _NUMBER: Final = 4
 _KILL: Final = b"k"
 # How long a process that ends waits for its server [s].
 _FAREWELL: Final = 2.0
-_COMMAND: Final = "import sys; sys.path[:] = {path!r}\nfrom ur_emulator.host.runtime.processes import serve_forks; serve_forks()"
+_COMMAND: Final = (
+    "import sys; sys.path[:] = {path!r}\n"
+    "from ur_emulator.host.runtime.processes import serve_forks; serve_forks()"
+)
 
 
 class Role(Enum):

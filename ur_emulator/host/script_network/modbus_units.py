@@ -19,6 +19,7 @@ from protocol.errors import RemoteProtocolError
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.script_network.sockets import OutgoingConnection
 from ur_emulator.machine.controller.io.modbus_signals import (
     DISCONNECTED,
     NO_ANSWER,
@@ -26,7 +27,15 @@ from ur_emulator.machine.controller.io.modbus_signals import (
     SignalType,
     UnitAddress,
 )
-from ur_emulator.machine.scripting.network import ScriptSocket
+from ur_emulator.machine.scripting.network import (
+    Arrival,
+    ForgetSignal,
+    ReleaseUnit,
+    ResetUnit,
+    SendToUnit,
+    ServeSignal,
+    SignalServed,
+)
 
 _READ = {
     SignalType.DIGITAL_INPUT: modbus.ModbusFunction.READ_DISCRETE_INPUTS,
@@ -99,9 +108,9 @@ class _Waiting:
 
 
 class ModbusLink:
-    """One unit's connection (see `controller.io.modbus_signals.ModbusUnit`)."""
+    """One unit's connection; its signals are the host's own records of those of the machine."""
 
-    def __init__(self, name: str, connect: Callable[[], ScriptSocket], period_s: float) -> None:
+    def __init__(self, name: str, connect: Callable[[], OutgoingConnection], period_s: float) -> None:
         """Prepare; nothing is connected before something is wanted.
 
         A unit that does not answer gets the next request after a control cycle.
@@ -109,7 +118,7 @@ class ModbusLink:
         self._name = name
         self._connect = connect
         self._period = period_s
-        self._socket: ScriptSocket | None = None
+        self._socket: OutgoingConnection | None = None
         self._connect_by = math.inf
         self._retry_at = -math.inf
         self._pause = FIRST_RETRY
@@ -335,20 +344,80 @@ class ModbusLink:
         return min(times)
 
 
+UnitRequest = ServeSignal | ForgetSignal | SendToUnit | ResetUnit | ReleaseUnit
+# What the machine takes for known of a signal before anything has arrived: see `SignalServed`.
+_AT_FIRST = ((), "", 0, 0)
+
+
 class ModbusClient:
-    """All connections to Modbus units of one box."""
+    """All connections to Modbus units of one box, and its records of the signals of the machine."""
 
     def __init__(
-        self, loop: EventLoop, connect: Callable[[str, int], ScriptSocket], period_s: float, report: Report
+        self,
+        loop: EventLoop,
+        connect: Callable[[str, int], OutgoingConnection],
+        period_s: float,
+        arrive: Callable[[Arrival], None],
+        report: Report,
     ) -> None:
         """Prepare; nothing is connected before there is a unit. `report` gets errors of ours."""
         self._loop = loop
         self._connect = connect
         self._period = period_s
+        self._arrive = arrive
         self._report = report
         self._links: dict[UnitAddress, ModbusLink] = {}
+        self._signals: dict[int, ModbusSignal] = {}
+        self._told: dict[int, tuple[tuple[int, ...], str, int, int]] = {}
 
-    def unit(self, address: UnitAddress) -> ModbusLink:
+    def carry_out(self, request: UnitRequest) -> None:
+        """Do what the machine asks of a unit."""
+        match request:
+            case ServeSignal(unit, number):
+                signal = self._signals.get(number)
+                if signal is None:
+                    signal = self._signals[number] = _signal_of(request)
+                signal.tolerance, signal.output = request.tolerance, request.output
+                if request.wanted:
+                    self._unit(unit).want(signal)
+            case ForgetSignal(unit, number):
+                self._told.pop(number, None)
+                forgotten = self._signals.pop(number, None)
+                if forgotten is not None and unit in self._links:
+                    self._links[unit].forget(forgotten)
+            case SendToUnit(unit, slave, function_code, data):
+                self._unit(unit).send(slave, function_code, data)
+            case ResetUnit(unit):
+                self._unit(unit).reset()
+            case ReleaseUnit(unit):
+                if unit in self._links:
+                    self._links[unit].release()
+        self._tell()
+
+    def advance(self, now: float) -> float:
+        """Advance all connections; close those that were released and are idle."""
+        next_time = math.inf
+        for address, link in tuple(self._links.items()):
+            next_time = min(next_time, link.advance(now))
+            if link.is_released and link.is_idle:
+                self._end(address)
+        self._tell()
+        return next_time
+
+    def failed(self, error: Exception) -> None:
+        """Close all connections after an error of ours; programs see units that do not answer."""
+        self._report("the connections to Modbus units are closed", error)
+        for link in self._links.values():
+            link.give_up("is not asked any more")
+        self._tell()
+        self.close()
+
+    def close(self) -> None:
+        """Close all connections at once."""
+        for address in tuple(self._links):
+            self._end(address)
+
+    def _unit(self, address: UnitAddress) -> ModbusLink:
         """Return the connection to a unit, the same as long as it is in use."""
         link = self._links.get(address)
         if link is None:
@@ -362,26 +431,13 @@ class ModbusClient:
         link.is_released = False
         return link
 
-    def advance(self, now: float) -> float:
-        """Advance all connections; close those that were released and are idle."""
-        next_time = math.inf
-        for address, link in tuple(self._links.items()):
-            next_time = min(next_time, link.advance(now))
-            if link.is_released and link.is_idle:
-                self._end(address)
-        return next_time
-
-    def failed(self, error: Exception) -> None:
-        """Close all connections after an error of ours; programs see units that do not answer."""
-        self._report("the connections to Modbus units are closed", error)
-        for link in self._links.values():
-            link.give_up("is not asked any more")
-        self.close()
-
-    def close(self) -> None:
-        """Close all connections at once."""
-        for address in tuple(self._links):
-            self._end(address)
+    def _tell(self) -> None:
+        """Let the machine know what has changed of its signals."""
+        for number, signal in self._signals.items():
+            known = signal.values, signal.trouble, signal.device_error, signal.connection_error
+            if known != self._told.get(number, _AT_FIRST):
+                self._told[number] = known
+                self._arrive(SignalServed(number, *known))
 
     def _end_oldest_released(self) -> None:
         for address, link in self._links.items():
@@ -393,3 +449,19 @@ class ModbusClient:
         self._links.pop(address).close()
         if not self._links:
             self._loop.remove(self)
+
+
+def _signal_of(request: ServeSignal) -> ModbusSignal:
+    """Return the host's record of a signal; no values have been read."""
+    signal = ModbusSignal(
+        str(request.signal),
+        request.unit,
+        request.slave,
+        request.address,
+        request.type,
+        request.sequential,
+        count=request.count,
+        write_address=request.write_address,
+    )
+    signal.values = ()
+    return signal

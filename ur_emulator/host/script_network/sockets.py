@@ -1,9 +1,10 @@
-"""Sockets of the scripts of one box: they never block, and their buffers are bounded, each and together."""
+"""Connections that a box makes: they never block, and their buffers are bounded, each and together."""
 
 import errno
 import selectors
 import socket
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import Final
 from weakref import WeakSet
@@ -13,6 +14,14 @@ from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.connection import BufferedSocket
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.addresses import LOOK_UPS, LookUp, is_closed
+from ur_emulator.machine.scripting.network import (
+    Arrival,
+    BytesArrived,
+    BytesUnsent,
+    Network,
+    SocketClosed,
+    SocketOpened,
+)
 
 # A connection with no more than this can always send: one that is stuck does not stop the others.
 _SHARE: Final = 4 * KIB
@@ -27,7 +36,7 @@ class Buffers:
         self._window_end = 0.0
         self._in_window = 0
         self._has_read_enough = False
-        self.connections: WeakSet[ScriptConnection] = WeakSet()
+        self.connections: WeakSet[OutgoingConnection] = WeakSet()
         self.unsent = 0
 
     def received(self, n_bytes: int) -> None:
@@ -78,10 +87,13 @@ _READ_SIZE = 16 * 1024
 _IN_PROGRESS = {0, errno.EINPROGRESS, errno.EWOULDBLOCK, getattr(errno, "WSAEWOULDBLOCK", errno.EINPROGRESS)}
 
 
-class ScriptConnection(BufferedSocket):
-    """One connection that a box has opened (see `scripting.network.ScriptSocket`).
+class OutgoingConnection(BufferedSocket):
+    """One connection that a box has opened.
 
-    `problem` says why there is none, if it could not be made; `is_own` that it leads to the box itself.
+    Attributes:
+        problem: why there is none, if it could not be made; "" if the peer refused.
+        is_connecting: it is being made.
+        is_own: it leads to a port of the box itself.
     """
 
     def __init__(
@@ -134,9 +146,14 @@ class ScriptConnection(BufferedSocket):
             self.read_on()
         return self._inbox
 
+    @property
+    def _unread(self) -> int:
+        """How many bytes nobody has read."""
+        return len(self._inbox)
+
     def read_on(self) -> None:
         """Read from the peer, or stop reading, as the budgets say now."""
-        wants_data = self._buffers.may_receive(len(self._inbox))
+        wants_data = self._buffers.may_receive(self._unread)
         if wants_data != self._wants_data and self.is_open:
             self._wants_data = wants_data
             self._watch()
@@ -233,6 +250,79 @@ class ScriptConnection(BufferedSocket):
     def _count_unsent(self) -> None:
         self._buffers.unsent += len(self._outbox) - self._counted_unsent
         self._counted_unsent = len(self._outbox)
+
+
+class ScriptConnection(OutgoingConnection):
+    """A connection of a script: what comes of it arrives at the machine, which has the inbox."""
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        buffers: Buffers,
+        report: Report,
+        own_address: str,
+        number: int,
+        network: Network,
+        arrive: Callable[[Arrival], None],
+        full: set[OutgoingConnection],
+        *,
+        is_own: bool,
+    ) -> None:
+        """Prepare; nothing is connected.
+
+        Args:
+            number: of the socket in the machine.
+            network: of the machine.
+            arrive: takes what comes.
+            full: the connection is in this set while it does not read, for want of room.
+        """
+        super().__init__(loop, buffers, report, own_address, is_own=is_own)
+        self._number = number
+        self._network = network
+        self._arrive = arrive
+        self._full = full
+        self._is_over = False
+
+    @property
+    def _unread(self) -> int:
+        return self._network.unread(self._number)
+
+    def read_on(self) -> None:
+        """Read from the peer, or stop reading, as the budgets say now."""
+        super().read_on()
+        if self.is_open and not self._wants_data:
+            self._full.add(self)
+        else:
+            self._full.discard(self)
+
+    def drop(self) -> None:
+        """Close, since the script has closed."""
+        self._is_over = True
+        self.close()
+
+    def close(self) -> None:
+        """Close; what has come can still be read."""
+        super().close()
+        self._full.discard(self)
+        if not self._is_over:
+            self._is_over = True
+            self._arrive(SocketClosed(self._number, self.problem))
+
+    def _on_connected(self, events: int) -> None:
+        super()._on_connected(events)
+        if self.is_open:
+            self._arrive(SocketOpened(self._number, self.is_own))
+
+    def _received(self, data: bytes) -> None:
+        self._arrive(BytesArrived(self._number, data))
+        self._buffers.received(len(data))
+        self.read_on()
+
+    def _count_unsent(self) -> None:
+        before = self._counted_unsent
+        super()._count_unsent()
+        if self._counted_unsent != before and self.is_open:
+            self._arrive(BytesUnsent(self._number, self._counted_unsent))
 
 
 def _can_call_from(own: str, address: str) -> bool:

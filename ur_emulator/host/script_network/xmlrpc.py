@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from contextlib import suppress
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 import h11
 
-from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.xmlrpc import AnswerReader, RemoteFaultError, encode_call
+from protocol.errors import RemoteProtocolError
+from protocol.xmlrpc import AnswerReader, RemoteFaultError
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.event_loop import EventLoop
-from ur_emulator.machine.scripting.network import RemoteCallError, ScriptSocket
+from ur_emulator.host.script_network.sockets import OutgoingConnection
+from ur_emulator.machine.scripting.network import RemoteCallError
 
 # A server that cannot be reached fails the call after this [s]; an answer may begin at any time.
 CONNECT_TIMEOUT: Final = 5.0
@@ -58,7 +59,7 @@ class ServerAddress:
 class HttpChannel:
     """A connection to a server, on which one call follows the other."""
 
-    def __init__(self, socket: ScriptSocket) -> None:
+    def __init__(self, socket: OutgoingConnection) -> None:
         self.socket = socket
         self._http = h11.Connection(h11.CLIENT)
 
@@ -163,29 +164,16 @@ def _check_head(head: h11.Response) -> None:
 _LOOK_EVERY = 0.05
 
 
-class XmlRpcCall:
-    """One call (see `scripting.network.RemoteCall`)."""
-
-    def __init__(self) -> None:
-        self.is_done = False
-        self._value: Any = None
-        self._error = ""
-
-    def result(self) -> Any:
-        """Return what the procedure returned; RemoteCallError if the call failed."""
-        if self._error:
-            raise RemoteCallError(self._error)
-        return self._value
-
-    def finish(self, value: Any, error: str = "") -> None:
-        """Take the end of the call."""
-        self._value, self._error, self.is_done = value, error, True
+# Called with the value that a procedure has returned, or with None and why the call has failed.
+CallDone = Callable[[Any, str], None]
 
 
 class XmlRpcClient:
     """The servers that the scripts of one box call, and the connections to them."""
 
-    def __init__(self, loop: EventLoop, connect: Callable[[str, int], ScriptSocket], report: Report) -> None:
+    def __init__(
+        self, loop: EventLoop, connect: Callable[[str, int], OutgoingConnection], report: Report
+    ) -> None:
         """Prepare; nothing is connected before the first call. `report` gets errors of ours."""
         self._loop = loop
         self._report = report
@@ -251,13 +239,13 @@ class XmlRpcClient:
 
 
 class XmlRpcServer:
-    """A server as one script handle knows it (see `scripting.network.RemoteServer`)."""
+    """A server as one script handle knows it."""
 
     def __init__(self, client: XmlRpcClient, url: str) -> None:
         self._client = client
         self._url = url
         self._channel: HttpChannel | None = None
-        self._calls: deque[tuple[XmlRpcCall, bytes]] = deque()
+        self._calls: deque[tuple[CallDone, bytes]] = deque()
         self._exchange: Exchange | None = None
 
     @property
@@ -265,18 +253,12 @@ class XmlRpcServer:
         """Whether a call is running."""
         return bool(self._calls)
 
-    def call(self, method: str, arguments: Sequence[Any]) -> XmlRpcCall:
-        """Begin to call a procedure; calls are made one after the other."""
-        call = XmlRpcCall()
-        try:
-            self._calls.append((call, encode_call(method, arguments)))
-        except LocalProtocolError as error:
-            call.finish(None, str(error))
-            return call
+    def call(self, body: bytes, done: CallDone) -> None:
+        """Begin with an encoded call; calls are made one after the other."""
+        self._calls.append((done, body))
         self._client.begin(self)
         if len(self._calls) == 1:
             self.advance()
-        return call
 
     def close(self) -> None:
         """Close the connection and forget the running calls."""
@@ -286,24 +268,24 @@ class XmlRpcServer:
 
     def give_up(self, why: str) -> None:
         """Fail the running calls."""
-        for call, _ in self._calls:
-            call.finish(None, why)
+        for done, _ in self._calls:
+            done(None, why)
         self.close()
 
     def advance(self) -> bool:
         """Go on with the call that is the first; return whether a piece of an answer was read."""
         if not self._calls:
             return False
-        call, body = self._calls[0]
+        done, body = self._calls[0]
         if self._exchange is None:
             self._exchange = self._make(body)
         try:
             return next(self._exchange)
         except StopIteration as end:
-            call.finish(end.value)
+            done(end.value, "")
         except RemoteCallError as error:
             self._disconnect()
-            call.finish(None, str(error))
+            done(None, str(error))
         self._end_exchange()
         self._calls.popleft()
         return True

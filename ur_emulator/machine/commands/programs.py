@@ -74,6 +74,26 @@ class StopProgram(CommandOperation):
         box.programs.stop()
 
 
+@dataclass(frozen=True, slots=True)
+class EndPrograms:
+    """End the secondary programs with an error, or, if there is none, the primary program."""
+
+    text: str
+
+    def apply(self, box: BoxParts) -> None:
+        box.programs.end_for_memory(self.text)
+
+
+@dataclass(frozen=True, slots=True)
+class ReportLine:
+    """Publish the line that the program executes, or do not: a client reads it."""
+
+    is_read: bool
+
+    def apply(self, box: BoxParts) -> None:
+        box.programs.reports_line = self.is_read
+
+
 class PauseProgram(CommandOperation):
     """Let the program stand still, and the arm come to rest on its path."""
 

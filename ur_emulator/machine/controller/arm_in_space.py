@@ -123,6 +123,11 @@ class ArmInSpace:
             )
 
     @property
+    def wrench_at_flange(self) -> Vector6:
+        """The wrench from which all others follow, base axes [N, Nm]."""
+        return self._wrench
+
+    @property
     def reported_force(self) -> Vector6:
         """The wrench that clients and programs see, base axes [N, Nm]."""
         return self._wrench if self._force_at_flange else self.tcp_force

@@ -192,7 +192,7 @@ class ModbusBuiltins(BuiltinGroup):
 
     @builtin("modbus_set_signal_watchdog")
     def _set_watchdog(self, thread: object, name: str, timeout: float) -> None:
-        self._signal("modbus_set_signal_watchdog", name).tolerance = float(timeout)
+        self._modbus.set_tolerance(self._signal("modbus_set_signal_watchdog", name), float(timeout))
 
     # --- connections
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Mapping, Sequence
 from typing import Any, Final
-from weakref import WeakSet
 
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.machine.controller.clock import Clock
@@ -38,16 +37,31 @@ class RpcBuiltins(BuiltinGroup):
         self._network = network
         self._clock = clock
         self.has_structs = clock.generation.major > 3
-        # Those whose handle the program still has, or that are connected.
-        self._servers: WeakSet[RemoteServer] = WeakSet()
+        # Those that may be connected, the one that was called last is last.
+        self._called: dict[RemoteServer, None] = {}
         # Values sent, since which cycle, and the cycle that counts anew.
         self._sent = self._since = self._renewed_at = 0
 
     def end(self) -> None:
         """Close every connection; the program has ended."""
-        for server in tuple(self._servers):
+        for server in self._called:
             server.close()
-        self._servers.clear()
+        self._called.clear()
+
+    def call(self, server: RemoteServer, method: str, arguments: Sequence[Any]) -> RemoteCall:
+        """Begin a call; of more servers than may be connected, one that is idle is closed."""
+        self._called.pop(server, None)
+        self._called[server] = None
+        idle = (other for other in self._called if not other.is_busy)
+        if len(self._called) > BUDGETS.remote_connections and (oldest := next(idle, server)) is not server:
+            self.close(oldest)
+        return server.call(method, arguments)
+
+    def close(self, server: RemoteServer) -> None:
+        """Close the connection to a server and forget its calls; harmless if there is none."""
+        if server in self._called:
+            del self._called[server]
+            server.close()
 
     def may_send(self, n_values: int) -> bool:
         """Count values that a call is about to send; False if the program has sent enough for now.
@@ -65,9 +79,7 @@ class RpcBuiltins(BuiltinGroup):
 
     @builtin("rpc_factory")
     def _make_handle(self, thread: object, kind: str, url: str) -> RemoteHandle:
-        server = self._network.remote_server(url if "://" in url else f"http://{url}")
-        self._servers.add(server)
-        return RemoteHandle(self, server)
+        return RemoteHandle(self, self._network.remote_server(url if "://" in url else f"http://{url}"))
 
 
 class RemoteHandle:
@@ -84,7 +96,7 @@ class RemoteHandle:
     ) -> Generator[Wait, None, Any]:
         """Call a procedure and wait for its result."""
         if method == _CLOSE:
-            self._server.close()
+            self._program.close(self._server)
             return None
         if named:
             raise ScriptRuntimeError(f"{method}: arguments of a remote procedure have no names")
@@ -95,7 +107,7 @@ class RemoteHandle:
             )
         while not self._program.may_send(n_values):
             yield NEXT_CYCLE
-        call: RemoteCall = self._server.call(method, [_to_wire(value) for value in arguments])
+        call = self._program.call(self._server, method, [_to_wire(value) for value in arguments])
         yield Blocked(lambda: call.is_done, Outside.PEER)
         try:
             return _from_wire(call.result(), self._program.has_structs)

@@ -91,9 +91,9 @@ class ModbusSignal:
         values: last ones known: of the unit, or what a program has set; 0 before.
         output: what a program has set, to be written; None while the signal is only read.
         tolerance: how long there may be no valid answer [s]; None for the usual time.
-        trouble: why there has been no valid answer for longer; empty while answers come. The unit sets it.
-        device_error: exception code of the last answer, 0 for a valid one. The unit sets it.
-        connection_error: DISCONNECTED, NO_ANSWER, or 0. The unit sets it.
+        trouble: why there has been no valid answer for longer; empty while answers come.
+        device_error: exception code of the last answer, 0 for a valid one.
+        connection_error: DISCONNECTED, NO_ANSWER, or 0.
         invalid_cycles: number of cycles for which there has been an error.
         due: tick of the next refresh; with a fraction, so that any frequency is kept on average.
     """
@@ -135,6 +135,12 @@ class ModbusSignal:
             return self.output
         return (0,) * self.write_count if self.reads_back else self.values
 
+    def served(self, values: tuple[int, ...], trouble: str, device_error: int, connection_error: int) -> None:
+        """Take what the unit knows; an output that a program has set keeps its values."""
+        self.trouble, self.device_error, self.connection_error = trouble, device_error, connection_error
+        if values and (self.output is None or self.reads_back):
+            self.values = values
+
     def is_same_place(self, other: ModbusSignal) -> bool:
         """Whether both stand for the same thing."""
         return self._place == other._place
@@ -150,6 +156,10 @@ class ModbusUnit(Protocol):
 
     def want(self, signal: ModbusSignal) -> None:
         """Write the signal's output, or read its value if it has none, as soon as possible."""
+        ...
+
+    def describe(self, signal: ModbusSignal) -> None:
+        """Take over how long the signal may be without a valid answer."""
         ...
 
     def forget(self, signal: ModbusSignal) -> None:
@@ -210,12 +220,18 @@ class ModbusSignals:
         """Request a signal now."""
         self._units[signal.unit].want(signal)
 
+    def set_tolerance(self, signal: ModbusSignal, tolerance: float) -> None:
+        """Set how long a signal may be without a valid answer [s]."""
+        signal.tolerance = tolerance
+        self._units[signal.unit].describe(signal)
+
     def reset(self, unit: UnitAddress) -> list[ModbusSignal]:
         """Connect to a unit anew; return its signals."""
         signals = [signal for signal in self.signals.values() if signal.unit == unit]
         if signals:
             self._units[unit].reset()
             for signal in signals:
+                signal.connection_error = DISCONNECTED
                 self.refresh(signal)
         return signals
 
