@@ -5,6 +5,7 @@ import struct
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -78,6 +79,9 @@ class FakeModbusUnit:
         if signal.output is None or signal.reads_back:
             read = range(signal.address, signal.address + signal.count)
             signal.values = tuple(self.memory.get((kind, address), 0) for address in read)
+
+    def describe(self, signal):
+        pass
 
     def forget(self, signal):
         self.log.append((signal.name, "forgotten"))
@@ -174,7 +178,8 @@ class BareBox(ServedBox):
     def __init__(self, software, controller, submitted):
         self.submitted = submitted
         identity = BoxIdentity(software, "UR3", "UR3", "20993000007")
-        super().__init__(controller, identity, RealtimePacer(controller.period_s), None, None)
+        machine = SimpleNamespace(controller=controller)
+        super().__init__(machine, identity, RealtimePacer(controller.period_s), None, None)
 
     def submit(self, command, done=None, *, in_place_of=""):
         self.submitted.append(command if done is None else Submitted(command, done))
