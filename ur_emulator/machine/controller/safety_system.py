@@ -5,28 +5,35 @@ The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothi
 
 from collections.abc import Mapping
 
-from protocol.ur_types import RobotMode, SafetyMode
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.machine.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.machine.controller.program_runner import ProgramRunner
 from ur_emulator.machine.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.machine.controller.safety import modes
 from ur_emulator.machine.controller.safety.boundaries import TRIGGER_BAND
 from ur_emulator.machine.controller.safety.inputs import Guard, OperationalMode, SafetyInput, SafetyInputs
-from ur_emulator.machine.controller.safety.limit_checks import Violation
+from ur_emulator.machine.controller.safety.limit_checks import (
+    JointWatch,
+    SetpointCheck,
+    Violation,
+    protective_stop,
+)
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.machine.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.motion.arm_motion import SCALING_RATE
+from ur_emulator.machine.motion.generators import JointTarget
 from ur_emulator.machine.plant.plant import Plant, PlantState
 
 # Joints settle behind their targets. The brakes wait for them, at most the second time (chosen) [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
+_REQUESTED_STOP = protective_stop(209, 0, "Protective stop requested")
 
 
 class SafetySystem:
     """Applies safety events to the safety state, and its effects to arm, program and power.
 
-    While it `is_busy`, `step` and `find_violation` must be called in every cycle.
+    While it `is_busy`, `step` must be called in every cycle; `watch` always.
     """
 
     def __init__(self, state: ControllerState, programs: ProgramRunner, plant: Plant) -> None:
@@ -41,6 +48,10 @@ class SafetySystem:
         self._is_waiting = False
         self._is_beyond_trigger = False
         self.is_busy = False
+        self._setpoints = SetpointCheck(state.robot, state.clock.period_s)
+        self._joints = JointWatch(state.robot)
+        # What watches the measured state: the first that finds something stops the arm.
+        self._watchers = (self._watch_joints, self._watch_limits, self._watch_compliance)
 
     @property
     def is_stopping(self) -> bool:
@@ -125,11 +136,46 @@ class SafetySystem:
                 self.cut_power()
         self._update()
 
-    def find_violation(self, sensed: PlantState) -> Violation | None:
-        """Return a violation of the limits of this safety mode, or None."""
+    def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
+        """Return what is wrong with the set-point `target`, which follows `before`; None: nothing."""
         state = self._state
-        limiter, space = state.speed.limiter, state.past.snapshot.space
-        return None if limiter is None else limiter.find_violation(sensed, space, state.clock.period_s)
+        invalid = self._setpoints.find_invalid(state.safety.limits, before, target)
+        if invalid is not None or not state.safety.boundaries:
+            return invalid
+        way = (target.q, *state.motion.way_to_rest(target))
+        now, *ahead = (state.arm.state(q, target.qd, state.tool.tcp_offset) for q in way)
+        near = state.safety.boundaries.find_near(now, ahead)
+        return None if near is None else Violation(near)
+
+    def watch(self, sensed: PlantState, running: bool) -> Violation | None:
+        """Return why the arm is to be stopped now that this is measured, or None; in every cycle."""
+        state = self._state
+        requested = _REQUESTED_STOP if state.requests.take_protective_stop() else None
+        self._joints.count_saturation(sensed)
+        if not state.safety.is_watched:
+            return None
+        if running:
+            for find_violation in self._watchers:
+                if violation := find_violation(sensed):
+                    return violation
+        return requested
+
+    def _watch_joints(self, sensed: PlantState) -> Violation | None:
+        state = self._state
+        plays = self._programs.runtime_state is ProgramState.PLAYING
+        may_hold = plays and state.error_settings.holds_high
+        return self._joints.find_violation(sensed, state.motion.target.qd, may_hold=may_hold)
+
+    def _watch_limits(self, sensed: PlantState) -> Violation | None:
+        state = self._state
+        limiter = state.speed.limiter
+        if limiter is None:
+            return None
+        return limiter.find_violation(sensed, state.past.snapshot.space, state.clock.period_s)
+
+    def _watch_compliance(self, sensed: PlantState) -> Violation | None:
+        compliance = self._state.compliance
+        return compliance.find_violation(sensed) if compliance.is_on else None
 
     # --- space
 
