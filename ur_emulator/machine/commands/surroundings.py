@@ -119,7 +119,7 @@ class AddObstacle(CommandOperation):
         _check_body(f"obstacle {self.name}", self.shape, SIZES[self.shape], self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        _put(box, box.plant.obstacles.put, self.name, self.shape, self.size, six(self.pose))
+        _put(box, box.plant.put_obstacle, self.name, self.shape, self.size, six(self.pose))
 
 
 def _check_body(
@@ -154,11 +154,11 @@ class RemoveObstacle(CommandOperation):
     name: str = parameter("of the obstacle")
 
     def apply(self, box: BoxParts) -> None:
-        known = box.plant.obstacles.names
+        known = box.plant.physics.obstacles.names
         if self.name not in known:
             there = f"are {', '.join(known)}" if known else "is none"
             raise RefusedError(f"there is no obstacle {self.name!r}: there {there}")
-        box.plant.obstacles.remove(self.name)
+        box.plant.physics.obstacles.remove(self.name)
 
 
 # --- Things that can be moved: what an arm grips, pushes and drops
@@ -210,7 +210,7 @@ class MoveThing(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         _known_thing(box, self.name)
-        box.plant.scene.move(self.name, six(self.pose))
+        box.plant.physics.scene.move(self.name, six(self.pose))
 
 
 class RemoveThing(CommandOperation):
@@ -220,11 +220,11 @@ class RemoveThing(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         _known_thing(box, self.name)
-        box.plant.scene.remove(self.name)
+        box.plant.physics.scene.remove(self.name)
 
 
 def _known_thing(box: BoxParts, name: str) -> None:
-    known = box.plant.scene.names
+    known = box.plant.physics.scene.names
     if name not in known:
         there = f"are {', '.join(known)}" if known else "is none"
         raise RefusedError(f"there is no thing {name!r}: there {there}")

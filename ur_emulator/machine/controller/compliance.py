@@ -25,7 +25,7 @@ from ur_emulator.machine.motion.axis_hold import AxisHold
 from ur_emulator.machine.motion.force_mode import ForceMode
 from ur_emulator.machine.motion.generators import TorqueCommand
 from ur_emulator.machine.motion.ownership import ArmState
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 # An external force above this when freedrive begins means a wrong payload or a push. Chosen: of a sensor six
 # times its precision. An arm without one takes for a force what friction bears at rest, a second after a

@@ -33,8 +33,9 @@ from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.motion.tool import UnreachableError
+from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
 from ur_emulator.machine.plant.exact import ExactPlant
-from ur_emulator.machine.plant.plant import FlangePush, Plant, PlantState
+from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.tools import SUPPLY
 from ur_hil.tools import ToolModel
 from urscript.run.host import Host
@@ -57,7 +58,7 @@ def make_snapshot(
     `sensed` is the state of the arm as `Plant.report` gives it, `control` how it was driven.
     """
     target = state.past.target
-    arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
+    arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.estimated_force
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
     wrench = state.force_sense.measure(wrench)
@@ -78,8 +79,7 @@ def make_snapshot(
     return Snapshot(
         clock.tick,
         clock.time,
-        *target,
-        *sensed,  # type: ignore[arg-type]  # mypy takes the second tuple for one of any length
+        *(target + sensed),
         robot_mode=int(mode),
         joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
@@ -153,7 +153,7 @@ class Controller:
         self.generation = generation = robot.generation
         self.period_s = generation.period_s
         make_plant = Plant if fidelity.has_physics else ExactPlant
-        self.plant = make_plant(robot, fidelity, seed, tools)
+        self.plant: ArmPlant = make_plant(robot, fidelity, seed, tools)
         q = robot.home_q
         if self.plant.touches(q):
             raise ModelError(f"{robot.name}: at home_q the arm would touch itself or the table; give another")

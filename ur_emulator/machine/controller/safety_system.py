@@ -23,7 +23,7 @@ from ur_emulator.machine.controller.safety.speed_scaling import SpeedLimiter, li
 from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.motion.arm_motion import SCALING_RATE
 from ur_emulator.machine.motion.generators import JointTarget
-from ur_emulator.machine.plant.plant import Plant, PlantState
+from ur_emulator.machine.plant.arm_plant import ArmPlant, PlantState
 
 # Joints settle behind their targets. The brakes wait for them, at most the second time (chosen) [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
@@ -36,9 +36,10 @@ class SafetySystem:
     While it `is_busy`, `step` must be called in every cycle; `watch` always.
     """
 
-    def __init__(self, state: ControllerState, programs: ProgramRunner, plant: Plant) -> None:
+    def __init__(self, state: ControllerState, programs: ProgramRunner, plant: ArmPlant) -> None:
         self._state = state
         self._plant = plant
+        state.arm.range = plant.range
         self._programs = programs
         self.inputs = SafetyInputs(
             self.handle, state.enabling_device, state.operational, self._begin_operational_mode
@@ -79,7 +80,6 @@ class SafetySystem:
         The mode in force, the inverse kinematics and freedrive keep them too.
         """
         self._state.safety.set_limits(limits)
-        self._state.arm.set_range(limits.q_min, limits.q_max)
         self._plant.set_range(limits.q_min, limits.q_max)
         self._set_limits(self._state.safety.mode)
         self._update()

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from protocol.pose import rotvec_from_flat
+from ur_emulator.machine.models.calibration import Calibration, calibrated_dh
+from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3, Vector6, six
 from ur_emulator.machine.models.things import BodyShape, Contact
@@ -60,14 +62,7 @@ _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 class ArmPhysics:
     """The moving arm.
 
-    Args:
-        dh: its six true rows.
-        mass_scale: six factors on the link masses.
-        substep: physics time step [s].
-        presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
-            memory of the path.
-        friction_rise: speed over which MuJoCo's grows from zero to its size [rad/s].
-        tools: on the flange.
+    Its friction follows a reversal over an angle, or is MuJoCo's, without a memory of the path.
 
     Attributes:
         q: motor positions (6,) [rad].
@@ -84,16 +79,16 @@ class ArmPhysics:
     def __init__(
         self,
         robot: RobotModel,
-        dh: Sequence[DhRow],
-        mass_scale: Sequence[float],
-        gains: ServoGains,
-        substep: float,
-        presliding: float,
-        friction_rise: float,
+        calibration: Calibration,
+        fidelity: Fidelity,
+        seed: int,
         tools: Sequence[ToolModel] = (),
     ) -> None:
-        self._spec = spec = physics_spec(robot, dh, mass_scale, gains, substep, tools)
-        model = compile_physics(spec, friction_rise)
+        mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
+        dh, substep = calibrated_dh(robot, calibration), robot.generation.substep_us * 1e-6
+        self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), substep, tools)
+        model = compile_physics(spec, fidelity.friction_rise)
+        presliding = fidelity.friction_presliding
         self._size = _Sizes(model.nbody, model.ngeom, model.nv, model.nu)
         self._presliding = Presliding(presliding) if presliding else None
         self.loads = Loads(tools)

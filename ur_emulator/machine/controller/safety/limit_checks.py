@@ -16,7 +16,7 @@ from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.machine.models.robot_model import RobotModel, Vector6
 from ur_emulator.machine.motion.generators import JointTarget
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 # A joint this far from its (delayed) target is blocked or pushed [rad].
 MAX_POSITION_DEVIATION = 0.15

@@ -17,7 +17,7 @@ from ur_emulator.machine.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.machine.models.robot_model import Vector6, six
 from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from ur_emulator.machine.motion.arm_motion import SCALING_RATE, ArmMotion
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 TOLERANCE = radians(1.15)
 # Tolerance of the limits of TCP, force, power and momentum, as a share; chosen.
