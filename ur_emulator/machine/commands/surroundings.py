@@ -12,7 +12,7 @@ from ur_emulator.machine.commands.operation import CommandOperation, parameter, 
 from ur_emulator.machine.controller.command import BoxParts, refuse
 from ur_emulator.machine.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.machine.models.robot_model import Vector3, six
-from ur_emulator.machine.models.things import Thing
+from ur_emulator.machine.models.things import SIZES, Thing
 
 # --- What is wired to the inputs of the box and the tool
 
@@ -90,13 +90,6 @@ class AttachPayload(CommandOperation):
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
-# What the sizes of each shape mean, in order [m]. A plane has no end; its z points away from it.
-SIZES: dict[Shape, tuple[str, ...]] = {
-    "box": ("edge along x", "edge along y", "edge along z"),
-    "sphere": ("radius",),
-    "capsule": ("radius", "length along z without the ends"),
-    "plane": (),
-}
 # How far away, how small and how large [m].
 FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
 
@@ -116,15 +109,14 @@ class AddObstacle(CommandOperation):
     def check_together(self) -> None:
         if not self.name:
             raise ArgumentError("obstacle without a name given: it needs one, to be removed by")
-        _check_body(f"obstacle {self.name}", self.shape, SIZES[self.shape], self.size, self.pose)
+        _check_body(f"obstacle {self.name}", self.shape, self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
         _put(box, box.plant.put_obstacle, self.name, self.shape, self.size, six(self.pose))
 
 
-def _check_body(
-    what: str, shape: str, wanted: tuple[str, ...], size: Sequence[float], pose: Sequence[float]
-) -> None:
+def _check_body(what: str, shape: str, size: Sequence[float], pose: Sequence[float]) -> None:
+    wanted = SIZES[shape]
     if len(size) != len(wanted) or any(within(value, SMALLEST, LARGEST) is None for value in size):
         raise ArgumentError(
             f"{what}: size {list(size)} given: a {shape} needs {len(wanted)} numbers "
@@ -165,12 +157,6 @@ class RemoveObstacle(CommandOperation):
 
 
 ThingShape = Literal["box", "cylinder", "sphere"]
-# What the sizes of each shape mean, in order [m].
-THING_SIZES: dict[ThingShape, tuple[str, ...]] = {
-    "box": ("edge along x", "edge along y", "edge along z"),
-    "cylinder": ("radius", "length along z"),
-    "sphere": ("radius",),
-}
 
 
 class AddThing(CommandOperation):
@@ -192,7 +178,7 @@ class AddThing(CommandOperation):
     def check_together(self) -> None:
         if not (self.name and self.name.isprintable() and len(self.name) <= 60):
             raise ArgumentError(f"name {ascii(self.name)[:60]} of a thing given: 1 to 60 printed characters")
-        _check_body(f"thing {self.name}", self.shape, THING_SIZES[self.shape], self.size, self.pose)
+        _check_body(f"thing {self.name}", self.shape, self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
         thing = Thing(self.name, self.shape, tuple(self.size), self.mass, self.friction, six(self.pose))
