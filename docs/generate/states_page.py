@@ -29,7 +29,7 @@ from ur_emulator.machine.controller.safety.inputs import (
 )
 from ur_emulator.machine.controller.safety.inputs import TRANSITIONS as ENABLING_TRANSITIONS
 from ur_emulator.machine.controller.safety.modes import EVENTS, MODES, after, mode_of
-from ur_emulator.machine.controller.snapshot import safety_status_bits
+from ur_emulator.machine.controller.status_words import safety_status_bits
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.motion.generators import Kind
 from ur_emulator.machine.motion.ownership import TABLE as ARM_ROWS
