@@ -146,11 +146,15 @@ class RemoveObstacle(CommandOperation):
     name: str = parameter("of the obstacle")
 
     def apply(self, box: BoxParts) -> None:
-        known = box.plant.physics.obstacles.names
-        if self.name not in known:
-            there = f"are {', '.join(known)}" if known else "is none"
-            raise RefusedError(f"there is no obstacle {self.name!r}: there {there}")
-        box.plant.physics.obstacles.remove(self.name)
+        obstacles = box.plant.physics.obstacles
+        _check_known("obstacle", self.name, obstacles.names)
+        obstacles.remove(self.name)
+
+
+def _check_known(what: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        there = f"are {', '.join(known)}" if known else "is none"
+        raise RefusedError(f"there is no {what} {name!r}: there {there}")
 
 
 # --- Things that can be moved: what an arm grips, pushes and drops
@@ -195,8 +199,9 @@ class MoveThing(CommandOperation):
         _check_distance(f"thing {self.name}", self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        _known_thing(box, self.name)
-        box.plant.physics.scene.move(self.name, six(self.pose))
+        scene = box.plant.physics.scene
+        _check_known("thing", self.name, scene.names)
+        scene.move(self.name, six(self.pose))
 
 
 class RemoveThing(CommandOperation):
@@ -205,12 +210,6 @@ class RemoveThing(CommandOperation):
     name: str = parameter("of the thing")
 
     def apply(self, box: BoxParts) -> None:
-        _known_thing(box, self.name)
-        box.plant.physics.scene.remove(self.name)
-
-
-def _known_thing(box: BoxParts, name: str) -> None:
-    known = box.plant.physics.scene.names
-    if name not in known:
-        there = f"are {', '.join(known)}" if known else "is none"
-        raise RefusedError(f"there is no thing {name!r}: there {there}")
+        scene = box.plant.physics.scene
+        _check_known("thing", self.name, scene.names)
+        scene.remove(self.name)

@@ -70,7 +70,7 @@ def make_snapshot(
         (sensed.actual_q, sensed.actual_qd),
         wrench,
         tcp if any(tcp) else None,
-        force_at_flange=state.force_sense.refers_to_flange,
+        state.force_sense.refers_to_flange,
     )
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io = state.speed, state.tool, state.io

@@ -48,11 +48,21 @@ class SafetySystem:
         self._rests_since: int | None = None
         self._is_waiting = False
         self._is_beyond_trigger = False
-        self.is_busy = False
         self._setpoints = SetpointCheck(state.robot, state.clock.period_s)
         self._joints = JointWatch(state.robot)
         # What watches the measured state: the first that finds something stops the arm.
         self._watchers = (self._watch_joints, self._watch_limits, self._watch_compliance)
+
+    @property
+    def is_busy(self) -> bool:
+        """True while `step` must be called in every cycle."""
+        return (
+            self._cut_after is not None
+            or bool(self.inputs.assigned)
+            or self._state.speed.limiter is not None
+            or self._watches_space
+            or self._state.safety.has(SafetyMode.RECOVERY)
+        )
 
     @property
     def is_stopping(self) -> bool:
@@ -62,7 +72,6 @@ class SafetySystem:
     def assign_input(self, pair: int, function: SafetyInput | None) -> None:
         """Set up a pair of configurable inputs as a safety input; None frees them."""
         self.inputs.assign(pair, function)
-        self._update()
 
     def set_up_inputs(self, inputs: Mapping[int, SafetyInput]) -> None:
         """Set up what an installation has of the inputs that need operational modes, and free its others."""
@@ -72,7 +81,6 @@ class SafetySystem:
         for pair, function in inputs.items():
             self.inputs.assign(pair, function)
         self.inputs.require_reset(Guard.AUTOMATIC, SafetyInput.AUTOMATIC_RESET in inputs.values())
-        self._update()
 
     def set_limits(self, limits: ConfiguredLimits) -> None:
         """Set the limits of joints and space, in place of those of the arm's model.
@@ -82,7 +90,6 @@ class SafetySystem:
         self._state.safety.set_limits(limits)
         self._plant.set_range(limits.q_min, limits.q_max)
         self._set_limits(self._state.safety.mode)
-        self._update()
 
     def handle(self, event: modes.SafetyEvent) -> None:
         """Apply an event."""
@@ -95,7 +102,6 @@ class SafetySystem:
             self._react(before)
         if modes.EVENTS[event].cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
             self.cut_power()  # an emergency stop ends without power, however soon it is released
-        self._update()
 
     def cut_power(self) -> None:
         """End the program, apply the brakes and cut the power at once."""
@@ -134,7 +140,6 @@ class SafetySystem:
                 and (state.clock.tick - self._rests_since) * state.clock.period_s >= BRAKE_DELAY
             ):
                 self.cut_power()
-        self._update()
 
     def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
         """Return what is wrong with the set-point `target`, which follows `before`; None: nothing."""
@@ -225,7 +230,6 @@ class SafetySystem:
     def _begin_operational_mode(self) -> None:
         state, mode = self._state, self._state.operational.mode
         self._set_limits(state.safety.mode)
-        self._update()
         state.events.append(LogAdded("Safety", f"Operational mode: {mode.name}"))
         if mode is OperationalMode.MANUAL and not state.robot.generation.has_remote_in_manual:
             state.pendant.set_remote_control(False)
@@ -255,12 +259,3 @@ class SafetySystem:
             low <= q <= high
             for low, q, high in zip(limits.q_min, past.sensed.actual_q, limits.q_max, strict=True)
         ) and not (in_space and in_space.find_crossed(past.snapshot.space.actual))
-
-    def _update(self) -> None:
-        self.is_busy = (
-            self._cut_after is not None
-            or bool(self.inputs.assigned)
-            or self._state.speed.limiter is not None
-            or self._watches_space
-            or self._state.safety.has(SafetyMode.RECOVERY)
-        )

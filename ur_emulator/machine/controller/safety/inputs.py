@@ -190,6 +190,12 @@ class Guard(Enum):
 
 _PRESSED = {"robot": SafetyEvent.ROBOT_EMERGENCY_PRESSED, "system": SafetyEvent.SYSTEM_EMERGENCY_PRESSED}
 _RELEASED = {"robot": SafetyEvent.ROBOT_EMERGENCY_RELEASED, "system": SafetyEvent.SYSTEM_EMERGENCY_RELEASED}
+# Begin and end of the stops by safeguards and enabling device.
+_STOPS = (
+    (SafetyEvent.SAFEGUARD_OPENED, SafetyEvent.SAFEGUARD_RESTORED),
+    (SafetyEvent.AUTOMATIC_SAFEGUARD_OPENED, SafetyEvent.AUTOMATIC_SAFEGUARD_RESTORED),
+    (SafetyEvent.NOT_ENABLED, SafetyEvent.ENABLED),
+)
 
 
 class SafetyInputs:
@@ -257,20 +263,12 @@ class SafetyInputs:
         """Send what the safeguards and the enabling device say in this operational mode, stops first."""
         allows, stops = self._choice.allows, {g: row.is_stopping for g, row in self._safeguards.items()}
         causes = (
-            (stops[Guard.PERMANENT], SafetyEvent.SAFEGUARD_OPENED, SafetyEvent.SAFEGUARD_RESTORED),
-            (
-                stops[Guard.AUTOMATIC] and allows.heeds_safeguard,
-                SafetyEvent.AUTOMATIC_SAFEGUARD_OPENED,
-                SafetyEvent.AUTOMATIC_SAFEGUARD_RESTORED,
-            ),
-            (
-                self._device.state in STOPPING and allows.needs_enabling,
-                SafetyEvent.NOT_ENABLED,
-                SafetyEvent.ENABLED,
-            ),
+            stops[Guard.PERMANENT],
+            stops[Guard.AUTOMATIC] and allows.heeds_safeguard,
+            self._device.state in STOPPING and allows.needs_enabling,
         )
-        for stands, event, end in sorted(causes, key=lambda row: not row[0]):
-            self._handle(event if stands else end)
+        for stands, (begin, end) in sorted(zip(causes, _STOPS, strict=True), key=lambda row: not row[0]):
+            self._handle(begin if stands else end)
 
     # --- modes
 
