@@ -86,6 +86,7 @@ class ArmPlant(ABC):
     ) -> None:
         self.robot = robot
         self.fidelity = fidelity
+        self.seed = seed
         self.period_s = robot.generation.period_s
         self.calibration = draw_calibration(robot, fidelity, seed)
         self.range = JointRange(robot.q_min, robot.q_max)
@@ -93,10 +94,15 @@ class ArmPlant(ABC):
         self._physics = ArmPhysics(robot, self.calibration, fidelity, seed, tools)
         self._thermometers = Thermometers(robot.generation)
         self._finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
+        self._set_up()
+        self.reset(robot.home_q)
+
+    @abstractmethod
+    def _set_up(self) -> None:
+        """Make what this kind of arm has beside the rest."""
 
     # --- the cycle
 
-    @abstractmethod
     def step(
         self,
         target: JointTarget | None,
@@ -115,6 +121,16 @@ class ArmPlant(ABC):
         Raises:
             PlantError: the target is not finite, or the simulation diverged and needs a reset.
         """
+        self.complete_cycle()
+        self.cycle += 1
+        self._begin_cycle(target, mode, torque)
+        self._state = self._read()
+
+    @abstractmethod
+    def _begin_cycle(
+        self, target: JointTarget | None, mode: ControlMode, torque: TorqueCommand | None
+    ) -> None:
+        """Take the command of a cycle; arguments as of `step`."""
 
     @abstractmethod
     def complete_cycle(self) -> None:

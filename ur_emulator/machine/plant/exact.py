@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import RefusedError
-from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.mjcf import GRAVITY
-from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6, six
+from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
 from ur_emulator.machine.plant.arm_plant import ArmPlant, PlantState
 from ur_emulator.machine.plant.drives import check_target
-from ur_hil.tools import ToolModel
 
 # Joint torque per current [Nm/A] of a UR3 in recordings of the maker's simulator; of other arms it is not
 # known, and taken from the arm.
@@ -32,24 +30,13 @@ _TORQUE_CONSTANTS = {"ur3": (13.13, 13.13, 9.312, 4.545, 4.545, 4.545)}
 class ExactPlant(ArmPlant):
     """An arm that follows exactly; see `ArmPlant`."""
 
-    def __init__(
-        self, robot: RobotModel, fidelity: Fidelity, seed: int, tools: Sequence[ToolModel] = ()
-    ) -> None:
-        super().__init__(robot, fidelity, seed, tools)
-        self._torque_constant = _TORQUE_CONSTANTS.get(robot.name, robot.torque_constant)
-        self.reset(robot.home_q)
+    def _set_up(self) -> None:
+        self._torque_constant = _TORQUE_CONSTANTS.get(self.robot.name, self.robot.torque_constant)
 
-    def step(
-        self,
-        target: JointTarget | None,
-        mode: ControlMode = ControlMode.POSITION,
-        torque: TorqueCommand | None = None,
+    def _begin_cycle(
+        self, target: JointTarget | None, mode: ControlMode, torque: TorqueCommand | None
     ) -> None:
-        """Move to the target; see `ArmPlant.step`. PlantError if it is not finite.
-
-        Without one, in freedrive and in torque control, the arm stands still.
-        """
-        self.cycle += 1
+        """Move to the target; without one, in freedrive and in torque control, the arm stands still."""
         if target is None:
             self._qd, self._moment = ZERO6, ZERO6
         elif mode in (ControlMode.TEACH, ControlMode.TORQUE):
@@ -62,7 +49,6 @@ class ExactPlant(ArmPlant):
         self._thermometers.step(self._current)
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
-        self._state = self._read()
 
     def complete_cycle(self) -> None:
         """Do nothing: the position depends on the target alone."""

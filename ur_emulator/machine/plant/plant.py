@@ -22,14 +22,12 @@ from numpy.typing import NDArray
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
-from ur_emulator.machine.models.fidelity import Fidelity
-from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, six
+from ur_emulator.machine.models.robot_model import ZERO6, six
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_plant import ArmPlant, PlantState
 from ur_emulator.machine.plant.drives import Drives, check_target
 from ur_emulator.machine.plant.feedback import Feedback
 from ur_emulator.machine.plant.hand import FingerCommand
-from ur_hil.tools import ToolModel
 
 # Control modes in which no joint holds a position.
 _FREE = (ControlMode.TEACH, ControlMode.TORQUE)
@@ -40,10 +38,8 @@ _Command = tuple[JointTarget | None, ControlMode, TorqueCommand | None, Sequence
 class Plant(ArmPlant):
     """An arm with physics; see `ArmPlant`."""
 
-    def __init__(
-        self, robot: RobotModel, fidelity: Fidelity, seed: int, tools: Sequence[ToolModel] = ()
-    ) -> None:
-        super().__init__(robot, fidelity, seed, tools)
+    def _set_up(self) -> None:
+        robot, fidelity, seed = self.robot, self.fidelity, self.seed
         self._drives = Drives(robot, self._dynamics, self.range, fidelity, seed)
         self._feedback = Feedback(robot, fidelity, seed)
         # The command of the present cycle, by which the arm has not moved yet.
@@ -60,7 +56,6 @@ class Plant(ArmPlant):
         # In force mode and after it, until the arm is moved away; see `hold_trim`.
         self._trim_is_held = False
         self._error = np.zeros(6)
-        self.reset(robot.home_q)
 
     # --- state for tests and for the control API
 
@@ -87,17 +82,10 @@ class Plant(ArmPlant):
 
     # --- the cycle
 
-    def step(
-        self,
-        target: JointTarget | None,
-        mode: ControlMode = ControlMode.POSITION,
-        torque: TorqueCommand | None = None,
+    def _begin_cycle(
+        self, target: JointTarget | None, mode: ControlMode, torque: TorqueCommand | None
     ) -> None:
-        """See `ArmPlant.step`; the arm moves when the cycle is completed."""
-        self.complete_cycle()
-        self.cycle += 1
         self._command = (target, mode, torque, self._finger_commands)
-        self._state = self._read()
 
     def complete_cycle(self) -> None:
         """See `ArmPlant.complete_cycle`; raises what `step` raises."""
