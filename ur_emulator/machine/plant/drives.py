@@ -245,9 +245,7 @@ class Drives:
             qd: their speeds (6,) [rad/s].
             extra: torque that holds blocked axes [Nm].
         """
-        still = np.zeros(6)
-        gravity = self._dynamics.evaluate(q, still, still)
-        self._friction.evaluate(np.array([qd, qd, qd]))
+        gravity = self._let_go(q, qd)
         torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
         if extra is not None:
             torque += extra
@@ -257,10 +255,14 @@ class Drives:
         self, q: NDArray[np.float64], qd: NDArray[np.float64], command: TorqueCommand
     ) -> None:
         """Fill `control` for an arm in torque control, with joints at q (6,) [rad], qd (6,) [rad/s]."""
-        still = np.zeros(6)
-        moment = self._dynamics.evaluate(q, still, still) + command.torque
-        self._friction.evaluate(np.array([qd, qd, qd]))
+        moment = self._let_go(q, qd) + command.torque
         self._give(moment + self._friction.share(command.viscous, command.coulomb), moment)
+
+    def _let_go(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the torque that holds free joints; set their friction."""
+        self._friction.evaluate(np.array([qd, qd, qd]))
+        still = np.zeros(6)
+        return self._dynamics.evaluate(q, still, still)
 
     def _give(self, torque: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
         """Let the free joints have a torque (6,) in this cycle; moment (6,) is its part without friction."""
