@@ -90,6 +90,7 @@ class AttachPayload(CommandOperation):
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
+_MIDDLE = "of its middle in the base frame, position in m and rotation vector in rad"
 # How far away, how small and how large [m].
 FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
 
@@ -102,9 +103,7 @@ class AddObstacle(CommandOperation):
     size: Sequence[float] = parameter(
         "box: three edges; sphere: radius; capsule: radius, length; plane: none", "m", lengths=(0, 3)
     )
-    pose: Sequence[float] = parameter(
-        "of its middle in the base frame, position in m and rotation vector in rad", lengths=(6, 6)
-    )
+    pose: Sequence[float] = parameter(_MIDDLE, lengths=(6, 6))
 
     def check_together(self) -> None:
         if not self.name:
@@ -172,9 +171,7 @@ class AddThing(CommandOperation):
         "box: three edges; cylinder: radius, length; sphere: radius", "m", lengths=(0, 3)
     )
     mass: float = parameter("evenly distributed", "kg", 0.001, 100.0)
-    pose: Sequence[float] = parameter(
-        "of its middle in the base frame, position in m and rotation vector in rad", lengths=(6, 6)
-    )
+    pose: Sequence[float] = parameter(_MIDDLE, lengths=(6, 6))
     friction: float = parameter(
         "coefficient of its surface; the pads of a tool have their own", low=0.0, high=2.0, default=0.5
     )

@@ -69,10 +69,6 @@ class SafetySystem:
         """True until the power is cut after an emergency stop."""
         return self._cut_after is not None
 
-    def assign_input(self, pair: int, function: SafetyInput | None) -> None:
-        """Set up a pair of configurable inputs as a safety input; None frees them."""
-        self.inputs.assign(pair, function)
-
     def set_up_inputs(self, inputs: Mapping[int, SafetyInput]) -> None:
         """Set up what an installation has of the inputs that need operational modes, and free its others."""
         for pair, function in tuple(self.inputs.assigned.items()):

@@ -8,7 +8,6 @@ so that it acts within every sub-step, in C, and implicitly in speed. The drives
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -78,7 +77,7 @@ class ArmPhysics:
         self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), substep, tools)
         model = compile_physics(spec, fidelity.friction_rise)
         presliding = fidelity.friction_presliding
-        self._size = _Sizes(model.nbody, model.ngeom, model.nv, model.nu)
+        self._sizes = [getattr(model, size) for size in _SET_LATER]
         self._presliding = Presliding(presliding) if presliding else None
         self.loads = Loads(tools)
         self.obstacles = Obstacles()
@@ -127,7 +126,7 @@ class ArmPhysics:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
         before = self.model
         model, data = self._spec.recompile(before, self.data)
-        for fields, n in zip(_SET_LATER, self._size, strict=True):
+        for fields, n in zip(_SET_LATER.values(), self._sizes, strict=True):
             for field in fields:
                 getattr(model, field)[:n] = getattr(before, field)[:n]
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -318,19 +317,10 @@ class ArmPhysics:
 # --- the model
 
 
-class _Sizes(NamedTuple):
-    """How many bodies, geoms, degrees of freedom and actuators the arm has; those of things come after."""
-
-    body: int
-    geom: int
-    dof: int
-    actuator: int
-
-
-# What is set in a compiled model, by the arrays of `_Sizes`.
-_SET_LATER = (
-    ("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_contype", "body_conaffinity"),
-    (
+# What is set in a compiled model, by the sizes of its arrays: those of the arm come before those of things.
+_SET_LATER = {
+    "nbody": ("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_contype", "body_conaffinity"),
+    "ngeom": (
         "geom_type",
         "geom_size",
         "geom_aabb",
@@ -341,9 +331,9 @@ _SET_LATER = (
         "geom_contype",
         "geom_conaffinity",
     ),
-    ("dof_solimp", "dof_solref", "dof_frictionloss"),
-    ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
-)
+    "nv": ("dof_solimp", "dof_solref", "dof_frictionloss"),
+    "nu": ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
+}
 
 
 def physics_spec(

@@ -44,8 +44,6 @@ class Plant(ArmPlant):
         self._feedback = Feedback(robot, fidelity, seed)
         # The command of the present cycle, by which the arm has not moved yet.
         self._command: _Command | None = None
-        self._n_substeps = robot.generation.n_substeps
-        self._tau_max = robot.tau_max
         self._per_torque = 1.0 / np.array(robot.torque_constant)
         self._currents = np.zeros(6)
         # Below this no joint can be at its torque limit [A].
@@ -157,7 +155,7 @@ class Plant(ArmPlant):
             )
         self._saturated_before = self._saturated_now
         self._saturated_now = not (max(currents) < self._unsaturated > -min(currents)) and any(
-            map(ge, map(abs, physics.torque.tolist()), self._tau_max)
+            map(ge, map(abs, physics.torque.tolist()), self.robot.tau_max)
         )
         error = self._error
         if is_free:
@@ -193,7 +191,7 @@ class Plant(ArmPlant):
         if not self._is_braked:
             self._engage_brakes()
         if self._physics.has_company:
-            self._physics.run_beside(self._n_substeps)
+            self._physics.run_beside(self.robot.generation.n_substeps)
         self._feedback.take_rest()
 
     def _engage_brakes(self) -> None:

@@ -291,7 +291,7 @@ class SafetyInputs:
     # --- configurable inputs
 
     def assign(self, pair: int, function: SafetyInput | None) -> None:
-        """Set up a pair of configurable inputs."""
+        """Set up a pair of configurable inputs as a safety input; None frees them."""
         if function is None:
             self.assigned.pop(pair, None)
         else:
