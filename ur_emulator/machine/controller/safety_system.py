@@ -96,7 +96,7 @@ class SafetySystem:
         if safety.mode is not before:
             state.events.append(SafetyModeChanged(int(safety.mode)))
             self._react(before)
-        if modes.EVENTS[event].cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
+        if event.value.cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
             self.cut_power()  # an emergency stop ends without power, however soon it is released
 
     def cut_power(self) -> None:
