@@ -78,7 +78,10 @@ class Obstacles:
         if (contacts_at(self._model, self._q).contact.geom == geom).any():
             self._hide(geom)
             raise RefusedError(f"obstacle {name}: the arm is where it should stand, move one of them")
-        self.remove(name)
+        if len(self._slots) == SLOTS:
+            self._hide(self._first + self._slots[name][0])
+        else:
+            self.remove(name)
         self._slots[name] = slot, BodyShape(name, False, shape, tuple(size), pose)
 
     def remove(self, name: str) -> None:
