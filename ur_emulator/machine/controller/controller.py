@@ -247,7 +247,7 @@ class Controller:
             self._step_grippers()
         sensed = self.plant.sense()
         state.energy.step(state.mode.mode, sensed.actual_current)
-        self._watch(sensed, running)
+        self._watch(sensed, control, running)
         settings = state.error_settings
         if settings.pause_codes and settings.must_pause(state.events[n_events:]):
             self.programs.pause()
@@ -313,11 +313,11 @@ class Controller:
             ]
         )
 
-    def _watch(self, sensed: PlantState, running: bool) -> None:
+    def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if the measured state violates a limit, or a stop was requested."""
         state, settings = self.state, self.state.error_settings
         is_watched = running and state.safety.is_watched  # before a stop
-        if violation := self.safety.watch(sensed, running):
+        if violation := self.safety.watch(sensed, control, running):
             self._stop_for(violation, sensed.actual_q)
         may_warn = is_watched and settings.warns_of_deviation
         if may_warn and (warning := settings.deviation_warning(sensed.position_error)):

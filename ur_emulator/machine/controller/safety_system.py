@@ -5,7 +5,7 @@ The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothi
 
 from collections.abc import Mapping
 
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode
+from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.machine.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.machine.controller.program_runner import ProgramRunner
 from ur_emulator.machine.controller.robot_mode import POWERED, ModeCommand
@@ -50,8 +50,10 @@ class SafetySystem:
         self._is_beyond_trigger = False
         self._setpoints = SetpointCheck(state.robot, state.clock.period_s)
         self._joints = JointWatch(state.robot)
-        # What watches the measured state: the first that finds something stops the arm.
-        self._watchers = (self._watch_joints, self._watch_limits, self._watch_compliance)
+        # What watches the measured state of a stiff arm and of one that yields: the first that finds something
+        # stops the arm.
+        self._watchers_of_stiff = (self._watch_joints, self._watch_limits)
+        self._watchers = (*self._watchers_of_stiff, self._watch_compliance)
 
     @property
     def is_busy(self) -> bool:
@@ -148,15 +150,18 @@ class SafetySystem:
         near = state.safety.boundaries.find_near(now, ahead)
         return None if near is None else Violation(near)
 
-    def watch(self, sensed: PlantState, running: bool) -> Violation | None:
-        """Return why the arm is to be stopped now that this is measured, or None; in every cycle."""
+    def watch(self, sensed: PlantState, control: ControlMode, running: bool) -> Violation | None:
+        """Return why the arm is to be stopped now that this is measured, or None; in every cycle.
+
+        `control` is how the arm was driven, `running` whether it had power and its brakes were open.
+        """
         state = self._state
         requested = _REQUESTED_STOP if state.requests.take_protective_stop() else None
         self._joints.count_saturation(sensed)
         if not state.safety.is_watched:
             return None
         if running:
-            for find_violation in self._watchers:
+            for find_violation in self._watchers if control else self._watchers_of_stiff:
                 if violation := find_violation(sensed):
                     return violation
         return requested
@@ -175,8 +180,7 @@ class SafetySystem:
         return limiter.find_violation(sensed, state.past.snapshot.space, state.clock.period_s)
 
     def _watch_compliance(self, sensed: PlantState) -> Violation | None:
-        compliance = self._state.compliance
-        return compliance.find_violation(sensed) if compliance.is_on else None
+        return self._state.compliance.find_violation(sensed)
 
     # --- space
 

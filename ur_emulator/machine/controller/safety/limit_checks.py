@@ -149,6 +149,7 @@ class JointWatch:
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
         self._period_s = robot.generation.period_s
+        self._holding_deviation = robot.generation.limits.holding_deviation
         self._holds = False
         self._saturated_s = 0.0
 
@@ -162,7 +163,7 @@ class JointWatch:
         `target_qd` are the speeds of the set-point [rad/s]; a resting arm may hold with all torque while a
         program runs that has not switched it off.
         """
-        most, holding = MAX_POSITION_DEVIATION, self._robot.generation.limits.holding_deviation
+        most, holding = MAX_POSITION_DEVIATION, self._holding_deviation
         if holding is not None:
             rests = may_hold and not any(target_qd)
             self._holds = rests and (self._holds or max(map(abs, sensed.actual_qd)) <= RESTING_SPEED)
