@@ -50,8 +50,8 @@ class SafetySystem:
         self._is_beyond_trigger = False
         self._setpoints = SetpointCheck(state.robot, state.clock.period_s)
         self._joints = JointWatch(state.robot)
-        # What watches the measured state of a stiff arm and of one that yields: the first that finds something
-        # stops the arm.
+        # What watches the measured state of a stiff arm, and of one that yields, in this order: the first
+        # that finds something stops the arm.
         self._watchers_of_stiff = (self._watch_joints, self._watch_limits)
         self._watchers = (*self._watchers_of_stiff, self._watch_compliance)
 

@@ -7,6 +7,7 @@ from the seed: equal seeds and equal targets give bit-identical states.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -245,14 +246,12 @@ class ArmPlant(ABC):
 _NOTHING: Vector3 = (0.0, 0.0, 0.0)
 
 
+@dataclass(slots=True)
 class FlangePush:
     """Pushes the flange of a plant, for a time or until the next push."""
 
-    __slots__ = ("_cycles_left", "_plant")
-
-    def __init__(self, plant: ArmPlant) -> None:
-        self._plant = plant
-        self._cycles_left = 0
+    _plant: ArmPlant
+    _cycles_left: int = 0
 
     @property
     def will_end(self) -> bool:

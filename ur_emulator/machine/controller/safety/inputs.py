@@ -55,11 +55,11 @@ STOPPING = frozenset({_S.RELEASED, _S.FULLY_PRESSED, _S.TO_BE_RELEASED})
 ACTIVE = frozenset({_S.ENABLING, _S.TO_BE_RELEASED})
 
 
+@dataclass(slots=True)
 class EnablingDevice:
     """The device of a box, or none."""
 
-    def __init__(self) -> None:
-        self.state = EnablingState.NO_DEVICE
+    state: EnablingState = EnablingState.NO_DEVICE
 
     def act(self, act: EnablingAct) -> None:
         """Let something happen to it."""
@@ -139,12 +139,13 @@ class OperationalModeChoice:
 # --- a safeguard of the cell: open or closed, with a reset button or without
 
 
+@dataclass(slots=True)
 class Safeguard:
     """A safeguard; it stops the arm while it is open, or closed and not reset."""
 
-    def __init__(self) -> None:
-        self.is_stopping = False
-        self._is_open = self._needs_reset = False
+    is_stopping: bool = False
+    _is_open: bool = False
+    _needs_reset: bool = False
 
     def guard(self, is_open: bool) -> None:
         """Open or close it."""

@@ -127,14 +127,12 @@ def _tool_speed(arm: CartesianState) -> float:
     return max(hypot(*arm.tcp_speed[:3]), hypot(*arm.elbow_velocity))
 
 
+@dataclass(slots=True)
 class SpeedScaling:
     """Rate of the time on the path, by speed slider (0..1) and the limits of the safety mode."""
 
-    __slots__ = ("limiter", "slider")
-
-    def __init__(self) -> None:
-        self.slider = 1.0
-        self.limiter: SpeedLimiter | None = None
+    slider: float = 1.0
+    limiter: SpeedLimiter | None = None
 
     @property
     def share(self) -> float:
