@@ -79,8 +79,8 @@ class Run:
                 {
                     "q": plant.q_true,
                     "target_q": np.array(snapshot.target_q),
-                    "place": plant.flange_position,
-                    "contact": plant.contact_wrench,
+                    "place": plant.physics.flange_position.copy(),
+                    "contact": plant.physics.contact_wrench,
                     "felt": np.array(snapshot.actual_tcp_force),
                     "speed": np.array(snapshot.actual_tcp_speed),
                     "target_pose": np.array(snapshot.target_tcp_pose),

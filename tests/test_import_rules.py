@@ -84,6 +84,7 @@ CONTROLLER_ORDER = (
     {"safety"},
     {"settings"},
     {"arm_dynamics", "client_inputs", "world_model"},
+    {"electrics", "status_words"},
     {"snapshot"},
     {"past_cycles"},
     {"compliance", "force_sense"},

@@ -22,8 +22,8 @@ from ur_emulator.host.control_api.command_line import main, plain
 from ur_emulator.host.control_api.operations import OPERATIONS, BoxOperations, ReadProperty, describe, make
 from ur_emulator.host.control_api.step_operations import CONDITIONS
 from ur_emulator.machine.commands.operation import Kind
-from ur_emulator.machine.commands.surroundings import SIZES
-from ur_emulator.machine.plant.obstacles import SHAPES
+from ur_emulator.machine.models.things import SIZES
+from ur_emulator.machine.plant.shapes import SHAPES
 
 ROOT = Path(__file__).parents[2]
 EVERY = pytest.mark.parametrize("name", OPERATIONS)

@@ -171,7 +171,7 @@ def test_payload_transition_is_smooth_and_the_arm_carries_it():
 
 def space(robot, qdd):
     model, data = pinocchio_arm(robot, (2.0, (0.01, 0.02, 0.05), np.zeros((3, 3))))
-    arm = ArmInSpace(ArmModel(robot), (Q, QD), qdd, (Q, QD), (0.0,) * 6, TCP, force_at_flange=True)
+    arm = ArmInSpace(ArmModel(robot), (Q, QD), qdd, (Q, QD), (0.0,) * 6, TCP, True)
     return model, data, arm
 
 

@@ -260,10 +260,10 @@ def test_a_block_slips_at_the_load_that_friction_carries(share, holds):
 def test_the_load_that_nobody_declared_is_felt():
     bench = Bench(mass=1.0)
     bench.grip(100.0)
-    with_block = bench.plant.sense().tcp_force[2]
+    with_block = bench.plant.sense().estimated_force[2]
     bench.scene.remove("block")
     bench.run(0.5, 0.0, 100.0)
-    assert bench.plant.sense().tcp_force[2] - with_block == pytest.approx(9.81, abs=2.0)
+    assert bench.plant.sense().estimated_force[2] - with_block == pytest.approx(9.81, abs=2.0)
 
 
 def test_things_come_and_go_and_the_arm_stays():
@@ -622,9 +622,9 @@ def furnished(scene):
 
 def test_a_cell_file_is_the_scene_of_a_box_and_the_surroundings_of_a_plan():
     plant = furnished(load_scene(EXAMPLE))
-    assert plant.scene.names == ("block", "can")
-    assert plant.scene.state("block").pose[2] == pytest.approx(0.0, abs=1e-3)  # on the floor
-    assert plant.scene.state("can").pose[2] == pytest.approx(0.13, abs=1e-3)  # on the shelf
+    assert plant.physics.scene.names == ("block", "can")
+    assert plant.physics.scene.state("block").pose[2] == pytest.approx(0.0, abs=1e-3)  # on the floor
+    assert plant.physics.scene.state("can").pose[2] == pytest.approx(0.13, abs=1e-3)  # on the shelf
     cell = load_scene(EXAMPLE)
     assert [solid.name for solid in cell.solids] == ["shelf"]
 
@@ -633,11 +633,11 @@ def test_a_fragment_of_mjcf_is_a_scene(tmp_path):
     path = tmp_path / "kitchen.xml"
     path.write_text(MJCF)
     plant = furnished(load_scene(path))
-    assert plant.scene.names == ("mug",)
-    assert plant.scene.state("mug").pose[2] == pytest.approx(0.13, abs=1e-3)
-    plant.scene.remove("mug")
-    plant.scene.put(Thing("mug", "sphere", (0.03,), 0.1, 0.5, (0.5, -0.3, 0.2, 0.0, 0.0, 0.0)))
-    assert plant.scene.names == ("mug",)
+    assert plant.physics.scene.names == ("mug",)
+    assert plant.physics.scene.state("mug").pose[2] == pytest.approx(0.13, abs=1e-3)
+    plant.physics.scene.remove("mug")
+    plant.physics.scene.put(Thing("mug", "sphere", (0.03,), 0.1, 0.5, (0.5, -0.3, 0.2, 0.0, 0.0, 0.0)))
+    assert plant.physics.scene.names == ("mug",)
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ from ur_emulator.machine.plant.drives import ServoGains
 from ur_emulator.machine.plant.feedback import GearRipple
 from ur_emulator.machine.plant.friction import Friction
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
-from ur_emulator.machine.plant.plant import Thermometers
 from ur_emulator.machine.plant.sensors import ForceDrift
+from ur_emulator.machine.plant.thermometers import Thermometers
 
 Q = np.array([0.4, -1.3, 1.1, -0.6, 0.9, 2.0])
 STILL = np.zeros(6)

@@ -15,7 +15,7 @@ from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
 from ur_emulator.machine.commands.client_writes import WriteInputs
 from ur_emulator.machine.commands.programs import ResumeProgram
 from ur_emulator.machine.commands.safety import TriggerProtectiveStop
-from ur_emulator.machine.controller.snapshot import safety_status_bits
+from ur_emulator.machine.controller.status_words import safety_status_bits
 
 V3_15 = SoftwareVersion(3, 15, 8)
 

@@ -142,7 +142,7 @@ def is_steady(controller: Controller) -> bool:
 def take_state(box: ServedBox) -> BoxState:
     """Return the state of a box; in the thread of its loop, or when it does not run."""
     controller = box.controller
-    now, pendant = controller.snapshot, controller.state.pendant
+    now, pendant, physics = controller.snapshot, controller.state.pendant, controller.plant.physics
     popups = tuple(r.text for r in pendant.requests if r.kind is RequestedType.NONE)
     return BoxState(
         tick=now.tick,
@@ -171,10 +171,10 @@ def take_state(box: ServedBox) -> BoxState:
         analog_outputs=now.analog_values[2:4],
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
-        obstacles=controller.plant.obstacles.names,
+        obstacles=physics.obstacles.names,
         things=_things(controller),
-        shapes=(*controller.plant.shapes, *map(_shape_of, controller.state.safety.limits.boundaries.planes)),
-        contacts=controller.plant.contacts,
+        shapes=(*physics.shapes, *map(_shape_of, controller.state.safety.limits.boundaries.planes)),
+        contacts=physics.contacts,
         grippers=tuple(gripper.summary() for gripper in controller.state.grippers),
         popups=(*pendant.shown, *popups),
         questions=tuple(
@@ -187,7 +187,7 @@ def take_state(box: ServedBox) -> BoxState:
 
 
 def _things(controller: Controller) -> tuple[ThingNow, ...]:
-    scene = controller.plant.scene
+    scene = controller.plant.physics.scene
     states = ((name, scene.state(name)) for name in scene.names)
     return tuple(ThingNow(name, now.pose, now.twist, now.touches_tool) for name, now in states)
 

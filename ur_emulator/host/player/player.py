@@ -26,7 +26,7 @@ from ur_emulator.machine.commands.programs import (
 from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 from ur_emulator.machine.controller.safety.safety_state import limits_of
-from ur_emulator.machine.controller.snapshot import RUNNING_STATES
+from ur_emulator.machine.controller.status_words import RUNNING_STATES
 from ur_emulator.program_files.compiling import (
     CompileResult,
     compile_loaded,

@@ -151,7 +151,7 @@ class AssignSafetyInput(CommandOperation):
         function = None if self.function == "none" else inputs.SafetyInput(self.function)
         if function is not None and function.needs_operational_modes:
             needs_operational_modes(box.state)
-        box.safety.assign_input(self.pair, function)
+        box.safety.inputs.assign(self.pair, function)
 
 
 class ChangeSafetySettings(CommandOperation):

@@ -12,7 +12,7 @@ from ur_emulator.machine.commands.operation import CommandOperation, parameter, 
 from ur_emulator.machine.controller.command import BoxParts, refuse
 from ur_emulator.machine.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.machine.models.robot_model import Vector3, six
-from ur_emulator.machine.models.things import Thing
+from ur_emulator.machine.models.things import SIZES, Thing
 
 # --- What is wired to the inputs of the box and the tool
 
@@ -90,13 +90,7 @@ class AttachPayload(CommandOperation):
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
-# What the sizes of each shape mean, in order [m]. A plane has no end; its z points away from it.
-SIZES: dict[Shape, tuple[str, ...]] = {
-    "box": ("edge along x", "edge along y", "edge along z"),
-    "sphere": ("radius",),
-    "capsule": ("radius", "length along z without the ends"),
-    "plane": (),
-}
+_MIDDLE = "of its middle in the base frame, position in m and rotation vector in rad"
 # How far away, how small and how large [m].
 FARTHEST, SMALLEST, LARGEST = 5.0, 0.001, 5.0
 
@@ -109,22 +103,19 @@ class AddObstacle(CommandOperation):
     size: Sequence[float] = parameter(
         "box: three edges; sphere: radius; capsule: radius, length; plane: none", "m", lengths=(0, 3)
     )
-    pose: Sequence[float] = parameter(
-        "of its middle in the base frame, position in m and rotation vector in rad", lengths=(6, 6)
-    )
+    pose: Sequence[float] = parameter(_MIDDLE, lengths=(6, 6))
 
     def check_together(self) -> None:
         if not self.name:
             raise ArgumentError("obstacle without a name given: it needs one, to be removed by")
-        _check_body(f"obstacle {self.name}", self.shape, SIZES[self.shape], self.size, self.pose)
+        _check_body(f"obstacle {self.name}", self.shape, self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        _put(box, box.plant.obstacles.put, self.name, self.shape, self.size, six(self.pose))
+        _put(box, box.plant.put_obstacle, self.name, self.shape, self.size, six(self.pose))
 
 
-def _check_body(
-    what: str, shape: str, wanted: tuple[str, ...], size: Sequence[float], pose: Sequence[float]
-) -> None:
+def _check_body(what: str, shape: str, size: Sequence[float], pose: Sequence[float]) -> None:
+    wanted = SIZES[shape]
     if len(size) != len(wanted) or any(within(value, SMALLEST, LARGEST) is None for value in size):
         raise ArgumentError(
             f"{what}: size {list(size)} given: a {shape} needs {len(wanted)} numbers "
@@ -154,23 +145,21 @@ class RemoveObstacle(CommandOperation):
     name: str = parameter("of the obstacle")
 
     def apply(self, box: BoxParts) -> None:
-        known = box.plant.obstacles.names
-        if self.name not in known:
-            there = f"are {', '.join(known)}" if known else "is none"
-            raise RefusedError(f"there is no obstacle {self.name!r}: there {there}")
-        box.plant.obstacles.remove(self.name)
+        obstacles = box.plant.physics.obstacles
+        _check_known("obstacle", self.name, obstacles.names)
+        obstacles.remove(self.name)
+
+
+def _check_known(what: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        there = f"are {', '.join(known)}" if known else "is none"
+        raise RefusedError(f"there is no {what} {name!r}: there {there}")
 
 
 # --- Things that can be moved: what an arm grips, pushes and drops
 
 
 ThingShape = Literal["box", "cylinder", "sphere"]
-# What the sizes of each shape mean, in order [m].
-THING_SIZES: dict[ThingShape, tuple[str, ...]] = {
-    "box": ("edge along x", "edge along y", "edge along z"),
-    "cylinder": ("radius", "length along z"),
-    "sphere": ("radius",),
-}
 
 
 class AddThing(CommandOperation):
@@ -182,9 +171,7 @@ class AddThing(CommandOperation):
         "box: three edges; cylinder: radius, length; sphere: radius", "m", lengths=(0, 3)
     )
     mass: float = parameter("evenly distributed", "kg", 0.001, 100.0)
-    pose: Sequence[float] = parameter(
-        "of its middle in the base frame, position in m and rotation vector in rad", lengths=(6, 6)
-    )
+    pose: Sequence[float] = parameter(_MIDDLE, lengths=(6, 6))
     friction: float = parameter(
         "coefficient of its surface; the pads of a tool have their own", low=0.0, high=2.0, default=0.5
     )
@@ -192,7 +179,7 @@ class AddThing(CommandOperation):
     def check_together(self) -> None:
         if not (self.name and self.name.isprintable() and len(self.name) <= 60):
             raise ArgumentError(f"name {ascii(self.name)[:60]} of a thing given: 1 to 60 printed characters")
-        _check_body(f"thing {self.name}", self.shape, THING_SIZES[self.shape], self.size, self.pose)
+        _check_body(f"thing {self.name}", self.shape, self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
         thing = Thing(self.name, self.shape, tuple(self.size), self.mass, self.friction, six(self.pose))
@@ -209,8 +196,9 @@ class MoveThing(CommandOperation):
         _check_distance(f"thing {self.name}", self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        _known_thing(box, self.name)
-        box.plant.scene.move(self.name, six(self.pose))
+        scene = box.plant.physics.scene
+        _check_known("thing", self.name, scene.names)
+        scene.move(self.name, six(self.pose))
 
 
 class RemoveThing(CommandOperation):
@@ -219,12 +207,6 @@ class RemoveThing(CommandOperation):
     name: str = parameter("of the thing")
 
     def apply(self, box: BoxParts) -> None:
-        _known_thing(box, self.name)
-        box.plant.scene.remove(self.name)
-
-
-def _known_thing(box: BoxParts, name: str) -> None:
-    known = box.plant.scene.names
-    if name not in known:
-        there = f"are {', '.join(known)}" if known else "is none"
-        raise RefusedError(f"there is no thing {name!r}: there {there}")
+        scene = box.plant.physics.scene
+        _check_known("thing", self.name, scene.names)
+        scene.remove(self.name)

@@ -4,6 +4,7 @@ Most cycles of a box without clients, and all that a program does in joint space
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,51 +17,29 @@ from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6,
 _STEP = 1e-3
 
 
+@dataclass(slots=True, eq=False)
 class ArmInSpace:
     """What follows from the joints of one cycle; the result does not depend on when it is read.
 
     Args:
         arm: the controller's kinematics.
-        target: angles and speeds of the joints' set-point, (6,) each.
+        target_joints: angles and speeds of the joints' set-point, (6,) each.
         qdd: accelerations of the set-point [rad/s^2], (6,).
-        actual: measured angles and speeds.
+        actual_joints: measured angles and speeds.
         wrench: at the flange, base axes [N, Nm].
         tcp: tool centre point in the flange frame; None for the flange itself.
         force_at_flange: the reported wrench is that at the flange, wherever the TCP is.
     """
 
-    __slots__ = (
-        "_actual",
-        "_actual_joints",
-        "_arm",
-        "_force_at_flange",
-        "_qdd",
-        "_target",
-        "_target_joints",
-        "_tcp",
-        "_wrench",
-    )
-
-    def __init__(
-        self,
-        arm: ArmModel,
-        target: tuple[Vector6, Vector6],
-        qdd: Vector6,
-        actual: tuple[Vector6, Vector6],
-        wrench: Vector6,
-        tcp: Sequence[float] | None,
-        *,
-        force_at_flange: bool,
-    ) -> None:
-        self._arm = arm
-        self._target_joints = target
-        self._qdd = qdd
-        self._actual_joints = actual
-        self._wrench = wrench
-        self._tcp = tcp
-        self._force_at_flange = force_at_flange
-        self._target: CartesianState | None = None
-        self._actual: CartesianState | None = None
+    _arm: ArmModel
+    _target_joints: tuple[Vector6, Vector6]
+    _qdd: Vector6
+    _actual_joints: tuple[Vector6, Vector6]
+    _wrench: Vector6
+    _tcp: Sequence[float] | None
+    _force_at_flange: bool
+    _target: CartesianState | None = field(default=None, init=False)
+    _actual: CartesianState | None = field(default=None, init=False)
 
     @property
     def target(self) -> CartesianState:

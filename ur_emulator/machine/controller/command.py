@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ur_emulator.machine.controller.program_runner import ProgramRunner
     from ur_emulator.machine.controller.safety_system import SafetySystem
     from ur_emulator.machine.controller.state import ControllerState
-    from ur_emulator.machine.plant.plant import FlangePush, Plant
+    from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush
 
 # Values that a command returns; most return none.
 Result = Mapping[str, Any] | None
@@ -30,7 +30,7 @@ class BoxParts(Protocol):
     """The parts of a box that commands act on; `safety` applies safety events to arm, program and power."""
 
     state: ControllerState
-    plant: Plant
+    plant: ArmPlant
     push: FlangePush
     programs: ProgramRunner
     safety: SafetySystem

@@ -8,14 +8,16 @@ an input acts once no move runs, with or without a program; freedrive replaces f
 
 from math import hypot
 
-from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, ControlMode, RobotMode
-from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.controller.io.configuration import IoConfiguration
 from ur_emulator.machine.controller.past_cycles import PastCycles
 from ur_emulator.machine.controller.robot_mode import RobotModeMachine
 from ur_emulator.machine.controller.safety.inputs import OperationalModeChoice
-from ur_emulator.machine.controller.safety.limit_checks import SPEED_TOLERANCE, Violation
+from ur_emulator.machine.controller.safety.limit_checks import (
+    SPEED_TOLERANCE,
+    Violation,
+    protective_stop,
+)
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits, SafetyState
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
@@ -23,7 +25,7 @@ from ur_emulator.machine.motion.axis_hold import AxisHold
 from ur_emulator.machine.motion.force_mode import ForceMode
 from ur_emulator.machine.motion.generators import TorqueCommand
 from ur_emulator.machine.motion.ownership import ArmState
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 # An external force above this when freedrive begins means a wrong payload or a push. Chosen: of a sensor six
 # times its precision. An arm without one takes for a force what friction bears at rest, a second after a
@@ -205,23 +207,20 @@ class Compliance:
             return None
         joint = max(range(6), key=lambda i: abs(error[i]))
         axis, unit = _AXES[deviation.axis], "m" if deviation.axis < 3 else "rad"
-        return _stop(
+        return protective_stop(
             153,
             joint,
-            f"position deviates from path: {JOINT_NAMES[joint]}: stiff axis {axis} of force mode is "
-            f"{deviation.size:.4f} {unit} off, limit {deviation.limit:g} {unit}",
+            f"Protective Stop: position deviates from path: {JOINT_NAMES[joint]}: stiff axis {axis} of "
+            f"force mode is {deviation.size:.4f} {unit} off, limit {deviation.limit:g} {unit}",
         )
 
 
 # Source of code and text: the maker's list of error codes.
-WRONG_PAYLOAD = Violation(
-    ErrorReported(
-        156,
-        0,
-        ReportLevel.WARNING,
-        "Protective Stop: Wrong payload or mounting detected, "
-        "or something is pushing the robot when entering Freedrive mode",
-    )
+WRONG_PAYLOAD = protective_stop(
+    156,
+    0,
+    "Protective Stop: Wrong payload or mounting detected, "
+    "or something is pushing the robot when entering Freedrive mode",
 )
 
 
@@ -232,11 +231,9 @@ def _moved_too_far(limits: ConfiguredLimits, sensed: PlantState) -> Violation | 
     """
     for i, (q, qd) in enumerate(zip(sensed.actual_q, sensed.actual_qd, strict=True)):
         if (q > limits.q_max[i] and qd > 0.0) or (q < limits.q_min[i] and qd < 0.0):
-            return _stop(150, i, f"Position close to joint limits: {JOINT_NAMES[i]} at {q:.3f} rad")
+            text = f"Protective Stop: Position close to joint limits: {JOINT_NAMES[i]} at {q:.3f} rad"
+            return protective_stop(150, i, text)
         if abs(qd) > limits.speed[i] * SPEED_TOLERANCE:
-            return _stop(191, 32 + i, f"Joint speed limit violated: {JOINT_NAMES[i]} at {abs(qd):.3f} rad/s")
+            text = f"Protective Stop: Joint speed limit violated: {JOINT_NAMES[i]} at {abs(qd):.3f} rad/s"
+            return protective_stop(191, 32 + i, text)
     return None
-
-
-def _stop(code: int, argument: int, text: str) -> Violation:
-    return Violation(ErrorReported(code, argument, ReportLevel.WARNING, f"Protective Stop: {text}"))

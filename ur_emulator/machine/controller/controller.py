@@ -8,26 +8,19 @@ time is the tick.
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 
-from protocol.primary.messages import ReportLevel
 from protocol.rtde.types import SafetyStatusBits
-from protocol.ur_types import ControlMode, ProgramState, RobotMode
+from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
 from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.command import Command
-from ur_emulator.machine.controller.events import ErrorReported, RobotModeChanged
+from ur_emulator.machine.controller.events import RobotModeChanged
 from ur_emulator.machine.controller.force_sense import VARIABLE
 from ur_emulator.machine.controller.io.watchdogs import WatchdogAction
 from ur_emulator.machine.controller.program_runner import ProgramRunner
 from ur_emulator.machine.controller.robot_mode import JOINT_VECTORS, ModeCommand, RobotModeMachine
 from ur_emulator.machine.controller.safety.inputs import ACTIVE
-from ur_emulator.machine.controller.safety.limit_checks import (
-    UNREACHABLE_PATH,
-    HighHoldingTorque,
-    SetpointCheck,
-    Violation,
-    find_violation,
-)
+from ur_emulator.machine.controller.safety.limit_checks import UNREACHABLE_PATH, Violation
 from ur_emulator.machine.controller.safety.modes import SafetyEvent
 from ur_emulator.machine.controller.safety.safety_state import UNLOCK_DELAY
 from ur_emulator.machine.controller.safety_system import SafetySystem
@@ -40,8 +33,9 @@ from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.motion.tool import UnreachableError
+from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
 from ur_emulator.machine.plant.exact import ExactPlant
-from ur_emulator.machine.plant.plant import FlangePush, Plant, PlantState
+from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.tools import SUPPLY
 from ur_hil.tools import ToolModel
 from urscript.run.host import Host
@@ -64,7 +58,7 @@ def make_snapshot(
     `sensed` is the state of the arm as `Plant.report` gives it, `control` how it was driven.
     """
     target = state.past.target
-    arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.tcp_force
+    arm, clock, sensor, wrench = state.arm, state.clock, state.force_sense.sensor, sensed.estimated_force
     if sensor is not None:
         wrench = sensor.wrench_at_flange(state.client_inputs.get(VARIABLE, ZERO6), arm.fk(sensed.actual_q))
     wrench = state.force_sense.measure(wrench)
@@ -76,7 +70,7 @@ def make_snapshot(
         (sensed.actual_q, sensed.actual_qd),
         wrench,
         tcp if any(tcp) else None,
-        force_at_flange=state.force_sense.refers_to_flange,
+        state.force_sense.refers_to_flange,
     )
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io = state.speed, state.tool, state.io
@@ -85,8 +79,7 @@ def make_snapshot(
     return Snapshot(
         clock.tick,
         clock.time,
-        *target,
-        *sensed,  # type: ignore[arg-type]  # mypy takes the second tuple for one of any length
+        *(target + sensed),
         robot_mode=int(mode),
         joint_mode=JOINT_VECTORS[mode, safety_mode],
         safety_mode=int(safety_mode),
@@ -160,16 +153,12 @@ class Controller:
         self.generation = generation = robot.generation
         self.period_s = generation.period_s
         make_plant = Plant if fidelity.has_physics else ExactPlant
-        self.plant = make_plant(robot, fidelity, seed, tools)
+        self.plant: ArmPlant = make_plant(robot, fidelity, seed, tools)
         q = robot.home_q
         if self.plant.touches(q):
             raise ModelError(f"{robot.name}: at home_q the arm would touch itself or the table; give another")
         self.plant.reset(q)
-        self._setpoints = SetpointCheck(robot, self.period_s)
         self._mode = mode
-        self._saturated_s = 0.0
-        holding = generation.limits.holding_deviation
-        self._holding = None if holding is None else HighHoldingTorque(holding)
         self._settle = 0
         self._settle_cycles = generation.cycles(SETTLE_TIME)
         # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
@@ -326,27 +315,13 @@ class Controller:
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if the measured state violates a limit, or a stop was requested."""
-        state = self.state
-        self._saturated_s = self._saturated_s + self.period_s if sensed.torque_saturated else 0.0
-        requested = _REQUESTED_STOP if state.requests.take_protective_stop() else None
-        if running and state.safety.is_watched:
-            holding_deviation = None
-            if self._holding is not None:
-                is_enabled = self.programs.runtime_state is ProgramState.PLAYING
-                is_enabled = is_enabled and state.error_settings.holds_high
-                holding_deviation = self._holding.step(is_enabled, state.motion.target.qd, sensed.actual_qd)
-            violation = find_violation(state.robot, sensed, self._saturated_s, holding_deviation)
-            if self.safety.is_busy and violation is None:
-                violation = self.safety.find_violation(sensed)
-            if control and violation is None:
-                violation = state.compliance.find_violation(sensed)
-            if violation := violation or requested:
-                self._stop_for(violation, sensed.actual_q)
-            settings = state.error_settings
-            if settings.warns_of_deviation and (warning := settings.deviation_warning(sensed.position_error)):
-                state.events.append(warning)
-        elif requested and state.safety.is_watched:
-            self._stop_for(requested, sensed.actual_q)
+        state, settings = self.state, self.state.error_settings
+        is_watched = running and state.safety.is_watched  # before a stop
+        if violation := self.safety.watch(sensed, control, running):
+            self._stop_for(violation, sensed.actual_q)
+        may_warn = is_watched and settings.warns_of_deviation
+        if may_warn and (warning := settings.deviation_warning(sensed.position_error)):
+            state.events.append(warning)
 
     def _check_watchdogs(self) -> None:
         late = self.state.watchdogs.late(self.state.clock.tick)
@@ -370,12 +345,7 @@ class Controller:
             target = state.motion.step(self.period_s, scale)
             if target is before or state.safety.is_stopped or state.motion.is_compliant:
                 return target
-            violation = self._setpoints.find_invalid(state.safety.limits, before, target)
-            if violation is None and state.safety.boundaries:
-                way = (target.q, *state.motion.way_to_rest(target))
-                now, *ahead = (state.arm.state(q, target.qd, state.tool.tcp_offset) for q in way)
-                near = state.safety.boundaries.find_near(now, ahead)
-                violation = None if near is None else Violation(near)
+            violation = self.safety.find_invalid(before, target)
         except UnreachableError:
             violation = UNREACHABLE_PATH
         if violation is None:
@@ -405,4 +375,3 @@ class Controller:
 
 
 _BY_HAND = ControlMode.TEACH
-_REQUESTED_STOP = Violation(ErrorReported(209, 0, ReportLevel.WARNING, "Protective stop requested"))

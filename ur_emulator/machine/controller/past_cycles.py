@@ -11,7 +11,7 @@ from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.models.robot_generation import RobotGeneration
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion.generators import JointTarget
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.
 HISTORY_TIME = 1.0

@@ -5,33 +5,41 @@ The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothi
 
 from collections.abc import Mapping
 
-from protocol.ur_types import RobotMode, SafetyMode
+from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.machine.controller.events import LogAdded, SafetyModeChanged
 from ur_emulator.machine.controller.program_runner import ProgramRunner
 from ur_emulator.machine.controller.robot_mode import POWERED, ModeCommand
 from ur_emulator.machine.controller.safety import modes
 from ur_emulator.machine.controller.safety.boundaries import TRIGGER_BAND
 from ur_emulator.machine.controller.safety.inputs import Guard, OperationalMode, SafetyInput, SafetyInputs
-from ur_emulator.machine.controller.safety.limit_checks import Violation
+from ur_emulator.machine.controller.safety.limit_checks import (
+    JointWatch,
+    SetpointCheck,
+    Violation,
+    protective_stop,
+)
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.machine.controller.safety.speed_scaling import SpeedLimiter, limits_of_mode
 from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.motion.arm_motion import SCALING_RATE
-from ur_emulator.machine.plant.plant import Plant, PlantState
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.arm_plant import ArmPlant, PlantState
 
 # Joints settle behind their targets. The brakes wait for them, at most the second time (chosen) [s].
 BRAKE_DELAY, LONGEST_BRAKING = 0.05, 1.5
+_REQUESTED_STOP = protective_stop(209, 0, "Protective stop requested")
 
 
 class SafetySystem:
     """Applies safety events to the safety state, and its effects to arm, program and power.
 
-    While it `is_busy`, `step` and `find_violation` must be called in every cycle.
+    While it `is_busy`, `step` must be called in every cycle; `watch` always.
     """
 
-    def __init__(self, state: ControllerState, programs: ProgramRunner, plant: Plant) -> None:
+    def __init__(self, state: ControllerState, programs: ProgramRunner, plant: ArmPlant) -> None:
         self._state = state
         self._plant = plant
+        state.arm.range = plant.range
         self._programs = programs
         self.inputs = SafetyInputs(
             self.handle, state.enabling_device, state.operational, self._begin_operational_mode
@@ -40,17 +48,28 @@ class SafetySystem:
         self._rests_since: int | None = None
         self._is_waiting = False
         self._is_beyond_trigger = False
-        self.is_busy = False
+        self._setpoints = SetpointCheck(state.robot, state.clock.period_s)
+        self._joints = JointWatch(state.robot)
+        # What watches the measured state of a stiff arm, and of one that yields, in this order: the first
+        # that finds something stops the arm.
+        self._watchers_of_stiff = (self._watch_joints, self._watch_limits)
+        self._watchers = (*self._watchers_of_stiff, self._watch_compliance)
+
+    @property
+    def is_busy(self) -> bool:
+        """True while `step` must be called in every cycle."""
+        return (
+            self._cut_after is not None
+            or bool(self.inputs.assigned)
+            or self._state.speed.limiter is not None
+            or self._watches_space
+            or self._state.safety.has(SafetyMode.RECOVERY)
+        )
 
     @property
     def is_stopping(self) -> bool:
         """True until the power is cut after an emergency stop."""
         return self._cut_after is not None
-
-    def assign_input(self, pair: int, function: SafetyInput | None) -> None:
-        """Set up a pair of configurable inputs as a safety input; None frees them."""
-        self.inputs.assign(pair, function)
-        self._update()
 
     def set_up_inputs(self, inputs: Mapping[int, SafetyInput]) -> None:
         """Set up what an installation has of the inputs that need operational modes, and free its others."""
@@ -60,7 +79,6 @@ class SafetySystem:
         for pair, function in inputs.items():
             self.inputs.assign(pair, function)
         self.inputs.require_reset(Guard.AUTOMATIC, SafetyInput.AUTOMATIC_RESET in inputs.values())
-        self._update()
 
     def set_limits(self, limits: ConfiguredLimits) -> None:
         """Set the limits of joints and space, in place of those of the arm's model.
@@ -68,10 +86,8 @@ class SafetySystem:
         The mode in force, the inverse kinematics and freedrive keep them too.
         """
         self._state.safety.set_limits(limits)
-        self._state.arm.set_range(limits.q_min, limits.q_max)
         self._plant.set_range(limits.q_min, limits.q_max)
         self._set_limits(self._state.safety.mode)
-        self._update()
 
     def handle(self, event: modes.SafetyEvent) -> None:
         """Apply an event."""
@@ -82,9 +98,8 @@ class SafetySystem:
         if safety.mode is not before:
             state.events.append(SafetyModeChanged(int(safety.mode)))
             self._react(before)
-        if modes.EVENTS[event].cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
+        if event.value.cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
             self.cut_power()  # an emergency stop ends without power, however soon it is released
-        self._update()
 
     def cut_power(self) -> None:
         """End the program, apply the brakes and cut the power at once."""
@@ -123,13 +138,49 @@ class SafetySystem:
                 and (state.clock.tick - self._rests_since) * state.clock.period_s >= BRAKE_DELAY
             ):
                 self.cut_power()
-        self._update()
 
-    def find_violation(self, sensed: PlantState) -> Violation | None:
-        """Return a violation of the limits of this safety mode, or None."""
+    def find_invalid(self, before: JointTarget, target: JointTarget) -> Violation | None:
+        """Return what is wrong with the set-point `target`, which follows `before`; None: nothing."""
         state = self._state
-        limiter, space = state.speed.limiter, state.past.snapshot.space
-        return None if limiter is None else limiter.find_violation(sensed, space, state.clock.period_s)
+        invalid = self._setpoints.find_invalid(state.safety.limits, before, target)
+        if invalid is not None or not state.safety.boundaries:
+            return invalid
+        way = (target.q, *state.motion.way_to_rest(target))
+        now, *ahead = (state.arm.state(q, target.qd, state.tool.tcp_offset) for q in way)
+        near = state.safety.boundaries.find_near(now, ahead)
+        return None if near is None else Violation(near)
+
+    def watch(self, sensed: PlantState, control: ControlMode, running: bool) -> Violation | None:
+        """Return why the arm is to be stopped now that this is measured, or None; in every cycle.
+
+        `control` is how the arm was driven, `running` whether it had power and its brakes were open.
+        """
+        state = self._state
+        requested = _REQUESTED_STOP if state.requests.take_protective_stop() else None
+        self._joints.count_saturation(sensed)
+        if not state.safety.is_watched:
+            return None
+        if running:
+            for find_violation in self._watchers if control else self._watchers_of_stiff:
+                if violation := find_violation(sensed):
+                    return violation
+        return requested
+
+    def _watch_joints(self, sensed: PlantState) -> Violation | None:
+        state = self._state
+        plays = self._programs.runtime_state is ProgramState.PLAYING
+        may_hold = plays and state.error_settings.holds_high
+        return self._joints.find_violation(sensed, state.motion.target.qd, may_hold=may_hold)
+
+    def _watch_limits(self, sensed: PlantState) -> Violation | None:
+        state = self._state
+        limiter = state.speed.limiter
+        if limiter is None:
+            return None
+        return limiter.find_violation(sensed, state.past.snapshot.space, state.clock.period_s)
+
+    def _watch_compliance(self, sensed: PlantState) -> Violation | None:
+        return self._state.compliance.find_violation(sensed)
 
     # --- space
 
@@ -179,7 +230,6 @@ class SafetySystem:
     def _begin_operational_mode(self) -> None:
         state, mode = self._state, self._state.operational.mode
         self._set_limits(state.safety.mode)
-        self._update()
         state.events.append(LogAdded("Safety", f"Operational mode: {mode.name}"))
         if mode is OperationalMode.MANUAL and not state.robot.generation.has_remote_in_manual:
             state.pendant.set_remote_control(False)
@@ -209,12 +259,3 @@ class SafetySystem:
             low <= q <= high
             for low, q, high in zip(limits.q_min, past.sensed.actual_q, limits.q_max, strict=True)
         ) and not (in_space and in_space.find_crossed(past.snapshot.space.actual))
-
-    def _update(self) -> None:
-        self.is_busy = (
-            self._cut_after is not None
-            or bool(self.inputs.assigned)
-            or self._state.speed.limiter is not None
-            or self._watches_space
-            or self._state.safety.has(SafetyMode.RECOVERY)
-        )

@@ -7,73 +7,20 @@ is a pure function of a snapshot and a layout table.
 """
 
 import math
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from protocol.realtime.layout import SNAPSHOT_FIELDS
-from protocol.rtde.types import RobotStatusBits, SafetyStatusBits, TimeScaleSource
-from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
+from protocol.rtde.types import TimeScaleSource
+from protocol.ur_types import JointMode
+from ur_emulator.machine.controller import electrics
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, ToolLine
 from ur_emulator.machine.controller.io.registers import RegisterValues
 from ur_emulator.machine.controller.robot_mode import POWERED
 from ur_emulator.machine.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
-from ur_emulator.machine.models.robot_generation import Electrics, RobotGeneration
+from ur_emulator.machine.controller.status_words import RUNNING_STATES, robot_status_bits, safety_status_bits
+from ur_emulator.machine.models.robot_generation import Electrics
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
-
-# --- the two words of status bits that RTDE publishes, as functions of the modes
-
-# A program counts as running until it stands still; paused it does not, nor when it has ended. Inferred from
-# a client that waits for both flags of the robot mode data to fall.
-RUNNING_STATES = frozenset({ProgramState.PLAYING, ProgramState.PAUSING, ProgramState.RESUMING})
-
-_EMERGENCY = SafetyStatusBits.EMERGENCY_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
-_SAFEGUARD = int(SafetyStatusBits.SAFEGUARD_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY)
-
-# Inferred from the names of the bits: every mode has one of its own, and what keeps the arm from moving also
-# says so. The bits of a mode that is not listed are 0.
-SAFETY_BITS: dict[int, int] = {
-    SafetyMode.NORMAL: int(SafetyStatusBits.NORMAL_MODE),
-    SafetyMode.REDUCED: int(SafetyStatusBits.REDUCED_MODE),
-    SafetyMode.RECOVERY: int(SafetyStatusBits.RECOVERY_MODE),
-    SafetyMode.PROTECTIVE_STOP: int(
-        SafetyStatusBits.PROTECTIVE_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
-    ),
-    SafetyMode.SAFEGUARD_STOP: _SAFEGUARD,
-    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _SAFEGUARD,
-    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _SAFEGUARD,
-    SafetyMode.SYSTEM_EMERGENCY_STOP: int(SafetyStatusBits.SYSTEM_EMERGENCY_STOPPED | _EMERGENCY),
-    SafetyMode.ROBOT_EMERGENCY_STOP: int(SafetyStatusBits.ROBOT_EMERGENCY_STOPPED | _EMERGENCY),
-    SafetyMode.VIOLATION: int(SafetyStatusBits.VIOLATION | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
-    SafetyMode.FAULT: int(SafetyStatusBits.FAULT | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
-}
-
-
-def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
-    """Return `robot_status_bits` without the buttons of the pendant."""
-    power = RobotStatusBits.POWER_ON if robot_mode in POWERED else RobotStatusBits(0)
-    running = RobotStatusBits.PROGRAM_RUNNING if runtime_state in RUNNING_STATES else RobotStatusBits(0)
-    return int(power | running)
-
-
-def safety_status_bits(safety_status: int) -> int:
-    """Return `safety_status_bits` for a SafetyStatus, without the enabling device."""
-    return SAFETY_BITS.get(safety_status, 0)
-
-
-# --- electrics: currents and temperatures of box and tool, and the energy that the arm takes
-#
-# No manual gives numbers, so all of them are chosen: outputs drive the inputs of a PLC, the tool is a
-# resistor, the box warms up after it was switched on.
-
-# The part of the joints' currents that shows on the arm's bus, as the drives chop.
-BUS_SHARE = 0.1
-# What one high output of the box or one switched output of the tool carries [A]: a PLC's input.
-OUTPUT_CURRENT = 0.006
-# Resistance of what hangs at the tool's supply: 24 V give 60 mA, 12 V half of that [ohm].
-TOOL_RESISTANCE = 400.0
-# The masterboard goes from the temperature of the room to this much above, exponentially [degree C, s].
-ROOM_TEMPERATURE, BOARD_RISE, BOARD_TIME = 24.0, 8.0, 900.0
 
 _BOX_OUTPUTS = STANDARD.mask | CONFIGURABLE.mask
 
@@ -84,31 +31,6 @@ TOOL_MODES: dict[int, JointMode] = {
     JointMode.READY_FOR_POWER_OFF: JointMode.SHUTTING_DOWN,
     JointMode.VIOLATION: JointMode.FAULT,
 }
-
-
-def arm_current(supply: Electrics, joint_currents: Iterable[float]) -> float:
-    """Return the current on the arm's bus [A] for those of the joints."""
-    return supply.idle_current + BUS_SHARE * sum(map(abs, joint_currents))
-
-
-class EnergyMeter:
-    """Sums up the power on the arm's bus; `consumed` [J]."""
-
-    __slots__ = ("_joules_per_ampere", "_supply", "consumed")
-
-    def __init__(self, generation: RobotGeneration) -> None:
-        """Begin with nothing; the generation has the control cycle and the voltage of the bus."""
-        self._supply = generation.electrics
-        self._joules_per_ampere = self._supply.robot_voltage * generation.period_s
-        self.consumed = 0.0
-
-    def step(self, mode: RobotMode, joint_currents: Vector6) -> None:
-        """Add the energy of a cycle with these currents [A]."""
-        if mode in POWERED:
-            self.consumed += self._joules_per_ampere * arm_current(self._supply, joint_currents)
-
-
-# --- the snapshot
 
 
 class _Fields(NamedTuple):
@@ -247,7 +169,7 @@ class Snapshot(_Fields):
         """Current on the arm's bus [A]."""
         if self.robot_mode not in POWERED:
             return 0.0
-        return arm_current(self.supply, self.actual_current)
+        return electrics.arm_current(self.supply, self.actual_current)
 
     @property
     def actual_joint_voltage(self) -> Vector6:
@@ -279,16 +201,15 @@ class Snapshot(_Fields):
     @property
     def io_current(self) -> float:
         """Current of the box's outputs [A]."""
-        return OUTPUT_CURRENT * (self.actual_digital_output_bits & _BOX_OUTPUTS).bit_count()
+        return electrics.OUTPUT_CURRENT * (self.actual_digital_output_bits & _BOX_OUTPUTS).bit_count()
 
     @property
     def tool_output_current(self) -> float:
         """Current out of the tool's supply [A]; 0 while it is off."""
         if not self.tool_output_voltage:
             return 0.0
-        switched = (self.actual_digital_output_bits & TOOL.mask).bit_count()
-        resting = self.tool_output_voltage / TOOL_RESISTANCE + OUTPUT_CURRENT * switched
-        return resting + self.gripper_current
+        switched = electrics.OUTPUT_CURRENT * (self.actual_digital_output_bits & TOOL.mask).bit_count()
+        return self.tool_output_voltage / electrics.TOOL_RESISTANCE + switched + self.gripper_current
 
     @property
     def tool_temperature(self) -> float:
@@ -298,7 +219,7 @@ class Snapshot(_Fields):
     @property
     def masterboard_temperature(self) -> float:
         """Temperature inside the box [degree C]."""
-        return ROOM_TEMPERATURE + BOARD_RISE * (1.0 - math.exp(-self.timestamp / BOARD_TIME))
+        return electrics.board_temperature(self.timestamp)
 
     @property
     def analog_io_types(self) -> int:

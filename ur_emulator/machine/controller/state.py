@@ -11,6 +11,7 @@ from ur_emulator.machine.controller.arm_dynamics import ArmDynamics
 from ur_emulator.machine.controller.client_inputs import ClientInputs
 from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.compliance import Compliance
+from ur_emulator.machine.controller.electrics import EnergyMeter
 from ur_emulator.machine.controller.events import EventQueue, ProgramRequests
 from ur_emulator.machine.controller.force_sense import ForceSense
 from ur_emulator.machine.controller.interpreter_queue import InterpreterQueue
@@ -27,7 +28,6 @@ from ur_emulator.machine.controller.safety.inputs import EnablingDevice, Operati
 from ur_emulator.machine.controller.safety.safety_state import SafetyState, limits_of
 from ur_emulator.machine.controller.safety.speed_scaling import SpeedScaling
 from ur_emulator.machine.controller.settings import ErrorSettings, PlanningSettings, ToolSettings
-from ur_emulator.machine.controller.snapshot import EnergyMeter
 from ur_emulator.machine.controller.world_model import WorldModel
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.robot_model import RobotModel, Vector6

@@ -16,6 +16,7 @@ from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_t
 from ur_emulator.errors import KinematicsError
 from ur_emulator.machine.kinematics.closed_form import closed_form_inverse
 from ur_emulator.machine.models.calibration import NOMINAL, Calibration, calibrated_dh
+from ur_emulator.machine.models.joint_range import JointRange
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
 from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6, six
 
@@ -80,6 +81,7 @@ class ArmModel:
         calibration: differences of this arm from the nominal one.
 
     Attributes:
+        range: the joint ranges that `inverse` keeps; at first those of the robot.
         mass: of all moving links [kg].
         n_iterations: of Newton's method in the last call of `inverse`.
 
@@ -111,12 +113,8 @@ class ArmModel:
         self.n_iterations = 0
         self._tcp: Sequence[float] | None = None
         self._tcp_offset: Vector3 = (0.0, 0.0, 0.0)
-        self.set_range(robot.q_min, robot.q_max)
+        self.range = JointRange(robot.q_min, robot.q_max)
         self._tcp_rotation: Sequence[float] = rotvec_to_flat(0.0, 0.0, 0.0)
-
-    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
-        """Set the joint ranges [rad] that `inverse` keeps; at first those of the robot."""
-        self._q_min, self._q_max = q_min, q_max
 
     def fk(self, q: Sequence[float], tcp: Sequence[float] | None = None) -> Pose:
         """Forward kinematics: the pose of the tool centre point at joint angles q (6,) [rad]."""
@@ -295,7 +293,7 @@ class ArmModel:
     def _into_range(self, q: Sequence[float], near: Sequence[float]) -> Vector6 | None:
         """Unwrap each angle to the turn next to `near` that lies in the joint's range."""
         angles: list[float] = []
-        for angle, reference, low, high in zip(q, near, self._q_min, self._q_max, strict=True):
+        for angle, reference, low, high in zip(q, near, self.range.q_min, self.range.q_max, strict=True):
             turned = angle + 2.0 * pi * round((reference - angle) / (2.0 * pi))
             while turned > high:
                 turned -= 2.0 * pi

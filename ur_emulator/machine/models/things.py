@@ -4,6 +4,15 @@ from dataclasses import dataclass
 
 from ur_emulator.machine.models.robot_model import Vector3, Vector6
 
+# What the sizes of each shape mean, in order [m]. A plane has no end; its z points away from it.
+SIZES: dict[str, tuple[str, ...]] = {
+    "box": ("edge along x", "edge along y", "edge along z"),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length along z without the ends"),
+    "plane": (),
+    "cylinder": ("radius", "length along z"),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Thing:

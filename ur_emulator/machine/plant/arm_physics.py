@@ -5,18 +5,18 @@ of the gears. The law of the joint servos is that of MuJoCo's actuators, force =
 so that it acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from protocol.pose import rotvec_from_flat
+from ur_emulator.machine.models.calibration import Calibration, calibrated_dh
+from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
-from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3, Vector6, six
+from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3
 from ur_emulator.machine.models.things import BodyShape, Contact
 from ur_emulator.machine.plant.drives import Drives, ServoGains
 from ur_emulator.machine.plant.friction import Presliding
@@ -25,6 +25,7 @@ from ur_emulator.machine.plant.loads import Loads
 from ur_emulator.machine.plant.obstacles import OBSTACLES, Obstacles, add_slots
 from ur_emulator.machine.plant.scene import PREFIX, Scene
 from ur_emulator.machine.plant.sensors import REC_Q, REC_QD
+from ur_emulator.machine.plant.shapes import BY_GEOM, DrawnBox, contacts_at, pose_of
 from ur_hil.tools import ToolModel
 
 TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
@@ -40,17 +41,6 @@ _CONTACT_SOLIMP = (0.3, 0.95, 0.0005, 0.5, 2.0)
 # Sliding friction of what touches; assumed: a tool of metal or plastic on a table.
 _SLIDING_FRICTION = 0.3
 
-# Shapes by MuJoCo's types, and MuJoCo's sizes as those of `BodyShape`.
-_SHAPES: dict[int, tuple[str, Callable[..., tuple[float, ...]]]] = {
-    int(mujoco.mjtGeom.mjGEOM_BOX): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", lambda r, half, _: (r, 2 * half)),
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", lambda r, half, _: (r, 2 * half)),
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", lambda r, *_: (r,)),
-    int(mujoco.mjtGeom.mjGEOM_PLANE): ("plane", lambda *_: ()),
-    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
-    int(mujoco.mjtGeom.mjGEOM_MESH): ("box", lambda x, y, z: (2 * x, 2 * y, 2 * z)),
-}
-
 # Chosen: bounds a wrench at a singularity, and changes it by 1 % where the least singular value of the
 # Jacobian is .047; recordings of a real UR3 go there and show no damping.
 _DAMPING = 0.005**2 * np.eye(6)
@@ -60,14 +50,7 @@ _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
 class ArmPhysics:
     """The moving arm.
 
-    Args:
-        dh: its six true rows.
-        mass_scale: six factors on the link masses.
-        substep: physics time step [s].
-        presliding: angle over which friction follows a reversal [rad]; 0: friction is MuJoCo's, without a
-            memory of the path.
-        friction_rise: speed over which MuJoCo's grows from zero to its size [rad/s].
-        tools: on the flange.
+    Its friction follows a reversal over an angle, or is MuJoCo's, without a memory of the path.
 
     Attributes:
         q: motor positions (6,) [rad].
@@ -84,17 +67,17 @@ class ArmPhysics:
     def __init__(
         self,
         robot: RobotModel,
-        dh: Sequence[DhRow],
-        mass_scale: Sequence[float],
-        gains: ServoGains,
-        substep: float,
-        presliding: float,
-        friction_rise: float,
+        calibration: Calibration,
+        fidelity: Fidelity,
+        seed: int,
         tools: Sequence[ToolModel] = (),
     ) -> None:
-        self._spec = spec = physics_spec(robot, dh, mass_scale, gains, substep, tools)
-        model = compile_physics(spec, friction_rise)
-        self._size = _Sizes(model.nbody, model.ngeom, model.nv, model.nu)
+        mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
+        dh, substep = calibrated_dh(robot, calibration), robot.generation.substep_us * 1e-6
+        self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), substep, tools)
+        model = compile_physics(spec, fidelity.friction_rise)
+        presliding = fidelity.friction_presliding
+        self._sizes = [getattr(model, size) for size in _SET_LATER]
         self._presliding = Presliding(presliding) if presliding else None
         self.loads = Loads(tools)
         self.obstacles = Obstacles()
@@ -143,7 +126,7 @@ class ArmPhysics:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
         before = self.model
         model, data = self._spec.recompile(before, self.data)
-        for fields, n in zip(_SET_LATER, self._size, strict=True):
+        for fields, n in zip(_SET_LATER.values(), self._sizes, strict=True):
             for field in fields:
                 getattr(model, field)[:n] = getattr(before, field)[:n]
         mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -222,8 +205,8 @@ class ArmPhysics:
         for shape, (dx, dy, dz), at in self._sliding_shapes:
             q, (x, y, z, rx, ry, rz) = float(data.qpos[at]), shape.pose
             shapes.append(replace(shape, pose=(x + dx * q, y + dy * q, z + dz * q, rx, ry, rz)))
-        for shape, geom, middle, turn in self._moving_shapes:
-            shapes.append(replace(shape, pose=_pose(*_placed(data, geom, middle, turn))))
+        for shape, geom, box in self._moving_shapes:
+            shapes.append(replace(shape, pose=pose_of(*box.place(data, geom))))
         return (*shapes, *self.obstacles.shapes)
 
     def _sort_shapes(self) -> None:
@@ -237,19 +220,18 @@ class ArmPhysics:
         flange, to_flange = data.site_xpos[site], data.site_xmat[site].reshape(3, 3).T
         self._fixed_shapes: list[BodyShape] = []
         self._sliding_shapes: list[tuple[BodyShape, Vector3, int]] = []
-        self._moving_shapes: list[tuple[BodyShape, int, NDArray[np.float64], NDArray[np.float64]]] = []
+        self._moving_shapes: list[tuple[BodyShape, int, DrawnBox]] = []
         for geom in range(model.ngeom):
-            body, row = model.body(model.geom_bodyid[geom]), _SHAPES.get(model.geom_type[geom])
+            body, row = model.body(model.geom_bodyid[geom]), BY_GEOM.get(int(model.geom_type[geom]))
             if row is None or body.name in (*LINKS, OBSTACLES) or (name := self._name_of(geom)) == "base":
                 continue
-            middle, turn, half = _box_around(model, geom)
-            shape, is_carried = row[0], bool(self._is_arm[body.id])
-            size = row[1](*half.tolist())
-            position, rotation = _placed(data, geom, middle, turn)
+            (shape, from_mujoco), is_carried = row, bool(self._is_arm[body.id])
+            box = DrawnBox.of(model, geom)
+            position, rotation = box.place(data, geom)
             if is_carried:
-                position = to_flange @ (position - flange)
-                rotation = to_flange @ rotation
-            drawn = BodyShape(name, is_carried, shape, size, _pose(position, rotation))
+                position, rotation = to_flange @ (position - flange), to_flange @ rotation
+            size = from_mujoco(*box.size.tolist())
+            drawn = BodyShape(name, is_carried, shape, size, pose_of(position, rotation))
             carrier = model.body(model.body_weldid[body.id])
             joint = int(carrier.jntadr[0])
             if joint < 0 or carrier.name in LINKS:
@@ -258,7 +240,7 @@ class ArmPhysics:
                 axis = (to_flange @ data.xaxis[joint]).tolist()
                 self._sliding_shapes.append((drawn, tuple(axis), int(model.jnt_qposadr[joint])))
             else:
-                self._moving_shapes.append((drawn, geom, middle, turn))
+                self._moving_shapes.append((drawn, geom, box))
 
     def _name_of(self, geom: int) -> str:
         """What people call the body of a shape: a link, a tool, an obstacle, a thing, the table."""
@@ -293,12 +275,7 @@ class ArmPhysics:
 
     def touches(self, q: Sequence[float]) -> bool:
         """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        data = mujoco.MjData(self.model)
-        data.qpos[:] = self.data.qpos
-        data.qpos[:6] = q
-        mujoco.mj_kinematics(self.model, data)
-        mujoco.mj_collision(self.model, data)
-        return int(data.ncon) > 0
+        return bool(contacts_at(self.model, np.array([*q, *self.data.qpos[6:]])).ncon)
 
     def run(self, drives: Drives, capture_at: int, captured: NDArray[np.float64]) -> None:
         """Advance by the sub-steps of a cycle.
@@ -340,51 +317,10 @@ class ArmPhysics:
 # --- the model
 
 
-def _pose(position: NDArray[np.float64], rotation: NDArray[np.float64]) -> Vector6:
-    """The pose of a position (3,) [m] and a rotation (3, 3)."""
-    return six([*position.tolist(), *rotvec_from_flat(*rotation.ravel().tolist())])
-
-
-_Box = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-
-
-def _box_around(model: mujoco.MjModel, geom: int) -> _Box:
-    """Middle (3,) and rotation (3, 3) of a shape in MuJoCo's frame of it, and its sizes (3,) [m].
-
-    That of a mesh is its principal axes; the box around it has those of its file.
-    """
-    if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
-        return np.zeros(3), np.eye(3), model.geom_size[geom]
-    mesh, flat = int(model.geom_dataid[geom]), np.empty(9)
-    mujoco.mju_quat2Mat(flat, model.mesh_quat[mesh])
-    to_file = flat.reshape(3, 3)
-    begin = model.mesh_vertadr[mesh]
-    corners = model.mesh_vert[begin : begin + model.mesh_vertnum[mesh]] @ to_file.T
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    return to_file.T @ (low + high) / 2.0, to_file.T, (high - low) / 2.0
-
-
-def _placed(
-    data: mujoco.MjData, geom: int, middle: NDArray[np.float64], turn: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position (3,) [m] and rotation (3, 3) of such a box in the base frame."""
-    rotation = data.geom_xmat[geom].reshape(3, 3)
-    return data.geom_xpos[geom] + rotation @ middle, rotation @ turn
-
-
-class _Sizes(NamedTuple):
-    """How many bodies, geoms, degrees of freedom and actuators the arm has; those of things come after."""
-
-    body: int
-    geom: int
-    dof: int
-    actuator: int
-
-
-# What is set in a compiled model, by the arrays of `_Sizes`.
-_SET_LATER = (
-    ("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_contype", "body_conaffinity"),
-    (
+# What is set in a compiled model, by the sizes of its arrays: those of the arm come before those of things.
+_SET_LATER = {
+    "nbody": ("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_contype", "body_conaffinity"),
+    "ngeom": (
         "geom_type",
         "geom_size",
         "geom_aabb",
@@ -395,9 +331,9 @@ _SET_LATER = (
         "geom_contype",
         "geom_conaffinity",
     ),
-    ("dof_solimp", "dof_solref", "dof_frictionloss"),
-    ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
-)
+    "nv": ("dof_solimp", "dof_solref", "dof_frictionloss"),
+    "nu": ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
+}
 
 
 def physics_spec(

@@ -71,7 +71,7 @@ class CommandPath:
         self._lag = lag
         n_filter = N_SIGNALS if damping is None else 2 * N_SIGNALS
         n_kept = n_filter + 2
-        self._matrix = _cycle_matrix(path_responses(n_substeps, substep, lag, damping), lead, trim_gain)
+        self._matrix = _cycle_matrix(n_substeps, substep, lag, damping, lead, trim_gain)
         n_outputs, n_inputs = self._matrix.shape
         self._inputs = np.zeros((n_inputs, 6))
         self._kept = self._inputs[:n_kept]
@@ -144,30 +144,16 @@ class CommandPath:
 _PACK = Struct("18d").pack_into
 
 
-def path_responses(n_substeps: int, substep: float, lag: float, damping: float | None) -> NDArray[np.float64]:
-    """Return the response of one joint's set-point to each input of its path; arguments as `trace_cycle`.
-
-    Returns:
-        (m, n_substeps + 1, n): the filter's rows at the start of each sub-step and at the end of the cycle,
-        by input: the filter's rows, then q, qd, deflection of each of the targets, newest first.
-    """
+def _cycle_matrix(
+    n_substeps: int, substep: float, lag: float, damping: float | None, lead: float, trim_gain: float
+) -> NDArray[np.float64]:
+    """Return the matrix of the tables above; arguments as of `CommandPath`."""
     n_filter = N_SIGNALS if damping is None else 2 * N_SIGNALS
-    n_inputs = n_filter + N_SIGNALS * _N_KNOTS
-    responses = np.empty((n_filter, n_substeps + 1, n_inputs))
-    # Column by column: the response to a unit in one input while all others are zero.
-    for column in range(n_inputs):
-        unit = np.zeros(n_inputs)
-        unit[column] = 1.0
-        filtered, knots = unit[:n_filter], unit[n_filter:].reshape(_N_KNOTS, N_SIGNALS)
-        rows = trace_cycle(filtered, knots, n_substeps, substep, lag, damping)
-        responses[:, :, column] = rows.T
-    return responses
-
-
-def _cycle_matrix(responses: NDArray[np.float64], lead: float, trim_gain: float) -> NDArray[np.float64]:
-    """Return the matrix of the tables above."""
-    n_filter = len(responses)
-    rows = np.insert(responses, [n_filter, n_filter], 0.0, axis=2)
+    # The response to a unit in each input while all others are zero, one column each.
+    units = np.eye(n_filter + N_SIGNALS * _N_KNOTS)
+    knots = units[n_filter:].reshape(_N_KNOTS, N_SIGNALS, -1)
+    responses = trace_cycle(units[:n_filter], knots, n_substeps, substep, lag, damping)
+    rows = np.insert(responses.swapaxes(0, 1), [n_filter, n_filter], 0.0, axis=2)
     q, qd, deflection = rows[:N_SIGNALS]
     trim = np.zeros(q.shape[1])
     trim[[n_filter, n_filter + 1]] = 1.0, trim_gain
@@ -184,6 +170,8 @@ def trace_cycle(
     damping: float | None = None,
 ) -> NDArray[np.float64]:
     """Follow one cycle of the command path of one joint, sub-step by sub-step: the definition.
+
+    Several joints have a further axis, the last.
 
     Args:
         filtered: filter state at the start of the cycle: q, qd, deflection, then of a filter of second order

@@ -16,16 +16,16 @@ In freedrive there is no set-point: see `Freedrive`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.machine.models.calibration import Calibration
+from ur_emulator.errors import PlantError
 from ur_emulator.machine.models.fidelity import REVERSAL_SPEED, Fidelity
-from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
+from ur_emulator.machine.models.joint_range import JointRange
+from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6, six
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.command_path import CommandPath
 from ur_emulator.machine.plant.friction import Friction
@@ -84,19 +84,15 @@ class Freedrive:
     """Torque of the drives in freedrive.
 
     Args:
-        robot: gives ranges, rated speeds and torques.
+        robot: gives rated speeds and torques.
+        joint_range: at whose ends the drives push back.
     """
 
-    def __init__(self, robot: RobotModel) -> None:
+    def __init__(self, robot: RobotModel, joint_range: JointRange) -> None:
+        self._range = joint_range
         self._strength = LIMIT_SHARE * np.array(robot.tau_max)
-        self.set_range(robot.q_min, robot.q_max)
         self._free_speed = SPEED_MARGIN * np.array(robot.qd_max)
         self._braking_speed = (1.0 - SPEED_MARGIN) * np.array(robot.qd_max)
-
-    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
-        """Set the joint ranges [rad] at whose ends the drives push back; at first those of the robot."""
-        self._low = np.array(q_min) + RANGE_MARGIN
-        self._high = np.array(q_max) - RANGE_MARGIN
 
     def torque(
         self,
@@ -113,7 +109,8 @@ class Freedrive:
             q: joint angles (6,) [rad].
             qd: joint speeds (6,) [rad/s].
         """
-        beyond = np.maximum(q - self._high, 0.0) + np.minimum(q - self._low, 0.0)
+        low, high = np.array(self._range.q_min) + RANGE_MARGIN, np.array(self._range.q_max) - RANGE_MARGIN
+        beyond = np.maximum(q - high, 0.0) + np.minimum(q - low, 0.0)
         depth = np.clip(beyond / RANGE_MARGIN, -1.0, 1.0)
         outwards = np.clip(qd * np.sign(depth) / _FULL_SPEED, 0.0, 1.0)
         repelling = depth * np.abs(depth) * (_REST_SHARE + (1.0 - _REST_SHARE) * outwards)
@@ -124,7 +121,15 @@ class Freedrive:
 
 
 _INTEGRAL_TIME = 0.12  # s; assumed: arms of this kind settle within a few tenths of a second
-TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far above any real target, small enough for arithmetic
+_TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far above any real target, small enough for arithmetic
+
+
+def check_target(target: JointTarget, cycle: int) -> None:
+    """Raise PlantError for a target, of this cycle, that is not finite or far too large."""
+    if not hypot(*target.q, *target.qd, *target.qdd) < _TARGET_MAX:
+        raise PlantError(
+            f"target {target} in cycle {cycle}: finite numbers below {_TARGET_MAX:g} are needed", cycle=cycle
+        )
 
 
 class Drives:
@@ -133,9 +138,8 @@ class Drives:
     A cycle is `command`, `advance`, `keep`, or for free joints `drive_freely` or `drive_by_torque` alone.
 
     Args:
-        gains: of the servos, as in the actuators.
-        substep: [s].
-        period: control cycle [s].
+        dynamics: the controller's torque model.
+        joint_range: that freedrive keeps.
 
     Attributes:
         actual_speed: (6,) [rad/s], for the caller to fill before `advance`: it sets the true friction.
@@ -152,26 +156,23 @@ class Drives:
     def __init__(
         self,
         robot: RobotModel,
-        calibration: Calibration,
+        dynamics: InverseDynamics,
+        joint_range: JointRange,
         fidelity: Fidelity,
         seed: int,
-        gains: ServoGains,
-        substep: float,
-        period: float,
     ) -> None:
-        self._dynamics = InverseDynamics(robot, calibration)
-        self._guiding = Freedrive(robot)
-        n_substeps = round(period / substep)
+        self._dynamics, gains, generation = dynamics, ServoGains.of(robot), robot.generation
+        self._guiding = Freedrive(robot, joint_range)
+        self._period = period = generation.period_s
         self._path = path = CommandPath(
-            n_substeps,
-            substep,
+            generation.n_substeps,
+            generation.substep_us * 1e-6,
             fidelity.drive_lag,
             fidelity.drive_damping,
             gains.lead,
             period / _INTEGRAL_TIME * (fidelity.servo_dead_band or 1.0),
         )
         self._friction = Friction(robot, fidelity, seed)
-        self._period = period
         self._kp = gains.kp
         self._per_kp = 1.0 / gains.kp
         self._per_torque = 1.0 / np.array(robot.torque_constant)
@@ -192,14 +193,6 @@ class Drives:
         self.coulomb = self._friction.coulomb
         self.target_moment = self.target_current = ZERO6
 
-    def set_payload(self, mass: float, cog: Vector3, inertia: Vector6) -> None:
-        """Declare the payload to the controller's model, see `set_payload_body`."""
-        self._dynamics.set_payload(mass, cog, inertia)
-
-    def set_range(self, q_min: Vector6, q_max: Vector6) -> None:
-        """Set the joint ranges that freedrive keeps [rad]."""
-        self._guiding.set_range(q_min, q_max)
-
     def hold(self, q: NDArray[np.float64], q_motor: NDArray[np.float64]) -> None:
         """Hold the arm at rest: joints at q, motors at q_motor, (6,) each [rad]."""
         still = np.zeros(6)
@@ -219,25 +212,21 @@ class Drives:
         """Give no torque: the brakes hold the arm."""
         self.target_moment = self.target_current = ZERO6
 
-    def command(self, target: JointTarget) -> bool:
-        """Set the target of this cycle.
-
-        Returns:
-            False when the target is not finite or far too large; nothing has changed then.
-        """
-        if not hypot(*target.q, *target.qd, *target.qdd) < TARGET_MAX:
-            return False
+    def command(self, target: JointTarget) -> None:
+        """Set the target of this cycle, which `check_target` has let pass."""
         self._path.take(target)
         moment = self._dynamics.evaluate(self._q, self._qd, self._qdd_then_deflection)
         np.multiply(moment, self._per_kp, self._qdd_then_deflection)
         self.target_moment = six(moment.tolist())
-        return True
 
     def advance(self) -> None:
         """Fill `control` and `q_final`, and what depends on friction: `bias`, `coulomb`, `target_current`."""
         self._path.advance()
         self._friction.evaluate(self._path.speeds)
-        self._expect_current()
+        current = self.expected_current
+        np.add(self._moment, self._friction.expected, current)
+        np.multiply(current, self._per_torque, current)
+        self.target_current = six(current.tolist())
 
     def keep(self, error: NDArray[np.float64] | None) -> None:
         """End the cycle; the servos are trimmed by the joints' error (6,) [rad] unless that is None."""
@@ -245,25 +234,6 @@ class Drives:
             error = np.multiply(error, self._per_dead_band, self._work)
             np.trunc(error, error)
         self._path.keep(error)
-
-    def expect(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> bool:
-        """Set `target_moment` for a target, (6,) each, that the arm follows by itself.
-
-        Returns:
-            False when the target is not finite or far too large; nothing has changed then.
-        """
-        if not hypot(*q, *qd, *qdd) < TARGET_MAX:
-            return False
-        moment = self._dynamics.evaluate(np.array(q), np.array(qd, dtype=np.float64), np.array(qdd))
-        self.target_moment = six(moment.tolist())
-        return True
-
-    def _expect_current(self) -> None:
-        """Set the current for the model's torque and the friction at the target."""
-        current = self.expected_current
-        np.add(self._moment, self._friction.expected, current)
-        np.multiply(current, self._per_torque, current)
-        self.target_current = six(current.tolist())
 
     def drive_freely(
         self, q: NDArray[np.float64], qd: NDArray[np.float64], extra: Vector6 | None = None
@@ -275,9 +245,7 @@ class Drives:
             qd: their speeds (6,) [rad/s].
             extra: torque that holds blocked axes [Nm].
         """
-        still = np.zeros(6)
-        gravity = self._dynamics.evaluate(q, still, still)
-        self._friction.evaluate(np.array([qd, qd, qd]))
+        gravity = self._let_go(q, qd)
         torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
         if extra is not None:
             torque += extra
@@ -287,10 +255,14 @@ class Drives:
         self, q: NDArray[np.float64], qd: NDArray[np.float64], command: TorqueCommand
     ) -> None:
         """Fill `control` for an arm in torque control, with joints at q (6,) [rad], qd (6,) [rad/s]."""
-        still = np.zeros(6)
-        moment = self._dynamics.evaluate(q, still, still) + command.torque
-        self._friction.evaluate(np.array([qd, qd, qd]))
+        moment = self._let_go(q, qd) + command.torque
         self._give(moment + self._friction.share(command.viscous, command.coulomb), moment)
+
+    def _let_go(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the torque that holds free joints; set their friction."""
+        self._friction.evaluate(np.array([qd, qd, qd]))
+        still = np.zeros(6)
+        return self._dynamics.evaluate(q, still, still)
 
     def _give(self, torque: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
         """Let the free joints have a torque (6,) in this cycle; moment (6,) is its part without friction."""

@@ -132,18 +132,17 @@ class Feedback:
 
     A cycle is `take` or `take_rest`.
 
-    Args:
-        age_substeps: from the measured moment to the end of the cycle's physics.
-
     Attributes:
         capture_at: number of the sub-step whose beginning is the measured moment; after the last sub-step:
             its end.
         reading: what the sensors say of the last cycle.
     """
 
-    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int, age_substeps: int) -> None:
+    def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
         generation = robot.generation
         n_substeps = generation.n_substeps
+        # From the measured moment to the end of the plant's cycle, which comes a cycle later, see `Plant`.
+        age_substeps = max(0, round(fidelity.feedback_age / (generation.substep_us * 1e-6)) - n_substeps)
         self.capture_at = -age_substeps % n_substeps if age_substeps else n_substeps
         self.gear = (GearWithPlay if fidelity.backlash else GearRipple)(robot, fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, generation.period_s)

@@ -4,9 +4,8 @@ MuJoCo's models have a fixed size. So the model has SLOTS shapes from the beginn
 their own; those that are not in use collide with nothing and are skipped as a whole when none is in use.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import cos, hypot, inf, sin
+from collections.abc import Sequence
+from math import hypot
 
 import mujoco
 import numpy as np
@@ -15,50 +14,19 @@ from numpy.typing import NDArray
 from ur_emulator.errors import RefusedError
 from ur_emulator.machine.models.robot_model import Vector6
 from ur_emulator.machine.models.things import BodyShape
+from ur_emulator.machine.plant.shapes import SHAPES, contacts_at, quaternion
 
 OBSTACLES = "obstacles"
 SLOTS = 16
-
-# A shape that is not in use, and the part of a plane that is drawn [m].
-_UNUSED, _DRAWN = 0.001, 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A kind of obstacle.
-
-    Attributes:
-        geom: MuJoCo's type.
-        to_mujoco: its sizes, as `AddObstacle` has them, as MuJoCo's sizes.
-        half_extent: half edges of the smallest box around it [m]; infinite for a plane.
-    """
-
-    geom: mujoco.mjtGeom
-    to_mujoco: Callable[..., tuple[float, float, float]]
-    half_extent: Callable[..., tuple[float, float, float]]
-
-
-SHAPES: dict[str, Shape] = {
-    "box": Shape(
-        mujoco.mjtGeom.mjGEOM_BOX,
-        lambda x, y, z: (x / 2, y / 2, z / 2),
-        lambda x, y, z: (x / 2, y / 2, z / 2),
-    ),
-    "sphere": Shape(mujoco.mjtGeom.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0), lambda r: (r, r, r)),
-    "capsule": Shape(
-        mujoco.mjtGeom.mjGEOM_CAPSULE,
-        lambda r, length: (r, length / 2, 0.0),
-        lambda r, length: (r, r, length / 2 + r),
-    ),
-    # A wall without end; what is on the side of negative z is inside it.
-    "plane": Shape(mujoco.mjtGeom.mjGEOM_PLANE, lambda: (_DRAWN, _DRAWN, 0.1), lambda: (inf, inf, inf)),
-}
+# One more, so that an obstacle stays until the one that replaces it is found to have room.
+_N_SHAPES = SLOTS + 1
+_UNUSED = 0.001  # size of a shape that is not in use [m]
 
 
 def add_slots(spec: mujoco.MjSpec) -> None:
     """Reserve shapes in a model."""
     body = spec.worldbody.add_body(name=OBSTACLES)
-    for i in range(SLOTS):
+    for i in range(_N_SHAPES):
         body.add_geom(
             name=f"{OBSTACLES}_{i}",
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -73,8 +41,7 @@ class Obstacles:
     """The obstacles of one arm, in a model with slots for them."""
 
     def __init__(self) -> None:
-        self._slots: dict[str, int] = {}
-        self._shapes: dict[str, BodyShape] = {}
+        self._slots: dict[str, tuple[int, BodyShape]] = {}
 
     def bind(self, model: mujoco.MjModel, q: NDArray[np.float64]) -> None:
         """Be in this model from now on; `q` has the positions of all joints: none must overlap the arm."""
@@ -91,94 +58,58 @@ class Obstacles:
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
         """What they are, in the same order."""
-        return tuple(self._shapes.values())
+        return tuple(shape for _, shape in self._slots.values())
 
     def name_of(self, geom: int) -> str:
         """The obstacle that a shape of the model is."""
-        return next(name for name, slot in self._slots.items() if slot == geom - self._first)
+        return next(name for name, (slot, _) in self._slots.items() if slot == geom - self._first)
 
     def put(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Add an obstacle, one of SHAPES with sizes as it wants them [m]; one of the same name is replaced.
+        """Add an obstacle, a shape with sizes as in `things.SIZES` [m]; one of the same name is replaced.
 
         The pose is that of its middle in the base frame [m, rad]. RefusedError if it would overlap the arm,
         or there are too many; nothing changes then.
         """
-        slot = next(i for i in range(SLOTS + 1) if i not in self._slots.values())
-        if slot == SLOTS and name not in self._slots:
+        if len(self._slots) == SLOTS and name not in self._slots:
             raise RefusedError(f"obstacle {name}: there are {SLOTS} already, remove one first")
-        in_place = slot == SLOTS
-        if in_place:
-            slot = self._slots[name]
-            before = self._read(slot)
-        self._write(slot, SHAPES[shape], size, pose)
-        if self._touches(slot):
-            if in_place:
-                self._restore(slot, before)
-            else:
-                self._hide(slot)
+        slot = min(set(range(_N_SHAPES)).difference(slot for slot, _ in self._slots.values()))
+        geom = self._first + slot
+        self._write(geom, shape, size, pose)
+        if (contacts_at(self._model, self._q).contact.geom == geom).any():
+            self._hide(geom)
             raise RefusedError(f"obstacle {name}: the arm is where it should stand, move one of them")
-        if not in_place:
+        if len(self._slots) == SLOTS:
+            self._hide(self._first + self._slots[name][0])
+        else:
             self.remove(name)
-        self._slots[name] = slot
-        self._shapes[name] = BodyShape(name, False, shape, tuple(size), pose)
+        self._slots[name] = slot, BodyShape(name, False, shape, tuple(size), pose)
 
     def remove(self, name: str) -> None:
         """Remove an obstacle, if it exists."""
-        slot = self._slots.pop(name, None)
-        self._shapes.pop(name, None)
-        if slot is not None:
-            self._hide(slot)
+        if name in self._slots:
+            slot, _ = self._slots.pop(name)
+            self._hide(self._first + slot)
 
-    def _write(self, slot: int, shape: Shape, size: Sequence[float], pose: Vector6) -> None:
-        model, geom = self._model, self._first + slot
-        half = shape.half_extent(*size)
-        endless = half[0] == inf
+    def _write(self, geom: int, name: str, size: Sequence[float], pose: Vector6) -> None:
+        model, shape = self._model, SHAPES[name]
+        of_mujoco = shape.to_mujoco(*size)
+        half = shape.half_extent(*of_mujoco)
         model.geom_type[geom] = int(shape.geom)
-        model.geom_size[geom] = shape.to_mujoco(*size)
-        model.geom_aabb[geom] = (0.0, 0.0, 0.0, *((0.0, 0.0, 0.0) if endless else half))
-        model.geom_rbound[geom] = 0.0 if endless else hypot(*half)
+        model.geom_size[geom] = of_mujoco
+        model.geom_aabb[geom] = (0.0, 0.0, 0.0, *half)
+        model.geom_rbound[geom] = hypot(*half)
         model.geom_pos[geom] = pose[:3]
         model.geom_quat[geom] = quaternion(pose[3:])
         # Left at "same frame as its body", the shape would not follow its own position.
         model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
         self._switch(geom, True)
 
-    def _hide(self, slot: int) -> None:
-        geom = self._first + slot
+    def _hide(self, geom: int) -> None:
         self._model.geom_sameframe[geom] = int(mujoco.mjtSameFrame.mjSAMEFRAME_BODY)
         self._switch(geom, False)
 
     def _switch(self, geom: int, on: bool) -> None:
         model = self._model
         model.geom_contype[geom] = model.geom_conaffinity[geom] = int(on)
-        own = slice(self._first, self._first + SLOTS)
-        any_on = int(model.geom_contype[own].any())
+        any_on = int(model.geom_contype[self._first : self._first + _N_SHAPES].any())
         model.body_contype[self._body] = model.body_conaffinity[self._body] = any_on
-
-    def _read(self, slot: int) -> list[np.ndarray]:
-        return [np.copy(field[self._first + slot]) for field in self._fields()]
-
-    def _restore(self, slot: int, values: list[np.ndarray]) -> None:
-        for field, value in zip(self._fields(), values, strict=True):
-            field[self._first + slot] = value
-
-    def _fields(self) -> tuple[np.ndarray, ...]:
-        m = self._model
-        return m.geom_type, m.geom_size, m.geom_aabb, m.geom_rbound, m.geom_pos, m.geom_quat
-
-    def _touches(self, slot: int) -> bool:
-        data = mujoco.MjData(self._model)
-        data.qpos[:] = self._q
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_comPos(self._model, data)
-        mujoco.mj_collision(self._model, data)
-        geom = self._first + slot
-        return any(geom in data.contact[i].geom for i in range(data.ncon))
-
-
-def quaternion(vector: Sequence[float]) -> tuple[float, float, float, float]:
-    """Quaternion (w, x, y, z) of a rotation vector [rad]."""
-    angle = hypot(*vector)
-    x, y, z = vector
-    share = sin(angle / 2) / angle if angle > 0.0 else 0.5
-    return (cos(angle / 2), share * x, share * y, share * z)

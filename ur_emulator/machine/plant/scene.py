@@ -15,7 +15,7 @@ from protocol.pose import rpy_to_rotvec
 from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.machine.models.robot_model import Vector6, six
 from ur_emulator.machine.models.things import Thing, ThingState
-from ur_emulator.machine.plant.obstacles import quaternion
+from ur_emulator.machine.plant.shapes import SHAPES, collide, quaternion
 from ur_hil.cell import Cell, load_cell
 from ur_hil.input_files import MIB, FileKind
 
@@ -23,13 +23,6 @@ MOST_THINGS = 32
 PREFIX = "thing_"
 
 _SCENE = "scene"
-
-_GEOMS: dict[str, tuple[mujoco.mjtGeom, Callable[..., tuple[float, float, float]]]] = {
-    "box": (mujoco.mjtGeom.mjGEOM_BOX, lambda x, y, z: (x / 2, y / 2, z / 2)),
-    "cylinder": (mujoco.mjtGeom.mjGEOM_CYLINDER, lambda r, length: (r, length / 2, 0.0)),
-    "capsule": (mujoco.mjtGeom.mjGEOM_CAPSULE, lambda r, length: (r, length / 2, 0.0)),
-    "sphere": (mujoco.mjtGeom.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0)),
-}
 
 # As the pads of a tool: what is squeezed must not sink in, see `hand.py`.
 _SOLREF, _SOLIMP = (0.006, 1.0), (0.9, 0.99, 0.001, 0.5, 2.0)
@@ -71,7 +64,7 @@ class Scene:
             for solid in surroundings.things:
                 pose = six([*solid.centre, *rpy_to_rotvec(solid.rpy)])
                 self.put(Thing(solid.name, solid.shape, solid.sizes, solid.mass, solid.friction, pose))
-        self._collide()
+        collide(self._model, self._data)
         standing = (0, self._model.body(_SCENE).id)  # the table is of the world
         if self._arm_touches(lambda geom: self._model.geom_bodyid[geom] in standing):
             raise RefusedError("scene: the arm is where something should stand, move one of them")
@@ -116,7 +109,7 @@ class Scene:
         geom.mass = thing.mass
         geom.solref, geom.solimp, geom.condim = _SOLREF, _SOLIMP, 4
         self._recompile()
-        self._collide()
+        collide(self._model, self._data)
         if self._touches(name):
             self._spec.delete(body)
             self._recompile()
@@ -155,12 +148,6 @@ class Scene:
             six([*data.qvel[v : v + 3].tolist(), *spin.tolist()]),
             self._touches(PREFIX + name),
         )
-
-    def _collide(self) -> None:
-        """Find the contacts of the present pose."""
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_comPos(self._model, self._data)
-        mujoco.mj_collision(self._model, self._data)
 
     def _touches(self, body: str) -> bool:
         """Whether the body of a thing touches the arm or its tool."""
@@ -205,5 +192,5 @@ def _add_cell(body: mujoco.MjsBody, cell: Cell) -> None:
 
 
 def _add_shape(body: mujoco.MjsBody, shape: str, size: tuple[float, ...], friction: float) -> mujoco.MjsGeom:
-    kind, to_mujoco = _GEOMS[shape]
-    return body.add_geom(type=kind, size=to_mujoco(*size), friction=[friction, 0.005, 0.0001])
+    kind = SHAPES[shape]
+    return body.add_geom(type=kind.geom, size=kind.to_mujoco(*size), friction=[friction, 0.005, 0.0001])

@@ -92,14 +92,14 @@ class Record:
 
 
 class Reading(NamedTuple):
-    """Measurements; names, units and order as in `PlantState`."""
+    """Measurements: the first fields of `PlantState`, with their names and units."""
 
     actual_q: Vector6
     actual_qd: Vector6
     actual_current: Vector6
     joint_voltage: Vector6
-    tool_accelerometer: Vector3
-    tcp_force: Vector6
+    actual_tool_accelerometer: Vector3
+    estimated_force: Vector6
 
 
 class Sensors:

@@ -60,7 +60,7 @@ class StateBuiltins(BuiltinGroup):
             "get_tcp_force": lambda thread: Pose.of(past.snapshot.actual_tcp_force),
             "force": lambda thread: math.hypot(*past.snapshot.actual_tcp_force[:3]),
             "get_tcp_offset": lambda thread: Pose.of(settings.tcp_offset),
-            "get_tool_accelerometer_reading": lambda thread: list(past.sensed.tool_accelerometer),
+            "get_tool_accelerometer_reading": lambda thread: list(past.sensed.actual_tool_accelerometer),
             "get_tool_current": lambda thread: past.snapshot.tool_output_current,
             "get_steptime": lambda thread: step_time,
             "get_target_payload": lambda thread: settings.payload.mass,

@@ -13,7 +13,8 @@ from protocol.ur_types import SIMULATED_MASTERBOARD, ControlMode, ProgramState, 
 from ur_emulator.machine.controller.robot_mode import POWERED
 from ur_emulator.machine.controller.safety.modes import EMERGENCY_MODES, MOVING_MODES
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits, SafetyState
-from ur_emulator.machine.controller.snapshot import RUNNING_STATES, Snapshot
+from ur_emulator.machine.controller.snapshot import Snapshot
+from ur_emulator.machine.controller.status_words import RUNNING_STATES
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.calibration import calibrated_dh
 from ur_emulator.machine.models.robot_generation import Software

@@ -55,11 +55,11 @@ STOPPING = frozenset({_S.RELEASED, _S.FULLY_PRESSED, _S.TO_BE_RELEASED})
 ACTIVE = frozenset({_S.ENABLING, _S.TO_BE_RELEASED})
 
 
+@dataclass(slots=True)
 class EnablingDevice:
     """The device of a box, or none."""
 
-    def __init__(self) -> None:
-        self.state = EnablingState.NO_DEVICE
+    state: EnablingState = EnablingState.NO_DEVICE
 
     def act(self, act: EnablingAct) -> None:
         """Let something happen to it."""
@@ -139,12 +139,13 @@ class OperationalModeChoice:
 # --- a safeguard of the cell: open or closed, with a reset button or without
 
 
+@dataclass(slots=True)
 class Safeguard:
     """A safeguard; it stops the arm while it is open, or closed and not reset."""
 
-    def __init__(self) -> None:
-        self.is_stopping = False
-        self._is_open = self._needs_reset = False
+    is_stopping: bool = False
+    _is_open: bool = False
+    _needs_reset: bool = False
 
     def guard(self, is_open: bool) -> None:
         """Open or close it."""
@@ -190,6 +191,12 @@ class Guard(Enum):
 
 _PRESSED = {"robot": SafetyEvent.ROBOT_EMERGENCY_PRESSED, "system": SafetyEvent.SYSTEM_EMERGENCY_PRESSED}
 _RELEASED = {"robot": SafetyEvent.ROBOT_EMERGENCY_RELEASED, "system": SafetyEvent.SYSTEM_EMERGENCY_RELEASED}
+# Begin and end of the stops by safeguards and enabling device.
+_STOPS = (
+    (SafetyEvent.SAFEGUARD_OPENED, SafetyEvent.SAFEGUARD_RESTORED),
+    (SafetyEvent.AUTOMATIC_SAFEGUARD_OPENED, SafetyEvent.AUTOMATIC_SAFEGUARD_RESTORED),
+    (SafetyEvent.NOT_ENABLED, SafetyEvent.ENABLED),
+)
 
 
 class SafetyInputs:
@@ -257,20 +264,12 @@ class SafetyInputs:
         """Send what the safeguards and the enabling device say in this operational mode, stops first."""
         allows, stops = self._choice.allows, {g: row.is_stopping for g, row in self._safeguards.items()}
         causes = (
-            (stops[Guard.PERMANENT], SafetyEvent.SAFEGUARD_OPENED, SafetyEvent.SAFEGUARD_RESTORED),
-            (
-                stops[Guard.AUTOMATIC] and allows.heeds_safeguard,
-                SafetyEvent.AUTOMATIC_SAFEGUARD_OPENED,
-                SafetyEvent.AUTOMATIC_SAFEGUARD_RESTORED,
-            ),
-            (
-                self._device.state in STOPPING and allows.needs_enabling,
-                SafetyEvent.NOT_ENABLED,
-                SafetyEvent.ENABLED,
-            ),
+            stops[Guard.PERMANENT],
+            stops[Guard.AUTOMATIC] and allows.heeds_safeguard,
+            self._device.state in STOPPING and allows.needs_enabling,
         )
-        for stands, event, end in sorted(causes, key=lambda row: not row[0]):
-            self._handle(event if stands else end)
+        for stands, (begin, end) in sorted(zip(causes, _STOPS, strict=True), key=lambda row: not row[0]):
+            self._handle(begin if stands else end)
 
     # --- modes
 
@@ -293,7 +292,7 @@ class SafetyInputs:
     # --- configurable inputs
 
     def assign(self, pair: int, function: SafetyInput | None) -> None:
-        """Set up a pair of configurable inputs."""
+        """Set up a pair of configurable inputs as a safety input; None frees them."""
         if function is None:
             self.assigned.pop(pair, None)
         else:

@@ -1,6 +1,6 @@
 """What stops the arm by itself: limit checks, and the protective stop they lead to.
 
-`SetpointCheck` checks the next set-point, `find_violation` the measured state.
+`SetpointCheck` checks the next set-point, `JointWatch` the measured state.
 Sources: joint limits and torque limits of the robot model; C153 "position deviates from path" and C204
 "invalid setpoints" from user reports. The thresholds of the deviation are not published; those here are
 chosen (docs/fidelity.md).
@@ -16,13 +16,13 @@ from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.machine.models.robot_model import RobotModel, Vector6
 from ur_emulator.machine.motion.generators import JointTarget
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 # A joint this far from its (delayed) target is blocked or pushed [rad].
 MAX_POSITION_DEVIATION = 0.15
 # A drive at its torque limit for longer than this cannot follow [s].
 MAX_SATURATION_TIME = 0.1
-# For the high holding torque a joint is at rest up to this speed [rad/s]. Source: see `HighHoldingTorque`.
+# For the high holding torque a joint is at rest up to this speed [rad/s]. Source: see `JointWatch`.
 RESTING_SPEED = 0.01
 # Rounding of a joint speed.
 SPEED_TOLERANCE = 1.0 + 1e-6
@@ -36,7 +36,8 @@ class Violation:
     blocked: bool = False
 
 
-def _stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Violation:
+def protective_stop(code: int, argument: int, text: str, *, blocked: bool = False) -> Violation:
+    """Return the violation that clients are told of by a code, its argument and a text."""
     return Violation(ErrorReported(code, argument, ReportLevel.WARNING, text), blocked)
 
 
@@ -82,27 +83,24 @@ class SetpointCheck:
             step, most = abs(q - q_before) / self._period_s, limit * SPEED_TOLERANCE
             if not (abs(qd) <= most and step <= most):  # one that is not a number is invalid
                 speed = max(step, abs(qd))
-                return _stop(
-                    204,
-                    i,
-                    f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {speed:.4g} rad/s, "
-                    f"limit {limit:.3f}",
-                )
+                return _invalid_setpoint(i, f"{speed:.4g} rad/s, limit {limit:.3f}")
             reach = q + qd * braking_time
             if (reach > high and q > q_before) or (reach < low and q < q_before):
-                return _stop(
-                    204,
-                    i,
-                    f"Protective Stop: Invalid setpoints: {JOINT_NAMES[i]} at {q:.3f} rad, "
-                    f"limits {low:.3f} to {high:.3f}",
-                )
+                return _invalid_setpoint(i, f"{q:.3f} rad, limits {low:.3f} to {high:.3f}")
         return None
+
+
+def _invalid_setpoint(joint: int, value: str) -> Violation:
+    text = f"Protective Stop: Invalid setpoints: {JOINT_NAMES[joint]} at {value}"
+    return protective_stop(204, joint, text)
 
 
 # Of the cylinder around the forearm and of the sphere around the flange that no hand may come between [m].
 # Source of radii, distance and code: the maker by a user of a UR5e.
 _CLAMPING_RADIUS = 0.0375
-CLAMPING = _stop(403, 0, "Protective Stop: Danger of clamping between the Robot's lower arm and tool")
+CLAMPING = protective_stop(
+    403, 0, "Protective Stop: Danger of clamping between the Robot's lower arm and tool"
+)
 
 
 def clamping_gap(robot: RobotModel, q: Vector6) -> float:
@@ -120,7 +118,7 @@ def clamping_gap(robot: RobotModel, q: Vector6) -> float:
 
 
 # The arm cannot go where a tool path leads. The real code is not known: 204 is that of other set-points.
-UNREACHABLE_PATH = _stop(
+UNREACHABLE_PATH = protective_stop(
     204, 0, "Protective Stop: Invalid setpoints: the path leads to a pose that the robot cannot reach"
 )
 
@@ -139,43 +137,44 @@ def torque_shares(robot: RobotModel, currents: tuple[float, ...]) -> list[float]
     ]
 
 
-class HighHoldingTorque:
-    """Whether a resting arm gives way further, by `deviation` [rad], with all torque, before it is stopped.
+class JointWatch:
+    """Watches that the joints follow their set-point.
 
-    Source: URScript manual e-Series 5.15, high_holding_torque_disable: while a program runs, no joint moves
-    faster than 0.01 rad/s, and the target rests. Chosen: once it has begun it lasts until the target moves.
+    A resting arm of some generations gives way further, with all torque, before it is stopped
+    (`SafetyLimits.holding_deviation`). Source: URScript manual e-Series 5.15, high_holding_torque_disable:
+    while a program runs, no joint moves faster than 0.01 rad/s, and the target rests. Chosen: once it has
+    begun it lasts until the target moves.
     """
 
-    def __init__(self, deviation: float) -> None:
-        self._deviation = deviation
+    def __init__(self, robot: RobotModel) -> None:
+        self._robot = robot
+        self._period_s = robot.generation.period_s
+        self._holding_deviation = robot.generation.limits.holding_deviation
         self._holds = False
+        self._saturated_s = 0.0
 
-    def step(self, is_enabled: bool, target_qd: Vector6, actual_qd: Vector6) -> float | None:
-        """Return the deviation at which this cycle stops the arm [rad]; None for the usual limits.
+    def count_saturation(self, sensed: PlantState) -> None:
+        """Count, in every cycle, for how long a drive has been at its torque limit without a break."""
+        self._saturated_s = self._saturated_s + self._period_s if sensed.torque_saturated else 0.0
 
-        Speeds are those of the set-point and measured ones [rad/s]; it is enabled while a program runs that
-        has not switched it off.
+    def find_violation(self, sensed: PlantState, target_qd: Vector6, *, may_hold: bool) -> Violation | None:
+        """Return a violation by the measured state, or None.
+
+        `target_qd` are the speeds of the set-point [rad/s]; a resting arm may hold with all torque while a
+        program runs that has not switched it off.
         """
-        may_hold = is_enabled and not any(target_qd)
-        self._holds = may_hold and (self._holds or max(map(abs, actual_qd)) <= RESTING_SPEED)
-        return self._deviation if self._holds else None
-
-
-def find_violation(
-    robot: RobotModel, sensed: PlantState, saturated_s: float, holding_deviation: float | None = None
-) -> Violation | None:
-    """Return a violation by the measured state, or None.
-
-    `saturated_s`: for how long a drive has been at its torque limit without a break [s]; for
-    `holding_deviation` see `HighHoldingTorque.step`.
-    """
-    errors = sensed.position_error
-    most = MAX_POSITION_DEVIATION if holding_deviation is None else holding_deviation
-    if max(errors) > most or min(errors) < -most:
-        i = next(i for i, error in enumerate(errors) if abs(error) > most)
-        return _stop(153, i, f"Protective stop: position deviates from path: {JOINT_NAMES[i]}", blocked=True)
-    if saturated_s > MAX_SATURATION_TIME and holding_deviation is None:
-        joint = most_loaded_joint(robot, sensed.joint_control_output)
-        text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"
-        return _stop(157, joint, text, blocked=True)
-    return None
+        most, holding = MAX_POSITION_DEVIATION, self._holding_deviation
+        if holding is not None:
+            rests = may_hold and not any(target_qd)
+            self._holds = rests and (self._holds or max(map(abs, sensed.actual_qd)) <= RESTING_SPEED)
+            most = holding if self._holds else most
+        errors = sensed.position_error
+        if max(errors) > most or min(errors) < -most:
+            i = next(i for i, error in enumerate(errors) if abs(error) > most)
+            text = f"Protective stop: position deviates from path: {JOINT_NAMES[i]}"
+            return protective_stop(153, i, text, blocked=True)
+        if self._saturated_s > MAX_SATURATION_TIME and not self._holds:
+            joint = most_loaded_joint(self._robot, sensed.joint_control_output)
+            text = f"Protective stop: Collision detected by joint: {JOINT_NAMES[joint]}"
+            return protective_stop(157, joint, text, blocked=True)
+        return None

@@ -3,7 +3,7 @@
 Every mode but NORMAL has a cause of its own: a button that is pressed, an input, or something that has
 happened and stays until somebody deals with it. Several causes may stand at a time; the mode is that of the
 first of `MODES` whose cause stands, so that releasing an emergency stop leads back to the safeguard stop that
-lies under it. `EVENTS` says which causes an event brings and takes.
+lies under it. `SafetyEvent` says which causes an event brings and takes.
 
 Sources: UR3/CB3 user manual 3.13, safety chapters: stop categories (0: power is cut at once, 1: brake and
 then cut the power, 2: brake and keep the power), safeguard stop with automatic resume or a reset button,
@@ -114,93 +114,73 @@ EMERGENCY_MODES = frozenset({Mode.ROBOT_EMERGENCY_STOP, Mode.SYSTEM_EMERGENCY_ST
 WATCHED_MODES = frozenset(row.mode for row in MODES if _RANK[row.mode] > _RANK[Mode.PROTECTIVE_STOP])
 
 
-class SafetyEvent(Enum):
-    """Events of the safety system."""
-
-    PROTECTIVE_STOP = "protective stop"
-    UNLOCK = "unlock protective stop"
-    SAFEGUARD_OPENED = "safeguard opened"
-    SAFEGUARD_RESTORED = "safeguard restored"
-    AUTOMATIC_SAFEGUARD_OPENED = "automatic-mode safeguard opened"
-    AUTOMATIC_SAFEGUARD_RESTORED = "automatic-mode safeguard restored"
-    NOT_ENABLED = "enabling device released or fully pressed"
-    ENABLED = "enabling device in its middle position"
-    ROBOT_EMERGENCY_PRESSED = "robot emergency stop pressed"
-    SYSTEM_EMERGENCY_PRESSED = "system emergency stop pressed"
-    ROBOT_EMERGENCY_RELEASED = "robot emergency stop released"
-    SYSTEM_EMERGENCY_RELEASED = "system emergency stop released"
-    REDUCED_ON = "reduced mode on"
-    REDUCED_OFF = "reduced mode off"
-    RANGE_LEFT = "joint or tool out of range when the brakes open"
-    RANGE_KEPT = "joints and tool back in range"
-    VIOLATION = "violation"
-    FAULT = "fault"
-    RESTART = "restart safety"
-    POWERED_OFF = "power off"
-
-
 @dataclass(frozen=True, slots=True)
 class EventRow:
-    """What an event does.
+    """What an event is and does.
 
     Attributes:
+        title: what it is called.
         brings: the mode whose cause it brings, or None. One that latches is not noted in a mode above it.
         cuts_power: the joints lose their power, whatever the mode.
     """
 
+    title: str
     brings: Mode | None
     takes: frozenset[Mode]
     meaning: str
     cuts_power: bool = False
 
 
-def _brings(mode: Mode, meaning: str) -> EventRow:
-    return EventRow(mode, frozenset(), meaning)
+def _brings(title: str, mode: Mode, meaning: str) -> EventRow:
+    return EventRow(title, mode, frozenset(), meaning)
 
 
-def _takes(meaning: str, *modes: Mode, cuts_power: bool = False) -> EventRow:
-    return EventRow(None, frozenset(modes), meaning, cuts_power)
+def _takes(title: str, meaning: str, *modes: Mode, cuts_power: bool = False) -> EventRow:
+    return EventRow(title, None, frozenset(modes), meaning, cuts_power)
 
 
-_E = SafetyEvent
-EVENTS: dict[SafetyEvent, EventRow] = {
-    _E.PROTECTIVE_STOP: _brings(
-        Mode.PROTECTIVE_STOP, "physics, a set-point, a script, a client; only while the robot is RUNNING"
-    ),
-    _E.UNLOCK: _takes("dashboard, 5 s after the stop; port 30001 at once", Mode.PROTECTIVE_STOP),
-    _E.SAFEGUARD_OPENED: _brings(Mode.SAFEGUARD_STOP, "safeguard input SI"),
-    _E.SAFEGUARD_RESTORED: _takes(
+class SafetyEvent(Enum):
+    """Events of the safety system."""
+
+    # fmt: off
+    PROTECTIVE_STOP = _brings("protective stop", Mode.PROTECTIVE_STOP,
+        "physics, a set-point, a script, a client; only while the robot is RUNNING")
+    UNLOCK = _takes("unlock protective stop",
+        "dashboard, 5 s after the stop; port 30001 at once", Mode.PROTECTIVE_STOP)
+    SAFEGUARD_OPENED = _brings("safeguard opened", Mode.SAFEGUARD_STOP, "safeguard input SI")
+    SAFEGUARD_RESTORED = _takes("safeguard restored",
         "safeguard input SI; where a reset button is set up, that button once SI is closed",
-        Mode.SAFEGUARD_STOP,
-    ),
-    _E.AUTOMATIC_SAFEGUARD_OPENED: _brings(
-        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP, "e-Series: configurable input, or automatic mode begins"
-    ),
-    _E.AUTOMATIC_SAFEGUARD_RESTORED: _takes(
+        Mode.SAFEGUARD_STOP)
+    AUTOMATIC_SAFEGUARD_OPENED = _brings("automatic-mode safeguard opened",
+        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP, "e-Series: configurable input, or automatic mode begins")
+    AUTOMATIC_SAFEGUARD_RESTORED = _takes("automatic-mode safeguard restored",
         "e-Series: configurable input, its reset where one is set up, or automatic mode ends",
-        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP,
-    ),
-    _E.NOT_ENABLED: _brings(
-        Mode.SYSTEM_THREE_POSITION_ENABLING_STOP, "e-Series: configurable input, or manual mode begins"
-    ),
-    _E.ENABLED: _takes(
-        "e-Series: configurable input, or manual mode ends", Mode.SYSTEM_THREE_POSITION_ENABLING_STOP
-    ),
-    _E.ROBOT_EMERGENCY_PRESSED: _brings(Mode.ROBOT_EMERGENCY_STOP, "button on the pendant, input EI"),
-    _E.SYSTEM_EMERGENCY_PRESSED: _brings(Mode.SYSTEM_EMERGENCY_STOP, "configurable input"),
-    _E.ROBOT_EMERGENCY_RELEASED: _takes("button on the pendant, input EI", Mode.ROBOT_EMERGENCY_STOP),
-    _E.SYSTEM_EMERGENCY_RELEASED: _takes("configurable input", Mode.SYSTEM_EMERGENCY_STOP),
-    _E.REDUCED_ON: _brings(Mode.REDUCED, "configurable input; a plane that triggers it"),
-    _E.REDUCED_OFF: _takes("configurable input; 20 mm back behind the plane", Mode.REDUCED),
-    _E.RANGE_LEFT: _brings(Mode.RECOVERY, "the controller, when the brakes open; also beyond a plane"),
-    _E.RANGE_KEPT: _takes("the controller, in every cycle of recovery", Mode.RECOVERY),
-    _E.VIOLATION: _brings(Mode.VIOLATION, "a safety plane or the tool's cone is crossed; the control API"),
-    _E.FAULT: _brings(Mode.FAULT, "the control API"),
-    _E.RESTART: _takes(
-        "dashboard", Mode.FAULT, Mode.VIOLATION, Mode.PROTECTIVE_STOP, Mode.RECOVERY, cuts_power=True
-    ),
-    _E.POWERED_OFF: _takes("the power is off, for whatever reason", Mode.RECOVERY),
-}
+        Mode.AUTOMATIC_MODE_SAFEGUARD_STOP)
+    NOT_ENABLED = _brings("enabling device released or fully pressed",
+        Mode.SYSTEM_THREE_POSITION_ENABLING_STOP, "e-Series: configurable input, or manual mode begins")
+    ENABLED = _takes("enabling device in its middle position",
+        "e-Series: configurable input, or manual mode ends", Mode.SYSTEM_THREE_POSITION_ENABLING_STOP)
+    ROBOT_EMERGENCY_PRESSED = _brings("robot emergency stop pressed", Mode.ROBOT_EMERGENCY_STOP,
+        "button on the pendant, input EI")
+    SYSTEM_EMERGENCY_PRESSED = _brings("system emergency stop pressed", Mode.SYSTEM_EMERGENCY_STOP,
+        "configurable input")
+    ROBOT_EMERGENCY_RELEASED = _takes("robot emergency stop released",
+        "button on the pendant, input EI", Mode.ROBOT_EMERGENCY_STOP)
+    SYSTEM_EMERGENCY_RELEASED = _takes("system emergency stop released",
+        "configurable input", Mode.SYSTEM_EMERGENCY_STOP)
+    REDUCED_ON = _brings("reduced mode on", Mode.REDUCED, "configurable input; a plane that triggers it")
+    REDUCED_OFF = _takes("reduced mode off", "configurable input; 20 mm back behind the plane", Mode.REDUCED)
+    RANGE_LEFT = _brings("joint or tool out of range when the brakes open", Mode.RECOVERY,
+        "the controller, when the brakes open; also beyond a plane")
+    RANGE_KEPT = _takes("joints and tool back in range",
+        "the controller, in every cycle of recovery", Mode.RECOVERY)
+    VIOLATION = _brings("violation", Mode.VIOLATION,
+        "a safety plane or the tool's cone is crossed; the control API")
+    FAULT = _brings("fault", Mode.FAULT, "the control API")
+    RESTART = _takes("restart safety", "dashboard",
+        Mode.FAULT, Mode.VIOLATION, Mode.PROTECTIVE_STOP, Mode.RECOVERY, cuts_power=True)
+    POWERED_OFF = _takes("power off", "the power is off, for whatever reason", Mode.RECOVERY)
+    # fmt: on
 
 
 def mode_of(causes: AbstractSet[Mode]) -> Mode:
@@ -210,7 +190,7 @@ def mode_of(causes: AbstractSet[Mode]) -> Mode:
 
 def after(causes: frozenset[Mode], event: SafetyEvent) -> frozenset[Mode]:
     """Return the causes that stand after an event."""
-    row = EVENTS[event]
+    row = event.value
     causes -= row.takes
     if row.brings is not None and not (
         ROW[row.brings].latches and _RANK[mode_of(causes)] < _RANK[row.brings]

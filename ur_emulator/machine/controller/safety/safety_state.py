@@ -70,15 +70,12 @@ class ConfiguredLimits:
 
     def within(self, settings: SafetySettings) -> ConfiguredLimits:
         """Return the limits with those of an installation, which cannot widen those of the joints."""
-        q_min, q_max = settings.q_min, settings.q_max
-        speed, reduced = settings.joint_speed, settings.reduced_joint_speed
-        top = self.speed if speed is None else _each(min, self.speed, speed)
-        arm = settings.arm or self.arm
+        top, arm = _each(min, self.speed, settings.joint_speed), settings.arm or self.arm
         return ConfiguredLimits(
-            self.q_min if q_min is None else _each(max, self.q_min, q_min),
-            self.q_max if q_max is None else _each(min, self.q_max, q_max),
+            _each(max, self.q_min, settings.q_min),
+            _each(min, self.q_max, settings.q_max),
             top,
-            _each(min, top, self.reduced_speed if reduced is None else reduced),
+            _each(min, top, settings.reduced_joint_speed or self.reduced_speed),
             self.recovery_speed,
             arm,
             arm.within(settings.reduced_arm or self.reduced_arm),
@@ -100,8 +97,8 @@ def limits_of(robot: RobotModel) -> ConfiguredLimits:
     )
 
 
-def _each(choose: Callable[[float, float], float], a: Vector6, b: Vector6) -> Vector6:
-    return six([choose(x, y) for x, y in zip(a, b, strict=True)])
+def _each(choose: Callable[[float, float], float], own: Vector6, given: Vector6 | None) -> Vector6:
+    return own if given is None else six([choose(x, y) for x, y in zip(own, given, strict=True)])
 
 
 # The dashboard refuses to unlock a protective stop sooner than this [s]. Source: UR dashboard documents.

@@ -9,17 +9,15 @@ manuals. That the controller slows down instead of stopping is chosen.
 from dataclasses import dataclass
 from math import hypot, isfinite, radians
 
-from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES, SafetyMode
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
-from ur_emulator.machine.controller.events import ErrorReported
-from ur_emulator.machine.controller.safety.limit_checks import Violation
+from ur_emulator.machine.controller.safety.limit_checks import Violation, protective_stop
 from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits
 from ur_emulator.machine.kinematics.arm_model import ArmModel, CartesianState
 from ur_emulator.machine.models.robot_model import Vector6, six
 from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from ur_emulator.machine.motion.arm_motion import SCALING_RATE, ArmMotion
-from ur_emulator.machine.plant.plant import PlantState
+from ur_emulator.machine.plant.arm_plant import PlantState
 
 TOLERANCE = radians(1.15)
 # Tolerance of the limits of TCP, force, power and momentum, as a share; chosen.
@@ -89,11 +87,11 @@ class SpeedLimiter:
 
         `space` is the arm in the last cycle, `dt` the duration of a cycle [s].
         """
-        error = self._joint_error(sensed.actual_qd) or self._arm_error(sensed, space)
-        self._exceeded_s = 0.0 if error is None else self._exceeded_s + dt
-        return Violation(error) if error is not None and self._exceeded_s > PATIENCE else None
+        violation = self._joint_violation(sensed.actual_qd) or self._arm_violation(sensed, space)
+        self._exceeded_s = 0.0 if violation is None else self._exceeded_s + dt
+        return violation if self._exceeded_s > PATIENCE else None
 
-    def _joint_error(self, actual_qd: Vector6) -> ErrorReported | None:
+    def _joint_violation(self, actual_qd: Vector6) -> Violation | None:
         limits = self._limits.joints
         excess = [abs(qd) - limit for qd, limit in zip(actual_qd, limits, strict=True)]
         worst = max(range(6), key=excess.__getitem__)
@@ -103,9 +101,9 @@ class SpeedLimiter:
             f"Protective Stop: Joint speed limit violated: {JOINT_NAMES[worst]} at "
             f"{abs(actual_qd[worst]):.3f} rad/s, limit {limits[worst]:.3f}"
         )
-        return ErrorReported(191, 32 + worst, ReportLevel.WARNING, text)
+        return protective_stop(191, 32 + worst, text)
 
-    def _arm_error(self, sensed: PlantState, space: ArmInSpace) -> ErrorReported | None:
+    def _arm_violation(self, sensed: PlantState, space: ArmInSpace) -> Violation | None:
         limits = self._limits.arm
         if limits == UNLIMITED:
             return None
@@ -120,7 +118,7 @@ class SpeedLimiter:
         ):
             if value > limit * (1.0 + ARM_TOLERANCE):
                 text = f"Protective Stop: {name} limit violated: {value:.3f} {unit}, limit {limit:g}"
-                return ErrorReported(code, argument, ReportLevel.WARNING, text)
+                return protective_stop(code, argument, text)
         return None
 
 
@@ -129,14 +127,12 @@ def _tool_speed(arm: CartesianState) -> float:
     return max(hypot(*arm.tcp_speed[:3]), hypot(*arm.elbow_velocity))
 
 
+@dataclass(slots=True)
 class SpeedScaling:
     """Rate of the time on the path, by speed slider (0..1) and the limits of the safety mode."""
 
-    __slots__ = ("limiter", "slider")
-
-    def __init__(self) -> None:
-        self.slider = 1.0
-        self.limiter: SpeedLimiter | None = None
+    slider: float = 1.0
+    limiter: SpeedLimiter | None = None
 
     @property
     def share(self) -> float:
