@@ -19,14 +19,9 @@ from motion_support import DT, HOME, START, TOOL, Swing, at, line, run_cycles
 from protocol.pose import pose_add, pose_inv, pose_sub, pose_trans, rotvec_to_matrix
 from ur_emulator.machine.controller.io.encoders import RANGES, Encoder
 from ur_emulator.machine.motion.arm_motion import ArmMotion
+from ur_emulator.machine.motion.conveyor import CATCH_UP_ACCELERATION, BeltEstimate, Conveyor, LinearBelt
 from ur_emulator.machine.motion.generators import SpeedJ
 from ur_emulator.machine.motion.move import Move
-from ur_emulator.machine.motion.overlay import (
-    CATCH_UP_ACCELERATION,
-    BeltEstimate,
-    Conveyor,
-    LinearBelt,
-)
 
 
 @pytest.fixture

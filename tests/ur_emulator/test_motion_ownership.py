@@ -19,13 +19,13 @@ from ur_emulator.machine.motion.generators import (
     Kind,
     ServoJ,
     SpeedJ,
-    SpeedL,
     StopJ,
     TorqueCommand,
 )
 from ur_emulator.machine.motion.leg import move_j
 from ur_emulator.machine.motion.move import Move
 from ur_emulator.machine.motion.ownership import TABLE, TRANSITIONS, ArmState, Event, Fate
+from ur_emulator.machine.motion.tool_streams import SpeedL
 
 SIX = (0.0,) * 6
 QD = (0.4, -0.3, 0.2, 0.1, 0.0, 0.5)

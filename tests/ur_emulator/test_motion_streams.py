@@ -12,18 +12,11 @@ from motion_support import ARM, DT, HOME, START, TOOL, tool_accelerations, tool_
 from protocol.pose import pose_sub
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
-from ur_emulator.machine.motion.generators import (
-    LOST_DECELERATION,
-    JointTarget,
-    ServoJ,
-    SpeedJ,
-    SpeedL,
-    StopJ,
-    StopL,
-)
+from ur_emulator.machine.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedJ, StopJ
 from ur_emulator.machine.motion.leg import move_j
 from ur_emulator.machine.motion.move import Move
 from ur_emulator.machine.motion.tool import Tool
+from ur_emulator.machine.motion.tool_streams import SpeedL, StopL
 
 FAST = (math.inf,) * 6  # no joint is too slow
 

@@ -28,7 +28,7 @@ from ur_emulator.machine.motion.path import (
     measure,
     times,
 )
-from ur_emulator.machine.motion.path_samples import Sample, reaches_end, sample_path
+from ur_emulator.machine.motion.path_samples import JOINT_SPEED_SHARE, Sample, reaches_end, sample_path
 from ur_emulator.machine.motion.tool import UnreachableError
 
 # Above this angle the arc of a movep would be too narrow: the cubic is used [rad].
@@ -76,22 +76,21 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     after = second.first_part(r, 0.5 * second.path.length)
     if before <= 0.0 or after <= 0.0 or first.goal is None:
         return None
-    a, b = first.path, second.path
+    a, b, tool = first.path, second.path, first.tool
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
         # As long before the waypoint as behind it, so the speed is the same at both ends of the curve.
-        before = after = min(before, after)
-    leave = first.path.length - before
-    if isinstance(a, ToolPath) and isinstance(b, ToolPath):
-        curve = _tool_curve(first, second, a, b, leave, after)
+        enter = min(before, after)
+        leave = a.length - enter
+        curve = _tool_curve(first, second, a.path, b.path, leave, enter)
         v = max(first.v, second.v)
-        samples = sample_path(curve, first.tool, first.near(leave), v)
-        if not reaches_end(samples, curve.length, first.tool.arm.robot):
+        samples = sample_path(curve, tool, first.near(leave), v)
+        if not reaches_end(samples, curve.length, tool.arm.robot):
             return None
-        return Blend(
-            ToolPath(curve, first.tool), leave, after, 1.0, v / curve.rate, min(first.a, second.a), samples
-        )
+        limit = min(first.a, second.a)
+        return Blend(ToolPath(curve, tool), leave, enter, 1.0, v / curve.rate, limit, samples)
     if isinstance(b, ToolPath) and (not second.samples or second.samples[-1].s < after):
         return None
+    leave = a.length - before
     try:
         start_q, slope = a.at(leave, first.near(leave))
         end_q, end_slope = b.at(after, second.near(after))
@@ -107,22 +106,21 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     v = max(first.v, scale * second.v)
     if scale == 1.0 and isinstance(a, JointLine):
         v /= joint_curve.rate
+    for speed, most in zip(joint_curve.speeds, tool.arm.robot.qd_max, strict=True):
+        v = min(v, JOINT_SPEED_SHARE * most / speed) if speed > 0.0 else v
     limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
     return Blend(joint_curve, leave, after, scale, v, limit)
 
 
 def _tool_curve(
-    first: Leg, second: Leg, a: ToolPath, b: ToolPath, leave: float, enter: float
+    first: Leg, second: Leg, a: PosePath, b: PosePath, leave: float, enter: float
 ) -> PoseCurve | PoseCorner:
-    lines = isinstance(a.path, PoseLine) and isinstance(b.path, PoseLine)
-    if lines and first.process and second.process:
-        corner = _corner(a.path, b.path, first, leave, enter)
+    (start, slope), (end, end_slope) = a.at(leave), b.at(enter)
+    waypoint, length = first.goal_pose, 2.0 * enter
+    if first.process and second.process and isinstance(a, PoseLine) and isinstance(b, PoseLine):
+        corner = _corner(start, slope, end, end_slope, waypoint)
         if corner is not None:
             return corner
-    start, slope = a.path.at(leave)
-    end, end_slope = b.path.at(enter)
-    waypoint = first.goal_pose
-    length = 2.0 * enter
     cubic = Cubic.between(
         pose_sub(start, waypoint), times(length, slope), pose_sub(end, waypoint), times(length, end_slope)
     )
@@ -179,11 +177,8 @@ def _fastest(path: PosePath) -> float:
     return max(measure(path.at(path.length * k / _SAMPLES)[1]) for k in range(_SAMPLES + 1))
 
 
-def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
+def _corner(start: Pose, slope: Vector6, end: Pose, end_slope: Vector6, waypoint: Pose) -> PoseCorner | None:
     """Return the arc tangent to two lines; None if it would be too narrow, or a line is mainly a rotation."""
-    start, slope = first.at(leave)
-    end, end_slope = second.at(enter)
-    waypoint = leg.goal_pose
     d1, d2 = slope[:3], end_slope[:3]
     r, r2 = dist(start[:3], waypoint[:3]), dist(end[:3], waypoint[:3])
     # The speed is constant only where s is the path length of the tool on both lines.

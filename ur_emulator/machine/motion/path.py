@@ -1,8 +1,8 @@
-"""Paths of the tool: straight line and arc, as pure functions of the length travelled.
+"""Paths of the tool and of the joints, as pure functions of the length travelled.
 
-`at(s)` gives the pose and its derivative with respect to s, a twist in base axes per unit of s. Orientation
-turns on the geodesic at a constant rate, on the same parameter. Sources: URScript manual CB3 3.15, movel and
-movec.
+Of the tool: straight line and arc. Orientation turns on the geodesic at a constant rate, on the same
+parameter. Sources: URScript manual CB3 3.15, movel and movec. Of the joints: a straight line, a cubic, or a
+path of the tool through the inverse kinematics.
 """
 
 from __future__ import annotations
@@ -16,15 +16,12 @@ from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
 from ur_emulator.machine.motion.tool import Tool, UnreachableError
 
-# --- A cubic curve between two points with given derivatives: the shape of all blends
-
-
 Vector = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Cubic:
-    """p(u) = c0 + c1 u + c2 u^2 + c3 u^3 for u in 0..1, in any number of coordinates."""
+    """The shape of all blends: c0 + c1 u + c2 u^2 + c3 u^3 for u in 0..1, in any number of coordinates."""
 
     c0: Vector
     c1: Vector
@@ -96,7 +93,7 @@ class PosePath(Protocol):
     bend: float
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """Return the pose at s and its derivative, a twist per unit of s."""
+        """Return the pose at s and its derivative, a twist in base axes per unit of s."""
         ...
 
 
@@ -153,8 +150,7 @@ class PoseArc:
         """
         self._start = start
         self._centre = centre
-        cx, cy, cz = centre
-        self._u = (start[0] - cx, start[1] - cy, start[2] - cz)
+        self._u = _minus(start, centre)
         self._w = _cross(axis, self._u)
         self._angle = angle
         turn = (axis[0] * angle, axis[1] * angle, axis[2] * angle) if fixed else pose_sub(goal, start)[3:]
@@ -191,31 +187,27 @@ def arc_through(
     goal (chosen, not documented). `fixed` is mode 1 of movec: the orientation is fixed to the tangent, the
     goal's rotation is ignored.
     """
-    a, b, c = _position(start), _position(via), _position(goal)
-    ab, ac = _minus(b, a), _minus(c, a)
+    ab, ac = _minus(via, start), _minus(goal, start)
     normal = _cross(ab, ac)
     size = _norm(normal)
-    nearest = min(_norm(ab), _norm(ac), _norm(_minus(c, b)))
+    nearest = min(_norm(ab), _norm(ac), _norm(_minus(goal, via)))
     if nearest < _COINCIDENT or size <= _FLAT * _norm(ab) * _norm(ac):
         return PoseLine(start, (*goal[:3], *start[3:]) if fixed else goal)
     axis = (normal[0] / size, normal[1] / size, normal[2] / size)
     # Centre of the circle through three points, seen from the first.
     p, q = _cross(normal, ab), _cross(ac, normal)
     ab2, ac2 = _dot(ab, ab), _dot(ac, ac)
-    x, y, z = (o + (ac2 * i + ab2 * j) / (2.0 * size * size) for o, i, j in zip(a, p, q, strict=True))
+    x, y, z = (o + (ac2 * i + ab2 * j) / (2.0 * size * size) for o, i, j in zip(start[:3], p, q, strict=True))
     centre = (x, y, z)
-    u, v = _minus(a, centre), _minus(c, centre)
+    u, v = _minus(start, centre), _minus(goal, centre)
     angle = acos(max(-1.0, min(1.0, _dot(u, v) / (_norm(u) * _norm(v)))))
     if _dot(_cross(u, v), axis) < 0.0:
         angle = 2.0 * pi - angle
     return PoseArc(start, centre, axis, angle, six(goal), fixed=fixed)
 
 
-def _position(pose: Sequence[float]) -> Vector3:
-    return (pose[0], pose[1], pose[2])
-
-
-def _minus(a: Vector3, b: Vector3) -> Vector3:
+def _minus(a: Sequence[float], b: Sequence[float]) -> Vector3:
+    """Return the way from the position b to a, which may be poses."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
@@ -229,11 +221,6 @@ def _norm(a: Sequence[float]) -> float:
 
 def _cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-# --- Paths in joint space: a straight line, a cubic, or a path of the tool through the inverse kinematics
-#
-# `at(s, near)` gives the joint angles and their derivative with respect to s.
 
 
 class JointPath(Protocol):

@@ -15,9 +15,10 @@ from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.machine.motion.generators import Generator as MotionGenerator
-from ur_emulator.machine.motion.generators import StopJ, StopL
+from ur_emulator.machine.motion.generators import StopJ
 from ur_emulator.machine.motion.ownership import Command
 from ur_emulator.machine.motion.tool import Tool
+from ur_emulator.machine.motion.tool_streams import StopL
 from urscript import NEXT_CYCLE, HostFunction, ScriptRuntimeError
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])

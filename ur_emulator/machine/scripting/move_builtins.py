@@ -1,6 +1,7 @@
 """Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move before it."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -39,6 +40,9 @@ OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blend
 # A program with waypoints close together may command so many moves in one cycle.
 MAX_PER_CYCLE = 4
 
+# Makes a move for joint angles and tool pose at its start.
+MakeLeg = Callable[[Vector6, ToolPose], Leg]
+
 
 class MoveBuiltins(BuiltinGroup):
     """Moves from waypoint to waypoint."""
@@ -70,94 +74,79 @@ class MoveBuiltins(BuiltinGroup):
     @builtin("movej")
     def _movej(self, thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movej", a, v, t, r, JOINT_DEFAULTS)
-
-        def make(start: Vector6, _: ToolPose) -> Leg:
-            goal = self._joints_of(q, start)
-            require_range("movej", goal, self._arm.safety.limits)
-            return self._planner.usual(move_j(start, goal, self._arm.tool, a=a, v=v, t=t, r=r))
-
-        return self._travel(thread, make)
+        make = self._joint_leg("movej", q, a=a, v=v, t=t, r=r)
+        return self._travel(thread, lambda *start: self._planner.usual(make(*start)))
 
     @builtin("optimovej")
     def _optimovej(self, thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
         _require_shares("optimovej", a, v, r)
-        target = self._goal_of("optimovej", goal)
+        make = self._joint_leg("optimovej", self._goal_of("optimovej", goal), a=1.0, v=1.0, r=r)
+        return self._travel(thread, lambda *start: self._planner.optimal(make(*start), a, v))
+
+    def _joint_leg(self, function: str, target: Any, **limits: float) -> MakeLeg:
+        """Return what makes a move of the joints from where they are."""
 
         def make(start: Vector6, _: ToolPose) -> Leg:
-            q = self._joints_of(target, start)
-            require_range("optimovej", q, self._arm.safety.limits)
-            return self._planner.optimal(move_j(start, q, self._arm.tool, a=1.0, v=1.0, r=r), a, v)
+            goal = self._joints_of(target, start)
+            require_range(function, goal, self._arm.safety.limits)
+            return move_j(start, goal, self._arm.tool, **limits)
 
-        return self._travel(thread, make)
+        return make
 
     # --- moves of the tool
 
     @builtin("movel")
     def _movel(self, thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
-        goal = self._pose_of(pose)
-
-        def make(q: Vector6, start: ToolPose) -> Leg:
-            path = PoseLine(start, goal)
-            return self._planner.usual(move_tool(path, q, self._arm.tool, a=a, v=v, t=t, r=r))
-
-        return self._travel(thread, make)
+        make = self._tool_leg(PoseLine, pose, a=a, v=v, t=t, r=r)
+        return self._travel(thread, lambda *start: self._planner.usual(make(*start)))
 
     @builtin("optimovel")
     def _optimovel(self, thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
         _require_shares("optimovel", a, v, r)
-        pose = self._pose_of(self._goal_of("optimovel", goal))
-
-        def make(q: Vector6, start: ToolPose) -> Leg:
-            leg = move_tool(PoseLine(start, pose), q, self._arm.tool, a=1.0, v=1.0, r=r)
-            return self._planner.optimal(leg, a, v)
-
-        return self._travel(thread, make)
+        make = self._tool_leg(PoseLine, self._goal_of("optimovel", goal), a=1.0, v=1.0, r=r)
+        return self._travel(thread, lambda *start: self._planner.optimal(make(*start), a, v))
 
     @builtin("movep")
     def _movep(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
-        _require_limits("movep", a, v, 0.0, r)
-        goal = self._pose_of(pose)
-        return self._process(thread, lambda start: PoseLine(start, goal), a, v, r)
+        return self._process("movep", thread, PoseLine, pose, a=a, v=v, r=r)
 
     @builtin("servoc")
     def _servoc(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
-        _require_limits("servoc", a, v, 0.0, r)
-        goal = self._pose_of(pose)
         # Drivers call it with the same pose again and again: nothing to warn of.
-        return self._process(thread, lambda start: PoseLine(start, goal), a, v, r, may_overlap=True)
+        return self._process("servoc", thread, PoseLine, pose, a=a, v=v, r=r, may_overlap=True)
 
     @builtin("movec")
     def _movec(
         self, thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
     ) -> Cycles:
-        _require_limits("movec", a, v, 0.0, r)
-        via, goal, fixed = self._pose_of(pose_via), self._pose_of(pose_to), mode == 1
-        return self._process(thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, r)
+        arc = partial(arc_through, fixed=mode == 1)
+        return self._process("movec", thread, arc, pose_via, pose_to, a=a, v=v, r=r)
 
     def _process(
         self,
+        function: str,
         thread: object,
-        make_path: Callable[[ToolPose], PosePath],
-        a: float,
-        v: float,
-        r: float,
-        *,
+        path: Callable[..., PosePath],
+        *goals: Any,
         may_overlap: bool = False,
+        **limits: float,
     ) -> Cycles:
         """Follow a path at constant speed of the tool."""
+        _require_limits(function, t=0.0, **limits)
+        make = self._tool_leg(path, *goals, **limits, process=True)
+        return self._travel(
+            thread, lambda *start: self._planner.limited(make(*start)), may_overlap=may_overlap
+        )
 
-        def make(q: Vector6, start: ToolPose) -> Leg:
-            leg = move_tool(make_path(start), q, self._arm.tool, a=a, v=v, r=r, process=True)
-            return self._planner.limited(leg)
-
-        return self._travel(thread, make, may_overlap=may_overlap)
+    def _tool_leg(self, path: Callable[..., PosePath], *goals: Any, **limits: Any) -> MakeLeg:
+        """Return what makes a move of the tool along a path from where it is through the goals."""
+        poses = [self._pose_of(goal) for goal in goals]
+        return lambda q, start: move_tool(path(start, *poses), q, self._arm.tool, **limits)
 
     # --- how an arm gets there
 
-    def _travel(
-        self, thread: object, make: Callable[[Vector6, ToolPose], Leg], *, may_overlap: bool = False
-    ) -> Cycles:
+    def _travel(self, thread: object, make: MakeLeg, *, may_overlap: bool = False) -> Cycles:
         """Follow a leg, made for joint angles and tool pose at its start; from rest, or out of a blend.
 
         `may_overlap`: no warning about a waypoint that is left out.

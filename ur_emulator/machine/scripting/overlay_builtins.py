@@ -7,8 +7,9 @@ from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, Encoders
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.conveyor import Belt, CircularBelt, Conveyor, LinearBelt
 from ur_emulator.machine.motion.generators import StopJ
-from ur_emulator.machine.motion.overlay import CircularBelt, Conveyor, LinearBelt, OffsetType, PathOffset
+from ur_emulator.machine.motion.path_offset import OffsetType, PathOffset
 from ur_emulator.machine.scripting.builtin_group import (
     BuiltinGroup,
     Cycles,
@@ -204,7 +205,7 @@ class ConveyorBuiltins(BuiltinGroup):
         path = self._motion.path
         return Pose.of(self._arm.tool.twist(path.q, path.qd))
 
-    def _track(self, belt: LinearBelt | CircularBelt, encoder_index: float) -> None:
+    def _track(self, belt: Belt, encoder_index: float) -> None:
         self.end()
         encoder, clock = self._encoders.encoders[int(encoder_index)], self._clock
         self._tracked = Conveyor(belt, self._arm.tool, lambda: encoder.travel, lambda: clock.time)

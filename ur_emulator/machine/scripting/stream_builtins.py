@@ -7,6 +7,7 @@ from ur_emulator.machine.controller.events import EventQueue, LogAdded
 from ur_emulator.machine.controller.past_cycles import PastCycles
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6
 from ur_emulator.machine.motion import generators
+from ur_emulator.machine.motion.tool_streams import SpeedL, StopL
 from ur_emulator.machine.scripting.builtin_group import (
     MIN_LIMIT,
     BuiltinGroup,
@@ -40,7 +41,7 @@ class StreamBuiltins(BuiltinGroup):
         a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
         a = _limit("speedl", t, a=a)
         twist = floats(tuple(xd))
-        return self._stream(thread, generators.SpeedL(twist, a, a_rot, self._arm.tool), t)
+        return self._stream(thread, SpeedL(twist, a, a_rot, self._arm.tool), t)
 
     @builtin("servoj")
     def _servoj(
@@ -60,7 +61,7 @@ class StreamBuiltins(BuiltinGroup):
     def _stopl(self, thread: object, a: float, aRot: float | None) -> Cycles:
         a_rot = a if aRot is None else aRot
         require_positive("stopl", a=a, aRot=a_rot)
-        return self._arm.stop(thread, generators.StopL(a, a_rot, self._arm.tool))
+        return self._arm.stop(thread, StopL(a, a_rot, self._arm.tool))
 
     def _stream(self, thread: object, generator: generators.Streamed, t: float | None) -> Cycles:
         """Renew a motion for the time t [s] of the speed slider, or until it is done."""
