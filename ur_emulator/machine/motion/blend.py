@@ -92,8 +92,7 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
         return None
     leave = a.length - before
     try:
-        start_q, slope = a.at(leave, first.near(leave))
-        end_q, end_slope = b.at(after, second.near(after))
+        (start_q, slope), (end_q, end_slope) = first.at(leave), second.at(after)
     except UnreachableError:
         return None
     if isinstance(a, ToolPath) or isinstance(b, ToolPath):

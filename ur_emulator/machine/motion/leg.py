@@ -57,6 +57,10 @@ class Leg:
     v_max: float = _FASTEST
     a_max: float = _STRONGEST
 
+    def at(self, s: float) -> tuple[Vector6, Vector6]:
+        """Return the joint angles after the length s and their derivative, or raise UnreachableError."""
+        return self.path.at(s, self.near(s))
+
     def near(self, s: float) -> Vector6:
         """Return joint angles close to those after the length s [rad], for the inverse kinematics."""
         if not self.samples:

@@ -69,7 +69,7 @@ class ForceBuiltins(BuiltinGroup):
 
     @builtin("end_freedrive_mode", "end_teach_mode")
     def _end_freedrive(self, thread: object) -> None:
-        self._compliance.end_freedrive_by_program()
+        self._compliance.end_freedrive(by_program=True)
 
     @builtin("get_freedrive_status")
     def _freedrive_status(self, thread: object) -> int:

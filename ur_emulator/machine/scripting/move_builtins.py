@@ -75,13 +75,13 @@ class MoveBuiltins(BuiltinGroup):
     def _movej(self, thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movej", a, v, t, r, JOINT_DEFAULTS)
         make = self._joint_leg("movej", q, a=a, v=v, t=t, r=r)
-        return self._travel(thread, lambda *start: self._planner.usual(make(*start)))
+        return self._travel(thread, make, self._planner.usual)
 
     @builtin("optimovej")
     def _optimovej(self, thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
         _require_shares("optimovej", a, v, r)
         make = self._joint_leg("optimovej", self._goal_of("optimovej", goal), a=1.0, v=1.0, r=r)
-        return self._travel(thread, lambda *start: self._planner.optimal(make(*start), a, v))
+        return self._travel(thread, make, partial(self._planner.optimal, a_share=a, v_share=v))
 
     def _joint_leg(self, function: str, target: Any, **limits: float) -> MakeLeg:
         """Return what makes a move of the joints from where they are."""
@@ -99,13 +99,13 @@ class MoveBuiltins(BuiltinGroup):
     def _movel(self, thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
         make = self._tool_leg(PoseLine, pose, a=a, v=v, t=t, r=r)
-        return self._travel(thread, lambda *start: self._planner.usual(make(*start)))
+        return self._travel(thread, make, self._planner.usual)
 
     @builtin("optimovel")
     def _optimovel(self, thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
         _require_shares("optimovel", a, v, r)
         make = self._tool_leg(PoseLine, self._goal_of("optimovel", goal), a=1.0, v=1.0, r=r)
-        return self._travel(thread, lambda *start: self._planner.optimal(make(*start), a, v))
+        return self._travel(thread, make, partial(self._planner.optimal, a_share=a, v_share=v))
 
     @builtin("movep")
     def _movep(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
@@ -135,9 +135,7 @@ class MoveBuiltins(BuiltinGroup):
         """Follow a path at constant speed of the tool."""
         _require_limits(function, t=0.0, **limits)
         make = self._tool_leg(path, *goals, **limits, process=True)
-        return self._travel(
-            thread, lambda *start: self._planner.limited(make(*start)), may_overlap=may_overlap
-        )
+        return self._travel(thread, make, self._planner.limited, may_overlap=may_overlap)
 
     def _tool_leg(self, path: Callable[..., PosePath], *goals: Any, **limits: Any) -> MakeLeg:
         """Return what makes a move of the tool along a path from where it is through the goals."""
@@ -146,8 +144,10 @@ class MoveBuiltins(BuiltinGroup):
 
     # --- how an arm gets there
 
-    def _travel(self, thread: object, make: MakeLeg, *, may_overlap: bool = False) -> Cycles:
-        """Follow a leg, made for joint angles and tool pose at its start; from rest, or out of a blend.
+    def _travel(
+        self, thread: object, make: MakeLeg, plan: Callable[[Leg], Leg], *, may_overlap: bool = False
+    ) -> Cycles:
+        """Follow a leg, made where it starts and then planned; from rest, or out of a blend.
 
         `may_overlap`: no warning about a waypoint that is left out.
         """
@@ -156,7 +156,7 @@ class MoveBuiltins(BuiltinGroup):
         if before is not None and isinstance(move := before.generator, Move) and move.returned:
             last = move.leg
             if last.goal is not None and last.tool.tcp == arm.settings.tcp_offset:
-                outcome = move.follow(make(last.goal, last.goal_pose))
+                outcome = move.follow(plan(make(last.goal, last.goal_pose)))
                 if outcome is Follow.BLENDED:
                     yield from _until_open(before, move)
                     return
@@ -173,7 +173,7 @@ class MoveBuiltins(BuiltinGroup):
         if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
             yield from arm.stop(thread, StopJ(motion.stop_deceleration))
         start = motion.path.q
-        move = Move(make(start, arm.tcp_pose(start)))
+        move = Move(plan(make(start, arm.tcp_pose(start))))
         yield from _until_open(arm.take(thread, move), move)
 
     def _goal_of(self, function: str, goal: Any) -> Any:
