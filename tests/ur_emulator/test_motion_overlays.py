@@ -108,11 +108,11 @@ def test_a_stream_goes_on_from_the_displaced_target(motion):
     motion.add_overlay(swing)
     command = motion.command("me", SpeedJ((0.1,) * 6, 2.0))
     for _ in range(60):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     before = motion.target
     motion.remove_overlay(swing)
-    command.renew()
+    command.is_renewed = True
     after = motion.step(DT, 1.0)
     assert np.abs(np.subtract(after.qd, before.qd)).max() <= 2.0 * DT * 1.001
 

@@ -125,7 +125,7 @@ def test_speedl_stays_on_its_line_for_ten_seconds_and_through_the_stop(renewed):
     for k in range(1250):
         if k % renewed == 0:
             command = motion.command(owner, SpeedL(tuple(v), 1.0, 1.0, TOOL))
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     half = TOOL.pose(motion.target.q)
     motion.command(owner, StopL(1.0, 1.0, TOOL))

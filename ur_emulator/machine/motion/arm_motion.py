@@ -237,7 +237,7 @@ class ArmMotion:
             return
         self._time.resume()
         if self._command is not None:
-            self._command.renew()
+            self._command.is_renewed = True
         self._go(Event.RESUME)
         self._turn_back()
 
@@ -411,7 +411,7 @@ class ArmMotion:
         if self.state in _AT_REST:
             self.scale = scale
             if any(path.qd) or any(path.qdd):
-                path = path.at_rest()
+                path = JointTarget(path.q)
         else:
             if scale != self.scale:
                 change = self.scaling_rate * dt
@@ -487,5 +487,5 @@ class ArmMotion:
                 if has_settled and self._chain.all_ended:
                     self._drop_overlays()
             elif any(before.qd) or any(before.qdd):
-                self.target = before.at_rest()
+                self.target = JointTarget(before.q)
         self._is_special = bool(self._overlays) or not self._time.is_normal

@@ -137,7 +137,7 @@ class PoseCurve:
         self.bend = max(map(measure, cubic.bends())) / length**2
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath."""
+        """Return the pose and the twist at s."""
         value, slope = self._cubic.at(s / self.length)
         twist = (*slope[:3], *_turn_rate(value[3:], slope[3:]))
         return pose_add(value, self._waypoint), times(1.0 / self.length, twist)
@@ -160,7 +160,7 @@ class PoseCorner:
         self.bend = max(1.0 / radius, turning / self.length**2)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath."""
+        """Return the pose and the twist at s."""
         phi = s / self._radius
         sine, rise = self._radius * sin(phi), self._radius * (1.0 - cos(phi))
         x, y, z = (p + sine * u + rise * w for p, u, w in zip(self._start[:3], self._u, self._w, strict=True))

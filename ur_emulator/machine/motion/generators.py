@@ -30,10 +30,6 @@ class JointTarget(NamedTuple):
             six([(w - v) / dt for v, w in zip(self.qd, qd, strict=True)]),
         )
 
-    def at_rest(self) -> JointTarget:
-        """Return the same position without motion."""
-        return JointTarget(self.q)
-
 
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
 REST_SPEED = 1e-6  # rad/s
@@ -139,7 +135,7 @@ class Streamed:
         return StopJ(PAUSE_DECELERATION)
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """See Generator."""
+        """Return the target at the end of the next cycle; each stream has its own law."""
         raise NotImplementedError
 
 

@@ -30,15 +30,11 @@ _LEAD_CYCLES = 2
 
 
 class Follow(Enum):
-    """The result of `Move.follow`.
+    """The result of `Move.follow`."""
 
-    `BLENDED`: the move joined the chain. `SKIPPED`: its waypoint is left out, if the next move allows it.
-    `REFUSED`: the arm stops first.
-    """
-
-    BLENDED = "blended"
-    SKIPPED = "skipped"
-    REFUSED = "refused"
+    BLENDED = "the move joined the chain"
+    SKIPPED = "its waypoint is left out, if the next move allows it"
+    REFUSED = "the arm stops first"
 
 
 class Move:

@@ -129,7 +129,7 @@ class PoseLine:
         return _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath; the end is exactly the goal."""
+        """Return the pose and the twist at s; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._twist
         return pose_add(times(s / self.length, self._change), self._start), self._twist
@@ -160,7 +160,7 @@ class PoseArc:
         self._goal = self._pose(1.0) if fixed else goal
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath."""
+        """Return the pose and the twist at s; the end is exactly the goal, if that has an orientation."""
         share = s / self.length
         phi = share * self._angle
         sine, cosine = sin(phi), cos(phi)
@@ -226,10 +226,7 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
 class JointPath(Protocol):
     """A path of the joints; s is radians of the leading axis or metres of the tool.
 
-    Attributes:
-        length: greatest s.
-        rate: greatest speed when s moves at 1: of the leading axis, or of the tool.
-        bend: greatest acceleration when s moves at a constant 1: of the leading axis, or of the tool.
+    Its attributes are those of `PosePath`, with `rate` and `bend` of the leading axis, or of the tool.
     """
 
     length: float
@@ -260,7 +257,7 @@ class JointLine:
         self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in difference])
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath; the end is exactly the goal."""
+        """Return joint angles and their derivative at s; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._share
         return six([p + s * k for p, k in zip(self._start, self._share, strict=True)]), self._share
@@ -280,7 +277,7 @@ class JointCurve:
         self.bend = max(abs(x) for bend in cubic.bends() for x in bend) / length**2
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath."""
+        """Return joint angles and their derivative at s."""
         q, slope = self._cubic.at(s / self.length)
         return six(q), six([k / self.length for k in slope])
 
@@ -296,7 +293,7 @@ class ToolPath:
         self.bend = path.bend
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath."""
+        """Return the joint angles that are closest to `near`, and their derivative at s."""
         pose, twist = self.path.at(s)
         q = self.tool.joints(pose, near)
         if q is None:

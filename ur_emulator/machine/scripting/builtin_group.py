@@ -4,7 +4,7 @@ A group is a class whose marked methods are builtins. It gets only the parts of 
 on. Signatures, versions and costs of builtins are in `urscript.catalogue`.
 """
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -116,8 +116,8 @@ def require_range(function: str, q: Vector6, limits: ConfiguredLimits) -> None:
             )
 
 
-def floats(values: Sequence[float]) -> Vector6:
-    """Return six values as floats; a script may write whole numbers."""
+def floats(values: Iterable[float]) -> Vector6:
+    """Return six values, also those of a pose, as floats; a script may write whole numbers."""
     return six(list(map(float, values)))
 
 

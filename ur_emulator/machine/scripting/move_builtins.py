@@ -1,6 +1,6 @@
 """Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move before it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from math import inf
 from typing import Any
@@ -183,7 +183,7 @@ class MoveBuiltins(BuiltinGroup):
                 case str():
                     return Pose.of(self._world.pose(goal, BASE))
                 case Struct(members={"pose": Pose() as pose, "frame": str(frame)}):
-                    return Pose.of(self._world.convert(_pose(pose), frame, BASE))
+                    return Pose.of(self._world.convert(floats(pose), frame, BASE))
         except WorldModelError as error:
             raise ScriptRuntimeError(f"{function}: {error}") from None
         if isinstance(goal, Pose) or (isinstance(goal, list) and len(goal) == 6):
@@ -196,7 +196,7 @@ class MoveBuiltins(BuiltinGroup):
     def _joints_of(self, target: Any, near: Vector6) -> Vector6:
         if not isinstance(target, Pose):
             return floats(target)
-        solution = self._arm.model.inverse(_pose(target), near, self._arm.settings.tcp_offset)
+        solution = self._arm.model.inverse(floats(target), near, self._arm.settings.tcp_offset)
         if solution is None:
             raise ScriptRuntimeError(
                 "The robot cannot reach the requested pose. "
@@ -205,7 +205,8 @@ class MoveBuiltins(BuiltinGroup):
         return solution
 
     def _pose_of(self, target: Any) -> ToolPose:
-        return _pose(target) if isinstance(target, Pose) else self._arm.tcp_pose(floats(target))
+        values = floats(target)
+        return values if isinstance(target, Pose) else self._arm.tcp_pose(values)
 
     @builtin("set_pos")
     def _set_pos(self, thread: object, q: Any) -> None:
@@ -253,10 +254,6 @@ def _require_shares(function: str, a: float, v: float, r: float) -> None:
             raise ScriptRuntimeError(f"{function}: {name} must be above 0 and up to 1, got {share:g}")
     if r < 0.0:
         raise ScriptRuntimeError(f"{function}: r must not be below 0, got {r:g}")
-
-
-def _pose(value: Sequence[float]) -> ToolPose:
-    return floats(tuple(value))
 
 
 _AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

@@ -38,28 +38,6 @@ def _motions(leg: Leg, places: Iterable[float]) -> Iterator[tuple[Vector6, Vecto
         return
 
 
-def gentle(leg: Leg, limit: ToolWrenchLimit, payload: Payload) -> Leg:
-    """Slow a move down so that what the tool carries is accelerated by no more than a limited wrench.
-
-    A duration that is too short is given up. Source: script manual e-Series 5.2x, tool_wrench_limit_set: the
-    wrench that motion causes, without gravity, in a frame at the flange; axes without a limit are free.
-    Chosen: the wrench is that of the declared payload, at points of the path; half of a limit is left for the
-    change of direction, so the speed is lowered first, then the acceleration. Not limited: blends, streams
-    (servoj, speedj, ...), overlays and stops.
-    """
-    if leg.path.length <= 0.0 or payload.mass <= 0.0:
-        return leg
-    per_acceleration, per_square = _wrenches(leg, limit, payload)
-    most = np.array(limit.most)
-    planned = leg.with_duration()
-    v = min(planned.v, _least(0.5 * most / np.maximum(per_square, _NOTHING)) ** 0.5)
-    left = most - per_square * v**2
-    a = min(planned.a, _least(left / np.maximum(per_acceleration, _NOTHING)))
-    if (a, v) == (planned.a, planned.v):
-        return leg
-    return replace(leg, a=a, v=v, t=0.0)
-
-
 def _least(bounds: NDArray[np.float64]) -> float:
     least = float(bounds.min(initial=inf))
     return least if isfinite(least) else inf
@@ -115,9 +93,23 @@ class MovePlanner:
         self._tool = tool
 
     def limited(self, leg: Leg) -> Leg:
-        """Return a move that keeps the limit of the tool's wrench."""
-        limit = self._planning.tool_wrench_limit
-        return leg if limit is None else gentle(leg, limit, self._tool.payload)
+        """Return a move that accelerates what the tool carries by no more than the limited wrench.
+
+        A duration that is too short is given up. Source: script manual e-Series 5.2x, tool_wrench_limit_set:
+        the wrench that motion causes, without gravity, in a frame at the flange; axes without a limit are
+        free. Chosen: the wrench is that of the declared payload, at points of the path; half of a limit is
+        left for the change of direction, so the speed is lowered first, then the acceleration. Not limited:
+        blends, streams (servoj, speedj, ...), overlays and stops.
+        """
+        limit, payload = self._planning.tool_wrench_limit, self._tool.payload
+        if limit is None or leg.path.length <= 0.0 or payload.mass <= 0.0:
+            return leg
+        per_acceleration, per_square = _wrenches(leg, limit, payload)
+        most, planned = np.array(limit.most), leg.with_duration()
+        v = min(planned.v, _least(0.5 * most / np.maximum(per_square, _NOTHING)) ** 0.5)
+        left = most - per_square * v**2
+        a = min(planned.a, _least(left / np.maximum(per_acceleration, _NOTHING)))
+        return leg if (a, v) == (planned.a, planned.v) else replace(leg, a=a, v=v, t=0.0)
 
     def usual(self, leg: Leg) -> Leg:
         """Return a move of movej or movel in the motion version that is set."""

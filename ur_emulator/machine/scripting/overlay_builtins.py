@@ -57,7 +57,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     @builtin("path_offset_set")
     def _set(self, thread: object, offset: Any, kind: float) -> None:
-        self._offset.set(floats(tuple(offset)), OffsetType(int(kind)))
+        self._offset.set(floats(offset), OffsetType(int(kind)))
 
     @builtin("path_offset_get")
     def _get(self, thread: object, kind: float) -> Pose:
@@ -167,7 +167,7 @@ class ConveyorBuiltins(BuiltinGroup):
         self, thread: object, direction: Pose, ticks_per_meter: float, encoder_index: float
     ) -> None:
         _require_ticks("track_conveyor_linear", "ticks_per_meter", ticks_per_meter)
-        x, y, z = floats(tuple(direction))[:3]
+        x, y, z = floats(direction)[:3]
         if not hypot(x, y, z) > 0.0:
             raise ScriptRuntimeError(
                 f"track_conveyor_linear: direction ({x:g}, {y:g}, {z:g}) leads nowhere, "
@@ -185,7 +185,7 @@ class ConveyorBuiltins(BuiltinGroup):
         encoder_index: float,
     ) -> None:
         _require_ticks("track_conveyor_circular", "ticks_per_revolution", ticks_per_revolution)
-        belt = CircularBelt(floats(tuple(center)), float(ticks_per_revolution), bool(rotate_tool))
+        belt = CircularBelt(floats(center), float(ticks_per_revolution), bool(rotate_tool))
         self._track(belt, encoder_index)
 
     @builtin("stop_conveyor_tracking")
