@@ -116,8 +116,7 @@ class ArmMotion:
     @property
     def goal(self) -> Vector6:
         """Joint angles at the next waypoint; those of the path if there is none [rad]."""
-        move = self.move
-        goal = None if move is None else move.goal
+        goal = None if (move := self.move) is None else move.goal
         return self.path.q if goal is None else goal
 
     @property

@@ -18,7 +18,7 @@ from ur_emulator.machine.scripting.builtin_group import (
     floats,
     require_positive,
 )
-from urscript.errors import ScriptRuntimeError
+from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, log_form
 
 # Greatest distance of a task frame [m]: beyond it poses lose precision.
@@ -42,7 +42,20 @@ class ForceBuiltins(BuiltinGroup):
         self._stiffness = ServoGains.of(arm.robot).kp.tolist()
         self._sensing = arm.robot.generation.force_sensing
 
-    # --- hand guiding and contacts
+    def functions(self) -> dict[str, HostFunction]:
+        """Return the builtins."""
+        arm, past, sense, compliance = self._arm, self._past, self._force_sense, self._compliance
+        return super().functions() | {
+            "get_freedrive_status": lambda thread: singularity_status(
+                arm.model.jacobian(past.sensed.actual_q, arm.settings.tcp_offset)
+            ),
+            "zero_ftsensor": lambda thread: sense.set_zero(past.steady_cycles),
+            "tool_contact": lambda thread, direction: sense.steps_since_contact(tuple(direction)[:3]),
+            "force_mode_get_damping": lambda thread: compliance.force_damping,
+            "force_mode_get_gain_scaling": lambda thread: compliance.force_gain_scaling,
+        }
+
+    # --- hand guiding
 
     @builtin("freedrive_mode", "teach_mode")
     def _begin_freedrive(self, thread: object, free_axes: Any = (1,) * 6, feature: Any = "base") -> None:
@@ -71,19 +84,6 @@ class ForceBuiltins(BuiltinGroup):
     @builtin("end_freedrive_mode", "end_teach_mode")
     def _end_freedrive(self, thread: object) -> None:
         self._compliance.end_freedrive(by_program=True)
-
-    @builtin("get_freedrive_status")
-    def _freedrive_status(self, thread: object) -> int:
-        jacobian = self._arm.model.jacobian(self._past.sensed.actual_q, self._arm.settings.tcp_offset)
-        return singularity_status(jacobian)
-
-    @builtin("zero_ftsensor")
-    def _set_zero(self, thread: object) -> None:
-        self._force_sense.set_zero(self._past.steady_cycles)
-
-    @builtin("tool_contact")
-    def _tool_contact(self, thread: object, direction: Any) -> int:
-        return self._force_sense.steps_since_contact(tuple(direction)[:3])
 
     # --- force mode
 
@@ -127,14 +127,6 @@ class ForceBuiltins(BuiltinGroup):
     @builtin("force_mode_set_gain_scaling")
     def _set_gain_scaling(self, thread: object, scaling: float) -> None:
         self._compliance.force_gain_scaling = float(scaling)
-
-    @builtin("force_mode_get_damping")
-    def _get_damping(self, thread: object) -> float:
-        return self._compliance.force_damping
-
-    @builtin("force_mode_get_gain_scaling")
-    def _get_gain_scaling(self, thread: object) -> float:
-        return self._compliance.force_gain_scaling
 
     def _begin_force(
         self, frame: force_mode.TaskFrame, selection: tuple[bool, ...], wrench: Vector6, limits: Vector6

@@ -63,7 +63,6 @@ class MoveBuiltins(BuiltinGroup):
             world: has the frames that goals can be given in.
         """
         self._arm = arm
-        self._motion = arm.motion
         self._place_arm = place_arm
         self._events = events
         self._planner = planner
@@ -97,7 +96,7 @@ class MoveBuiltins(BuiltinGroup):
 
     @builtin("movel")
     def _movel(self, thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
-        a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
+        a, v = _limits("movel", a, v, t, r)
         make = self._tool_leg(PoseLine, pose, a=a, v=v, t=t, r=r)
         return self._travel(thread, make, self._planner.usual)
 
@@ -129,12 +128,14 @@ class MoveBuiltins(BuiltinGroup):
         thread: object,
         path: Callable[..., PosePath],
         *goals: Any,
+        a: float,
+        v: float,
+        r: float,
         may_overlap: bool = False,
-        **limits: float,
     ) -> Cycles:
         """Follow a path at constant speed of the tool."""
-        _require_limits(function, t=0.0, **limits)
-        make = self._tool_leg(path, *goals, **limits, process=True)
+        _limits(function, a, v, 0.0, r)
+        make = self._tool_leg(path, *goals, a=a, v=v, r=r, process=True)
         return self._travel(thread, make, self._planner.limited, may_overlap=may_overlap)
 
     def _tool_leg(self, path: Callable[..., PosePath], *goals: Any, **limits: Any) -> MakeLeg:
@@ -151,7 +152,7 @@ class MoveBuiltins(BuiltinGroup):
 
         `may_overlap`: no warning about a waypoint that is left out.
         """
-        arm, motion = self._arm, self._motion
+        arm, motion = self._arm, self._arm.motion
         before = motion.command_of(thread)
         if before is not None and isinstance(move := before.generator, Move) and move.returned:
             last = move.leg
@@ -211,7 +212,7 @@ class MoveBuiltins(BuiltinGroup):
     @builtin("set_pos")
     def _set_pos(self, thread: object, q: Any) -> None:
         angles = floats(q)
-        if self._motion.is_moving or self._motion.owner is not None:
+        if self._arm.motion.is_moving or self._arm.motion.owner is not None:
             raise ScriptRuntimeError("set_pos: the arm moves, stop it first")
         require_range("set_pos", angles, self._arm.safety.limits)
         if not self._place_arm(angles):
@@ -230,22 +231,18 @@ def _until_open(command: Command, move: Move) -> Cycles:
 
 
 def _limits(
-    function: str, a: float, v: float, t: float, r: float, defaults: tuple[float, float]
+    function: str, a: float, v: float, t: float, r: float, defaults: tuple[float, float] = TOOL_DEFAULTS
 ) -> tuple[float, float]:
-    """Acceleration and speed to use: a time has priority, so that they may be 0 beside it."""
+    """Check limits; return acceleration and speed: a time has priority, so that they may be 0 beside it."""
     if t > 0.0:
         a, v = a or defaults[0], v or defaults[1]
-    _require_limits(function, a, v, t, r)
-    return a, v
-
-
-def _require_limits(function: str, a: float, v: float, t: float, r: float) -> None:
     require_positive(function, a=a, v=v)
     for name, value in (("t", t), ("r", r)):
         if not value >= 0.0:
             raise ScriptRuntimeError(f"{function}: {name} must not be below 0, got {value:g}")
     if t:
         require_positive(function, t=t)
+    return a, v
 
 
 def _require_shares(function: str, a: float, v: float, r: float) -> None:
