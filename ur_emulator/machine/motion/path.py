@@ -1,71 +1,19 @@
 """Paths of the tool and of the joints, as pure functions of the length travelled.
 
 Of the tool: straight line and arc. Orientation turns on the geodesic at a constant rate, on the same
-parameter. Sources: URScript manual CB3 3.15, movel and movec. Of the joints: a straight line, a cubic, or a
-path of the tool through the inverse kinematics.
+parameter. Sources: URScript manual CB3 3.15, movel and movec. Of the joints: a straight line, or a path of
+the tool through the inverse kinematics. Those of blends are in `blend`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import acos, cos, pi, sin, sqrt
 from typing import Protocol
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
 from ur_emulator.machine.motion.tool import Tool, UnreachableError
-
-Vector = tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Cubic:
-    """The shape of all blends: c0 + c1 u + c2 u^2 + c3 u^3 for u in 0..1, in any number of coordinates."""
-
-    c0: Vector
-    c1: Vector
-    c2: Vector
-    c3: Vector
-
-    @classmethod
-    def between(
-        cls, start: Sequence[float], slope: Sequence[float], end: Sequence[float], end_slope: Sequence[float]
-    ) -> Cubic:
-        """Return the curve with these values and derivatives at u = 0 and u = 1 (Hermite's form)."""
-        difference = [b - a for a, b in zip(start, end, strict=True)]
-        return cls(
-            tuple(start),
-            tuple(slope),
-            tuple(3.0 * w - 2.0 * a - b for w, a, b in zip(difference, slope, end_slope, strict=True)),
-            tuple(a + b - 2.0 * w for w, a, b in zip(difference, slope, end_slope, strict=True)),
-        )
-
-    def at(self, u: float) -> tuple[Vector, Vector]:
-        """Return the point and the derivative with respect to u."""
-        rows = list(zip(self.c0, self.c1, self.c2, self.c3, strict=True))
-        return (
-            tuple(a + u * (b + u * (c + u * d)) for a, b, c, d in rows),
-            tuple(b + u * (2.0 * c + u * 3.0 * d) for _, b, c, d in rows),
-        )
-
-    def fastest(self) -> Vector:
-        """Return for each coordinate the greatest absolute value of the derivative."""
-        found = []
-        for b, c, d in zip(self.c1, self.c2, self.c3, strict=True):
-            values = [b, b + 2.0 * c + 3.0 * d]
-            if d != 0.0 and 0.0 < -c / (3.0 * d) < 1.0:
-                values.append(b - c * c / (3.0 * d))
-            found.append(max(map(abs, values)))
-        return tuple(found)
-
-    def bends(self) -> tuple[Vector, Vector]:
-        """Return the second derivatives at both ends; in between it is a mixture of them."""
-        return (
-            tuple(2.0 * c for c in self.c2),
-            tuple(2.0 * c + 6.0 * d for c, d in zip(self.c2, self.c3, strict=True)),
-        )
-
 
 # A rotation in place needs a speed too; nothing is published. Chosen: a rotation counts as the path of a
 # point at this distance from the tool centre point, if that is longer than the tool's own path [m/rad].
@@ -261,25 +209,6 @@ class JointLine:
         if s >= self.length:
             return self._goal, self._share
         return six([p + s * k for p, k in zip(self._start, self._share, strict=True)]), self._share
-
-
-class JointCurve:
-    """A cubic in joint space, in the units of the first move of a blend.
-
-    `speeds` (6,) are the greatest speeds of the joints when s moves at 1.
-    """
-
-    def __init__(self, cubic: Cubic, length: float) -> None:
-        self._cubic = cubic
-        self.length = length
-        self.speeds = six([x / length for x in cubic.fastest()])
-        self.rate = max(self.speeds)
-        self.bend = max(abs(x) for bend in cubic.bends() for x in bend) / length**2
-
-    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """Return joint angles and their derivative at s."""
-        q, slope = self._cubic.at(s / self.length)
-        return six(q), six([k / self.length for k in slope])
 
 
 class ToolPath:
