@@ -36,7 +36,7 @@ class ReleaseBrakes(CommandOperation):
     """Go to RUNNING, powering on first if need be."""
 
     def apply(self, box: BoxParts) -> None:
-        box.state.compliance.end_freedrive_by_client()
+        box.state.compliance.end_freedrive(by_client=True)
         _give_power(box, ModeCommand.BRAKE_RELEASE)
 
 

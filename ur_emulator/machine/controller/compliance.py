@@ -125,20 +125,16 @@ class Compliance:
             self._is_refused = hypot(*wrench[:3]) > self._unexpected_force
         self._hand_over()
 
-    def end_freedrive_by_program(self) -> None:
-        """End the freedrive that the program has requested."""
-        self.by_program = False
-        self._hand_over()
-
-    def end_freedrive_by_client(self) -> None:
-        """End the freedrive that a client has requested."""
-        self.by_client = False
+    def end_freedrive(self, *, by_program: bool = False, by_client: bool = False) -> None:
+        """End the freedrive that the program, or a client, has requested."""
+        self.by_program = self.by_program and not by_program
+        self.by_client = self.by_client and not by_client
         self._hand_over()
 
     def begin_force(self, force_mode: ForceMode) -> None:
         """Go into force mode; freedrive by the program ends."""
         self.end_force()
-        self.end_freedrive_by_program()
+        self.end_freedrive(by_program=True)
         if not self.is_in_freedrive:
             self._force = force_mode
             self._motion.add_overlay(force_mode)
@@ -151,7 +147,7 @@ class Compliance:
 
     def program_ended(self) -> None:
         """End freedrive and force mode of the program."""
-        self.end_freedrive_by_program()
+        self.end_freedrive(by_program=True)
         self.end_force()
 
     def _hand_over(self) -> None:
@@ -198,11 +194,8 @@ class Compliance:
             return WRONG_PAYLOAD
         if self._motion.is_compliant:
             return _moved_too_far(self._safety.limits, sensed)
-        force_mode = self.force_mode
-        if force_mode is None:
-            return None
-        error = sensed.position_error
-        deviation = force_mode.deviation(sensed.actual_q, error)
+        force_mode, error = self.force_mode, sensed.position_error
+        deviation = None if force_mode is None else force_mode.deviation(sensed.actual_q, error)
         if deviation is None:
             return None
         joint = max(range(6), key=lambda i: abs(error[i]))

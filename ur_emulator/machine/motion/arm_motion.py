@@ -29,64 +29,11 @@ from ur_emulator.machine.motion.leg import move_j
 from ur_emulator.machine.motion.move import Move
 from ur_emulator.machine.motion.overlay import Overlay, OverlayChain
 from ur_emulator.machine.motion.ownership import TRANSITIONS, ArmState, Command, Event, Fate
+from ur_emulator.machine.motion.path_time import PAUSE_RATE, PathTime
 from ur_emulator.machine.motion.stream_delay import StreamDelay
 
-# --- Time on the path: a pause slows it down to a standstill, and the first motion of a program runs it up
-#
-# An arm that has stopped on its path continues exactly there. An arm that has left its path, in a fast stop
-# or moved by hand, first returns to where it left it: slowly, all joints together (chosen; a real box
-# leaves that to the operator). Streams are not scaled: they ramp to rest and up again by themselves.
-
-
-# Rate of the time scaling in a pause and after it [1/s]. Chosen: as for the speed slider.
-PAUSE_RATE = 4.0
 # Leading axis on the return to the path [rad/s, rad/s^2]. Chosen: slow.
 RETURN_SPEED, RETURN_ACCELERATION = 0.25, 1.0
-
-
-class PathTime:
-    """The rate of time on the path: a factor that ramps to 0 while `paused`, else to 1.
-
-    The target of a cycle is where the factor at its beginning leads; its speed is that of the factor at its
-    end. Source: recordings of the first move of a program; there the first cycle already advances by a step
-    of the ramp (`runs_up`).
-
-    Attributes:
-        slowing, rising: rates of change of the factor [1/s].
-    """
-
-    def __init__(self) -> None:
-        self.paused = self.runs_up = False
-        self.factor = 1.0
-        self.slowing = self.rising = PAUSE_RATE
-
-    @property
-    def is_normal(self) -> bool:
-        """True without a pause, at a factor of 1."""
-        return not self.paused and self.factor == 1.0
-
-    def resume(self) -> None:
-        """End a pause; the factor rises from where it is."""
-        self.paused = self.runs_up = False
-        self.rising = PAUSE_RATE
-
-    def begin(self, rate: float, *, runs_up: bool = False) -> None:
-        """Rise from a standstill."""
-        self.factor, self.rising, self.runs_up = 0.0, rate, runs_up
-
-    def step(self, dt: float) -> float:
-        """Advance the ramp by a cycle; return the factor at its beginning."""
-        begin = self.factor
-        if self.paused:
-            self.factor = max(0.0, begin - self.slowing * dt)
-        elif begin < 1.0:
-            rise = self.rising * dt
-            if self.runs_up and begin == 0.0:
-                begin = rise
-            self.factor = begin + rise if begin + rise < 1.0 - 1e-9 else 1.0
-        return begin
-
-
 # Rate of change of the speed scaling [1/s], so that the joint speeds have no step. Chosen.
 SCALING_RATE = 4.0
 
@@ -169,8 +116,7 @@ class ArmMotion:
     @property
     def goal(self) -> Vector6:
         """Joint angles at the next waypoint; those of the path if there is none [rad]."""
-        move = self.move
-        goal = None if move is None else move.goal
+        goal = None if (move := self.move) is None else move.goal
         return self.path.q if goal is None else goal
 
     @property
@@ -253,11 +199,10 @@ class ArmMotion:
         A move whose instruction has returned for a blend continues to its waypoint: the end of a program is
         the same with and without a blend in its last move.
         """
-        if (command := self.command_of(owner)) is None:
-            return
-        if isinstance(command.generator, Move) and command.generator.returned:
+        command = self.command_of(owner)
+        if command is not None and isinstance(command.generator, Move) and command.generator.returned:
             command.owner = None
-        else:
+        elif command is not None:
             self._brake(Event.TAKEN, at_once=False)
 
     # --- programs: they begin, pause, go on and end
@@ -291,7 +236,7 @@ class ArmMotion:
             return
         self._time.resume()
         if self._command is not None:
-            self._command.renew()
+            self._command.is_renewed = True
         self._go(Event.RESUME)
         self._turn_back()
 
@@ -465,7 +410,7 @@ class ArmMotion:
         if self.state in _AT_REST:
             self.scale = scale
             if any(path.qd) or any(path.qdd):
-                path = path.at_rest()
+                path = JointTarget(path.q)
         else:
             if scale != self.scale:
                 change = self.scaling_rate * dt
@@ -531,20 +476,15 @@ class ArmMotion:
     def _displace(self, before: JointTarget, dt: float, advance: float, rate: float) -> None:
         """Compute the target beside overlays, or in time that is not normal."""
         path = self.path
-        if self.state is _BY_HAND:
-            pass
-        elif not self._overlays:
-            self.target = path
-        elif advance > 0.0 or rate > 0.0 or any(path.qd):
-            self.target = self._chain.displace(path, before, dt, rate)
-            if self._may_settle():
-                self._drop_overlays()
-        elif any(before.qd) or any(before.qdd):
-            self.target = before.at_rest()
+        if self.state is not _BY_HAND:
+            if not self._overlays:
+                self.target = path
+            elif advance > 0.0 or rate > 0.0 or any(path.qd):
+                self.target = self._chain.displace(path, before, dt, rate)
+                # The move that ended overlays displaced has ended at rest.
+                has_settled = self.move is None and (self.state not in _AT_REST or not any(self.target.qd))
+                if has_settled and self._chain.all_ended:
+                    self._drop_overlays()
+            elif any(before.qd) or any(before.qdd):
+                self.target = JointTarget(before.q)
         self._is_special = bool(self._overlays) or not self._time.is_normal
-
-    def _may_settle(self) -> bool:
-        """True when all overlays have ended, and the move that they displaced has ended at rest."""
-        if not self._chain.all_ended or self.move is not None:
-            return False
-        return self.state not in _AT_REST or not any(self.target.qd)

@@ -14,21 +14,10 @@ from dataclasses import dataclass
 from math import acos, cos, dist, hypot, pi, sin, sqrt, tan
 
 from protocol.pose import Pose, pose_add, pose_sub
-from ur_emulator.machine.models.robot_model import Vector6
+from ur_emulator.machine.models.robot_model import Vector6, six
 from ur_emulator.machine.motion.leg import Leg
-from ur_emulator.machine.motion.path import (
-    Cubic,
-    JointCurve,
-    JointLine,
-    JointPath,
-    PoseLine,
-    PosePath,
-    ToolPath,
-    Vector,
-    measure,
-    times,
-)
-from ur_emulator.machine.motion.path_samples import Sample, reaches_end, sample_path
+from ur_emulator.machine.motion.path import JointLine, JointPath, PoseLine, PosePath, ToolPath, measure, times
+from ur_emulator.machine.motion.path_samples import JOINT_SPEED_SHARE, Sample, reaches_end, sample_path
 from ur_emulator.machine.motion.tool import UnreachableError
 
 # Above this angle the arc of a movep would be too narrow: the cubic is used [rad].
@@ -38,6 +27,8 @@ _SAMPLES = 8  # intervals of a blend, for its greatest speed
 # Where the lengths before and behind the waypoint differ by a greater factor, a blend of two joint moves is
 # shaped as if they differed by this one: else the curve overshoots.
 _GREATEST_RATIO = 3.0
+
+Vector = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,25 +67,23 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     after = second.first_part(r, 0.5 * second.path.length)
     if before <= 0.0 or after <= 0.0 or first.goal is None:
         return None
-    a, b = first.path, second.path
+    a, b, tool = first.path, second.path, first.tool
     if isinstance(a, ToolPath) and isinstance(b, ToolPath):
         # As long before the waypoint as behind it, so the speed is the same at both ends of the curve.
-        before = after = min(before, after)
-    leave = first.path.length - before
-    if isinstance(a, ToolPath) and isinstance(b, ToolPath):
-        curve = _tool_curve(first, second, a, b, leave, after)
+        enter = min(before, after)
+        leave = a.length - enter
+        curve = _tool_curve(first, second, a.path, b.path, leave, enter)
         v = max(first.v, second.v)
-        samples = sample_path(curve, first.tool, first.near(leave), v)
-        if not reaches_end(samples, curve.length, first.tool.arm.robot):
+        samples = sample_path(curve, tool, first.near(leave), v)
+        if not reaches_end(samples, curve.length, tool.arm.robot):
             return None
-        return Blend(
-            ToolPath(curve, first.tool), leave, after, 1.0, v / curve.rate, min(first.a, second.a), samples
-        )
+        limit = min(first.a, second.a)
+        return Blend(ToolPath(curve, tool), leave, enter, 1.0, v / curve.rate, limit, samples)
     if isinstance(b, ToolPath) and (not second.samples or second.samples[-1].s < after):
         return None
+    leave = a.length - before
     try:
-        start_q, slope = a.at(leave, first.near(leave))
-        end_q, end_slope = b.at(after, second.near(after))
+        (start_q, slope), (end_q, end_slope) = first.at(leave), second.at(after)
     except UnreachableError:
         return None
     if isinstance(a, ToolPath) or isinstance(b, ToolPath):
@@ -107,26 +96,92 @@ def blend(first: Leg, second: Leg, r: float, most: float) -> Blend | None:
     v = max(first.v, scale * second.v)
     if scale == 1.0 and isinstance(a, JointLine):
         v /= joint_curve.rate
+    for speed, most in zip(joint_curve.speeds, tool.arm.robot.qd_max, strict=True):
+        v = min(v, JOINT_SPEED_SHARE * most / speed) if speed > 0.0 else v
     limit = min(leg.a for leg in (first, second) if isinstance(leg.path, JointLine))
     return Blend(joint_curve, leave, after, scale, v, limit)
 
 
 def _tool_curve(
-    first: Leg, second: Leg, a: ToolPath, b: ToolPath, leave: float, enter: float
+    first: Leg, second: Leg, a: PosePath, b: PosePath, leave: float, enter: float
 ) -> PoseCurve | PoseCorner:
-    lines = isinstance(a.path, PoseLine) and isinstance(b.path, PoseLine)
-    if lines and first.process and second.process:
-        corner = _corner(a.path, b.path, first, leave, enter)
+    (start, slope), (end, end_slope) = a.at(leave), b.at(enter)
+    waypoint, length = first.goal_pose, 2.0 * enter
+    if first.process and second.process and isinstance(a, PoseLine) and isinstance(b, PoseLine):
+        corner = _corner(start, slope, end, end_slope, waypoint)
         if corner is not None:
             return corner
-    start, slope = a.path.at(leave)
-    end, end_slope = b.path.at(enter)
-    waypoint = first.goal_pose
-    length = 2.0 * enter
     cubic = Cubic.between(
         pose_sub(start, waypoint), times(length, slope), pose_sub(end, waypoint), times(length, end_slope)
     )
     return PoseCurve(cubic, waypoint, length)
+
+
+@dataclass(frozen=True, slots=True)
+class Cubic:
+    """The shape of all blends: c0 + c1 u + c2 u^2 + c3 u^3 for u in 0..1, in any number of coordinates."""
+
+    c0: Vector
+    c1: Vector
+    c2: Vector
+    c3: Vector
+
+    @classmethod
+    def between(
+        cls, start: Sequence[float], slope: Sequence[float], end: Sequence[float], end_slope: Sequence[float]
+    ) -> Cubic:
+        """Return the curve with these values and derivatives at u = 0 and u = 1 (Hermite's form)."""
+        difference = [b - a for a, b in zip(start, end, strict=True)]
+        return cls(
+            tuple(start),
+            tuple(slope),
+            tuple(3.0 * w - 2.0 * a - b for w, a, b in zip(difference, slope, end_slope, strict=True)),
+            tuple(a + b - 2.0 * w for w, a, b in zip(difference, slope, end_slope, strict=True)),
+        )
+
+    def at(self, u: float) -> tuple[Vector, Vector]:
+        """Return the point and the derivative with respect to u."""
+        rows = list(zip(self.c0, self.c1, self.c2, self.c3, strict=True))
+        return (
+            tuple(a + u * (b + u * (c + u * d)) for a, b, c, d in rows),
+            tuple(b + u * (2.0 * c + u * 3.0 * d) for _, b, c, d in rows),
+        )
+
+    def fastest(self) -> Vector:
+        """Return for each coordinate the greatest absolute value of the derivative."""
+        found = []
+        for b, c, d in zip(self.c1, self.c2, self.c3, strict=True):
+            values = [b, b + 2.0 * c + 3.0 * d]
+            if d != 0.0 and 0.0 < -c / (3.0 * d) < 1.0:
+                values.append(b - c * c / (3.0 * d))
+            found.append(max(map(abs, values)))
+        return tuple(found)
+
+    def bends(self) -> tuple[Vector, Vector]:
+        """Return the second derivatives at both ends; in between it is a mixture of them."""
+        return (
+            tuple(2.0 * c for c in self.c2),
+            tuple(2.0 * c + 6.0 * d for c, d in zip(self.c2, self.c3, strict=True)),
+        )
+
+
+class JointCurve:
+    """A cubic in joint space, in the units of the first move of a blend.
+
+    `speeds` (6,) are the greatest speeds of the joints when s moves at 1.
+    """
+
+    def __init__(self, cubic: Cubic, length: float) -> None:
+        self._cubic = cubic
+        self.length = length
+        self.speeds = six([x / length for x in cubic.fastest()])
+        self.rate = max(self.speeds)
+        self.bend = max(abs(x) for bend in cubic.bends() for x in bend) / length**2
+
+    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
+        """Return joint angles and their derivative at s."""
+        q, slope = self._cubic.at(s / self.length)
+        return six(q), six([k / self.length for k in slope])
 
 
 class PoseCurve:
@@ -140,7 +195,7 @@ class PoseCurve:
         self.bend = max(map(measure, cubic.bends())) / length**2
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath."""
+        """Return the pose and the twist at s."""
         value, slope = self._cubic.at(s / self.length)
         twist = (*slope[:3], *_turn_rate(value[3:], slope[3:]))
         return pose_add(value, self._waypoint), times(1.0 / self.length, twist)
@@ -163,7 +218,7 @@ class PoseCorner:
         self.bend = max(1.0 / radius, turning / self.length**2)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath."""
+        """Return the pose and the twist at s."""
         phi = s / self._radius
         sine, rise = self._radius * sin(phi), self._radius * (1.0 - cos(phi))
         x, y, z = (p + sine * u + rise * w for p, u, w in zip(self._start[:3], self._u, self._w, strict=True))
@@ -179,11 +234,8 @@ def _fastest(path: PosePath) -> float:
     return max(measure(path.at(path.length * k / _SAMPLES)[1]) for k in range(_SAMPLES + 1))
 
 
-def _corner(first: PosePath, second: PosePath, leg: Leg, leave: float, enter: float) -> PoseCorner | None:
+def _corner(start: Pose, slope: Vector6, end: Pose, end_slope: Vector6, waypoint: Pose) -> PoseCorner | None:
     """Return the arc tangent to two lines; None if it would be too narrow, or a line is mainly a rotation."""
-    start, slope = first.at(leave)
-    end, end_slope = second.at(enter)
-    waypoint = leg.goal_pose
     d1, d2 = slope[:3], end_slope[:3]
     r, r2 = dist(start[:3], waypoint[:3]), dist(end[:3], waypoint[:3])
     # The speed is constant only where s is the path length of the tool on both lines.

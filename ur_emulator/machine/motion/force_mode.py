@@ -35,15 +35,6 @@ from ur_emulator.machine.models.robot_generation import ForceSensing
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion.tool import Tool
 
-# --- The task frame of force mode: the directions of its axes, cycle by cycle
-#
-# Source: URScript manual CB3 3.15, force_mode, `type`; UR3/CB3 manual, program node "Force": a point must
-# be at least 10 mm away; with the motion type no axis is compliant before the tool moves, and when it
-# stands again the frame stays as it was last. Chosen, where the manuals leave it open: the frame gives
-# directions only, the wrench acts at the tool centre point; the other axes of type 1; the motion of type 3
-# is that along the program's path.
-
-
 Axes = NDArray[np.float64]
 
 MIN_DISTANCE = 0.01  # m, of the tool from the origin of a frame of type 1
@@ -60,23 +51,28 @@ class FrameType(IntEnum):
 
 
 class TaskFrame:
-    """A task frame in the base: the pose as given to force_mode [m, rad], and how it is turned."""
+    """A task frame in the base: the pose as given to force_mode [m, rad], and how it turns cycle by cycle.
+
+    Source: URScript manual CB3 3.15, force_mode, `type`; UR3/CB3 manual, program node "Force": a point must
+    be at least 10 mm away; with the motion type no axis is compliant before the tool moves, and when it
+    stands again the frame stays as it was last. Chosen, where the manuals leave it open: the frame gives
+    directions only, the wrench acts at the tool centre point; the other axes of type 1; the motion of type 3
+    is that along the program's path.
+
+    Attributes:
+        axes: directions of the axes in the base as columns (3, 3); None as long as there are none.
+    """
 
     def __init__(self, pose: Pose, kind: FrameType) -> None:
         self.kind = kind
         self._origin = np.array(pose[:3])
         self._given: Axes = np.array(rotvec_to_matrix(pose[3:]))
-        self._axes = self._given if kind is FrameType.FIXED else None
-
-    @property
-    def axes(self) -> Axes | None:
-        """Directions of the axes in the base as columns (3, 3); None as long as there are none."""
-        return self._axes
+        self.axes = self._given if kind is FrameType.FIXED else None
 
     def follow(self, before: TaskFrame) -> None:
         """Begin with the directions of the frame whose place this one takes, if they are of its kind."""
         if self.kind is before.kind is not FrameType.FIXED:
-            self._axes = before.axes
+            self.axes = before.axes
 
     def distance(self, tool: Sequence[float]) -> float:
         """Return how far a tool position is from the origin [m]."""
@@ -88,7 +84,7 @@ class TaskFrame:
             self._turn_to_point(np.array(tool[:3]))
         elif self.kind is FrameType.MOTION:
             self._turn_along(np.array(velocity[:3]))
-        return self._axes
+        return self.axes
 
     def _turn_to_point(self, tool: NDArray[np.float64]) -> None:
         offset = self._origin - tool
@@ -101,7 +97,7 @@ class TaskFrame:
         if np.linalg.norm(z) < 1e-6:
             z = np.cross(self._given[:, 0], y)
         z /= np.linalg.norm(z)
-        self._axes = np.column_stack([np.cross(y, z), y, z])
+        self.axes = np.column_stack([np.cross(y, z), y, z])
 
     def _turn_along(self, velocity: NDArray[np.float64]) -> None:
         z = self._given[:, 2]
@@ -109,7 +105,7 @@ class TaskFrame:
         speed = float(np.linalg.norm(x))
         if speed > _MOTION:
             x /= speed
-            self._axes = np.column_stack([x, np.cross(z, x), z])
+            self.axes = np.column_stack([x, np.cross(z, x), z])
 
 
 # Dry friction of free motion [N, Nm]. So noise and the error of the zero do not accelerate a free arm.
@@ -172,7 +168,7 @@ class Deviation(NamedTuple):
 
 
 class ForceMode:
-    """The overlay; it begins without displacement and speed.
+    """The overlay of force mode; it begins without displacement and speed.
 
     How the wrench is sensed says how fast the mode may act; `stiffness` is that of the joint servos (6,)
     [Nm/rad].
@@ -220,7 +216,7 @@ class ForceMode:
         self._tightest = float(stiff.min()) if stiff.size else inf
 
     def displace(self, tool_pose: Pose, dt: float) -> Pose:
-        """See Overlay."""
+        """Return where a tool on its path is after a cycle of the law, displaced."""
         along_path = ZERO6 if self._path_pose is None else pose_sub(tool_pose, self._path_pose)
         measured = self._measure()
         share = dt / (self._sensing.filter_time + dt)

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from math import hypot, inf
+from math import inf
 from operator import sub
 from typing import ClassVar, NamedTuple, Protocol
 
-from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
-from ur_emulator.machine.motion.tool import Tool
-
-# --- The joint target: the set-point of the arm at the end of a control cycle
 
 
 class JointTarget(NamedTuple):
@@ -34,16 +30,14 @@ class JointTarget(NamedTuple):
             six([(w - v) / dt for v, w in zip(self.qd, qd, strict=True)]),
         )
 
-    def at_rest(self) -> JointTarget:
-        """Return the same position without motion."""
-        return JointTarget(self.q)
-
 
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
 REST_SPEED = 1e-6  # rad/s
 
 # Deceleration of the leading axis when a stream is paused [rad/s^2]. Chosen: what drivers give to stopj.
 PAUSE_DECELERATION = 4.0
+# Deceleration when no further servoj or torque comes [rad/s^2]. Chosen: that of a program's end.
+LOST_DECELERATION = 20.0
 
 
 class Kind(Enum):
@@ -103,12 +97,14 @@ class Streamed:
     Source: splines of the maker's driver script, whose live test asks for the whole path at 25 %.
 
     Attributes:
+        a: acceleration of the leading axis, also when it is lost [rad/s^2].
         scale: speed scaling of the last cycle; 0 before the first.
         surplus: scaled time that it has run longer than it was asked to [s].
     """
 
     kind: ClassVar[Kind] = Kind.STREAM
-    done: bool
+    done = False
+    a = LOST_DECELERATION
     scale = 0.0
     surplus = 0.0
 
@@ -131,15 +127,15 @@ class Streamed:
         return was
 
     def when_lost(self) -> Generator:
-        """Return the generator that stops the arm when the command is not renewed."""
-        raise NotImplementedError
+        """Return the generator that stops the arm when the command is not renewed, with its acceleration."""
+        return StopJ(self.a)
 
     def when_paused(self) -> Generator:
         """Return the generator that stops the arm when the program pauses."""
         return StopJ(PAUSE_DECELERATION)
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """See Generator."""
+        """Return the target at the end of the next cycle; each stream has its own law."""
         raise NotImplementedError
 
 
@@ -154,7 +150,6 @@ class SpeedJ(Streamed):
     def __init__(self, qd: Vector6, a: float) -> None:
         self.qd = qd
         self.a = a
-        self.done = False
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Move the target velocity towards the goal, in the time of the speed slider."""
@@ -170,10 +165,6 @@ class SpeedJ(Streamed):
             self.done = after.qd == self.qd
             qd = six([scale * v for v in after.qd])
         return target.continued(qd, dt)
-
-    def when_lost(self) -> Generator:
-        """Stop with the acceleration of the last command."""
-        return StopJ(self.a)
 
 
 class StopJ:
@@ -196,25 +187,21 @@ class StopJ:
         return JointTarget(after.q) if self.done else after
 
 
-# --- servoj: the joints follow a position that is commanded anew in every cycle
-#
-# Source: URScript manual CB3 3.15, servoj: `gain` is "the proportional gain for following the target
-# position", and `lookahead_time` "projects the current position forward in time with the current velocity";
-# a long one "prevents overshoot". As an equation: qdd = gain (q_goal - (q + lookahead qd)). Its lag behind
-# a moving goal is the lookahead time, which users measure (plus the delay of the arm). Where a goal moves
-# faster than a joint can, the joint follows at its rated speed: the maker's tests stream such goals and
-# expect the arm to arrive.
-
-
 # Ranges of the manual; values outside are limited to them.
 LOOKAHEAD = (0.03, 0.2)  # s
 GAIN = (100.0, 2000.0)  # 1/s^2
-# Deceleration when no further servoj or torque comes [rad/s^2]. Chosen: that of a program's end.
-LOST_DECELERATION = 20.0
 
 
 class ServoJ(Streamed):
-    """Move the joints towards `q`; it never ends by itself."""
+    """Move the joints towards a position that is commanded anew in every cycle; it never ends by itself.
+
+    Source: URScript manual CB3 3.15, servoj: `gain` is "the proportional gain for following the target
+    position", and `lookahead_time` "projects the current position forward in time with the current velocity";
+    a long one "prevents overshoot". As an equation: qdd = gain (q_goal - (q + lookahead qd)). Its lag behind
+    a moving goal is the lookahead time, which users measure (plus the delay of the arm). Where a goal moves
+    faster than a joint can, the joint follows at its rated speed: the maker's tests stream such goals and
+    expect the arm to arrive.
+    """
 
     def __init__(self, q: Vector6, lookahead: float, gain: float, qd_max: Vector6) -> None:
         """Take the goal [rad], the lookahead time [s], the gain [1/s^2] and the rated speeds [rad/s]."""
@@ -222,7 +209,6 @@ class ServoJ(Streamed):
         self._qd_max = qd_max
         self._lookahead = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1])
         self._gain = min(max(gain, GAIN[0]), GAIN[1])
-        self.done = False
 
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Advance by `scale * dt`; the integration is implicit, so that all gains are stable."""
@@ -244,146 +230,6 @@ class ServoJ(Streamed):
             six([(scale * w - v) / dt for v, w in zip(target.qd, after, strict=True)]),
         )
 
-    def when_lost(self) -> Generator:
-        """Stop."""
-        return StopJ(LOST_DECELERATION)
-
-
-# --- speedl and stopl: the twist of the tool changes linearly to a value and stays there
-#
-# Source: URScript manual CB3 3.15, speedl: "accelerate linearly in Cartesian space and continue with constant
-# tool speed"; `aRot` for the rotation. That the line is held over any distance is chosen.
-
-
-# Least deceleration of the tool when speedl is paused [m/s^2]. Chosen: the moves' default.
-PAUSE_LINEAR = 1.2
-
-# The tool returns to its line with this time constant [s]; chosen: some cycles of every generation. A joint
-# at a singularity cannot follow: the distance that it has to catch up is bounded [m, rad].
-CATCH_UP_TIME = 0.05
-MAX_LAG = (1e-3, 1e-2)
-
-
-def twist_towards(now: Sequence[float], goal: Sequence[float], a: float, a_rot: float, dt: float) -> Vector6:
-    """Return a twist one cycle on; its linear part changes at most at `a`, its rotation at `a_rot`."""
-    return six([*_towards(now[:3], goal[:3], a * dt), *_towards(now[3:], goal[3:], a_rot * dt)])
-
-
-def _towards(now: Sequence[float], goal: Sequence[float], reach: float) -> list[float]:
-    change = [b - a for a, b in zip(now, goal, strict=True)]
-    size = hypot(*change)
-    if size <= reach:
-        return list(goal)
-    return [a + reach / size * d for a, d in zip(now, change, strict=True)]
-
-
-class ToolCourse:
-    """Where the tool should be under the twists that were asked for: their integral, from where it began.
-
-    Joint speeds that give a twist only at the ends of the cycles let the tool drift off its line, so the
-    joints are held to the integrated pose. One course goes on from command to command of the same tool.
-    """
-
-    def __init__(self, tool: Tool) -> None:
-        self.tool = tool
-        self._pose: Pose = ZERO6
-        self._twist = ZERO6
-        self._last: JointTarget | None = None
-
-    def twist_at(self, target: JointTarget) -> Vector6:
-        """Return the twist of the tool; the course begins anew at a target that is not its own."""
-        if target is not self._last:
-            self._last = target
-            self._pose = self.tool.pose(target.q)
-            self._twist = self.tool.twist(target.q, target.qd) if any(target.qd) else ZERO6
-        return self._twist
-
-    def step(self, target: JointTarget, twist: Vector6, dt: float) -> JointTarget:
-        """Return the target at the end of a cycle in which the twist changes linearly to `twist`."""
-        tool = self.tool
-        pose = tool.pose(target.q)
-        before = self.twist_at(target)
-        lag = pose_sub(self._pose, pose)
-        lag = six([*_towards(ZERO6[:3], lag[:3], MAX_LAG[0]), *_towards(ZERO6[:3], lag[3:], MAX_LAG[1])])
-        way = [0.5 * dt * (v + w) for v, w in zip(before, twist, strict=True)]
-        self._pose = pose_add(way, pose_add(lag, pose))
-        self._twist = twist
-        qd = ZERO6
-        if any(twist):
-            ahead = [q + dt * v for q, v in zip(target.q, target.qd, strict=True)]
-            qd = tool.rates(ahead, [w + error / CATCH_UP_TIME for w, error in zip(twist, lag, strict=True)])
-        self._last = target.continued(qd, dt)
-        return self._last
-
-
-class SpeedL(Streamed):
-    """Accelerate the tool to a twist in base axes and keep it; `done` when it is reached."""
-
-    def __init__(self, twist: Vector6, a: float, a_rot: float, tool: Tool) -> None:
-        """Take the twist [m/s, rad/s] and the accelerations [m/s^2, rad/s^2]."""
-        self._twist = twist
-        self._a, self._a_rot = a, a_rot
-        self.course = ToolCourse(tool)
-        self.done = False
-
-    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Move the tool's twist towards the goal, in the time of the speed slider."""
-        was, twist = self.rescale(scale), ZERO6
-        if scale > 0.0:
-            unscaled = six([x / was for x in self.course.twist_at(target)])
-            unscaled = twist_towards(unscaled, self._twist, self._a, self._a_rot, scale * dt)
-            self.done = unscaled == self._twist
-            twist = six([scale * x for x in unscaled])
-        return self.course.step(target, twist, dt)
-
-    def when_replaced(self, by: Generator) -> None:
-        """A command of the same tool goes on from the pose that this one should have reached."""
-        super().when_replaced(by)
-        if isinstance(by, SpeedL | StopL) and by.course.tool == self.course.tool:
-            by.course = self.course
-
-    def when_lost(self) -> Generator:
-        """Stop with the accelerations of the last command."""
-        return self._stop(self._a, self._a_rot)
-
-    def when_paused(self) -> Generator:
-        """Stop in the direction of the tool, at least with the decelerations of a pause."""
-        return self._stop(max(self._a, PAUSE_LINEAR), max(self._a_rot, PAUSE_DECELERATION))
-
-    def _stop(self, a: float, a_rot: float) -> Generator:
-        stop = StopL(a, a_rot, self.course.tool)
-        stop.course = self.course
-        return stop
-
-
-class StopL:
-    """Decelerate the tool to rest. Source: URScript manual CB3 3.15, stopl."""
-
-    kind: ClassVar[Kind] = Kind.STOP
-
-    def __init__(self, a: float, a_rot: float, tool: Tool) -> None:
-        """Take the decelerations [m/s^2, rad/s^2]."""
-        self._a, self._a_rot = a, a_rot
-        self.course = ToolCourse(tool)
-        self.done = False
-
-    def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
-        """Move the tool's twist towards zero; the speed slider does not soften a stop."""
-        if not any(target.qd):
-            self.done = True
-            return JointTarget(target.q)
-        twist = twist_towards(self.course.twist_at(target), ZERO6, self._a, self._a_rot, dt)
-        after = self.course.step(target, twist, dt)
-        self.done = max(map(abs, after.qd)) <= REST_SPEED
-        return JointTarget(after.q) if self.done else after
-
-
-# --- direct_torque: a program gives the torques of the joints, cycle by cycle; no position is held
-#
-# Source: URScript manual e-Series 5.25.1, direct_torque: gravity is always compensated; without a call in
-# every cycle the robot returns to position control. Chosen: the set-point is the measured arm meanwhile,
-# and position control begins by bringing the joints to rest.
-
 
 class TorqueCommand(NamedTuple):
     """What the drives shall give in one cycle.
@@ -400,10 +246,14 @@ class TorqueCommand(NamedTuple):
 
 
 class DirectTorque(Streamed):
-    """Follow the measured arm while the drives give a torque; `measure` gives its angles and speeds."""
+    """Follow the measured arm while the drives give a torque; `measure` gives its angles and speeds.
+
+    No position is held. Source: URScript manual e-Series 5.25.1, direct_torque: gravity is always
+    compensated; without a call in every cycle the robot returns to position control. Chosen: the set-point is
+    the measured arm meanwhile, and position control begins by bringing the joints to rest.
+    """
 
     kind: ClassVar[Kind] = Kind.TORQUE
-    done = False
 
     def __init__(self, command: TorqueCommand, measure: Callable[[], JointTarget]) -> None:
         self.command = command
@@ -416,7 +266,3 @@ class DirectTorque(Streamed):
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Return the measured arm."""
         return self._measure()
-
-    def when_lost(self) -> Generator:
-        """Hold the position where the arm comes to rest."""
-        return StopJ(LOST_DECELERATION)

@@ -6,6 +6,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import dist, sqrt
+from operator import attrgetter
 
 from protocol.pose import Pose
 from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
@@ -56,11 +57,15 @@ class Leg:
     v_max: float = _FASTEST
     a_max: float = _STRONGEST
 
+    def at(self, s: float) -> tuple[Vector6, Vector6]:
+        """Return the joint angles after the length s and their derivative, or raise UnreachableError."""
+        return self.path.at(s, self.near(s))
+
     def near(self, s: float) -> Vector6:
         """Return joint angles close to those after the length s [rad], for the inverse kinematics."""
         if not self.samples:
             return self.path.at(s, ())[0]
-        sample = self.samples[max(0, bisect_right(self.samples, s, key=_length) - 1)]
+        sample = self.samples[max(0, bisect_right(self.samples, s, key=attrgetter("s")) - 1)]
         return six([q + (s - sample.s) * k for q, k in zip(sample.q, sample.slope, strict=True)])
 
     def position(self, s: float) -> Vector3:
@@ -143,15 +148,8 @@ def move_j(
 ) -> Leg:
     """Return a move that is linear in joint space: all joints start and stop together.
 
-    Source: URScript manual CB3 3.15, movej.
-
-    Args:
-        start: joint angles at its beginning [rad], (6,).
-        goal: joint angles to reach [rad], (6,).
-        tool: kinematics, for blends.
-        a, v: acceleration [rad/s^2] and speed [rad/s] of the leading axis.
-        t: duration [s]; above 0 it has priority over `a` and `v`.
-        r: blend radius [m].
+    Source: URScript manual CB3 3.15, movej. `start` and `goal` are joint angles (6,) [rad]; the limits are
+    those of a `Leg`.
     """
     a, v = min(a, _STRONGEST), min(v, _FASTEST)
     return Leg(JointLine(start, goal), tool, six(goal), tool.pose(goal), v, a, t, r)
@@ -170,12 +168,7 @@ def move_tool(
 ) -> Leg:
     """Return a move of the tool along a path. Source: URScript manual CB3 3.15, movel, movep, movec.
 
-    Args:
-        near: joint angles at its beginning [rad], (6,).
-        a, v: acceleration [m/s^2] and speed [m/s] of the tool.
-        t: duration [s]; above 0 it has priority over `a` and `v`.
-        r: blend radius [m].
-        process: keep the speed through blends.
+    `near` are joint angles at its beginning (6,) [rad]; the limits are those of a `Leg`.
     """
     a, v = min(a, _STRONGEST), min(v, _FASTEST)
     length = path.length
@@ -183,12 +176,7 @@ def move_tool(
         return Leg(ToolPath(path, tool), tool, near, tool.pose(near), v, a, t, r, process)
     samples = sample_path(path, tool, near, max(v, 2.0 * length / t) if t > 0.0 else v)
     goal = samples[-1].q if reaches_end(samples, length, tool.arm.robot) else None
-    goal_pose = path.at(length)[0]
-    return Leg(ToolPath(path, tool), tool, goal, goal_pose, v, a, t, r, process, samples)
-
-
-def _length(sample: Sample) -> float:
-    return sample.s
+    return Leg(ToolPath(path, tool), tool, goal, path.at(length)[0], v, a, t, r, process, samples)
 
 
 def _inside(holds: Callable[[float], bool], most: float) -> float:

@@ -10,131 +10,18 @@ there is no further move, the arm stops at the last waypoint.
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from enum import Enum
 from itertools import accumulate
-from math import ceil, dist, inf, sqrt
+from math import dist
 from typing import ClassVar
 
-from ur_emulator.machine.models.robot_model import RobotModel, Vector6, six
-from ur_emulator.machine.motion.blend import Blend, blend
+from ur_emulator.machine.models.robot_model import Vector6, six
+from ur_emulator.machine.motion.blend import blend
 from ur_emulator.machine.motion.generators import JointTarget, Kind
 from ur_emulator.machine.motion.leg import Leg
-from ur_emulator.machine.motion.path import JointCurve, JointPath
-from ur_emulator.machine.motion.path_samples import JOINT_SPEED_SHARE, Limits, Sample, joint_limits
-from ur_emulator.machine.motion.speed_plan import (
-    Interval,
-    SmoothPlan,
-    SpeedPlan,
-    StoppingCurve,
-    plan,
-    stopping_curve,
-)
-
-# --- Segments of the path of a chain of moves: parts of moves and the blends between them, with their limits
-
-
-# Longest interval on a curve, in units of 1 / bend, and the greatest number of intervals between two limits.
-_SHORT, _MOST = 0.25, 32
-
-
-@dataclass(frozen=True, slots=True)
-class PathSegment:
-    """A part of a path.
-
-    Attributes:
-        path: in its own unit.
-        begin, end: of the part [unit].
-        scale: units of the chain per unit of the path.
-        leg: the move whose waypoint it leads to.
-        intervals: the limits within the segment, in units of the chain.
-    """
-
-    path: JointPath
-    begin: float
-    end: float
-    scale: float
-    leg: Leg
-    limits: tuple[Limits, ...]
-    intervals: tuple[Interval, ...]
-
-    @property
-    def length(self) -> float:
-        """Length in units of the chain."""
-        return (self.end - self.begin) * self.scale
-
-    def cut(self, *, begin: float | None = None, end: float | None = None) -> PathSegment:
-        """Return a shorter segment."""
-        begin = self.begin if begin is None else begin
-        end = self.end if end is None else end
-        intervals = _intervals(self.limits, begin, end, self.scale)
-        return replace(self, begin=begin, end=end, intervals=intervals)
-
-
-def segment_of_leg(leg: Leg, begin: float, scale: float) -> PathSegment:
-    """Return a move from a point of its path on."""
-    path = leg.path
-    limits = _limits(path, leg.v, leg.a, leg.samples, _robot(leg))
-    intervals = _intervals(limits, begin, path.length, scale)
-    return PathSegment(path, begin, path.length, scale, leg, limits, intervals)
-
-
-def segment_of_blend(blend: Blend, to: Leg, scale: float) -> PathSegment:
-    """Return a blend that leads into a move."""
-    path = blend.path
-    v = blend.v
-    if isinstance(path, JointCurve):
-        for speed, most in zip(path.speeds, _robot(to).qd_max, strict=True):
-            v = min(v, JOINT_SPEED_SHARE * most / speed) if speed > 0.0 else v
-    limits = _limits(path, v, blend.a, blend.samples, _robot(to))
-    intervals = _intervals(limits, 0.0, path.length, scale)
-    return PathSegment(path, 0.0, path.length, scale, to, limits, intervals)
-
-
-def _intervals(limits: tuple[Limits, ...], begin: float, end: float, scale: float) -> tuple[Interval, ...]:
-    """Return the limits from one point of a path to another, in units of the chain."""
-    found: list[Interval] = []
-    s = begin
-    for limit in limits:
-        length = min(limit.end, end) - s
-        if length > 0.0:
-            bounds = limit.bounds
-            # What a bend leaves of the acceleration changes with the speed, so not over long intervals.
-            n = min(_MOST, max(1, ceil(length / _SHORT * max(b for _, b in bounds))))
-            if scale != 1.0:
-                bounds = tuple((scale * a, b / scale) for a, b in bounds)
-            found += n * [Interval(length * scale / n, (scale * limit.speed) ** 2, bounds)]
-            s = limit.end
-    return tuple(found)
-
-
-def _robot(leg: Leg) -> RobotModel:
-    return leg.tool.arm.robot
-
-
-def _limits(
-    path: JointPath, v: float, a: float, samples: tuple[Sample, ...], robot: RobotModel
-) -> tuple[Limits, ...]:
-    """Return the limits of a path for a speed, an acceleration and the joints."""
-    bound = (a / path.rate, path.bend / path.rate)
-    speed = min(v, sqrt(a / path.bend) if path.bend > 0.0 else inf)
-    found: list[Limits] = []
-    for limit in joint_limits(samples, robot):
-        slower = min(speed, limit.speed)
-        bounds = (bound, *(other for other in limit.bounds if not _is_weaker(other, bound, slower)))
-        if found and found[-1][1:] == (slower, bounds):
-            found.pop()
-        found.append(Limits(limit.end, slower, bounds))
-    if not found or found[-1].end < path.length:
-        found.append(Limits(path.length, speed, (bound,)))
-    return tuple(found)
-
-
-def _is_weaker(one: tuple[float, float], other: tuple[float, float], speed: float) -> bool:
-    """Return whether a bound allows more than another at any speed up to a given one."""
-    z = speed * speed
-    return one[0] >= other[0] and one[0] - one[1] * z >= other[0] - other[1] * z
-
+from ur_emulator.machine.motion.path_segment import PathSegment, intervals_of
+from ur_emulator.machine.motion.speed_plan import SmoothPlan, SpeedPlan, StoppingCurve, plan, stopping_curve
 
 # If the arm is too fast for a blend, its radius is reduced by this factor, at most so many times.
 _SHRINK, _ATTEMPTS = 0.7, 16
@@ -143,15 +30,11 @@ _LEAD_CYCLES = 2
 
 
 class Follow(Enum):
-    """The result of `Move.follow`.
+    """The result of `Move.follow`."""
 
-    `BLENDED`: the move joined the chain. `SKIPPED`: its waypoint is left out, if the next move allows it.
-    `REFUSED`: the arm stops first.
-    """
-
-    BLENDED = "blended"
-    SKIPPED = "skipped"
-    REFUSED = "refused"
+    BLENDED = "the move joined the chain"
+    SKIPPED = "its waypoint is left out, if the next move allows it"
+    REFUSED = "the arm stops first"
 
 
 class Move:
@@ -168,18 +51,13 @@ class Move:
 
     def __init__(self, leg: Leg) -> None:
         """Plan a leg from rest to rest."""
-        self._leg = leg = leg.with_duration()
-        self._time = self._time_before = 0.0
-        self._cycle = 0.0
-        self._zone = _zone(leg, 0.0)
-        self._segments: list[PathSegment] = [segment_of_leg(leg, 0.0, 1.0)]
-        self._ends: list[float] = []
-        self._plan: SpeedPlan | SmoothPlan
-        self._stopping: StoppingCurve | None = None
-        rest = plan(self._segments[0].intervals, 0.0)
+        leg = leg.with_duration()
+        self._cycle = self._time = self._time_before = 0.0
+        segment = PathSegment.of(leg, leg, 0.0, 1.0)
+        rest = plan(segment.intervals, 0.0)
         assert rest is not None
         is_smooth = leg.smoothing > 0.0 and leg.r <= 0.0 < rest.duration
-        self._use(SmoothPlan(rest, leg.smoothing) if is_smooth else rest)
+        self._use(leg, 0.0, [segment], SmoothPlan(rest, leg.smoothing) if is_smooth else rest)
         # A move of length 0 may have a duration.
         self._wait = leg.t if leg.path.length <= 0.0 else 0.0
         self.done = self.duration <= 0.0
@@ -248,16 +126,13 @@ class Move:
                 segments = [
                     *ahead[:-1],
                     last.cut(end=found.leave),
-                    segment_of_blend(found, second, last.scale),
-                    segment_of_leg(second, found.enter, last.scale * found.scale),
+                    PathSegment.of(found, second, 0.0, last.scale),
+                    PathSegment.of(second, second, found.enter, last.scale * found.scale),
                 ]
-                planned = plan([interval for segment in segments for interval in segment.intervals], speed)
+                planned = plan(intervals_of(segments), speed)
                 if planned is not None:
-                    self._leg = second
+                    self._use(second, found.enter, segments, planned)
                     self.left_out = None
-                    self._zone = _zone(second, found.enter)
-                    self._segments = segments
-                    self._use(planned)
                     self.returned = False
                     self.n_joined += 1
                     return True
@@ -291,16 +166,20 @@ class Move:
         """Undo the last step: its target was not accepted."""
         self._time = self._time_before
 
-    def _use(self, found: SpeedPlan | SmoothPlan) -> None:
-        """Begin to execute a plan for the segments."""
-        self._plan = found
+    def _use(
+        self, leg: Leg, begin: float, segments: Sequence[PathSegment], found: SpeedPlan | SmoothPlan
+    ) -> None:
+        """Begin to execute a plan for segments; the last one is a leg from `begin` on."""
+        self._leg, self._segments, self._plan = leg, segments, found
         self._time = self._time_before = 0.0
-        self._ends = list(accumulate(segment.length for segment in self._segments))
-        self._stopping = None
+        self._ends: list[float] = list(accumulate(segment.length for segment in segments))
+        # How much of the leg's end its blend may replace: at most half of the leg.
+        length, r = leg.path.length, leg.r
+        self._zone = min(leg.last_part(r, 0.5 * length), length - begin) if r > 0.0 else 0.0
+        self._stopping: StoppingCurve | None = None
         if self._zone > 0.0:
-            last = self._segments[-1]
-            intervals = [interval for segment in self._segments for interval in segment.intervals]
-            self._stopping = stopping_curve(intervals, self._ends[-1] - self._zone * last.scale)
+            stop = self._ends[-1] - self._zone * segments[-1].scale
+            self._stopping = stopping_curve(intervals_of(segments), stop)
 
     def _at(self, s: float) -> int:
         """Return the index of the segment at a length."""
@@ -312,10 +191,3 @@ class Move:
         segment = self._segments[k]
         begin = segment.begin + (s - (self._ends[k - 1] if k > 0 else 0.0)) / segment.scale
         return [segment.cut(begin=min(begin, segment.end)), *self._segments[k + 1 :]]
-
-
-def _zone(leg: Leg, begin: float) -> float:
-    """Return how much of a leg's end its blend may replace: at most half of the leg, none before `begin`."""
-    if leg.r <= 0.0:
-        return 0.0
-    return min(leg.last_part(leg.r, 0.5 * leg.path.length), leg.path.length - begin)

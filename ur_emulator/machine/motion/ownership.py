@@ -56,7 +56,7 @@ class Command:
     Attributes:
         generator: computes it.
         owner: the thread; None when nobody waits for it any more.
-        is_renewed: its thread wants a stream to go on in this cycle.
+        is_renewed: its thread wants a stream to go on in this cycle; it sets it anew in each.
         left_at: where it was when it was suspended [rad].
     """
 
@@ -73,10 +73,6 @@ class Command:
     def is_over(self) -> bool:
         """True when its instruction returns: it has come to its end, or has lost the arm."""
         return self.fate is Fate.DONE or self.fate is Fate.TAKEN
-
-    def renew(self) -> None:
-        """Let a stream go on for one more cycle."""
-        self.is_renewed = True
 
 
 @dataclass(frozen=True, slots=True)

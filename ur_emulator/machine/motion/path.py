@@ -1,74 +1,19 @@
-"""Paths of the tool: straight line and arc, as pure functions of the length travelled.
+"""Paths of the tool and of the joints, as pure functions of the length travelled.
 
-`at(s)` gives the pose and its derivative with respect to s, a twist in base axes per unit of s. Orientation
-turns on the geodesic at a constant rate, on the same parameter. Sources: URScript manual CB3 3.15, movel and
-movec.
+Of the tool: straight line and arc. Orientation turns on the geodesic at a constant rate, on the same
+parameter. Sources: URScript manual CB3 3.15, movel and movec. Of the joints: a straight line, or a path of
+the tool through the inverse kinematics. Those of blends are in `blend`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import acos, cos, pi, sin, sqrt
 from typing import Protocol
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
 from ur_emulator.machine.motion.tool import Tool, UnreachableError
-
-# --- A cubic curve between two points with given derivatives: the shape of all blends
-
-
-Vector = tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Cubic:
-    """p(u) = c0 + c1 u + c2 u^2 + c3 u^3 for u in 0..1, in any number of coordinates."""
-
-    c0: Vector
-    c1: Vector
-    c2: Vector
-    c3: Vector
-
-    @classmethod
-    def between(
-        cls, start: Sequence[float], slope: Sequence[float], end: Sequence[float], end_slope: Sequence[float]
-    ) -> Cubic:
-        """Return the curve with these values and derivatives at u = 0 and u = 1 (Hermite's form)."""
-        difference = [b - a for a, b in zip(start, end, strict=True)]
-        return cls(
-            tuple(start),
-            tuple(slope),
-            tuple(3.0 * w - 2.0 * a - b for w, a, b in zip(difference, slope, end_slope, strict=True)),
-            tuple(a + b - 2.0 * w for w, a, b in zip(difference, slope, end_slope, strict=True)),
-        )
-
-    def at(self, u: float) -> tuple[Vector, Vector]:
-        """Return the point and the derivative with respect to u."""
-        rows = list(zip(self.c0, self.c1, self.c2, self.c3, strict=True))
-        return (
-            tuple(a + u * (b + u * (c + u * d)) for a, b, c, d in rows),
-            tuple(b + u * (2.0 * c + u * 3.0 * d) for _, b, c, d in rows),
-        )
-
-    def fastest(self) -> Vector:
-        """Return for each coordinate the greatest absolute value of the derivative."""
-        found = []
-        for b, c, d in zip(self.c1, self.c2, self.c3, strict=True):
-            values = [b, b + 2.0 * c + 3.0 * d]
-            if d != 0.0 and 0.0 < -c / (3.0 * d) < 1.0:
-                values.append(b - c * c / (3.0 * d))
-            found.append(max(map(abs, values)))
-        return tuple(found)
-
-    def bends(self) -> tuple[Vector, Vector]:
-        """Return the second derivatives at both ends; in between it is a mixture of them."""
-        return (
-            tuple(2.0 * c for c in self.c2),
-            tuple(2.0 * c + 6.0 * d for c, d in zip(self.c2, self.c3, strict=True)),
-        )
-
 
 # A rotation in place needs a speed too; nothing is published. Chosen: a rotation counts as the path of a
 # point at this distance from the tool centre point, if that is longer than the tool's own path [m/rad].
@@ -96,7 +41,7 @@ class PosePath(Protocol):
     bend: float
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """Return the pose at s and its derivative, a twist per unit of s."""
+        """Return the pose at s and its derivative, a twist in base axes per unit of s."""
         ...
 
 
@@ -132,7 +77,7 @@ class PoseLine:
         return _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath; the end is exactly the goal."""
+        """Return the pose and the twist at s; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._twist
         return pose_add(times(s / self.length, self._change), self._start), self._twist
@@ -153,8 +98,7 @@ class PoseArc:
         """
         self._start = start
         self._centre = centre
-        cx, cy, cz = centre
-        self._u = (start[0] - cx, start[1] - cy, start[2] - cz)
+        self._u = _minus(start, centre)
         self._w = _cross(axis, self._u)
         self._angle = angle
         turn = (axis[0] * angle, axis[1] * angle, axis[2] * angle) if fixed else pose_sub(goal, start)[3:]
@@ -164,7 +108,7 @@ class PoseArc:
         self._goal = self._pose(1.0) if fixed else goal
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
-        """See PosePath."""
+        """Return the pose and the twist at s; the end is exactly the goal, if that has an orientation."""
         share = s / self.length
         phi = share * self._angle
         sine, cosine = sin(phi), cos(phi)
@@ -191,31 +135,27 @@ def arc_through(
     goal (chosen, not documented). `fixed` is mode 1 of movec: the orientation is fixed to the tangent, the
     goal's rotation is ignored.
     """
-    a, b, c = _position(start), _position(via), _position(goal)
-    ab, ac = _minus(b, a), _minus(c, a)
+    ab, ac = _minus(via, start), _minus(goal, start)
     normal = _cross(ab, ac)
     size = _norm(normal)
-    nearest = min(_norm(ab), _norm(ac), _norm(_minus(c, b)))
+    nearest = min(_norm(ab), _norm(ac), _norm(_minus(goal, via)))
     if nearest < _COINCIDENT or size <= _FLAT * _norm(ab) * _norm(ac):
         return PoseLine(start, (*goal[:3], *start[3:]) if fixed else goal)
     axis = (normal[0] / size, normal[1] / size, normal[2] / size)
     # Centre of the circle through three points, seen from the first.
     p, q = _cross(normal, ab), _cross(ac, normal)
     ab2, ac2 = _dot(ab, ab), _dot(ac, ac)
-    x, y, z = (o + (ac2 * i + ab2 * j) / (2.0 * size * size) for o, i, j in zip(a, p, q, strict=True))
+    x, y, z = (o + (ac2 * i + ab2 * j) / (2.0 * size * size) for o, i, j in zip(start[:3], p, q, strict=True))
     centre = (x, y, z)
-    u, v = _minus(a, centre), _minus(c, centre)
+    u, v = _minus(start, centre), _minus(goal, centre)
     angle = acos(max(-1.0, min(1.0, _dot(u, v) / (_norm(u) * _norm(v)))))
     if _dot(_cross(u, v), axis) < 0.0:
         angle = 2.0 * pi - angle
     return PoseArc(start, centre, axis, angle, six(goal), fixed=fixed)
 
 
-def _position(pose: Sequence[float]) -> Vector3:
-    return (pose[0], pose[1], pose[2])
-
-
-def _minus(a: Vector3, b: Vector3) -> Vector3:
+def _minus(a: Sequence[float], b: Sequence[float]) -> Vector3:
+    """Return the way from the position b to a, which may be poses."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
@@ -231,18 +171,10 @@ def _cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-# --- Paths in joint space: a straight line, a cubic, or a path of the tool through the inverse kinematics
-#
-# `at(s, near)` gives the joint angles and their derivative with respect to s.
-
-
 class JointPath(Protocol):
     """A path of the joints; s is radians of the leading axis or metres of the tool.
 
-    Attributes:
-        length: greatest s.
-        rate: greatest speed when s moves at 1: of the leading axis, or of the tool.
-        bend: greatest acceleration when s moves at a constant 1: of the leading axis, or of the tool.
+    Its attributes are those of `PosePath`, with `rate` and `bend` of the leading axis, or of the tool.
     """
 
     length: float
@@ -273,29 +205,10 @@ class JointLine:
         self._share = six([w / self.length if self.length > 0.0 else 0.0 for w in difference])
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath; the end is exactly the goal."""
+        """Return joint angles and their derivative at s; the end is exactly the goal."""
         if s >= self.length:
             return self._goal, self._share
         return six([p + s * k for p, k in zip(self._start, self._share, strict=True)]), self._share
-
-
-class JointCurve:
-    """A cubic in joint space, in the units of the first move of a blend.
-
-    `speeds` (6,) are the greatest speeds of the joints when s moves at 1.
-    """
-
-    def __init__(self, cubic: Cubic, length: float) -> None:
-        self._cubic = cubic
-        self.length = length
-        self.speeds = six([x / length for x in cubic.fastest()])
-        self.rate = max(self.speeds)
-        self.bend = max(abs(x) for bend in cubic.bends() for x in bend) / length**2
-
-    def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath."""
-        q, slope = self._cubic.at(s / self.length)
-        return six(q), six([k / self.length for k in slope])
 
 
 class ToolPath:
@@ -309,7 +222,7 @@ class ToolPath:
         self.bend = path.bend
 
     def at(self, s: float, near: Sequence[float]) -> tuple[Vector6, Vector6]:
-        """See JointPath."""
+        """Return the joint angles that are closest to `near`, and their derivative at s."""
         pose, twist = self.path.at(s)
         q = self.tool.joints(pose, near)
         if q is None:

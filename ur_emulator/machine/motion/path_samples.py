@@ -10,7 +10,7 @@ from itertools import pairwise
 from math import ceil
 from typing import NamedTuple
 
-from ur_emulator.machine.models.robot_model import RobotModel, Vector6
+from ur_emulator.machine.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.machine.motion.path import PosePath
 from ur_emulator.machine.motion.tool import Tool
 
@@ -142,8 +142,7 @@ def _take(samples: list[Sample], path: PosePath, tool: Tool, s: float, near: Vec
         last = samples[-1]
         length = s - last.s
         if max(map(abs, last.slope)) * length <= _FARTHEST:
-            x, y, z, i, j, k = (q + length * slope for q, slope in zip(last.q, last.slope, strict=True))
-            near = (x, y, z, i, j, k)
+            near = six([q + length * slope for q, slope in zip(last.q, last.slope, strict=True)])
     q = tool.joints(pose, near)
     if q is None:
         return False

@@ -168,15 +168,13 @@ def _shape(interval: Interval, z: float, z_end: float, down: float) -> list[tupl
     return [(peak, z_peak), (length, z_end)] if peak < length else [(length, min(z_peak, z_end))]
 
 
-# --- SmoothPlan: a plan whose acceleration has no steps: the jerk is limited
-#
-# The length at a time is the mean of that of another plan over the time before it. So the path and its end
-# stay as they are, speed and acceleration do not become greater, and a step of the acceleration becomes a
-# ramp.
-
-
 class SmoothPlan:
-    """See the module; the mean is over `window` [s], above 0, in which the acceleration changes."""
+    """A plan whose acceleration has no steps: the jerk is limited.
+
+    The length at a time is the mean of that of another plan over the time before it: over `window` [s], above
+    0, in which the acceleration changes. So the path and its end stay as they are, speed and acceleration do
+    not become greater, and a step of the acceleration becomes a ramp.
+    """
 
     def __init__(self, plan: SpeedPlan, window: float) -> None:
         self._plan = plan

@@ -4,7 +4,7 @@ A group is a class whose marked methods are builtins. It gets only the parts of 
 on. Signatures, versions and costs of builtins are in `urscript.catalogue`.
 """
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -15,9 +15,10 @@ from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6, six
 from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
 from ur_emulator.machine.motion.generators import Generator as MotionGenerator
-from ur_emulator.machine.motion.generators import StopJ, StopL
+from ur_emulator.machine.motion.generators import StopJ
 from ur_emulator.machine.motion.ownership import Command
 from ur_emulator.machine.motion.tool import Tool
+from ur_emulator.machine.motion.tool_streams import StopL
 from urscript import NEXT_CYCLE, HostFunction, ScriptRuntimeError
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
@@ -115,8 +116,8 @@ def require_range(function: str, q: Vector6, limits: ConfiguredLimits) -> None:
             )
 
 
-def floats(values: Sequence[float]) -> Vector6:
-    """Return six values as floats; a script may write whole numbers."""
+def floats(values: Iterable[float]) -> Vector6:
+    """Return six values, also those of a pose, as floats; a script may write whole numbers."""
     return six(list(map(float, values)))
 
 

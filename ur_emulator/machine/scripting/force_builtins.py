@@ -1,5 +1,6 @@
 """Builtins for force mode, freedrive and contacts."""
 
+from functools import partial
 from typing import Any
 
 from ur_emulator.machine.controller.compliance import Compliance
@@ -17,7 +18,7 @@ from ur_emulator.machine.scripting.builtin_group import (
     floats,
     require_positive,
 )
-from urscript.errors import ScriptRuntimeError
+from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, log_form
 
 # Greatest distance of a task frame [m]: beyond it poses lose precision.
@@ -41,7 +42,20 @@ class ForceBuiltins(BuiltinGroup):
         self._stiffness = ServoGains.of(arm.robot).kp.tolist()
         self._sensing = arm.robot.generation.force_sensing
 
-    # --- hand guiding and contacts
+    def functions(self) -> dict[str, HostFunction]:
+        """Return the builtins."""
+        arm, past, sense, compliance = self._arm, self._past, self._force_sense, self._compliance
+        return super().functions() | {
+            "get_freedrive_status": lambda thread: singularity_status(
+                arm.model.jacobian(past.sensed.actual_q, arm.settings.tcp_offset)
+            ),
+            "zero_ftsensor": lambda thread: sense.set_zero(past.steady_cycles),
+            "tool_contact": lambda thread, direction: sense.steps_since_contact(tuple(direction)[:3]),
+            "force_mode_get_damping": lambda thread: compliance.force_damping,
+            "force_mode_get_gain_scaling": lambda thread: compliance.force_gain_scaling,
+        }
+
+    # --- hand guiding
 
     @builtin("freedrive_mode", "teach_mode")
     def _begin_freedrive(self, thread: object, free_axes: Any = (1,) * 6, feature: Any = "base") -> None:
@@ -53,7 +67,7 @@ class ForceBuiltins(BuiltinGroup):
         if feature in _FEATURES:
             turn = self._arm.tcp_pose(q)[3:] if feature == "tool" else ZERO6[3:]
         elif isinstance(feature, Pose):
-            turn = floats(tuple(feature))[3:]
+            turn = floats(feature)[3:]
         else:
             raise ScriptRuntimeError(
                 f'freedrive_mode: feature {log_form(feature)} is unknown; allowed: a pose, "base", "tool"'
@@ -69,20 +83,7 @@ class ForceBuiltins(BuiltinGroup):
 
     @builtin("end_freedrive_mode", "end_teach_mode")
     def _end_freedrive(self, thread: object) -> None:
-        self._compliance.end_freedrive_by_program()
-
-    @builtin("get_freedrive_status")
-    def _freedrive_status(self, thread: object) -> int:
-        jacobian = self._arm.model.jacobian(self._past.sensed.actual_q, self._arm.settings.tcp_offset)
-        return singularity_status(jacobian)
-
-    @builtin("zero_ftsensor")
-    def _set_zero(self, thread: object) -> None:
-        self._force_sense.set_zero(self._past.steady_cycles)
-
-    @builtin("tool_contact")
-    def _tool_contact(self, thread: object, direction: Any) -> int:
-        return self._force_sense.steps_since_contact(tuple(direction)[:3])
+        self._compliance.end_freedrive(by_program=True)
 
     # --- force mode
 
@@ -90,7 +91,7 @@ class ForceBuiltins(BuiltinGroup):
     def _force_mode(
         self, thread: object, task_frame: Any, selection_vector: Any, wrench: Any, type: float, limits: Any
     ) -> None:
-        frame = floats(tuple(task_frame))
+        frame = floats(task_frame)
         if not all(x in (0, 1) for x in selection_vector):
             raise ScriptRuntimeError(
                 f"force_mode: selection_vector must hold only 0 and 1, got {log_form(selection_vector)}"
@@ -102,20 +103,18 @@ class ForceBuiltins(BuiltinGroup):
                 f"force_mode: {log_form(task_frame)} is not a valid task frame; "
                 f"allowed: numbers up to {MAX_FRAME_DISTANCE:g}"
             )
-        settings = self._settings([bool(x) for x in selection_vector], tuple(wrench), limits)
-        self._begin_force(force_mode.TaskFrame(frame, force_mode.FrameType(int(type))), settings)
+        task = force_mode.TaskFrame(frame, force_mode.FrameType(int(type)))
+        self._begin_force(task, tuple(map(bool, selection_vector)), floats(wrench), floats(limits))
 
     @builtin("screw_driving")
     def _screw_driving(self, thread: object, f: float, v_limit: float) -> None:
         """Push along z of the tool; the other axes are stiff, without a limit of their own."""
         require_positive("screw_driving", v_limit=v_limit)
-        settings = self._settings(
-            [i == 2 for i in range(6)],
-            [f if i == 2 else 0.0 for i in range(6)],
-            [v_limit if i == 2 else _UNLIMITED for i in range(6)],
-        )
         frame = self._arm.tcp_pose(self._arm.motion.target.q)
-        self._begin_force(force_mode.TaskFrame(frame, force_mode.FrameType.FIXED), settings)
+        task = force_mode.TaskFrame(frame, force_mode.FrameType.FIXED)
+        wrench, limits = floats((0, 0, f, 0, 0, 0)), [_UNLIMITED] * 6
+        limits[2] = v_limit
+        self._begin_force(task, (False, False, True, False, False, False), wrench, floats(limits))
 
     @builtin("end_force_mode", "end_screw_driving")
     def _end_force(self, thread: object) -> None:
@@ -129,43 +128,29 @@ class ForceBuiltins(BuiltinGroup):
     def _set_gain_scaling(self, thread: object, scaling: float) -> None:
         self._compliance.force_gain_scaling = float(scaling)
 
-    @builtin("force_mode_get_damping")
-    def _get_damping(self, thread: object) -> float:
-        return self._compliance.force_damping
-
-    @builtin("force_mode_get_gain_scaling")
-    def _get_gain_scaling(self, thread: object) -> float:
-        return self._compliance.force_gain_scaling
-
-    def _settings(self, selection: list[bool], wrench: Any, limits: Any) -> force_mode.ForceSettings:
-        compliance = self._compliance
-        return force_mode.ForceSettings(
-            tuple(selection),
-            floats(wrench),
-            floats(limits),
-            compliance.force_damping,
-            compliance.force_gain_scaling,
-        )
-
-    def _begin_force(self, frame: force_mode.TaskFrame, settings: force_mode.ForceSettings) -> None:
+    def _begin_force(
+        self, frame: force_mode.TaskFrame, selection: tuple[bool, ...], wrench: Vector6, limits: Vector6
+    ) -> None:
         """Go into force mode, or on in it with other settings."""
-        tool, force_sense = self._arm.tool, self._force_sense
+        tool, force_sense, compliance = self._arm.tool, self._force_sense, self._compliance
+        settings = force_mode.ForceSettings(
+            selection, wrench, limits, compliance.force_damping, compliance.force_gain_scaling
+        )
         distance = frame.distance(self._arm.tcp_pose(self._arm.motion.target.q))
         if frame.kind is force_mode.FrameType.POINT and distance < force_mode.MIN_DISTANCE:
             raise ScriptRuntimeError(
                 f"force_mode: the tool is {1000.0 * distance:.1f} mm from the origin of the task frame, "
                 f"type 1 needs at least {1000.0 * force_mode.MIN_DISTANCE:g} mm"
             )
-        active = self._compliance.force_mode
+        active = compliance.force_mode
         if active is not None and active.tool == tool:
             frame.follow(active.frame)
             active.set(frame, settings)
             return
         offset = ZERO6 if force_sense.sensor is not None else force_sense.offset(self._past.steady_cycles)
-        self._compliance.begin_force(
-            force_mode.ForceMode(
-                tool, frame, settings, self._sensing, self._stiffness, lambda: self._measure(offset)
-            )
+        measure = partial(self._measure, offset)
+        compliance.begin_force(
+            force_mode.ForceMode(tool, frame, settings, self._sensing, self._stiffness, measure)
         )
 
     def _measure(self, offset: Vector6) -> force_mode.ArmMeasurement:

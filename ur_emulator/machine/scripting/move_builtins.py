@@ -1,6 +1,7 @@
 """Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move before it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -39,6 +40,9 @@ OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blend
 # A program with waypoints close together may command so many moves in one cycle.
 MAX_PER_CYCLE = 4
 
+# Makes a move for joint angles and tool pose at its start.
+MakeLeg = Callable[[Vector6, ToolPose], Leg]
+
 
 class MoveBuiltins(BuiltinGroup):
     """Moves from waypoint to waypoint."""
@@ -59,7 +63,6 @@ class MoveBuiltins(BuiltinGroup):
             world: has the frames that goals can be given in.
         """
         self._arm = arm
-        self._motion = arm.motion
         self._place_arm = place_arm
         self._events = events
         self._planner = planner
@@ -70,104 +73,91 @@ class MoveBuiltins(BuiltinGroup):
     @builtin("movej")
     def _movej(self, thread: object, q: Any, a: float, v: float, t: float, r: float) -> Cycles:
         a, v = _limits("movej", a, v, t, r, JOINT_DEFAULTS)
-
-        def make(start: Vector6, _: ToolPose) -> Leg:
-            goal = self._joints_of(q, start)
-            require_range("movej", goal, self._arm.safety.limits)
-            return self._planner.usual(move_j(start, goal, self._arm.tool, a=a, v=v, t=t, r=r))
-
-        return self._travel(thread, make)
+        make = self._joint_leg("movej", q, a=a, v=v, t=t, r=r)
+        return self._travel(thread, make, self._planner.usual)
 
     @builtin("optimovej")
     def _optimovej(self, thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
         _require_shares("optimovej", a, v, r)
-        target = self._goal_of("optimovej", goal)
+        make = self._joint_leg("optimovej", self._goal_of("optimovej", goal), a=1.0, v=1.0, r=r)
+        return self._travel(thread, make, partial(self._planner.optimal, a_share=a, v_share=v))
+
+    def _joint_leg(self, function: str, target: Any, **limits: float) -> MakeLeg:
+        """Return what makes a move of the joints from where they are."""
 
         def make(start: Vector6, _: ToolPose) -> Leg:
-            q = self._joints_of(target, start)
-            require_range("optimovej", q, self._arm.safety.limits)
-            return self._planner.optimal(move_j(start, q, self._arm.tool, a=1.0, v=1.0, r=r), a, v)
+            goal = self._joints_of(target, start)
+            require_range(function, goal, self._arm.safety.limits)
+            return move_j(start, goal, self._arm.tool, **limits)
 
-        return self._travel(thread, make)
+        return make
 
     # --- moves of the tool
 
     @builtin("movel")
     def _movel(self, thread: object, pose: Any, a: float, v: float, t: float, r: float) -> Cycles:
-        a, v = _limits("movel", a, v, t, r, TOOL_DEFAULTS)
-        goal = self._pose_of(pose)
-
-        def make(q: Vector6, start: ToolPose) -> Leg:
-            path = PoseLine(start, goal)
-            return self._planner.usual(move_tool(path, q, self._arm.tool, a=a, v=v, t=t, r=r))
-
-        return self._travel(thread, make)
+        a, v = _limits("movel", a, v, t, r)
+        make = self._tool_leg(PoseLine, pose, a=a, v=v, t=t, r=r)
+        return self._travel(thread, make, self._planner.usual)
 
     @builtin("optimovel")
     def _optimovel(self, thread: object, goal: Any, a: float, v: float, r: float) -> Cycles:
         _require_shares("optimovel", a, v, r)
-        pose = self._pose_of(self._goal_of("optimovel", goal))
-
-        def make(q: Vector6, start: ToolPose) -> Leg:
-            leg = move_tool(PoseLine(start, pose), q, self._arm.tool, a=1.0, v=1.0, r=r)
-            return self._planner.optimal(leg, a, v)
-
-        return self._travel(thread, make)
+        make = self._tool_leg(PoseLine, self._goal_of("optimovel", goal), a=1.0, v=1.0, r=r)
+        return self._travel(thread, make, partial(self._planner.optimal, a_share=a, v_share=v))
 
     @builtin("movep")
     def _movep(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
-        _require_limits("movep", a, v, 0.0, r)
-        goal = self._pose_of(pose)
-        return self._process(thread, lambda start: PoseLine(start, goal), a, v, r)
+        return self._process("movep", thread, PoseLine, pose, a=a, v=v, r=r)
 
     @builtin("servoc")
     def _servoc(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
-        _require_limits("servoc", a, v, 0.0, r)
-        goal = self._pose_of(pose)
         # Drivers call it with the same pose again and again: nothing to warn of.
-        return self._process(thread, lambda start: PoseLine(start, goal), a, v, r, may_overlap=True)
+        return self._process("servoc", thread, PoseLine, pose, a=a, v=v, r=r, may_overlap=True)
 
     @builtin("movec")
     def _movec(
         self, thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
     ) -> Cycles:
-        _require_limits("movec", a, v, 0.0, r)
-        via, goal, fixed = self._pose_of(pose_via), self._pose_of(pose_to), mode == 1
-        return self._process(thread, lambda start: arc_through(start, via, goal, fixed=fixed), a, v, r)
+        arc = partial(arc_through, fixed=mode == 1)
+        return self._process("movec", thread, arc, pose_via, pose_to, a=a, v=v, r=r)
 
     def _process(
         self,
+        function: str,
         thread: object,
-        make_path: Callable[[ToolPose], PosePath],
+        path: Callable[..., PosePath],
+        *goals: Any,
         a: float,
         v: float,
         r: float,
-        *,
         may_overlap: bool = False,
     ) -> Cycles:
         """Follow a path at constant speed of the tool."""
+        _limits(function, a, v, 0.0, r)
+        make = self._tool_leg(path, *goals, a=a, v=v, r=r, process=True)
+        return self._travel(thread, make, self._planner.limited, may_overlap=may_overlap)
 
-        def make(q: Vector6, start: ToolPose) -> Leg:
-            leg = move_tool(make_path(start), q, self._arm.tool, a=a, v=v, r=r, process=True)
-            return self._planner.limited(leg)
-
-        return self._travel(thread, make, may_overlap=may_overlap)
+    def _tool_leg(self, path: Callable[..., PosePath], *goals: Any, **limits: Any) -> MakeLeg:
+        """Return what makes a move of the tool along a path from where it is through the goals."""
+        poses = [self._pose_of(goal) for goal in goals]
+        return lambda q, start: move_tool(path(start, *poses), q, self._arm.tool, **limits)
 
     # --- how an arm gets there
 
     def _travel(
-        self, thread: object, make: Callable[[Vector6, ToolPose], Leg], *, may_overlap: bool = False
+        self, thread: object, make: MakeLeg, plan: Callable[[Leg], Leg], *, may_overlap: bool = False
     ) -> Cycles:
-        """Follow a leg, made for joint angles and tool pose at its start; from rest, or out of a blend.
+        """Follow a leg, made where it starts and then planned; from rest, or out of a blend.
 
         `may_overlap`: no warning about a waypoint that is left out.
         """
-        arm, motion = self._arm, self._motion
+        arm, motion = self._arm, self._arm.motion
         before = motion.command_of(thread)
         if before is not None and isinstance(move := before.generator, Move) and move.returned:
             last = move.leg
             if last.goal is not None and last.tool.tcp == arm.settings.tcp_offset:
-                outcome = move.follow(make(last.goal, last.goal_pose))
+                outcome = move.follow(plan(make(last.goal, last.goal_pose)))
                 if outcome is Follow.BLENDED:
                     yield from _until_open(before, move)
                     return
@@ -184,7 +174,7 @@ class MoveBuiltins(BuiltinGroup):
         if any(motion.path.qd):  # a move begins at rest, also after a program that was replaced in motion
             yield from arm.stop(thread, StopJ(motion.stop_deceleration))
         start = motion.path.q
-        move = Move(make(start, arm.tcp_pose(start)))
+        move = Move(plan(make(start, arm.tcp_pose(start))))
         yield from _until_open(arm.take(thread, move), move)
 
     def _goal_of(self, function: str, goal: Any) -> Any:
@@ -194,7 +184,7 @@ class MoveBuiltins(BuiltinGroup):
                 case str():
                     return Pose.of(self._world.pose(goal, BASE))
                 case Struct(members={"pose": Pose() as pose, "frame": str(frame)}):
-                    return Pose.of(self._world.convert(_pose(pose), frame, BASE))
+                    return Pose.of(self._world.convert(floats(pose), frame, BASE))
         except WorldModelError as error:
             raise ScriptRuntimeError(f"{function}: {error}") from None
         if isinstance(goal, Pose) or (isinstance(goal, list) and len(goal) == 6):
@@ -207,7 +197,7 @@ class MoveBuiltins(BuiltinGroup):
     def _joints_of(self, target: Any, near: Vector6) -> Vector6:
         if not isinstance(target, Pose):
             return floats(target)
-        solution = self._arm.model.inverse(_pose(target), near, self._arm.settings.tcp_offset)
+        solution = self._arm.model.inverse(floats(target), near, self._arm.settings.tcp_offset)
         if solution is None:
             raise ScriptRuntimeError(
                 "The robot cannot reach the requested pose. "
@@ -216,12 +206,13 @@ class MoveBuiltins(BuiltinGroup):
         return solution
 
     def _pose_of(self, target: Any) -> ToolPose:
-        return _pose(target) if isinstance(target, Pose) else self._arm.tcp_pose(floats(target))
+        values = floats(target)
+        return values if isinstance(target, Pose) else self._arm.tcp_pose(values)
 
     @builtin("set_pos")
     def _set_pos(self, thread: object, q: Any) -> None:
         angles = floats(q)
-        if self._motion.is_moving or self._motion.owner is not None:
+        if self._arm.motion.is_moving or self._arm.motion.owner is not None:
             raise ScriptRuntimeError("set_pos: the arm moves, stop it first")
         require_range("set_pos", angles, self._arm.safety.limits)
         if not self._place_arm(angles):
@@ -240,22 +231,18 @@ def _until_open(command: Command, move: Move) -> Cycles:
 
 
 def _limits(
-    function: str, a: float, v: float, t: float, r: float, defaults: tuple[float, float]
+    function: str, a: float, v: float, t: float, r: float, defaults: tuple[float, float] = TOOL_DEFAULTS
 ) -> tuple[float, float]:
-    """Acceleration and speed to use: a time has priority, so that they may be 0 beside it."""
+    """Check limits; return acceleration and speed: a time has priority, so that they may be 0 beside it."""
     if t > 0.0:
         a, v = a or defaults[0], v or defaults[1]
-    _require_limits(function, a, v, t, r)
-    return a, v
-
-
-def _require_limits(function: str, a: float, v: float, t: float, r: float) -> None:
     require_positive(function, a=a, v=v)
     for name, value in (("t", t), ("r", r)):
         if not value >= 0.0:
             raise ScriptRuntimeError(f"{function}: {name} must not be below 0, got {value:g}")
     if t:
         require_positive(function, t=t)
+    return a, v
 
 
 def _require_shares(function: str, a: float, v: float, r: float) -> None:
@@ -264,10 +251,6 @@ def _require_shares(function: str, a: float, v: float, r: float) -> None:
             raise ScriptRuntimeError(f"{function}: {name} must be above 0 and up to 1, got {share:g}")
     if r < 0.0:
         raise ScriptRuntimeError(f"{function}: r must not be below 0, got {r:g}")
-
-
-def _pose(value: Sequence[float]) -> ToolPose:
-    return floats(tuple(value))
 
 
 _AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")

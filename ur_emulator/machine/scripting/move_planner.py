@@ -7,6 +7,7 @@ client library. Chosen: what the drives can give from rest by the controller's m
 the form of the ramps; a move with a blend at its end keeps the ramps of version 1.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from math import inf, isfinite
 
@@ -16,37 +17,25 @@ from numpy.typing import NDArray
 from protocol.pose import rotvec_to_matrix
 from ur_emulator.machine.controller.arm_dynamics import ArmDynamics
 from ur_emulator.machine.controller.settings import Payload, PlanningSettings, ToolSettings, ToolWrenchLimit
+from ur_emulator.machine.models.robot_model import Vector6
 from ur_emulator.machine.motion.leg import Leg
 from ur_emulator.machine.motion.path import JointLine
 from ur_emulator.machine.motion.tool import UnreachableError
 
-# --- Slows moves down so that what the tool carries is accelerated by no more than a limited wrench
-#
-# Source: script manual e-Series 5.2x, tool_wrench_limit_set: the wrench that motion causes, without
-# gravity, in a frame at the flange; axes without a limit are free. Chosen: the wrench is that of the
-# declared payload, at points of the path; half of a limit is left for the change of direction, so the speed
-# is lowered first, then the acceleration. Not limited: blends, streams (servoj, speedj, ...), overlays and
-# stops.
-
-
-# Points of a path where the wrench is computed.
-_POINTS = 25
+# Points of a path where the wrench is computed, and parts at whose ends the arm is asked.
+_POINTS, _PARTS = 25, 8
 _NOTHING = 1e-9  # N, Nm
+# Share of the rated speed that the fastest joint has at a share of 1: rounding does not exceed the limit.
+_TOP_SHARE = 0.99
 
 
-def gentle(leg: Leg, limit: ToolWrenchLimit, payload: Payload) -> Leg:
-    """Return a move whose acceleration and speed keep the limit; a duration that is too short is given up."""
-    if leg.path.length <= 0.0 or payload.mass <= 0.0:
-        return leg
-    per_acceleration, per_square = _wrenches(leg, limit, payload)
-    most = np.array(limit.most)
-    planned = leg.with_duration()
-    v = min(planned.v, _least(0.5 * most / np.maximum(per_square, _NOTHING)) ** 0.5)
-    left = most - per_square * v**2
-    a = min(planned.a, _least(left / np.maximum(per_acceleration, _NOTHING)))
-    if (a, v) == (planned.a, planned.v):
-        return leg
-    return replace(leg, a=a, v=v, t=0.0)
+def _motions(leg: Leg, places: Iterable[float]) -> Iterator[tuple[Vector6, Vector6]]:
+    """Yield joint angles and their derivative at places of a path, up to where the move itself ends."""
+    try:
+        for s in places:
+            yield leg.at(s)
+    except UnreachableError:
+        return
 
 
 def _least(bounds: NDArray[np.float64]) -> float:
@@ -63,20 +52,12 @@ def _wrenches(
     """
     arm = leg.tool.arm
     places = np.linspace(0.0, leg.path.length, _POINTS)
-    turns, twists = [], []
-    for s in places.tolist():
-        try:
-            q, slope = leg.path.at(s, leg.near(s))
-        except UnreachableError:
-            break  # the move itself ends there
-        state = arm.state(q, slope)
-        turns.append(rotvec_to_matrix(state.tcp_pose[3:]))
-        twists.append(state.tcp_speed)
-    if len(twists) < 2:
+    states = [arm.state(q, slope) for q, slope in _motions(leg, places.tolist())]
+    if len(states) < 2:
         return np.zeros((1, 6)), np.zeros((1, 6))
-    turn = np.array(turns)
+    turn = np.array([rotvec_to_matrix(state.tcp_pose[3:]) for state in states])
     # Twists of the flange in its own axes, and how they change along the path.
-    twist = np.array(twists)
+    twist = np.array([state.tcp_speed for state in states])
     changes = np.gradient(twist, places[1], axis=0)
     linear, spin, linear_change, spin_change = (
         np.einsum("nji,nj->ni", turn, vectors)
@@ -103,12 +84,6 @@ def _wrenches(
     )
 
 
-# Parts of a path at whose ends the arm is asked.
-_PARTS = 8
-# Share of the rated speed that the fastest joint has at a share of 1: rounding does not exceed the limit.
-_TOP_SHARE = 0.99
-
-
 class MovePlanner:
     """Plans moves of one arm."""
 
@@ -118,9 +93,23 @@ class MovePlanner:
         self._tool = tool
 
     def limited(self, leg: Leg) -> Leg:
-        """Return a move that keeps the limit of the tool's wrench."""
-        limit = self._planning.tool_wrench_limit
-        return leg if limit is None else gentle(leg, limit, self._tool.payload)
+        """Return a move that accelerates what the tool carries by no more than the limited wrench.
+
+        A duration that is too short is given up. Source: script manual e-Series 5.2x, tool_wrench_limit_set:
+        the wrench that motion causes, without gravity, in a frame at the flange; axes without a limit are
+        free. Chosen: the wrench is that of the declared payload, at points of the path; half of a limit is
+        left for the change of direction, so the speed is lowered first, then the acceleration. Not limited:
+        blends, streams (servoj, speedj, ...), overlays and stops.
+        """
+        limit, payload = self._planning.tool_wrench_limit, self._tool.payload
+        if limit is None or leg.path.length <= 0.0 or payload.mass <= 0.0:
+            return leg
+        per_acceleration, per_square = _wrenches(leg, limit, payload)
+        most, planned = np.array(limit.most), leg.with_duration()
+        v = min(planned.v, _least(0.5 * most / np.maximum(per_square, _NOTHING)) ** 0.5)
+        left = most - per_square * v**2
+        a = min(planned.a, _least(left / np.maximum(per_acceleration, _NOTHING)))
+        return leg if (a, v) == (planned.a, planned.v) else replace(leg, a=a, v=v, t=0.0)
 
     def usual(self, leg: Leg) -> Leg:
         """Return a move of movej or movel in the motion version that is set."""
@@ -145,7 +134,7 @@ class MovePlanner:
         window = self._planning.smoothing
         if leg.t > 0.0:
             window = min(window, 0.5 * leg.t)
-            return replace(leg, t=leg.t - window, smoothing=window)
+            leg = replace(leg, t=leg.t - window)
         return replace(leg, smoothing=window)
 
     def _greatest(self, leg: Leg, parts: int = _PARTS) -> tuple[float, float]:
@@ -156,12 +145,7 @@ class MovePlanner:
         a = v = inf
         robot = leg.tool.arm.robot
         if leg.path.length > 0.0:
-            for k in range(parts + 1):
-                s = leg.path.length * k / parts
-                try:
-                    q, slope = leg.path.at(s, leg.near(s))
-                except UnreachableError:
-                    break  # the move itself ends there
+            for q, slope in _motions(leg, (leg.path.length * k / parts for k in range(parts + 1))):
                 a = min(a, self._dynamics.greatest_acceleration(q, slope))
                 for most, rate in zip(robot.qd_max, slope, strict=True):
                     v = min(v, _TOP_SHARE * most / abs(rate)) if rate else v

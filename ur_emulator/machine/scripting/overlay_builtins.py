@@ -7,8 +7,9 @@ from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, Encoders
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.conveyor import Belt, CircularBelt, Conveyor, LinearBelt
 from ur_emulator.machine.motion.generators import StopJ
-from ur_emulator.machine.motion.overlay import CircularBelt, Conveyor, LinearBelt, OffsetType, PathOffset
+from ur_emulator.machine.motion.path_offset import OffsetType, PathOffset
 from ur_emulator.machine.scripting.builtin_group import (
     BuiltinGroup,
     Cycles,
@@ -56,7 +57,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     @builtin("path_offset_set")
     def _set(self, thread: object, offset: Any, kind: float) -> None:
-        self._offset.set(floats(tuple(offset)), OffsetType(int(kind)))
+        self._offset.set(floats(offset), OffsetType(int(kind)))
 
     @builtin("path_offset_get")
     def _get(self, thread: object, kind: float) -> Pose:
@@ -166,7 +167,7 @@ class ConveyorBuiltins(BuiltinGroup):
         self, thread: object, direction: Pose, ticks_per_meter: float, encoder_index: float
     ) -> None:
         _require_ticks("track_conveyor_linear", "ticks_per_meter", ticks_per_meter)
-        x, y, z = floats(tuple(direction))[:3]
+        x, y, z = floats(direction)[:3]
         if not hypot(x, y, z) > 0.0:
             raise ScriptRuntimeError(
                 f"track_conveyor_linear: direction ({x:g}, {y:g}, {z:g}) leads nowhere, "
@@ -184,7 +185,7 @@ class ConveyorBuiltins(BuiltinGroup):
         encoder_index: float,
     ) -> None:
         _require_ticks("track_conveyor_circular", "ticks_per_revolution", ticks_per_revolution)
-        belt = CircularBelt(floats(tuple(center)), float(ticks_per_revolution), bool(rotate_tool))
+        belt = CircularBelt(floats(center), float(ticks_per_revolution), bool(rotate_tool))
         self._track(belt, encoder_index)
 
     @builtin("stop_conveyor_tracking")
@@ -204,7 +205,7 @@ class ConveyorBuiltins(BuiltinGroup):
         path = self._motion.path
         return Pose.of(self._arm.tool.twist(path.q, path.qd))
 
-    def _track(self, belt: LinearBelt | CircularBelt, encoder_index: float) -> None:
+    def _track(self, belt: Belt, encoder_index: float) -> None:
         self.end()
         encoder, clock = self._encoders.encoders[int(encoder_index)], self._clock
         self._tracked = Conveyor(belt, self._arm.tool, lambda: encoder.travel, lambda: clock.time)

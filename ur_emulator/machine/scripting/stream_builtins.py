@@ -7,6 +7,7 @@ from ur_emulator.machine.controller.events import EventQueue, LogAdded
 from ur_emulator.machine.controller.past_cycles import PastCycles
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6
 from ur_emulator.machine.motion import generators
+from ur_emulator.machine.motion.tool_streams import SpeedL, StopL
 from ur_emulator.machine.scripting.builtin_group import (
     MIN_LIMIT,
     BuiltinGroup,
@@ -32,15 +33,15 @@ class StreamBuiltins(BuiltinGroup):
     @builtin("speedj")
     def _speedj(self, thread: object, qd: list[float], a: float, t: float | None) -> Cycles:
         if not a >= MIN_LIMIT:
-            a = _limit("speedj", t, a=a)
+            a = _limit("speedj", t, "a", a)
         return self._stream(thread, generators.SpeedJ(floats(qd), a), t)
 
     @builtin("speedl")
     def _speedl(self, thread: object, xd: Any, a: float, t: float | None, aRot: float | None) -> Cycles:
-        a_rot = _limit("speedl", t, aRot=a if aRot is None else aRot)
-        a = _limit("speedl", t, a=a)
-        twist = floats(tuple(xd))
-        return self._stream(thread, generators.SpeedL(twist, a, a_rot, self._arm.tool), t)
+        a_rot = _limit("speedl", t, "aRot", a if aRot is None else aRot)
+        a = _limit("speedl", t, "a", a)
+        twist = floats(xd)
+        return self._stream(thread, SpeedL(twist, a, a_rot, self._arm.tool), t)
 
     @builtin("servoj")
     def _servoj(
@@ -60,7 +61,7 @@ class StreamBuiltins(BuiltinGroup):
     def _stopl(self, thread: object, a: float, aRot: float | None) -> Cycles:
         a_rot = a if aRot is None else aRot
         require_positive("stopl", a=a, aRot=a_rot)
-        return self._arm.stop(thread, generators.StopL(a, a_rot, self._arm.tool))
+        return self._arm.stop(thread, StopL(a, a_rot, self._arm.tool))
 
     def _stream(self, thread: object, generator: generators.Streamed, t: float | None) -> Cycles:
         """Renew a motion for the time t [s] of the speed slider, or until it is done."""
@@ -71,34 +72,27 @@ class StreamBuiltins(BuiltinGroup):
             yield NEXT_CYCLE
             # Exactly one cycle for t = step time at full speed, whatever the rounding.
             while (left := left - motion.scale * step_time) > 1e-6 * step_time and not command.is_over:
-                command.renew()
+                command.is_renewed = True
                 yield NEXT_CYCLE
             # A slow cycle is not lost or gained in the sum of many short commands.
             generator.surplus = -left if motion.scale < 1.0 else 0.0
         else:
             while not (generator.done or command.is_over):
-                command.renew()
+                command.is_renewed = True
                 yield NEXT_CYCLE
 
 
-def _limit(function: str, t: float | None, **limit: float) -> float:
+def _limit(function: str, t: float | None, name: str, value: float) -> float:
     """The acceleration to use.
 
     A stream whose speed does not change asks for zero acceleration, or for a rounding error of it. Source:
     splines of the maker's driver script. Without a time such a command would never be done.
     """
-    ((_, value),) = limit.items()
     if t is not None and t > 0.0 and 0.0 <= value < MIN_LIMIT:
         return MIN_LIMIT
-    require_positive(function, **limit)
+    require_positive(function, **{name: value})
     return value
 
-
-# --- direct_torque: the program drives the joints by torque
-#
-# Source: URScript manual e-Series 5.25.1, direct_torque: range and defaults of the scales; friction_comp is
-# the former argument, which does not count beside a scale and is logged once. Chosen: True means the
-# default scales, False none, before 5.25 too.
 
 # Shares of the modelled friction that direct_torque compensates. Source: script manual 5.25.1, direct_torque.
 _VISCOUS_SCALE = (0.9, 0.9, 0.8, 0.9, 0.9, 0.9)
@@ -106,7 +100,12 @@ _COULOMB_SCALE = (0.8, 0.8, 0.7, 0.8, 0.8, 0.8)
 
 
 class TorqueBuiltins(BuiltinGroup):
-    """The torque control of one program."""
+    """The torque control of one program.
+
+    Source: URScript manual e-Series 5.25.1, direct_torque: range and defaults of the scales; friction_comp is
+    the former argument, which does not count beside a scale and is logged once. Chosen: True means the
+    default scales, False none, before 5.25 too.
+    """
 
     def __init__(self, arm: ScriptArm, past: PastCycles, events: EventQueue) -> None:
         self._arm = arm
