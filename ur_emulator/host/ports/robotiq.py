@@ -1,7 +1,8 @@
 """Port 63352: the variables of a Robotiq gripper, as the software of the maker offers them.
 
-Answers come at once, from the present state; what a SET writes the gripper has after its next exchange. All
-clients, and programs at 127.0.0.1, talk to the same grippers; which of them (SID) belongs to the connection.
+A GET is answered at once, from the present state; a SET is a command, answered after the cycle in which it
+acts, and the gripper has what it writes after its next exchange. All clients, and programs at 127.0.0.1, talk
+to the same grippers; which of them (SID) belongs to the connection.
 """
 
 from collections import deque
@@ -13,6 +14,7 @@ from ur_emulator.host.ports.session import Session, SessionPort
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
+from ur_emulator.machine.commands.grippers import OperateGrippers
 from ur_emulator.machine.tools.robotiq import RobotiqGripper
 
 _REQUEST_COST = 2
@@ -34,11 +36,6 @@ class RobotiqPort(SessionPort["_RobotiqSession"]):
         super().__init__(box)
         self._grippers = {gripper.unit: gripper for gripper in grippers}
 
-    @property
-    def has_clients(self) -> bool:
-        """Somebody uses the software of the gripper."""
-        return bool(self._sessions)
-
     def _begin(self, connection: Connection) -> "_RobotiqSession":
         return _RobotiqSession(connection, self._box, self._grippers)
 
@@ -54,32 +51,43 @@ class _RobotiqSession(Session):
         self._parser = robotiq.GripperConnection()
         self._requests: deque[robotiq.Request] = deque()
         self._sid = robotiq.DEFAULT_SID
+        self._written: tuple[tuple[str, int], ...] = ()  # by SETs, and not yet applied
 
     def _take(self, data: bytes) -> None:
         self._requests.extend(self._parser.receive(data))
 
     def _answer_next(self) -> Steps[int]:
         requests = [self._requests.popleft() for _ in range(min(len(self._requests), _TOGETHER))]
-        if requests and not self.connection.send(b"".join(map(self._answer, requests))):
+        answers = []
+        for request in requests:
+            answers.append((yield from self._answer(request)))
+        yield from self._write()
+        if requests and not self.connection.send(b"".join(answers)):
             self.connection.close()  # without its answer, a client takes the next one for it
         return len(requests) * _REQUEST_COST
-        yield  # a generator that never waits
 
-    def _answer(self, request: robotiq.Request) -> bytes:
+    def _answer(self, request: robotiq.Request) -> Steps[bytes]:
         match request:
             case robotiq.Set(values=((robotiq.SID, sid),)):
+                yield from self._write()
                 # The maker's programs take each gripper that is acknowledged for connected, and wait for it.
                 self._sid = sid
                 return robotiq.ACK if self._chosen is not None else robotiq.NAK
             case robotiq.Set(values=values):
-                if (gripper := self._chosen) is not None:
-                    for name, value in values:
-                        gripper.set(name, value)
+                if self._chosen is not None:
+                    self._written += values
                 return robotiq.ACK
             case robotiq.Get(name=name):
+                yield from self._write()
                 return robotiq.encode_value(request, self._value(name))
             case robotiq.Malformed(is_set=is_set):
                 return robotiq.NAK if is_set else f"{robotiq.NOT_KNOWN}\n".encode()
+
+    def _write(self) -> Steps[None]:
+        """Apply what is written: in one cycle, so that a client that is faster than cycles is not behind."""
+        if self._written:
+            values, self._written = self._written, ()
+            yield from self._box.apply(OperateGrippers((self._sid,), "set", values))
 
     @property
     def _chosen(self) -> RobotiqGripper | None:

@@ -1,8 +1,9 @@
 """What drives the tools on the flange: a controller of its own for each kind, advanced once a cycle."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import count
 
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_emulator.machine.tools.onrobot import FIRST_UNIT, OnRobotGripper
 from ur_emulator.machine.tools.robotiq import RobotiqGripper
 from ur_emulator.machine.tools.vacuum import VacuumGripper
@@ -10,8 +11,6 @@ from ur_hil.tools import ToolModel
 
 SUPPLY = 24
 """Voltage at the tool connector that grippers need [V]."""
-
-Gripper = RobotiqGripper | OnRobotGripper | VacuumGripper
 
 _UNITS = (9, 2, 3, 4)
 """Addresses of the grippers 1 to 4 of programs. Source: reference `grippers.md` 1.1 (O)."""
@@ -39,3 +38,8 @@ def make_grippers(tools: Sequence[ToolModel], period: float, has_tool_line: bool
             case "vacuum":
                 grippers.append(VacuumGripper(tool, period))
     return tuple(grippers)
+
+
+def at_unit(grippers: Iterable[Gripper], unit: int) -> Gripper | None:
+    """The gripper with an address on the serial line; None if there is none."""
+    return next((gripper for gripper in grippers if gripper.unit == unit), None)
