@@ -176,7 +176,7 @@ class BareBox(ServedBox):
         identity = BoxIdentity(software, "UR3", "UR3", "20993000007")
         super().__init__(controller, identity, RealtimePacer(controller.period_s), None, None)
 
-    def submit(self, command, done=None, *, in_place_of=""):
+    def submit(self, command, done=None, *, in_place_of="", urgent=True):
         self.submitted.append(command if done is None else Submitted(command, done))
 
     def report(self, what, error):

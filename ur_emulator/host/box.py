@@ -264,7 +264,7 @@ class Box:
         numbers = {name: number for name, number in ports.items() if number}
         for tool in self._choice.tools:
             if tool.kind in SOFTWARE_OF:
-                numbers.setdefault(SOFTWARE_OF[tool.kind].port, 0)  # moved beyond the ports of TCP
+                numbers.setdefault(SOFTWARE_OF[tool.kind][0], 0)  # moved beyond the ports of TCP
         if self._options.port_base is None:
             numbers = dict.fromkeys(numbers, 0)
         if self._options.control_port is not None:

@@ -107,6 +107,7 @@ class ServedBox:
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         # By the name that replaces them, or by something that nothing else has.
         self._commands: dict[object, Command] = {}
+        self._is_urged = False
         # What is to act in a later cycle: its number, then the order in which they came.
         self._scheduled: list[tuple[int, int, Command, Done]] = []
         self._n_scheduled = 0
@@ -152,10 +153,13 @@ class ServedBox:
         """Number of the present period of remote control, 0 in local control."""
         return self.controller.state.pendant.remote_period
 
-    def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
+    def submit(
+        self, command: Command, done: Done | None = None, *, in_place_of: str = "", urgent: bool = True
+    ) -> None:
         """Take a command for the next cycle; `done` is called then with the result or the error.
 
-        It takes the place of one with the same name `in_place_of` that still waits.
+        It takes the place of one with the same name `in_place_of` that still waits. In lockstep, time passes
+        for an `urgent` one also while a script waits for the outside.
         """
         is_stopped = self.snapshot.safety_mode not in MOVING_MODES
         if isinstance(command, _STOPS) or (is_stopped and isinstance(command, UnlockProtectiveStop)):
@@ -163,6 +167,7 @@ class ServedBox:
         name = in_place_of or object()
         self._commands.pop(name, None)
         self._commands[name] = Submitted(command, done or self._report_error)
+        self._is_urged |= urgent
 
     def schedule(self, tick: int, command: Command, done: Done) -> None:
         """Take a command for the cycle of that number; in lockstep it is no reason for time to pass.
@@ -298,12 +303,12 @@ class ServedBox:
 
     @property
     def waits_outside(self) -> bool:
-        """True while a script waits for the outside and no command wants a cycle.
+        """True while a script waits for the outside and no urgent command wants a cycle.
 
         Who waits for a time does not wait for the operator.
         """
         waits = self.controller.waits_outside
-        return bool(waits and not self._commands and not (waits is Outside.OPERATOR and self._is_awake))
+        return bool(waits and not self._is_urged and not (waits is Outside.OPERATOR and self._is_awake))
 
     @property
     def readers_full(self) -> bool:
@@ -346,7 +351,7 @@ class ServedBox:
             self._publish(self.snapshot, now)
         elif self._pacer.may_tick(now, self):
             self._submit_due()
-            commands, self._commands = self._commands, {}
+            commands, self._commands, self._is_urged = self._commands, {}, False
             snapshot = self.controller.tick(commands.values())
             if self.watch is not None:
                 self.watch.look(self.controller.programs, now)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortPermissionError
@@ -18,13 +18,11 @@ from ur_emulator.host.ports.realtime import RealtimePort
 from ur_emulator.host.ports.robotiq import RobotiqPort
 from ur_emulator.host.ports.rtde import RtdePort
 from ur_emulator.host.ports.script_intake import ProgramIntake
-from ur_emulator.host.ports.session import SessionPort
 from ur_emulator.host.ports.tool_line import ToolLinePort
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.runtime.listener import ClientLimits, ClientLines, Listener, Port, SpareDescriptor
 from ur_emulator.host.served_box import ServedBox
-from ur_emulator.machine.tools.gripper import NO_UNIT
 
 CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
 TOOL_LINE = "tool_line"
@@ -35,19 +33,7 @@ _PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
 _READS_HTTP = frozenset({CONTROL, ROBOT_API, "onrobot", "rtde"})
 
 
-class ToolSoftware(NamedTuple):
-    """What the makers of a kind of tools have on the robot: a port by its name in `Ports`.
-
-    `make` gets the tools of the kind, and the address to which the port is bound; `has_line`: its clients use
-    the serial line at the tool.
-    """
-
-    port: str
-    make: Callable[[ServedBox, Sequence[Any], str], SessionPort[Any]]
-    has_line: bool
-
-
-def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> SessionPort[Any]:
+def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> Port:
     # A box without HTTP does not load it.
     from ur_emulator.host.ports.http import HttpPort
     from ur_emulator.host.ports.onrobot import MOST_BYTES, OnRobotAnswers
@@ -55,9 +41,11 @@ def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> Session
     return HttpPort(box, OnRobotAnswers(box, grippers, host), MOST_BYTES)
 
 
-SOFTWARE_OF = {
-    "robotiq": ToolSoftware("gripper", lambda box, grippers, _: RobotiqPort(box, grippers), has_line=True),
-    "onrobot": ToolSoftware("onrobot", _onrobot_port, has_line=False),
+_Maker = Callable[[ServedBox, Sequence[Any], str], Port]
+# Kinds of tools, the port of their maker's software, and what makes it for tools and the address of the port.
+SOFTWARE_OF: dict[str, tuple[str, _Maker]] = {
+    "robotiq": ("gripper", lambda box, grippers, host: RobotiqPort(box, grippers)),
+    "onrobot": ("onrobot", _onrobot_port),
 }
 
 
@@ -191,12 +179,11 @@ def answering_ports(
     if software.has_interpreter:
         ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
     grippers = box.controller.state.grippers
-    users: list[SessionPort[Any]] = []
-    for kind, of_kind in SOFTWARE_OF.items():
+    for kind, (name, make) in SOFTWARE_OF.items():
         if tools := [gripper for gripper in grippers if gripper.tool.kind == kind]:
-            ports[of_kind.port] = port = of_kind.make(box, tools, host)
-            users += [port] * of_kind.has_line
-    if software.has_tool_line and any(gripper.unit != NO_UNIT for gripper in grippers):
+            ports[name] = make(box, tools, host)
+    if software.has_tool_line and any(gripper.unit for gripper in grippers):
+        users = [port for port in ports.values() if isinstance(port, RobotiqPort)]
         ports[TOOL_LINE] = ToolLinePort(box, users)
     if software.robot_api:
         from ur_emulator.host.ports.http import HttpPort

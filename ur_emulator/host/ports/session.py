@@ -107,11 +107,6 @@ class SessionPort(ABC, Generic[_S]):
         self._box = box
         self._sessions: dict[Connection, _S] = {}
 
-    @property
-    def has_clients(self) -> bool:
-        """Somebody is connected."""
-        return bool(self._sessions)
-
     @abstractmethod
     def _begin(self, connection: Connection) -> _S:
         """Return the session of a new client."""

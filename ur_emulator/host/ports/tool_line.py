@@ -10,15 +10,14 @@ pause would ask thousands of times a second.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from protocol import modbus_rtu
+from ur_emulator.host.ports.robotiq import RobotiqPort
 from ur_emulator.host.ports.session import Session, SessionPort
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.commands.grippers import ExchangeRegisters
-from ur_emulator.machine.tools import at_unit
 
 _REQUEST_COST = 4
 _PACE = 0.004  # s
@@ -27,8 +26,8 @@ _PACE = 0.004  # s
 class ToolLinePort(SessionPort["_LineSession"]):
     """Passes requests of Modbus RTU on to grippers."""
 
-    def __init__(self, box: ServedBox, users: Sequence[SessionPort[Any]]) -> None:
-        """`users` are ports whose clients have the line before those of this one."""
+    def __init__(self, box: ServedBox, users: Sequence[RobotiqPort]) -> None:
+        """Clients of the `users` have the line before those of this port."""
         super().__init__(box)
         self._users = users
 
@@ -37,14 +36,14 @@ class ToolLinePort(SessionPort["_LineSession"]):
 
     def has_line(self, connection: Connection) -> bool:
         """Whether a client has the line; what others send is lost."""
-        is_taken = any(port.has_clients for port in self._users)
-        return not is_taken and next(iter(self._sessions), None) is connection
+        is_first = next(iter(self._sessions), None) is connection
+        return is_first and not any(port.has_clients for port in self._users)
 
     def reaches(self, unit: int) -> bool:
         """Whether a gripper answers to a unit; otherwise nothing does."""
         state = self._box.controller.state
-        gripper = at_unit(state.grippers, unit)
-        return gripper is not None and gripper.has_power and state.io.tool_line[:4] == gripper.line[:4]
+        line = state.io.tool_line[:4]
+        return any(g.unit == unit and g.has_power and g.line[:4] == line for g in state.grippers)
 
 
 class _LineSession(Session):

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from ur_emulator.machine.controller.command import BoxParts, Result
-from ur_emulator.machine.tools import at_unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,5 +34,7 @@ class ExchangeRegisters:
     pdu: bytes
 
     def apply(self, box: BoxParts) -> Result:
-        gripper = at_unit(box.state.grippers, self.unit)
-        return {"pdu": gripper.answer(self.pdu)} if gripper is not None and self.pdu else None
+        for gripper in box.state.grippers:
+            if gripper.unit == self.unit and self.pdu:
+                return {"pdu": gripper.answer(self.pdu)}
+        return None

@@ -1,6 +1,6 @@
 """What drives the tools on the flange: a controller of its own for each kind, advanced once a cycle."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import count
 
 from ur_emulator.machine.tools.gripper import Gripper
@@ -38,8 +38,3 @@ def make_grippers(tools: Sequence[ToolModel], period: float, has_tool_line: bool
             case "vacuum":
                 grippers.append(VacuumGripper(tool, period))
     return tuple(grippers)
-
-
-def at_unit(grippers: Iterable[Gripper], unit: int) -> Gripper | None:
-    """The gripper with an address on the serial line; None if there is none."""
-    return next((gripper for gripper in grippers if gripper.unit == unit), None)

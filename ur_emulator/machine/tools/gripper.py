@@ -8,9 +8,6 @@ from ur_emulator.machine.controller.io.lines import InputOutput, ToolLine
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_hil.tools import ToolModel
 
-NO_UNIT = -1
-"""Unit of a tool that is on no serial line."""
-
 _REACHED = 0.0003
 """A target this near is reached [m]: less than a count of the finest gripper."""
 
@@ -24,7 +21,7 @@ class Gripper(ABC):
     Attributes:
         line: settings of the serial line with which it is reached.
         is_at_modbus: the robot's Modbus server passes on what is for its unit.
-        unit: its address on the serial line; no other tool on the flange has it.
+        unit: its address on the serial line; 0: it is on none.
         has_cable: its supply comes from the control box, not from the tool connector.
         has_power: it has its supply.
         is_busy: it moves, or has not yet taken what clients have set.
@@ -79,22 +76,20 @@ class Gripper(ABC):
 
     def answer(self, pdu: bytes) -> bytes:
         """Do a request of Modbus, and return the answer."""
+        code, both = modbus.ExceptionCode, pdu[0] == modbus.ModbusFunction.READ_WRITE_REGISTERS
+        values: Sequence[int] = ()
         try:
-            if pdu[0] == modbus.ModbusFunction.READ_WRITE_REGISTERS:
-                read, write = modbus_rtu.decode_read_write(pdu)
-                self.write_registers(write.address, write.values)
-                values = self.read_registers(read.address, read.count)
-                return bytes((pdu[0], *modbus.encode_answer(read, values)[1:]))
-            request = modbus.decode_request(pdu)
-            if request.function.is_bits:
-                raise modbus.ModbusRequestError(modbus.ExceptionCode.ILLEGAL_FUNCTION)
-            if request.function.is_read:
-                return modbus.encode_answer(request, self.read_registers(request.address, request.count))
-            self.write_registers(request.address, request.values)
-            return modbus.encode_answer(request)
+            requests = modbus_rtu.decode_read_write(pdu)[::-1] if both else (modbus.decode_request(pdu),)
+            for request in requests:
+                if request.function.is_bits:
+                    raise modbus.ModbusRequestError(code.ILLEGAL_FUNCTION)
+                if request.function.is_read:
+                    values = self.read_registers(request.address, request.count)
+                else:
+                    self.write_registers(request.address, request.values)
+            return bytes((pdu[0], *modbus.encode_answer(request, values)[1:]))
         except modbus.ModbusRequestError as error:
-            return modbus.encode_exception(pdu[0], error.code)
+            wrong = error.code
         except LookupError:
-            code = modbus.ExceptionCode
             wrong = code.ILLEGAL_DATA_ADDRESS if self.has_power else code.SLAVE_DEVICE_FAILURE
-            return modbus.encode_exception(pdu[0], wrong)
+        return modbus.encode_exception(pdu[0], wrong)

@@ -20,7 +20,7 @@ after the activation is chosen.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from protocol.robotiq import (
     DEFAULT_SID,
@@ -56,8 +56,7 @@ _MOVING_CURRENT = 10
 """COU while the fingers move; 0 while they stand, since the screw holds by itself. Source: example frames."""
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(NamedTuple):
     """What clients write; names and values as in `protocol.robotiq.VARIABLES`."""
 
     ACT: int = 0
@@ -88,7 +87,7 @@ class RobotiqGripper(Gripper):
 
     def _reset(self) -> None:
         self._status, self._fault, self._objects = Status.RESET, Fault.NONE, Objects.AT_TARGET
-        self._is_moving = False
+        self._command, self._is_moving = None, False
         self._route: list[float] = []
         self._time_in_phase = self._time_activating = 0.0
 
@@ -96,45 +95,32 @@ class RobotiqGripper(Gripper):
 
     def set(self, *values: tuple[str, int]) -> None:
         """Write variables, pairs of name and value; the gripper has them after the next exchange."""
-        kept = {name: value for name, value in values if name in Settings.__slots__}
-        self._wanted = replace(self._wanted, **kept)
+        kept = {name: value for name, value in values if name in Settings._fields}
+        self._wanted = self._wanted._replace(**kept)
 
     def get(self, name: str) -> int | None:
         """Read a number; None without power, and for a variable that is none."""
-        if not self.has_power:
-            return None
-        match name:
-            case "POS":
-                return self._position
-            case "PRE":
-                return self._held.POS
-            case "STA":
-                return int(self._status)
-            case "OBJ":
-                return int(self._objects)
-            case "FLT":
-                return int(self._fault)
-            case "COU":
-                return self._current
-        return getattr(self._held, name, None)
+        return self._values.get(name) if self.has_power else None
+
+    def summary(self) -> dict[str, float]:
+        """The width between its pads [m], and its state."""
+        state = {name: self._values[name] for name in ("STA", "OBJ", "FLT")}
+        return {"SID": self.unit, "width": self._fingers.width, **state}
 
     @property
-    def _position(self) -> int:
-        return self.tool.count_of(self._fingers.width)
+    def _values(self) -> dict[str, int]:
+        return self._held._asdict() | {
+            "POS": self.tool.count_of(self._fingers.width),
+            "PRE": self._held.POS,
+            "STA": int(self._status),
+            "OBJ": int(self._objects),
+            "FLT": int(self._fault),
+            "COU": self._current,
+        }
 
     @property
     def _current(self) -> int:
         return 0 if self._stands else _MOVING_CURRENT
-
-    def summary(self) -> dict[str, float]:
-        """The width between its pads [m], and its state."""
-        return {
-            "SID": self.unit,
-            "width": self._fingers.width,
-            "STA": int(self._status),
-            "OBJ": int(self._objects),
-            "FLT": int(self._fault),
-        }
 
     # --- the serial line
 
@@ -153,7 +139,7 @@ class RobotiqGripper(Gripper):
         if not 0 <= at <= at + len(values) <= len(registers):
             raise LookupError
         registers[at : at + len(values)] = values
-        self._wanted = replace(self._wanted, **decode_request(registers))
+        self._wanted = self._wanted._replace(**decode_request(registers))
         self._exchange()
 
     def _inputs(self) -> list[int]:
@@ -169,7 +155,7 @@ class RobotiqGripper(Gripper):
             objects=self._objects if self._held.GTO or self._held.ATR else Objects.MOVING,
             fault=self._fault,
             requested=self._held.POS,
-            position=self._position,
+            position=self.tool.count_of(self._fingers.width),
             current=self._current,
         )
         return (*status, *[0] * _MORE_REGISTERS)
@@ -182,7 +168,6 @@ class RobotiqGripper(Gripper):
         if has_power is not self.has_power:
             self.has_power = has_power
             self._wanted = self._held = Settings()
-            self._command = None
             self._reset()
         if has_power:
             self._wait -= 1
@@ -202,7 +187,6 @@ class RobotiqGripper(Gripper):
         if not held.ACT:
             if before.ACT:
                 self._reset()
-                self._command = None
             if held.GTO != before.GTO:
                 self._fault = Fault.NOT_ACTIVATED if held.GTO else Fault.NONE
             return
@@ -279,7 +263,7 @@ class RobotiqGripper(Gripper):
         self._time_in_phase += self._period
         if self._time_activating > _LONGEST_ACTIVATION:
             self._reset()
-            self._fault, self._command = Fault.ACTIVATION, None
+            self._fault = Fault.ACTIVATION
             return
         end = self._route[0]
         self._command = FingerCommand(end, tool.speed_of(255), tool.force_of(0))

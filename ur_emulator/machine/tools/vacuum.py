@@ -6,7 +6,7 @@ when the output goes off. The cup holds in proportion to it.
 
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
-from ur_emulator.machine.tools.gripper import NO_UNIT, Gripper
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
 BUILD_UP = 0.15
@@ -20,7 +20,7 @@ class VacuumGripper(Gripper):
     """The valve, which is a load of the output and not of the supply, and the pressure switch."""
 
     def __init__(self, tool: ToolModel, period: float) -> None:
-        super().__init__(tool, period, NO_UNIT)
+        super().__init__(tool, period, unit=0)
         self._vacuum = 0.0
 
     def summary(self) -> dict[str, float]:
