@@ -41,9 +41,8 @@ def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> Port:
     return HttpPort(box, OnRobotAnswers(box, grippers, host), MOST_BYTES)
 
 
-_Maker = Callable[[ServedBox, Sequence[Any], str], Port]
 # Kinds of tools, the port of their maker's software, and what makes it for tools and the address of the port.
-SOFTWARE_OF: dict[str, tuple[str, _Maker]] = {
+SOFTWARE_OF: dict[str, tuple[str, Callable[[ServedBox, Sequence[Any], str], Port]]] = {
     "robotiq": ("gripper", lambda box, grippers, host: RobotiqPort(box, grippers)),
     "onrobot": ("onrobot", _onrobot_port),
 }
