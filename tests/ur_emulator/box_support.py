@@ -181,7 +181,7 @@ class BareBox(ServedBox):
         machine = SimpleNamespace(controller=controller)
         super().__init__(machine, identity, RealtimePacer(controller.period_s), None, None)
 
-    def submit(self, command, done=None, *, in_place_of=""):
+    def submit(self, command, done=None, *, in_place_of="", urgent=True):
         self.submitted.append(command if done is None else Submitted(command, done))
 
     def report(self, what, error):

@@ -51,8 +51,7 @@ class Fingers:
                 self.width = stopped
 
     def set(self, **values):
-        for name, value in values.items():
-            self.gripper.set(name, value)
+        self.gripper.set(*values.items())
 
     def get(self, *names):
         return tuple(self.gripper.get(name) for name in names)
@@ -488,7 +487,7 @@ def test_a_client_of_the_serial_line_may_leave_before_its_answer(n_others):
     bench, commands = ESeriesBench(version=(5, 25), tools=[HAND]), []
     bench.tick()  # the gripper has its supply
     bare = BareBox(E_SERIES.software(SoftwareVersion(5, 25)), bench.controller, commands)
-    port = ToolLinePort(bare, bench.controller.state.grippers, RobotiqPort(bare, []))
+    port = ToolLinePort(bare, [RobotiqPort(bare, [])])
     client = FakeConnection(port)
     others = [FakeConnection(port) for _ in range(n_others)]
     client.say(STATUS_REQUEST)

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from protocol.modbus import decode_values, encode_frame, encode_read
-from ur_emulator import ControlBox, cli, rack
+from ur_emulator import ControlBox, cli
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError, PortPermissionError
+from ur_emulator.host import rack
 from ur_emulator.host.ports.modbus import ModbusPort
 from ur_emulator.host.runtime import listener
 from ur_emulator.host.runtime.event_loop import EventLoop

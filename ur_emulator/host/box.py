@@ -270,9 +270,9 @@ class Box:
         """Numbers of the ports to open by name; 0 takes a free one."""
         ports = dataclasses.asdict(self.served_at.ports)
         numbers = {name: number for name, number in ports.items() if number}
-        for kind, name in SOFTWARE_OF.items():
-            if any(tool.kind == kind for tool in self._choice.tools):
-                numbers.setdefault(name, 0)  # moved beyond the ports of TCP
+        for tool in self._choice.tools:
+            if tool.kind in SOFTWARE_OF:
+                numbers.setdefault(SOFTWARE_OF[tool.kind][0], 0)  # moved beyond the ports of TCP
         if self._options.port_base is None:
             numbers = dict.fromkeys(numbers, 0)
         if self._options.control_port is not None:

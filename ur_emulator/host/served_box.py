@@ -118,6 +118,7 @@ class ServedBox:
         # Those that are no reason for a cycle, and what has arrived for scripts.
         self._quiet: list[Command] = []
         self._arrived: list[Arrival] = []
+        self._is_urged = False
         # What is to act in a later cycle: its number, then the order in which they came.
         self._scheduled: list[tuple[int, int, Command, Done]] = []
         self._n_scheduled = 0
@@ -163,10 +164,13 @@ class ServedBox:
         """Number of the present period of remote control, 0 in local control."""
         return self.controller.state.pendant.remote_period
 
-    def submit(self, command: Command, done: Done | None = None, *, in_place_of: str = "") -> None:
+    def submit(
+        self, command: Command, done: Done | None = None, *, in_place_of: str = "", urgent: bool = True
+    ) -> None:
         """Take a command for the next cycle; `done` is called then with the result or the error.
 
-        A command that still waits under the same name `in_place_of` is dropped.
+        A command that still waits under the same name `in_place_of` is dropped. In lockstep, time passes for
+        an `urgent` one also while a script waits for the outside.
         """
         is_stopped = self.snapshot.safety_mode not in MOVING_MODES
         if isinstance(command, _STOPS) or (is_stopped and isinstance(command, UnlockProtectiveStop)):
@@ -174,6 +178,7 @@ class ServedBox:
         name = in_place_of or object()
         self._commands.pop(name, None)
         self._commands[name] = command, done or self._report_error
+        self._is_urged |= urgent
 
     def submit_quietly(self, command: Command) -> None:
         """Take a command for the next cycle, whenever that is: it is no reason for time to pass."""
@@ -318,12 +323,12 @@ class ServedBox:
 
     @property
     def waits_outside(self) -> bool:
-        """True while a script waits for the outside and no command wants a cycle.
+        """True while a script waits for the outside and no urgent command wants a cycle.
 
         Who waits for a time does not wait for the operator.
         """
         waits = self.machine.waits_outside
-        return bool(waits and not self._commands and not (waits is Outside.OPERATOR and self._is_awake))
+        return bool(waits and not self._is_urged and not (waits is Outside.OPERATOR and self._is_awake))
 
     @property
     def readers_full(self) -> bool:
@@ -395,6 +400,7 @@ class ServedBox:
         arrived, self._arrived = self._arrived, []
         quiet, self._quiet = self._quiet, []
         submitted, self._commands = self._commands, {}
+        self._is_urged = False
         commands = [*((command, self._report_error) for command in quiet), *submitted.values()]
         inputs: list[Input] = [command for command, _ in commands]
         answer = self.machine.tick(inputs)

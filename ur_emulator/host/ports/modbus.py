@@ -10,16 +10,16 @@ Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus
 from protocol import modbus
 from protocol.errors import RemoteProtocolError
 from ur_emulator.host.ports.session import Session, SessionPort
-from ur_emulator.host.ports.tool_line import answer_registers
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.commands.client_writes import WriteModbus
+from ur_emulator.machine.commands.grippers import ExchangeRegisters, OperateGrippers
 from ur_emulator.machine.controller.modbus_map import MapAddressError, can_write, read_coil, read_register
-from ur_emulator.machine.tools.onrobot import OnRobotGripper
 
 # 2 in its register 0 turns the supply of grippers off and on. Source: reference `grippers.md` 3.2 (S1).
 _CYCLE_POWER = {(63, modbus.encode_write(modbus.ModbusFunction(function), 0, [2])) for function in (6, 16)}
+_READS = (modbus.ModbusFunction.READ_HOLDING_REGISTERS, modbus.ModbusFunction.READ_INPUT_REGISTERS)
 # Units of work for a request, and how many values cost another one.
 _REQUEST_COST, _VALUES_PER_UNIT = 4, 4
 
@@ -49,13 +49,15 @@ class _ModbusSession(Session):
             return 0
         if frame is None:
             return 0
-        grippers = [g for g in self._box.controller.state.grippers if isinstance(g, OnRobotGripper)]
+        grippers = {g.unit: g for g in self._box.controller.state.grippers if g.is_at_modbus}
+        gripper = grippers.get(frame.unit)
         if grippers and (frame.unit, frame.pdu) in _CYCLE_POWER:
-            for gripper in grippers:
-                gripper.cycle_power()
+            yield from self._box.apply(OperateGrippers(tuple(grippers), "cycle_power"))
             pdu = frame.pdu[:5]
-        elif addressed := [gripper for gripper in grippers if gripper.unit == frame.unit]:
-            pdu = answer_registers(addressed[0], frame.pdu)
+        elif gripper is not None and frame.pdu[0] in _READS:
+            pdu = gripper.answer(frame.pdu)
+        elif gripper is not None:
+            pdu = (yield from self._box.apply(ExchangeRegisters(frame.unit, frame.pdu)))["pdu"]
         else:
             pdu = yield from self._answer(frame.pdu)
         if not self.connection.send(modbus.encode_frame(frame.transaction, frame.unit, pdu)):

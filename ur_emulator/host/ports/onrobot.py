@@ -14,7 +14,9 @@ from protocol.errors import RemoteProtocolError
 from protocol.xmlrpc import CallReader
 from ur_emulator.host.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.host.runtime.connection import Connection
+from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
+from ur_emulator.machine.commands.grippers import OperateGrippers
 from ur_emulator.machine.tools.onrobot import FIRST_UNIT, STATUS, OnRobotGripper
 
 MOST_BYTES: Final = 8 * 1024  # of a call: it is read in one go
@@ -53,6 +55,8 @@ _TABLE: Final = (
 )
 METHODS: Final = {name: row[:3] for row in _TABLE for name in row[3].split()}
 
+# Methods that change the gripper, and what it then does.
+_OPERATIONS: Final = {"rg_grip": "grip", "rg_stop": "stop", "rg_set_fingertip_offset": "set_offset"}
 _TYPES: Final = {bool: "boolean", int: "int", float: "double", str: "string"}
 # What a device that is not there answers, by method or by type of its result; -4 by what does something.
 _ABSENT: Final = {"int": -1, "double": -999.0, "boolean": False, "struct": {}, "array": [-999.0, -999.0]} | {
@@ -63,9 +67,11 @@ _ABSENT: Final = {"int": -1, "double": -999.0, "boolean": False, "struct": {}, "
 
 
 class OnRobotAnswers:
-    """Answers calls, from the present state; `own_host` is the address that the port is bound to."""
+    """Answers calls: from the present state, or after the cycle in which the call has acted."""
 
-    def __init__(self, grippers: Sequence[OnRobotGripper], own_host: str) -> None:
+    def __init__(self, box: ServedBox, grippers: Sequence[OnRobotGripper], own_host: str) -> None:
+        """`own_host` is the address that the port is bound to."""
+        self._box = box
         self._grippers = {gripper.unit - FIRST_UNIT: gripper for gripper in grippers}
         self._own_host = own_host
 
@@ -77,7 +83,7 @@ class OnRobotAnswers:
         try:
             reader = CallReader(_MOST_VALUES)
             reader.feed(request.body)
-            answer: Any = (self._call(*reader.result()),)
+            answer: Any = ((yield from self._call(*reader.result())),)
         except RemoteProtocolError as error:
             answer = Fault(-503, str(error))
         except KeyError as name:
@@ -85,9 +91,8 @@ class OnRobotAnswers:
         except Fault as fault:
             answer = fault
         return HttpAnswer(200, dumps(answer, methodresponse=True).encode(), content_type="text/xml")
-        yield  # a generator that never waits
 
-    def _call(self, name: str, arguments: list[Any]) -> Any:
+    def _call(self, name: str, arguments: list[Any]) -> Steps[Any]:
         """Return the result of a call, or raise its Fault."""
         result, expected, _ = METHODS[name]
         given = " ".join(_TYPES.get(type(argument), "other") for argument in arguments)
@@ -96,8 +101,9 @@ class OnRobotAnswers:
         if not all(isfinite(argument) for argument in arguments if type(argument) is float):
             raise Fault(-501, f"{name} takes finite numbers, not {arguments}"[:200])
         if result == "int" and name.startswith("cb_"):
-            for supplied in self._grippers.values() if name == "cb_reset_tool_power" else ():
-                supplied.cycle_power()
+            if name == "cb_reset_tool_power":
+                units = tuple(gripper.unit for gripper in self._grippers.values())
+                yield from self._box.apply(OperateGrippers(units, "cycle_power"))
             return 0
         match name, arguments:
             case "system.listMethods", _:
@@ -114,14 +120,10 @@ class OnRobotAnswers:
         match name, arguments[1:]:
             case "cb_is_device_connected", (product,):
                 return product == gripper.linkage.product
-            case "rg_grip", (width, force):
-                gripper.grip(width, force)
-            case "rg_stop", _:
-                gripper.stop()
-            case "rg_set_fingertip_offset", (offset,):
-                gripper.set_offset(offset)
             case "rg_get_all_variables", _:
                 return gripper.values()
+            case method, values if operation := _OPERATIONS.get(method):
+                yield from self._box.apply(OperateGrippers((gripper.unit,), operation, tuple(values)))
             case _, ():
                 return gripper.values()[name.removeprefix("rg_get_")]
         return 0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortPermissionError
@@ -22,18 +23,29 @@ from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.runtime.listener import ClientLimits, ClientLines, Listener, Port, SpareDescriptor
 from ur_emulator.host.served_box import ServedBox
-from ur_emulator.machine.tools.onrobot import OnRobotGripper
-from ur_emulator.machine.tools.robotiq import RobotiqGripper
 
 CONTROL, MODBUS, ROBOT_API = "control", "modbus", "robot_api"
 TOOL_LINE = "tool_line"
-# Kinds of tools, and the port of their maker's software.
-SOFTWARE_OF = {"robotiq": "gripper", "onrobot": "onrobot"}
 # Ports whose numbers need privileges, and what the box lacks without them.
 _PRIVILEGED = {MODBUS: "Modbus server", ROBOT_API: "Robot API"}
 # Ports that read what a browser sends: web servers, and RTDE, for which its first letters are the size of a
 # package that is too long: it says so and closes.
-_READS_HTTP = frozenset({CONTROL, ROBOT_API, SOFTWARE_OF["onrobot"], "rtde"})
+_READS_HTTP = frozenset({CONTROL, ROBOT_API, "onrobot", "rtde"})
+
+
+def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> Port:
+    # A box without HTTP does not load it.
+    from ur_emulator.host.ports.http import HttpPort
+    from ur_emulator.host.ports.onrobot import MOST_BYTES, OnRobotAnswers
+
+    return HttpPort(box, OnRobotAnswers(box, grippers, host), MOST_BYTES)
+
+
+# Kinds of tools, the port of their maker's software, and what makes it for tools and the address of the port.
+SOFTWARE_OF: dict[str, tuple[str, Callable[[ServedBox, Sequence[Any], str], Port]]] = {
+    "robotiq": ("gripper", lambda box, grippers, host: RobotiqPort(box, grippers)),
+    "onrobot": ("onrobot", _onrobot_port),
+}
 
 
 class PortSet:
@@ -166,21 +178,14 @@ def answering_ports(
     if software.has_interpreter:
         ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
     grippers = box.controller.state.grippers
-    robotiq = [gripper for gripper in grippers if isinstance(gripper, RobotiqGripper)]
-    onrobot = [gripper for gripper in grippers if isinstance(gripper, OnRobotGripper)]
-    software_of_robotiq = RobotiqPort(box, robotiq)
-    if robotiq:
-        ports[SOFTWARE_OF["robotiq"]] = software_of_robotiq
-    if software.has_tool_line and (robotiq or onrobot):
-        ports[TOOL_LINE] = ToolLinePort(box, [*robotiq, *onrobot], software_of_robotiq)
-    if onrobot or software.robot_api:
-        # A box without HTTP does not load it.
-        from ur_emulator.host.ports.http import HttpPort
-    if onrobot:
-        from ur_emulator.host.ports.onrobot import MOST_BYTES, OnRobotAnswers
-
-        ports[SOFTWARE_OF["onrobot"]] = HttpPort(box, OnRobotAnswers(onrobot, host), MOST_BYTES)
+    for kind, (name, make) in SOFTWARE_OF.items():
+        if tools := [gripper for gripper in grippers if gripper.tool.kind == kind]:
+            ports[name] = make(box, tools, host)
+    if software.has_tool_line and any(gripper.unit for gripper in grippers):
+        users = [port for port in ports.values() if isinstance(port, RobotiqPort)]
+        ports[TOOL_LINE] = ToolLinePort(box, users)
     if software.robot_api:
+        from ur_emulator.host.ports.http import HttpPort
         from ur_emulator.host.ports.robot_api import RobotApiAnswers
 
         answers = RobotApiAnswers(box, player, reports, shut_down, host)

@@ -1,11 +1,12 @@
 """Port 63352: the variables of a Robotiq gripper, as the software of the maker offers them.
 
-Answers come at once, from the present state; what a SET writes the gripper has after its next exchange. All
-clients, and programs at 127.0.0.1, talk to the same grippers; which of them (SID) belongs to the connection.
+Answers come at once, from the present state. What a SET writes is a command for the next cycle; no answer
+shows it before the next exchange of the gripper, so nobody waits for it. All clients, and programs at
+127.0.0.1, talk to the same grippers; which of them (SID) belongs to the connection.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from protocol import robotiq
 from ur_emulator.budgets import BUDGETS
@@ -13,6 +14,7 @@ from ur_emulator.host.ports.session import Session, SessionPort
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
+from ur_emulator.machine.commands.grippers import OperateGrippers
 from ur_emulator.machine.tools.robotiq import RobotiqGripper
 
 _REQUEST_COST = 2
@@ -28,11 +30,14 @@ _CONSTANTS = {"DST": 4, "PCO": 0}
 
 
 class RobotiqPort(SessionPort["_RobotiqSession"]):
-    """Answers requests for the variables of grippers."""
+    """Answers requests for the variables of `grippers`, which are known by their unit."""
 
     def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper]) -> None:
         super().__init__(box)
-        self._grippers = {gripper.unit: gripper for gripper in grippers}
+        self.grippers = {gripper.unit: gripper for gripper in grippers}
+        # What SETs have written since the cycle of that number, by unit and name.
+        self._written: dict[int, dict[str, int]] = {}
+        self._tick = 0
 
     @property
     def has_clients(self) -> bool:
@@ -40,17 +45,27 @@ class RobotiqPort(SessionPort["_RobotiqSession"]):
         return bool(self._sessions)
 
     def _begin(self, connection: Connection) -> "_RobotiqSession":
-        return _RobotiqSession(connection, self._box, self._grippers)
+        return _RobotiqSession(connection, self._box, self)
+
+    def write(self, unit: int, values: Sequence[tuple[str, int]]) -> None:
+        """Have a gripper take variables; all that come between two cycles are one command.
+
+        None of them is urgent: in lockstep a client may move the fingers between two velocities of a stream.
+        """
+        if self._tick != (tick := self._box.snapshot.tick):
+            self._tick, self._written = tick, {}
+        written = self._written.setdefault(unit, {})
+        written.update(values)
+        command = OperateGrippers((unit,), "set", tuple(written.items()))
+        self._box.submit(command, in_place_of=f"gripper {unit}", urgent=False)
 
 
 class _RobotiqSession(Session):
     """A client."""
 
-    def __init__(
-        self, connection: Connection, box: ServedBox, grippers: Mapping[int, RobotiqGripper]
-    ) -> None:
+    def __init__(self, connection: Connection, box: ServedBox, port: RobotiqPort) -> None:
         super().__init__(connection, box)
-        self._grippers = grippers
+        self._port = port
         self._parser = robotiq.GripperConnection()
         self._requests: deque[robotiq.Request] = deque()
         self._sid = robotiq.DEFAULT_SID
@@ -72,9 +87,8 @@ class _RobotiqSession(Session):
                 self._sid = sid
                 return robotiq.ACK if self._chosen is not None else robotiq.NAK
             case robotiq.Set(values=values):
-                if (gripper := self._chosen) is not None:
-                    for name, value in values:
-                        gripper.set(name, value)
+                if self._chosen is not None:
+                    self._port.write(self._sid, values)
                 return robotiq.ACK
             case robotiq.Get(name=name):
                 return robotiq.encode_value(request, self._value(name))
@@ -84,12 +98,12 @@ class _RobotiqSession(Session):
     @property
     def _chosen(self) -> RobotiqGripper | None:
         """The gripper of this connection; None if there is none with its number, or it has no power."""
-        gripper = self._grippers.get(self._sid)
+        gripper = self._port.grippers.get(self._sid)
         return gripper if gripper is not None and gripper.has_power else None
 
     def _value(self, name: str) -> int | str:
         if name == robotiq.SID:
-            return str([unit for unit, gripper in self._grippers.items() if gripper.has_power])
+            return str([unit for unit, gripper in self._port.grippers.items() if gripper.has_power])
         gripper = self._chosen
         if gripper is None:
             return robotiq.NOT_KNOWN

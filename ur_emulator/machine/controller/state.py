@@ -32,7 +32,8 @@ from ur_emulator.machine.controller.world_model import WorldModel
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.robot_model import RobotModel, Vector6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
-from ur_emulator.machine.tools import SUPPLY, Gripper, make_grippers
+from ur_emulator.machine.tools import SUPPLY, make_grippers
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
 

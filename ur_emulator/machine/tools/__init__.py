@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import count
 
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_emulator.machine.tools.onrobot import FIRST_UNIT, OnRobotGripper
 from ur_emulator.machine.tools.robotiq import RobotiqGripper
 from ur_emulator.machine.tools.vacuum import VacuumGripper
@@ -10,8 +11,6 @@ from ur_hil.tools import ToolModel
 
 SUPPLY = 24
 """Voltage at the tool connector that grippers need [V]."""
-
-Gripper = RobotiqGripper | OnRobotGripper | VacuumGripper
 
 _UNITS = (9, 2, 3, 4)
 """Addresses of the grippers 1 to 4 of programs. Source: reference `grippers.md` 1.1 (O)."""

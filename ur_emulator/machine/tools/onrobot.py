@@ -14,14 +14,13 @@ from math import asin, cos, pi
 
 from ur_emulator.machine.controller.io.lines import TOOL, InputOutput, ToolLine
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
 FIRST_UNIT = 65  # of Modbus, of a gripper that is alone; two are the next ones
 # Bits of the status, from the lowest.
 STATUS = ("busy", "grip_detected", "s1_pushed", "s1_triggered", "s2_pushed", "s2_triggered", "safety_failed")
 
-_REACHED = 0.0003  # m; a width this near is reached
-_RESTS = 0.002  # m/s; slower than this the fingers stand
 _CLOSED = 5.0  # mm; jaws that have closed to less read as a grip
 _LEAST_BUSY = 0.1  # s; programs look for it within 20 cycles
 _OFF = 1.0  # s without supply, of a power cycle
@@ -30,24 +29,17 @@ _CURRENT = 0.2  # A while it moves; the screw holds by itself
 _GRIP, _STOP, _GRIP_OFFSET = 1, 8, 16
 
 
-class OnRobotGripper:
-    """The gripper's own controller; widths in mm. Attributes and `step` as of `RobotiqGripper`."""
+class OnRobotGripper(Gripper):
+    """A gripper; widths in mm."""
 
     line = ToolLine(is_enabled=True, parity=2)
-    has_cable = False
+    is_at_modbus = True
 
     def __init__(self, tool: ToolModel, period: float, unit: int = FIRST_UNIT) -> None:
-        """Begin without power; `period` is the cycle [s]."""
+        super().__init__(tool, period, unit)
         assert tool.linkage is not None
-        self.unit = unit
-        self.tool = tool
         self.linkage = tool.linkage
-        self._period = period
         self._offset = self._tip = 1e3 * tool.linkage.tip
-        self._fingers = FingerState(tool.stroke, 0.0, 0.0)
-        self._command: FingerCommand | None = None
-        self.has_power = self.is_busy = False
-        self.supply_current = 0.0
         # The last command, and the time since it.
         self._closes = self._has_grip = False
         self._since = self._first_depth = 0.0
@@ -101,12 +93,12 @@ class OnRobotGripper:
         }
 
     def summary(self) -> dict[str, float]:
-        """What people want to know of it: the width between its fingertips [m], and its state."""
+        """The width between its fingertips [m], and its state."""
         status = self.values()["status"] if self.has_power else -1
         return {"unit": self.unit, "width": self._fingers.width, "status": status}
 
     def read_registers(self, address: int, count: int) -> list[int]:
-        """Read registers, in 0.1 mm; LookupError if one of them does not exist, or without power."""
+        """Read registers, in 0.1 mm; LookupError also without power."""
         if not self.has_power:
             raise LookupError
         values, offset = self.values(), 10.0 * self._offset
@@ -121,7 +113,7 @@ class OnRobotGripper:
         return [round(registers[address + i]) & 0xFFFF for i in range(count)]
 
     def write_registers(self, address: int, values: Sequence[int]) -> None:
-        """Write force, width and command from 0 on, or the offset; LookupError as of `read_registers`."""
+        """Write force, width and command from 0 on, or the offset; LookupError also without power."""
         end = address + len(values)
         if not self.has_power or (end > 3 and (address, end) != (0x0407, 0x0408)):
             raise LookupError
@@ -171,8 +163,7 @@ class OnRobotGripper:
     def _look(self, target: float) -> None:
         """Look at where the fingers are."""
         self._since += self._period
-        stands = abs(self._fingers.speed) < _RESTS
-        reached = abs(self._fingers.width - target) <= _REACHED
+        stands, reached = self._stands, self._is_at(target)
         presses = abs(self._fingers.share) > 0.95 and not reached
         if stands and (reached or presses) and self._since >= _LEAST_BUSY:
             self.is_busy = False

@@ -20,7 +20,7 @@ after the activation is chosen.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from protocol.robotiq import (
     DEFAULT_SID,
@@ -32,8 +32,9 @@ from protocol.robotiq import (
     decode_request,
     encode_status,
 )
-from ur_emulator.machine.controller.io.lines import InputOutput, ToolLine
+from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
 EXCHANGE = 0.016
@@ -48,12 +49,6 @@ _LONGEST_ACTIVATION = 6.0
 _PAUSE = 0.2
 """At each end of the stroke during the activation [s]; assumed, so that it takes 1.5 to 3 s."""
 
-_REACHED = 0.0003
-"""A target this near is reached [m]: less than a count of the finest gripper."""
-
-_RESTS = 0.002
-"""Slower than this the fingers stand [m/s]."""
-
 _MORE_REGISTERS = 13
 """Registers behind the status, all 0: drivers read six."""
 
@@ -61,8 +56,7 @@ _MOVING_CURRENT = 10
 """COU while the fingers move; 0 while they stand, since the screw holds by itself. Source: example frames."""
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(NamedTuple):
     """What clients write; names and values as in `protocol.robotiq.VARIABLES`."""
 
     ACT: int = 0
@@ -80,104 +74,58 @@ class Settings:
     LGN: int = 0
 
 
-class RobotiqGripper:
-    """The gripper's own controller; `step` is its cycle.
-
-    Attributes:
-        unit: its address on the serial line, which is its SID.
-        line: settings of the serial line with which it is reached.
-        has_cable: its supply comes from the control box, not from the tool connector.
-        has_power: it has its supply.
-    """
-
-    line = ToolLine(is_enabled=True)
+class RobotiqGripper(Gripper):
+    """A gripper; its unit is its SID."""
 
     def __init__(
         self, tool: ToolModel, period: float, unit: int = DEFAULT_SID, *, has_cable: bool = False
     ) -> None:
-        """Begin without power; `period` is the cycle [s]."""
-        self.unit = unit
-        self.has_cable = has_cable
-        self._tool = tool
-        self._period = period
-        self._every = max(1, round(EXCHANGE / period))
-        self.has_power = False
-        self._wait = self._every
+        super().__init__(tool, period, unit, has_cable=has_cable)
+        self._every = self._wait = max(1, round(EXCHANGE / period))
         self._wanted = self._held = Settings()
-        self._command: FingerCommand | None = None
-        self._fingers = FingerState(tool.stroke, 0.0, 0.0)
         self._reset()
 
     def _reset(self) -> None:
         self._status, self._fault, self._objects = Status.RESET, Fault.NONE, Objects.AT_TARGET
-        self._is_moving = False
+        self._command, self._is_moving = None, False
         self._route: list[float] = []
         self._time_in_phase = self._time_activating = 0.0
 
-    @property
-    def is_busy(self) -> bool:
-        """It moves, or has not yet taken what clients have set."""
-        return self.has_power and (
-            self._is_moving or self._status is Status.ACTIVATING or self._held != self._wanted
-        )
-
-    @property
-    def supply_current(self) -> float:
-        """What it takes from the tool connector [A]: what COU reports."""
-        return 0.01 * self._current if self.has_power else 0.0
-
     # --- clients
 
-    def set(self, name: str, value: int) -> None:
-        """Write a variable; the gripper has it after the next exchange."""
-        if name in Settings.__slots__:
-            self._wanted = replace(self._wanted, **{name: value})
+    def set(self, *values: tuple[str, int]) -> None:
+        """Write variables, pairs of name and value; the gripper has them after the next exchange."""
+        kept = {name: value for name, value in values if name in Settings._fields}
+        self._wanted = self._wanted._replace(**kept)
 
     def get(self, name: str) -> int | None:
         """Read a number; None without power, and for a variable that is none."""
-        if not self.has_power:
-            return None
-        match name:
-            case "POS":
-                return self._position
-            case "PRE":
-                return self._held.POS
-            case "STA":
-                return int(self._status)
-            case "OBJ":
-                return int(self._objects)
-            case "FLT":
-                return int(self._fault)
-            case "COU":
-                return self._current
-        return getattr(self._held, name, None)
-
-    @property
-    def _position(self) -> int:
-        return self._tool.count_of(self._fingers.width)
-
-    @property
-    def _current(self) -> int:
-        return _MOVING_CURRENT if abs(self._fingers.speed) > _RESTS else 0
+        return self._values.get(name) if self.has_power else None
 
     def summary(self) -> dict[str, float]:
-        """What people want to know of it: the width between its pads [m], and its state."""
-        return {
-            "SID": self.unit,
-            "width": self._fingers.width,
+        """The width between its pads [m], and its state."""
+        state = {name: self._values[name] for name in ("STA", "OBJ", "FLT")}
+        return {"SID": self.unit, "width": self._fingers.width, **state}
+
+    @property
+    def _values(self) -> dict[str, int]:
+        return self._held._asdict() | {
+            "POS": self.tool.count_of(self._fingers.width),
+            "PRE": self._held.POS,
             "STA": int(self._status),
             "OBJ": int(self._objects),
             "FLT": int(self._fault),
+            "COU": self._current,
         }
+
+    @property
+    def _current(self) -> int:
+        return 0 if self._stands else _MOVING_CURRENT
 
     # --- the serial line
 
     def read_registers(self, address: int, count: int) -> list[int]:
-        """Read registers of the serial line: the status from 07D0 on, and what was written from 03E8 on.
-
-        Raises:
-            LookupError: one of them does not exist.
-        """
+        """Read the status from 07D0 on, or what was written from 03E8 on."""
         for first, registers in ((OUTPUTS, self._outputs()), (INPUTS, self._inputs())):
             at = address - first
             if at >= 0 and at + count <= len(registers):
@@ -185,17 +133,13 @@ class RobotiqGripper:
         raise LookupError
 
     def write_registers(self, address: int, values: Sequence[int]) -> None:
-        """Write registers from 03E8 on; the gripper has them at once.
-
-        Raises:
-            LookupError: one of them does not exist.
-        """
+        """Write registers from 03E8 on; the gripper has them at once."""
         registers = list(self._inputs())
         at = address - INPUTS
         if not 0 <= at <= at + len(values) <= len(registers):
             raise LookupError
         registers[at : at + len(values)] = values
-        self._wanted = replace(self._wanted, **decode_request(registers))
+        self._wanted = self._wanted._replace(**decode_request(registers))
         self._exchange()
 
     def _inputs(self) -> list[int]:
@@ -211,7 +155,7 @@ class RobotiqGripper:
             objects=self._objects if self._held.GTO or self._held.ATR else Objects.MOVING,
             fault=self._fault,
             requested=self._held.POS,
-            position=self._position,
+            position=self.tool.count_of(self._fingers.width),
             current=self._current,
         )
         return (*status, *[0] * _MORE_REGISTERS)
@@ -219,30 +163,22 @@ class RobotiqGripper:
     # --- the cycle
 
     def step(self, fingers: FingerState, has_power: bool, io: InputOutput) -> FingerCommand | None:
-        """Advance by a cycle.
-
-        Args:
-            fingers: after the last cycle.
-            io: not used; other grippers are driven by it.
-            has_power: the connector or the cable has 24 V, and no stop has cut them.
-
-        Returns:
-            What the drive does; None: it holds where it is, as its screw does without power.
-        """
+        """Advance by a cycle."""
         self._fingers = fingers
         if has_power is not self.has_power:
             self.has_power = has_power
             self._wanted = self._held = Settings()
-            self._command = None
             self._reset()
-        if not has_power:
-            return None
-        self._wait -= 1
-        if not self._wait:
-            self._wait = self._every
-            self._exchange()
-        self._move()
-        return self._command
+        if has_power:
+            self._wait -= 1
+            if not self._wait:
+                self._wait = self._every
+                self._exchange()
+            self._move()
+        is_moving = self._is_moving or self._status is Status.ACTIVATING
+        self.is_busy = has_power and (is_moving or self._held != self._wanted)
+        self.supply_current = 0.01 * self._current * has_power
+        return self._command if has_power else None
 
     def _exchange(self) -> None:
         """Take what clients have set."""
@@ -251,7 +187,6 @@ class RobotiqGripper:
         if not held.ACT:
             if before.ACT:
                 self._reset()
-                self._command = None
             if held.GTO != before.GTO:
                 self._fault = Fault.NOT_ACTIVATED if held.GTO else Fault.NONE
             return
@@ -268,7 +203,7 @@ class RobotiqGripper:
 
     def _follow(self, is_new: bool, before: Settings) -> None:
         """Go to the target, or stop."""
-        held, tool = self._held, self._tool
+        held, tool = self._held, self.tool
         if not held.GTO:
             if before.GTO:
                 self._command = None
@@ -287,13 +222,13 @@ class RobotiqGripper:
 
     def _activate(self) -> None:
         self._reset()
-        stroke = self._tool.stroke
+        stroke = self.tool.stroke
         self._status, self._objects, self._route = Status.ACTIVATING, Objects.MOVING, [stroke, 0.0, stroke]
 
     def _release(self) -> None:
         self._fault, self._is_moving, self._objects = Fault.RELEASING, True, Objects.MOVING
-        end = 0.0 if self._held.ARD else self._tool.stroke
-        self._command = FingerCommand(end, _RELEASE_SPEED, self._tool.force_of(0))
+        end = 0.0 if self._held.ARD else self.tool.stroke
+        self._command = FingerCommand(end, _RELEASE_SPEED, self.tool.force_of(0))
 
     def _move(self) -> None:
         """Look at where the fingers are."""
@@ -303,15 +238,13 @@ class RobotiqGripper:
         command, fingers = self._command, self._fingers
         if command is None:
             return
-        stands = abs(fingers.speed) < _RESTS
-        reached = abs(fingers.width - command.width) <= _REACHED
         if self._is_moving:
-            if reached and stands:
+            if self._stands and self._is_at(command.width):
                 self._arrive(Objects.AT_TARGET)
-            elif stands and self._presses(command.width):
+            elif self._stands and self._presses(command.width):
                 closing = command.width < fingers.width
                 self._arrive(Objects.CONTACT_CLOSING if closing else Objects.CONTACT_OPENING)
-        elif not stands and self._objects is not Objects.AT_TARGET:
+        elif not self._stands and self._objects is not Objects.AT_TARGET:
             self._objects = Objects.AT_TARGET  # the object is lost
 
     def _presses(self, width: float) -> bool:
@@ -325,17 +258,17 @@ class RobotiqGripper:
             self._fault, self._status = Fault.RELEASED, Status.RESET
 
     def _step_activation(self) -> None:
-        tool, fingers = self._tool, self._fingers
+        tool = self.tool
         self._time_activating += self._period
         self._time_in_phase += self._period
         if self._time_activating > _LONGEST_ACTIVATION:
             self._reset()
-            self._fault, self._command = Fault.ACTIVATION, None
+            self._fault = Fault.ACTIVATION
             return
         end = self._route[0]
         self._command = FingerCommand(end, tool.speed_of(255), tool.force_of(0))
-        there = abs(fingers.width - end) <= _REACHED or self._presses(end)
-        if not (there and abs(fingers.speed) < _RESTS and self._time_in_phase >= _PAUSE):
+        there = self._is_at(end) or self._presses(end)
+        if not (there and self._stands and self._time_in_phase >= _PAUSE):
             return
         del self._route[0]
         self._time_in_phase = 0.0

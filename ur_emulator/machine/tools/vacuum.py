@@ -4,8 +4,9 @@ The vacuum builds up while the cup is on something, within `BUILD_UP`, and ends 
 when the output goes off. The cup holds in proportion to it.
 """
 
-from ur_emulator.machine.controller.io.lines import InputOutput, ToolLine
+from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
+from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
 BUILD_UP = 0.15
@@ -15,29 +16,23 @@ _REACHED = 0.8
 """Share of the full vacuum from which the input is on; chosen."""
 
 
-class VacuumGripper:
-    """The valve and the pressure switch."""
-
-    line, has_cable = ToolLine(is_enabled=True), False
+class VacuumGripper(Gripper):
+    """The valve, which is a load of the output and not of the supply, and the pressure switch."""
 
     def __init__(self, tool: ToolModel, period: float) -> None:
-        """Begin without vacuum; `period` is the cycle [s]."""
-        self._tool = tool
-        self._per_cycle = period / BUILD_UP
+        super().__init__(tool, period, unit=0)
         self._vacuum = 0.0
-        self.is_busy = False
-        self.supply_current = 0.0  # its valve is a load of the output
 
     def summary(self) -> dict[str, float]:
         """The vacuum as a share of the full one."""
         return {"vacuum": self._vacuum}
 
     def step(self, fingers: FingerState, has_power: bool, io: InputOutput) -> FingerCommand | None:
-        """Advance by a cycle; arguments as of `RobotiqGripper.step`, `share` is 1 on an object."""
-        tool = self._tool
+        """Advance by a cycle."""
+        tool = self.tool
         sucks = has_power and io.read_digital_out(tool.output)
         on_object = sucks and fingers.share > 0.0
-        self._vacuum = min(1.0, self._vacuum + self._per_cycle) if on_object else 0.0
+        self._vacuum = min(1.0, self._vacuum + self._period / BUILD_UP) if on_object else 0.0
         self.is_busy = on_object and self._vacuum < 1.0
         reached = self._vacuum >= _REACHED
         if io.read_digital_in(tool.input) is not reached:
