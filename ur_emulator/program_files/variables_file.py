@@ -56,7 +56,7 @@ def write_variables(folder: ProgramFolder, installation: str, values: Mapping[st
     raw = folder.read(file, BUDGETS.program_bytes)
     data = unpack(file.name, raw, BUDGETS.program_bytes)
     if data.lstrip().startswith(b"<"):
-        new = _new_xml(ProgramReader(folder).parsed(file.name, data), values)
+        new = _new_xml(ProgramReader(folder).parsed(file, data), values)
     else:
         new = _new_properties(data, values)
     folder.write(file.inside, new if data is raw else gzip.compress(new, mtime=0))
@@ -82,7 +82,7 @@ def literal(value: Any, depth: int = 0) -> str:
 
 
 def _xml_items(reader: ProgramReader, file: FoundFile, data: bytes) -> Iterator[tuple[str, str]]:
-    root = reader.parsed(file.name, data).root
+    root = reader.parsed(file, data).root
     if root.tag != _ROOT:
         raise ProgramFileError(f"{file.name} is a <{root.tag}>, not <{_ROOT}>")
     for variable in root.iter("variable"):
