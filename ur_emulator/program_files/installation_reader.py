@@ -136,19 +136,17 @@ def _read_tree(tree: XmlTree) -> Installation:
     return found
 
 
-def pc_from(data: dict[str, str], file_name: str) -> installation.ExternalControlPc:
+def pc_from(data: dict[str, str], tree: XmlTree) -> installation.ExternalControlPc:
     """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
 
     ProgramFileError if the host is too long for a name, or the port is not a port number.
     """
     host = data.get("host_ip", "")
     if len(host) > BUDGETS.host_length:
-        raise ProgramFileError(
-            f"{file_name}: the host of External Control has more than {BUDGETS.host_length} characters"
-        )
+        raise tree.error(f"the host of External Control has more than {BUDGETS.host_length} characters")
     port = data.get("port_nr", "")
     if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
-        raise ProgramFileError(f"{file_name}: port {port[:20]!r} of External Control is none of 1 to 65535")
+        raise tree.error(f"port {port[:20]!r} of External Control is none of 1 to 65535")
     return installation.ExternalControlPc(host, int(port or 0))
 
 
@@ -185,7 +183,7 @@ class _Reader:
 
     def external_control(self) -> tuple[installation.ExternalControlPc, str]:
         data = self._contributed(_EXTERNAL_CONTROL)
-        return pc_from(data, self.tree.file.name), data.get("name", "")
+        return pc_from(data, self.tree), data.get("name", "")
 
     def grippers(self) -> installation.GripperSetup:
         data = self._contributed(_ROBOTIQ)

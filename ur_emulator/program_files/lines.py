@@ -8,8 +8,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ur_emulator.errors import UndefinedError
 from ur_emulator.program_files.installation import Installation
+from ur_emulator.program_files.reader import XmlTree
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Line:
     writes: Mapping[bool, str]
 
 
-def line_of(installation: Installation, name: str, file_name: str) -> Line:
+def line_of(installation: Installation, name: str, tree: XmlTree) -> Line:
     """Return the line that a program calls by a name; UndefinedError if there is none."""
     if any(signal.name == name for signal in installation.modbus):
         text = name.replace('"', "'")
@@ -98,8 +98,8 @@ def line_of(installation: Installation, name: str, file_name: str) -> Line:
     n = int(match[2]) if match else 0
     kinds = [kind for kind in LINE_KINDS if match and kind.name == match[1] and kind.first <= n]
     if not kinds:
-        raise UndefinedError(
-            f"{file_name}: the installation has no line {name[:100]!r}: "
+        raise tree.undefined(
+            f"the installation has no line {name[:100]!r}: "
             "use one of its names, or a line's own, such as digital_in[0]"
         )
     kind = kinds[-1]

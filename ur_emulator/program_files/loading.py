@@ -77,9 +77,8 @@ class LoadedProgram:
                 texts.append(part)
                 continue
             if isinstance(part, Header):
-                texts.extend(
-                    f"  {to_script_text(line)}" for line in header_lines(self.installation or NEW_BOX)
-                )
+                declared = header_lines(self.installation or NEW_BOX)
+                texts += [f"  {to_script_text(line)}" for line in declared]
                 continue
             header, lines = split_header(received(part.pc))
             if part.pc not in headed:

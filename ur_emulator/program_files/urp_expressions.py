@@ -76,7 +76,7 @@ def _part(maker: UrpMaker, node: Node, element: Element) -> Expression:
             return Expression(pose, name)
     pins = element.findall("pin")
     if len(pins) == 1:
-        line = line_of(maker.installation, tree.resolve(pins[0]).get("referencedName", ""), tree.file.name)
+        line = line_of(maker.installation, tree.resolve(pins[0]).get("referencedName", ""), tree)
         return Expression(line.read, line.label)
     raise node.tree.unknown(f"<{element.tag}> in an expression")
 
@@ -167,26 +167,23 @@ def position_of(tree: XmlTree, element: Element | None, what: str) -> tuple[str,
     angles = element.find("JointAngles")
     joints = tree.number_texts(element.get("joints") if angles is None else angles.get("angles"), what)
     given = element.get("pose")
-    pose = (
-        pose_of(tree, given, what)
-        if given
-        else _taught_pose(tree, element, six(list(map(float, joints))), what)
-    )
+    pose = pose_of(tree, given, what) if given else _taught_pose(tree, element, joints, what)
     return f"[{', '.join(joints)}]", pose
 
 
-def _taught_pose(tree: XmlTree, element: Element, joints: Vector6, what: str) -> Pose | None:
+def _taught_pose(tree: XmlTree, element: Element, joints: list[str], what: str) -> Pose | None:
     kinematics = element.find("Kinematics")
     offset = element.find("TCPOffset")
     if kinematics is None or offset is None:
         return None
-    rows = {}
+    rows = []
     known = tree.resolve(kinematics)
     for name in ("deltaTheta", "a", "d", "alpha"):
         row = known.find(name)
-        rows[name] = pose_of(tree, None if row is None else row.get("value"), f"{name} of {what}")
+        rows.append(pose_of(tree, None if row is None else row.get("value"), f"{name} of {what}"))
     flange = np.eye(4)
-    for joint, delta, a, d, alpha in zip(_moderate(tree, joints, what), *rows.values(), strict=True):
+    q = _moderate(tree, six(list(map(float, joints))), what)
+    for joint, delta, a, d, alpha in zip(q, *rows, strict=True):
         flange = flange @ _link(joint + delta, a, d, alpha)
     return pose_trans(
         T_to_pose(flange), pose_of(tree, tree.resolve(offset).get("pose"), f"the tool of {what}")

@@ -37,22 +37,31 @@ _AXES = ("X", "Y", "Z")
 _SIGNS = {"Plus": ("+", "1.0"), "Minus": ("-", "-1.0")}
 # Goal of a direction that no distance ends [m]; it is beyond the reach of every arm.
 _FAR = "1000.0"
-# Speed of the way back from a contact [m/s].
-_RETRACTION_SPEED = "0.1"
-_POINT = (
-    "def calculate_point_to_move_towards(feature, direction, position_distance):",
-    "  local goal=get_target_waypoint()",
-    "  local axis=[direction[0], direction[1], direction[2]]",
-    "  if (norm(axis) < 1e-6):",
-    "    return goal",
-    "  end",
-    "  local unit=normalize(axis)",
-    "  local d=position_distance",
-    "  local step=p[unit[0]*d, unit[1]*d, unit[2]*d, 0, 0, 0]",
-    "  local turned=pose_trans(p[0, 0, 0, feature[3], feature[4], feature[5]], step)",
-    "  return p[goal[0]+turned[0], goal[1]+turned[1], goal[2]+turned[2], goal[3], goal[4], goal[5]]",
-    "end",
-)
+# The way back from a contact: its speed is 0.1 m/s.
+_RETRACTION = """\
+kill move_thread_han_{n}
+stopl({a})
+local contactPose=get_forward_kin(get_actual_joint_positions_history(stepsToRetract))
+local axis=[targetTcpDirection[0], targetTcpDirection[1], targetTcpDirection[2]]
+local retractTo=contactPose
+if (norm(axis) > 1e-6):
+  local unit=normalize(axis)
+  retractTo = pose_sub(contactPose, p[unit[0]*{d}, unit[1]*{d}, unit[2]*{d}, 0, 0, 0])
+end
+movel(retractTo, a={a}, v=0.1)"""
+_POINT = """\
+def calculate_point_to_move_towards(feature, direction, position_distance):
+  local goal=get_target_waypoint()
+  local axis=[direction[0], direction[1], direction[2]]
+  if (norm(axis) < 1e-6):
+    return goal
+  end
+  local unit=normalize(axis)
+  local d=position_distance
+  local step=p[unit[0]*d, unit[1]*d, unit[2]*d, 0, 0, 0]
+  local turned=pose_trans(p[0, 0, 0, feature[3], feature[4], feature[5]], step)
+  return p[goal[0]+turned[0], goal[1]+turned[1], goal[2]+turned[2], goal[3], goal[4], goal[5]]
+end"""
 
 
 @KINDS.writes(
@@ -66,8 +75,8 @@ def _write_direction(maker: UrpMaker, node: Node, around: Around) -> None:
         raise node.tree.undefined("a direction needs <Until> nodes, and no others")
     feature = feature_name(node)
     name, vector = _direction(maker, node)
-    maker.put(node, around, f"Direction: {feature_label(feature)}{name}")
-    maker.declare("point of a direction", *_POINT)
+    maker.put(node, around, f"Direction: {_LABELS.get(feature, feature)}{name}")
+    maker.declare("point of a direction", _POINT)
     distance = _FAR
     for until in untils:
         if until.get("type") == "DISTANCE":
@@ -135,18 +144,7 @@ def _write_until(maker: UrpMaker, node: Node, n: int, acceleration: str, around:
                 "local stepsToRetract=tool_contact(direction=targetTcpDirection)",
             )
             with writer.block("if (stepsToRetract > 0):"):
-                writer.add(f"kill move_thread_han_{n}", f"stopl({deceleration})")
-                writer.add(
-                    "local contactPose=get_forward_kin(get_actual_joint_positions_history(stepsToRetract))",
-                    "local axis=[targetTcpDirection[0], targetTcpDirection[1], targetTcpDirection[2]]",
-                    "local retractTo=contactPose",
-                )
-                with writer.block("if (norm(axis) > 1e-6):"):
-                    step = ", ".join(f"unit[{i}]*{retraction}" for i in range(3))
-                    writer.add(
-                        "local unit=normalize(axis)", f"retractTo = pose_sub(contactPose, p[{step}, 0, 0, 0])"
-                    )
-                writer.add(f"movel(retractTo, a={deceleration}, v={_RETRACTION_SPEED})")
+                writer.add(_RETRACTION.format(n=n, a=deceleration, d=retraction))
                 maker.put(node, around, label)
                 maker.write_children(node, around)
                 writer.add("break")
@@ -186,6 +184,8 @@ _PARAMETERS = frozenset(
 )
 _BASE = "Joint_0_name"
 _TOOL = "Joint_6_name"
+# How labels call features, other than by their names.
+_LABELS = {"": "Base", _BASE: "Base", _TOOL: "Tool"}
 _AFTER = "breakAfter"
 
 
@@ -350,11 +350,6 @@ def frame_of(maker: UrpMaker, node: Node, name: str, tool: str) -> str:
     if feature is None:
         raise node.tree.undefined(f"the installation has no feature {name[:100]!r}")
     return name if feature.is_variable else pose_text(feature.pose)
-
-
-def feature_label(name: str) -> str:
-    """Return how labels call a feature."""
-    return {"": "Base", _BASE: "Base", _TOOL: "Tool"}.get(name, name)
 
 
 # --- parameters

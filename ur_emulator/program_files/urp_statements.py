@@ -190,7 +190,7 @@ def _write_contributed(maker: UrpMaker, node: Node, around: Around) -> None:
 
 
 def _write_external_control(maker: UrpMaker, node: Node, around: Around) -> None:
-    pc = pc_from(node.data, node.tree.file.name)
+    pc = pc_from(node.data, node.tree)
     title = one_line(node.get("strategyProgramNodeType") or EXTERNAL_CONTROL)
     name = maker.installation.pc_name or pc.host or title
     maker.put(node, around, f"Control by {name}")
@@ -205,7 +205,7 @@ def contributor(element: Element) -> str:
 def _line(maker: UrpMaker, node: Node) -> Line:
     pin = node.find("pin")
     name = "" if pin is None else pin.get("referencedName", "")
-    return line_of(maker.installation, name, node.tree.file.name)
+    return line_of(maker.installation, name, node.tree)
 
 
 def _is_high(node: Node) -> bool:
