@@ -63,10 +63,7 @@ class ProgramFolder:
 
         FileMissingError if there is none, or the name leads out of the folder.
         """
-        inside = self.locate(name)
-        if not _is(Path.is_file, self._known_root() / inside):
-            raise FileMissingError(f"there is no file {name!r} in the programs folder")
-        return FoundFile(inside)
+        return FoundFile(self._locate(name, Path.is_file, "file"))
 
     def has(self, name: str) -> bool:
         """Return whether there is a file of that name."""
@@ -106,10 +103,7 @@ class ProgramFolder:
 
     def locate_folder(self, name: str) -> PurePosixPath:
         """Return the path of a folder in this folder, from there on; FileMissingError if there is none."""
-        inside = self.locate(name)
-        if not _is(Path.is_dir, self._known_root() / inside):
-            raise FileMissingError(f"there is no folder {name!r} in the programs folder")
-        return inside
+        return self._locate(name, Path.is_dir, "folder")
 
     def beside(self, file: FoundFile, name: str) -> FoundFile:
         """Return the file that `file` refers to: by a path of the box, or by a name in the same folder.
@@ -179,6 +173,13 @@ class ProgramFolder:
                     elif entry.is_file(follow_symlinks=False):
                         yield inside / entry.name, entry.stat(follow_symlinks=False).st_size
 
+    def _locate(self, name: str, is_kind: Callable[[Path], bool], kind: str) -> PurePosixPath:
+        inside = self.locate(name)
+        with suppress(OSError):  # a name that is too long, a folder that may not be looked into
+            if is_kind(self._known_root() / inside):
+                return inside
+        raise FileMissingError(f"there is no {kind} {name!r} in the programs folder")
+
     @contextmanager
     def _opened(self, inside: PurePosixPath, problem: str) -> Iterator[int]:
         """Open a folder below this one; an OSError becomes a ProgramFileError with the problem."""
@@ -192,13 +193,6 @@ class ProgramFolder:
         if self._root is None:
             raise FileMissingError("the box has no programs, give it --programs DIR")
         return self._root
-
-
-def _is(kind: Callable[[Path], bool], path: Path) -> bool:
-    try:
-        return kind(path)
-    except OSError:  # a name that is too long, a folder that may not be looked into
-        return False
 
 
 # Files are read and written without following a link. Paths are resolved before, so that links which stay in

@@ -120,7 +120,7 @@ def _read_tree(tree: XmlTree) -> Installation:
         reader.output_rules(),
         0 if reader.attribute("SmoothTransitionSettings", "transitionHardness") == "HARD" else 1,
         reader.line_names(),
-        dict(_features(reader)),
+        dict(_features(reader, reader.first.get("Features", reader.first.get("GeomFeatures")))),
         {},
         tuple(reader.signals()),
         reader.safe_home(),
@@ -308,18 +308,11 @@ class _Reader:
         )
 
 
-def _features(file: _Reader) -> Iterator[tuple[str, installation.Feature]]:
-    """Yield the features of an installation with their names."""
-    container = file.first.get("Features", file.first.get("GeomFeatures"))
-    if container is not None:
-        yield from _features_in(file, container, "", is_variable=False)
-
-
-def _features_in(
-    file: _Reader, node: Element, name: str, *, is_variable: bool
+def _features(
+    file: _Reader, node: Element | None, name: str = "", *, is_variable: bool = False
 ) -> Iterator[tuple[str, installation.Feature]]:
-    """Yield the features in a node; a feature may stand in another node that has its name."""
-    for given in node:
+    """Yield the features in a node; one may stand in another node that has its name."""
+    for given in () if node is None else node:
         child = file.tree.resolve(given)
         inner_name = child.get("name") or name
         variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
@@ -330,7 +323,7 @@ def _features_in(
         if pose is not None and inner_name:
             yield inner_name, installation.Feature(pose, variable, is_taught)
         elif pose is None and given is child:
-            yield from _features_in(file, child, inner_name, is_variable=variable)
+            yield from _features(file, child, inner_name, is_variable=variable)
 
 
 def _pose_of(file: _Reader, node: Element) -> Vector6 | None:

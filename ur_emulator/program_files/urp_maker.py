@@ -15,16 +15,11 @@ from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 class Around:
     """What is around a node: the `<Move>` that waypoints belong to, if there is one.
 
-    `is_quiet`: labels say that the program does not stop at them.
+    `mark`: of the labels of nodes; "noBreak" says that the program does not stop at them.
     """
 
     move: Node | None = None
-    is_quiet: bool = False
-
-    @property
-    def mark(self) -> str:
-        """Mark of the label of a node."""
-        return "noBreak" if self.is_quiet else ""
+    mark: str = ""
 
 
 NodeWriter = Callable[["UrpMaker", Node, Around], None]

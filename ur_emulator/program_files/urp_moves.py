@@ -168,7 +168,7 @@ def _write_force(maker: UrpMaker, node: Node, around: Around) -> None:
     frame = frame_of(maker, node, feature_name(node), "tool_pose()")
     force_mode = f"force_mode({frame}, {lists[0]}, {lists[1]}, 2, {lists[2]})"
     maker.put(node, around, "Force", "sleep(0.02)", "zero_ftsensor()", force_mode)
-    maker.write_children(node, Around(around.move, is_quiet=True))
+    maker.write_children(node, Around(around.move, "noBreak"))
     maker.writer.add("end_force_mode()", "stopl(5.0)")
 
 
@@ -197,7 +197,7 @@ def _write_move(maker: UrpMaker, node: Node, around: Around) -> None:
     maker.put(node, around, motion)
     if node.get("useActiveTCP") == "false" and (tcp := node.find("tcp")) is not None:
         maker.writer.add(set_tcp(maker, node, tcp))
-    maker.write_children(node, Around(node, around.is_quiet))
+    maker.write_children(node, Around(node, around.mark))
 
 
 def set_tcp(maker: UrpMaker, node: Node, tcp: Element) -> str:

@@ -5,8 +5,8 @@ References are followed: a node has the content of the element that it stands fo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ur_emulator.budgets import BUDGETS
@@ -59,9 +59,17 @@ class Node:
         return None if found is None else self.tree.resolve(found)
 
 
-@dataclass(frozen=True, slots=True)
+_SUPPRESSED = frozenset({"SuppressedNode", "suppressedNode"})
+# Elements that give a variable its name.
+_VARIABLES = frozenset({"variable", "ProgramVariable"})
+
+
 class ProgramNodes:
-    """All nodes of a program.
+    """All nodes of a program, with the numbers of their labels.
+
+    Numbers follow the tree: values of variables, BeforeStart, main program, threads, events, sub-programs,
+    each depth first. Suppressed nodes have numbers too, and are left out. Source: program files and the
+    scripts that PolyScope saved beside them.
 
     Attributes:
         variables: the elements with the first values of variables.
@@ -72,78 +80,43 @@ class ProgramNodes:
         undefined: sub-programs whose files are missing; one line each.
     """
 
-    tree: XmlTree
-    variables: tuple[Element, ...]
-    before_start: Node | None
-    main: Node
-    others: tuple[Node, ...]
-    sub_programs: tuple[tuple[str, Node], ...]
-    functions: Mapping[Element, str]
-    names: Names
-    undefined: tuple[str, ...]
+    def __init__(self, tree: XmlTree, reader: ProgramReader) -> None:
+        """Read the nodes of a program.
 
-
-# --- from the tree of a program file to its nodes, with the numbers of their labels
-#
-# Numbers follow the tree: values of variables, BeforeStart, main program, threads, events, sub-programs, each
-# depth first. Suppressed nodes have numbers too, and are left out. Source: program files and the scripts that
-# PolyScope saved beside them.
-
-_SUPPRESSED = frozenset({"SuppressedNode", "suppressedNode"})
-# Elements that give a variable its name.
-_VARIABLES = frozenset({"variable", "ProgramVariable"})
-
-
-def read_nodes(tree: XmlTree, reader: ProgramReader) -> ProgramNodes:
-    """Return the nodes of a program.
-
-    UnknownNodeError for one of PolyScope 1.8, ProgramFileError without a main program, or beyond a limit.
-    """
-    if tree.root.tag == OLD_ROOT:
-        raise tree.unknown("a program of PolyScope 1.8")
-    return _NodeReader(reader).program(tree)
-
-
-@dataclass(slots=True)
-class _NodeReader:
-    reader: ProgramReader
-    last: int = 0
-    depth: int = 0
-    names: Names = field(default_factory=Names)
-    functions: dict[Element, str] = field(default_factory=dict)
-    waiting: list[tuple[XmlTree, Element]] = field(default_factory=list)
-    undefined: list[str] = field(default_factory=list)
-
-    def program(self, tree: XmlTree) -> ProgramNodes:
+        UnknownNodeError for one of PolyScope 1.8, ProgramFileError without a main program, or beyond a limit.
+        """
+        if tree.root.tag == OLD_ROOT:
+            raise tree.unknown("a program of PolyScope 1.8")
+        self.tree = tree
+        self.names = Names()
+        self.functions: dict[Element, str] = {}
+        self.undefined: list[str] = []
+        self._reader = reader
+        self._depth = 0
+        self._waiting: list[tuple[XmlTree, Element]] = []
         self._reserve_names(tree)
         top = tree.root.findall("children/*")
         first_values = tree.root.find("children/InitVariablesNode")
         variables = None if first_values is None else first_values.find("variables")
-        self.last = 0 if first_values is None else 1  # its number, also when it is empty
+        self.variables = () if variables is None else tuple(variables)
+        self._last = 0 if first_values is None else 1  # its number, also when it is empty
         before = [self._node(tree, one) for one in top if one.tag == "SpecialSequence"]
         for node in before:
             if node.get("type") != "BeforeStart":
                 raise tree.unknown(f"a sequence of type {node.get('type')!r}")
+        self.before_start = before[0] if before else None
         main = [self._node(tree, one) for one in top if one.tag == "MainProgram"]
         if not main:
             raise tree.error("there is no <MainProgram> in it")
+        self.main = main[0]
         known = ("InitVariablesNode", "SpecialSequence", "MainProgram", "Event", "SubProgram")
         others = [self._node(tree, one) for one in top if one.tag not in known]
         others += [self._node(tree, one) for one in top if one.tag == "Event"]
+        self.others = [node for node in others if node.kind not in _SUPPRESSED]
         for one in top:
             if one.tag == "SubProgram":
                 self._call(tree, one)
-        return ProgramNodes(
-            tree,
-            () if variables is None else tuple(variables),
-            before[0] if before else None,
-            main[0],
-            tuple(node for node in others if node.kind not in _SUPPRESSED),
-            tuple(self._sub_programs()),
-            self.functions,
-            self.names,
-            tuple(self.undefined),
-        )
+        self.sub_programs = list(self._sub_programs())
 
     def _reserve_names(self, tree: XmlTree) -> None:
         for element in tree.root.iter():
@@ -152,20 +125,20 @@ class _NodeReader:
 
     def _node(self, tree: XmlTree, element: Element, content: Element | None = None) -> Node:
         """Return the node that an element is; `content` is the element that has its nodes, if not itself."""
-        self.last += 1
-        if self.last > BUDGETS.program_marks:
+        self._last += 1
+        if self._last > BUDGETS.program_marks:
             raise tree.error(f"the program has more than {BUDGETS.program_marks} nodes")
-        self.depth += 1
-        if self.depth > BUDGETS.node_depth:
+        self._depth += 1
+        if self._depth > BUDGETS.node_depth:
             raise tree.error(f"nodes are nested more than {BUDGETS.node_depth} deep")
-        number = self.last
+        number = self._last
         content = tree.resolve(element) if content is None else content
         path = "suppressedNode/children/*" if element.tag in _SUPPRESSED else "children/*"
         children = [self._node(tree, child) for child in content.findall(path)]
         called = content.find("subprogram")
         if element.tag == "CallSubProgram" and called is not None:
             self._call(tree, called)
-        self.depth -= 1
+        self._depth -= 1
         return Node(element.tag, number, content, tree, tuple(_with_branches(children)))
 
     def _call(self, tree: XmlTree, element: Element) -> None:
@@ -176,10 +149,10 @@ class _NodeReader:
         if len(self.functions) >= BUDGETS.subprograms:
             raise tree.error(f"there are more than {BUDGETS.subprograms} sub-programs")
         self.functions[definition] = self.names.new(definition.get("name") or "SubProgram")
-        self.waiting.append((tree, definition))
+        self._waiting.append((tree, definition))
 
     def _sub_programs(self) -> Iterator[tuple[str, Node]]:
-        for tree, definition in self.waiting:  # it becomes longer with the calls in sub-programs
+        for tree, definition in self._waiting:  # it becomes longer with the calls in sub-programs
             own, body = self._body(tree, definition)
             yield self.functions[definition], self._node(own, definition, body)
 
@@ -190,13 +163,13 @@ class _NodeReader:
         if not file_name or not (is_empty or definition.get("keepSynchronizedWithDisk") == "true"):
             return tree, definition
         try:
-            file = self.reader.folder.beside(tree.file, file_name)
+            file = self._reader.folder.beside(tree.file, file_name)
         except FileMissingError as error:
             if is_empty:
                 name = self.functions[definition]
                 self.undefined.append(f"{tree.file.name}: sub-program {name!r} is missing: {error}")
             return tree, definition
-        other = self.reader.xml(file)
+        other = self._reader.xml(file)
         self._reserve_names(other)
         main = other.root.find("children/MainProgram")
         if main is None:

@@ -20,7 +20,7 @@ from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.script_writer import Header, Part, ScriptWriter, identifier
 from ur_emulator.program_files.urp_expressions import expression_of, variable_name
 from ur_emulator.program_files.urp_maker import Around, NodeKind, UrpMaker
-from ur_emulator.program_files.urp_nodes import Node, read_nodes
+from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 from ur_emulator.program_files.urp_robotiq import declare_functions
 
 KINDS: Mapping[str, NodeKind] = MappingProxyType(
@@ -80,7 +80,7 @@ def make_script(
         UnknownNodeError: a node is not known, and must not be skipped.
         ProgramFileError: something in the file is damaged, or a limit is exceeded.
     """
-    program = read_nodes(tree, reader)
+    program = ProgramNodes(tree, reader)
     maker = UrpMaker(program, installation, reader, KINDS, skip_unknown)
     writer, main = maker.writer, program.main
     name = identifier(tree.root.get("name") or tree.file.inside.stem)
