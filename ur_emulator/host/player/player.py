@@ -6,6 +6,7 @@ the box is switched on, the default installation of its folder says what is load
 
 import re
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
@@ -126,20 +127,14 @@ class ProgramPlayer:
         what = f"load {name}"
         if not stops:
             self._must_be_stopped(what)
-        try:
-            loaded, ready, set_up = yield from self._box.in_worker(
-                load_and_compile, self.folder, name, self.installation, self._catalogue, self._skip_unknown
-            )
-        except (EmulatorError, OSError) as error:
-            self._refuse(what, error)
+        loaded, ready, set_up = yield from self._read(what, load_and_compile, name, self._skip_unknown)
         if stops:
             with suppress(RefusedError):  # when the controller is not up, there is nothing to stop
                 yield from self.stop()
         installation = loaded.installation or self.installation
         yield from self._set_up(what, installation, set_up)
         self.loaded, self._ready = loaded, ready
-        self._box.note(f"Loaded program: {loaded.wire_path}")
-        for note in loaded.notes:
+        for note in (f"Loaded program: {loaded.wire_path}", *loaded.notes):
             self._box.note(note)
         self._use(installation, set_up)
         if isinstance(ready, ScriptFailed):
@@ -148,12 +143,7 @@ class ProgramPlayer:
     def _load_installation(self, name: str) -> Steps[None]:
         what = f"load installation {name}"
         self._must_be_stopped(what)
-        try:
-            installation, set_up = yield from self._box.in_worker(
-                load_installation_and_compile, self.folder, name, self.installation, self._catalogue
-            )
-        except (EmulatorError, OSError) as error:
-            self._refuse(what, error)
+        installation, set_up = yield from self._read(what, load_installation_and_compile, name)
         yield from self._set_up(what, installation, set_up)
         self._box.note(f"Loaded installation: {installation.wire_path}")
         self._use(installation, set_up)
@@ -221,6 +211,17 @@ class ProgramPlayer:
         finally:
             self._loading.remove(work)
 
+    def _read(self, what: str, read: Callable[..., T], name: str, *arguments: bool) -> Steps[T]:
+        """Read a file in the worker process; refuse the action if it cannot be used."""
+        try:
+            return (
+                yield from self._box.in_worker(
+                    read, self.folder, name, self.installation, self._catalogue, *arguments
+                )
+            )
+        except (EmulatorError, OSError) as error:
+            self._refuse(what, error)
+
     def _set_up(self, what: str, installation: Installation, set_up: CompileResult | None) -> Steps[None]:
         """Make an installation effective, and end when it is; not while a program runs."""
         self._must_be_stopped(what)  # the file has taken a while
@@ -237,8 +238,7 @@ class ProgramPlayer:
             self._declare(installation)
             self._box.start_alone(self._follow_inputs(installation.input_actions))
         if isinstance(set_up, ScriptFailed):
-            text = set_up.log_text or set_up.text
-            self._box.note(f"{installation.wire_path} has no effect: {text}")
+            self._box.note(f"{installation.wire_path} has no effect: {set_up.log_text or set_up.text}")
         elif set_up is not None:
             for setting in installation.safety.unwatched:
                 self._box.note(f"{installation.wire_path}: {setting} not watched")
@@ -301,22 +301,19 @@ class ProgramPlayer:
             self._refuse(what, PROGRAM_RUNS)
 
     def _must_be_able_to_play(self) -> None:
-        """Refuse to play while something stands against it."""
-        state, mode = self._box.controller.state, self._box.snapshot.robot_mode
-        if not state.safety.lets_programs_run:
-            self._refuse("play", "the robot is stopped for safety")
-        if mode != RobotMode.RUNNING:
-            self._refuse("play", f"the robot is in {RobotMode(mode).name}, it must be RUNNING")
-        if self.is_running and not self.is_paused:
-            self._refuse("play", "a program plays already")
-        if state.pendant.requests:
-            self._refuse("play", "a popup waits to be closed, or a question for its answer")
-        if self.is_paused:
-            return
-        if self.loaded is None:
-            self._refuse("play", "no program is loaded")
-        if self.loaded.undefined:
-            self._refuse("play", f"{self.loaded.undefined}; fill it in with PolyScope")
+        """Refuse to play while something stands against it: the first of these."""
+        state, mode = self._box.controller.state, RobotMode(self._box.snapshot.robot_mode)
+        undefined = "" if self.loaded is None else self.loaded.undefined
+        for stands, why in (
+            (not state.safety.lets_programs_run, "the robot is stopped for safety"),
+            (mode is not RobotMode.RUNNING, f"the robot is in {mode.name}, it must be RUNNING"),
+            (self.is_running and not self.is_paused, "a program plays already"),
+            (bool(state.pendant.requests), "a popup waits to be closed, or a question for its answer"),
+            (self.loaded is None and not self.is_paused, "no program is loaded"),
+            (bool(undefined) and not self.is_paused, f"{undefined}; fill it in with PolyScope"),
+        ):
+            if stands:
+                self._refuse("play", why)
 
     def _prepare(self, client: str) -> Steps[CompileResult]:
         """Return the loaded program ready to start; parts that PCs have are fetched now."""

@@ -116,33 +116,6 @@ class BoxFacts:
         return clock_time(self.timestamp)
 
 
-class ReportFolder:
-    """Where reports go."""
-
-    def __init__(self, programs: ProgramFolder) -> None:
-        self._folder = programs
-        self._temporary: TemporaryFolder | None = None
-        if not programs.exists:
-            remove_left_folders()
-
-    @property
-    def folder(self) -> ProgramFolder:
-        """The folder of programs; a box without one gets a temporary folder now."""
-        if not self._folder.exists:
-            try:
-                self._temporary = TemporaryFolder()
-            except OSError as error:
-                raise ProgramFileError(f"no temporary folder: {error.strerror or error}") from None
-            self._folder = ProgramFolder(self._temporary.path)
-        return self._folder
-
-    def close(self) -> None:
-        """Remove the temporary folder, if there is one, with what was written into it."""
-        temporary, self._temporary = self._temporary, None
-        if temporary is not None:
-            temporary.close()
-
-
 def save_log(folder: ProgramFolder, facts: BoxFacts) -> str:
     """Write the log, in place of what was written before; return the name of the file on the wire."""
     return folder.write(PurePosixPath(LOG_NAME), facts.log.encode("utf-8")).wire_path
@@ -216,16 +189,14 @@ def _write_report(folder: ProgramFolder, inside: PurePosixPath, data: bytes) -> 
 
 
 def _contents(facts: BoxFacts) -> dict[str, bytes]:
-    files = {
+    scripts = facts.interpreter | ({"program.script": facts.script} if facts.script else {})
+    return {
         LOG_NAME: facts.log.encode("utf-8"),
         "versions.json": _json(facts.versions),
         "programs.json": _json(facts.programs),
         "state.json": _json(facts.state),
+        **{name: text.encode("latin-1", "replace") for name, text in scripts.items()},
     }
-    files |= {name: text.encode("latin-1", "replace") for name, text in facts.interpreter.items()}
-    if facts.script:
-        files["program.script"] = facts.script.encode("latin-1", "replace")
-    return files
 
 
 def _json(value: Any) -> bytes:

@@ -4,10 +4,12 @@ import platform
 from collections.abc import Callable
 from typing import TypeVar
 
+from ur_emulator.errors import ProgramFileError
 from ur_emulator.host.player.player import ProgramPlayer
 from ur_emulator.host.reports import report_files
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
+from ur_emulator.program_files.folder import ProgramFolder
 from ur_hil import tool_version
 
 T = TypeVar("T")
@@ -22,7 +24,10 @@ class ReportWriter:
     def __init__(self, box: ServedBox, player: ProgramPlayer) -> None:
         self._box = box
         self._player = player
-        self._folder = report_files.ReportFolder(player.folder)
+        self._folder = player.folder
+        self._temporary: report_files.TemporaryFolder | None = None
+        if not self._folder.exists:
+            report_files.remove_left_folders()
         # Looked up now: a process without descriptors cannot do it later.
         self._versions = {
             "software": str(box.identity.software.version),
@@ -49,11 +54,20 @@ class ReportWriter:
 
     def close(self) -> None:
         """Remove what was written into a temporary folder."""
-        self._folder.close()
+        temporary, self._temporary = self._temporary, None
+        if temporary is not None:
+            temporary.close()
 
     def _written(self, write: Callable[..., T], *arguments: str) -> Steps[T]:
+        """Write a report in the worker process; a box without programs gets a temporary folder now."""
         facts = self._facts()
-        return (yield from self._box.in_worker(write, self._folder.folder, *arguments, facts))
+        if not self._folder.exists:
+            try:
+                self._temporary = report_files.TemporaryFolder()
+            except OSError as error:
+                raise ProgramFileError(f"no temporary folder: {error.strerror or error}") from None
+            self._folder = ProgramFolder(self._temporary.path)
+        return (yield from self._box.in_worker(write, self._folder, *arguments, facts))
 
     def _facts(self) -> report_files.BoxFacts:
         box, player = self._box, self._player
