@@ -153,7 +153,9 @@ class MemoryWatch:
         if now < self._next_look or any(_programs(one).is_releasing for one in (box, *self._grown)):
             return
         if self._ended is not None:
-            self._give_back(self._ended)
+            if self._ended is not box:
+                return  # its next cycle ends them
+            self._give_back(box)
             self._ended = None
         before, self._now = self._now, resident()
         self._collected = min(self._collected, self._now)

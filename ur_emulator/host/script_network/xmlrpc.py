@@ -218,15 +218,12 @@ class XmlRpcClient:
         self._busy[server] = None
 
     def make_room(self, server: XmlRpcServer) -> None:
-        """A server is about to connect; RemoteCallError if there are too many connections that are in use."""
+        """A server is about to connect: one that is idle gives its connection up, if there are too many.
+
+        The machine has seen to it that not all are in use.
+        """
         if len(self._connected) >= BUDGETS.remote_connections:
-            idle = next((other for other in self._connected if not other.is_busy), None)
-            if idle is None:
-                raise RemoteCallError(
-                    f"{BUDGETS.remote_connections} remote procedures of other handles are being called, "
-                    "wait for one of them"
-                )
-            idle.close()
+            next(other for other in self._connected if not other.is_busy).close()
         self._connected[server] = None
 
     def disconnected(self, server: XmlRpcServer) -> None:

@@ -363,7 +363,13 @@ class Network:
             self.requests.append(CloseSocket(socket.number))
 
     def begin_call(self, server: int, url: str, body: bytes, call: RemoteCall) -> None:
-        """Note a call."""
+        """Note a call; it fails at once if as many other servers are being called as may be connected."""
+        busy = {other for other, _ in self._calls.values()} - {server}
+        if len(busy) >= (most := BUDGETS.remote_connections):
+            call.finish(
+                None, f"{most} remote procedures of other handles are being called, wait for one of them"
+            )
+            return
         number = next(self._numbers)
         self._calls[number] = server, call
         self.requests.append(CallProcedure(server, url, number, body))
