@@ -19,10 +19,9 @@ from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.host.script_network import xmlrpc as module
-from ur_emulator.machine.scripting import network
 from ur_emulator.machine.commands.programs import StopProgram
 from ur_emulator.machine.models.generations import CB3, E_SERIES
-from ur_emulator.machine.scripting import rpc_builtins
+from ur_emulator.machine.scripting import network, rpc_builtins
 
 
 class FakeCall:

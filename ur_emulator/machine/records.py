@@ -14,7 +14,7 @@ from typing import Any, Final
 from zlib import crc32
 
 from ur_emulator.errors import EmulatorError
-from ur_emulator.machine.commands import client_writes, power, programs, safety, surroundings
+from ur_emulator.machine.commands import client_writes, grippers, power, programs, safety, surroundings
 from ur_emulator.machine.controller.safety import boundaries, inputs, safety_state
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.machine import Answer, Input, Machine
@@ -24,7 +24,18 @@ from urscript.catalogue import Catalogue
 from urscript.compile.interpreter_mode import CompiledStatements, compile_statements
 from urscript.errors import ScriptError
 
-_ROOMS = (client_writes, power, programs, safety, surroundings, network, boundaries, inputs, safety_state)
+_ROOMS = (
+    client_writes,
+    grippers,
+    power,
+    programs,
+    safety,
+    surroundings,
+    network,
+    boundaries,
+    inputs,
+    safety_state,
+)
 # All classes whose objects an input may consist of, by name.
 RECORDS: Final[Mapping[str, type[Any]]] = {
     name: value
@@ -44,9 +55,11 @@ def to_plain(value: Any) -> Any:
     kind = type(value)
     if value is None or kind in (bool, int, float, str):
         return value
-    if kind in (tuple, list):
+    if kind is tuple:
         return [to_plain(item) for item in value]
     match value:
+        case list():
+            return {"@": "list", "items": [to_plain(item) for item in value]}
         case bytes():
             return {"@": "bytes", "latin": value.decode("latin-1")}
         case CompiledProgram():
@@ -93,6 +106,8 @@ def _from_plain(plain: Any, machine: Machine, catalogue: Catalogue) -> Any:
     if not isinstance(plain, dict):
         return plain
     match plain:
+        case {"@": "list", "items": list(items)}:
+            return [_from_plain(item, machine, catalogue) for item in items]
         case {"@": "bytes", "latin": str(text)}:
             return text.encode("latin-1")
         case {"@": "program", "name": str(name), "text": str(text)}:
