@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from walk_box import KINDS, WalkBox, rtde
+from walk_box import JOURNAL, KINDS, WalkBox, rtde
 from walk_programs import KEPT_OUTPUT, program, statements_of
 from walk_rules import BrokenRule, Rules
 
@@ -22,6 +22,8 @@ sys.path.append(str(Path(__file__).parent.parent / "ur_emulator"))
 from dashboard_support import external_control, installation, urp
 
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from ur_emulator.host.replay import replay
+from ur_emulator.machine.commands.client_writes import WriteInputs
 
 LOADED = 9  # program files of a walk; the last one asks a PC for its program
 
@@ -352,9 +354,19 @@ class Walker:
 
 
 def walk(made: Walk, show: Callable[[str], object] = lambda text: None) -> tuple[int, AssertionError] | None:
-    """Walk; return the step that broke a rule and what it was, or None."""
+    """Walk, then replay the journal; return the step that broke a rule and what it was, or None."""
+    with _tempdir() as folder:
+        found = _walk(made, folder, show)
+        if found is None:
+            replayed = replay(folder / JOURNAL)
+            if replayed.difference is not None or replayed.end:
+                return len(made.steps) - 1, BrokenRule(f"the journal does not explain the walk: {replayed}")
+    return found
+
+
+def _walk(made: Walk, folder: Path, show: Callable[[str], object]) -> tuple[int, AssertionError] | None:
     kind = KINDS[made.kind]
-    with _tempdir() as folder, contextlib.closing(WalkBox(kind, made.seed, folder)) as box:
+    with contextlib.closing(WalkBox(kind, made.seed, folder)) as box:
         for number, text in enumerate(made.files):
             body = text.replace("{port}", str(box.port))
             (folder / f"walk{number}.script").write_text(body)
@@ -364,7 +376,11 @@ def walk(made: Walk, show: Callable[[str], object] = lambda text: None) -> tuple
             urp(external_control("127.0.0.1", str(box.port)), name="external")
         )
         (folder / "default.installation").write_bytes(installation())
-        box.controller.state.io.digital_out |= 1 << KEPT_OUTPUT
+        kept = (
+            ("standard_digital_output_mask", 1 << KEPT_OUTPUT),
+            ("standard_digital_output", 1 << KEPT_OUTPUT),
+        )
+        box.served.submit(WriteInputs(kept))
         box.tick(3)
         walker = Walker(box)
         for index, step in enumerate(made.steps):

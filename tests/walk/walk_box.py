@@ -23,6 +23,7 @@ from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.controller.events import Event
 from ur_emulator.machine.controller.snapshot import Snapshot
 
+JOURNAL = "walk.journal"
 _HANG = 30.0  # s of real time; no walk waits for it
 
 
@@ -62,10 +63,12 @@ class WalkBox:
     def __init__(self, kind: Kind, seed: int, programs: Path, fidelity: str = "typical") -> None:
         options = BoxOptions(
             kind.robot, kind.version, port_base=None, seed=seed, programs=programs, fidelity=fidelity,
-            tool=kind.tool, services=kind.services,
+            tool=kind.tool, services=kind.services, journal=programs / JOURNAL,
         )  # fmt: skip
         self._loop = EventLoop(precise=False)
         self._box = Box(options, loop=self._loop)
+        assert self._box._journal is not None
+        self._box._journal._waits = True
         self._box.on_end = self._loop.stop
         self.served = self._box._box
         self.served._pacer, self.served._repeats = self, False

@@ -129,7 +129,8 @@ def _header(options: BoxOptions) -> dict[str, Any]:
     given = {field.name: getattr(options, field.name) for field in fields(options)}
     box = {name: value for name, value in given.items() if name not in _OUTSIDE}
     box = {name: list(value) if name == "services" else value for name, value in box.items()}
-    box = {name: str(value) if isinstance(value, Path | Pace) else value for name, value in box.items()}
+    box = {name: str(value) if isinstance(value, Path) else value for name, value in box.items()}
+    box["pace"] = Pace(box["pace"]).value
     files = {
         word: Path(word).read_text(encoding="utf-8")
         for name in FILES

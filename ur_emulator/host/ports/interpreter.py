@@ -5,7 +5,7 @@ Clients take turns, so that one that sends thousands of lines does not keep othe
 """
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from protocol import interpreter
@@ -16,7 +16,7 @@ from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.commands.programs import AbortMove, AppendStatements, SkipStatements
-from ur_emulator.machine.controller.command import BoxParts, Command, Result
+from ur_emulator.machine.controller.command import Command
 from ur_emulator.machine.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.program_files.compiling import compile_line
 
@@ -46,19 +46,6 @@ class _Line:
     def cost(self) -> int:
         """What it is counted with [bytes]."""
         return _LINE_COST + len(self.text)
-
-
-@dataclass(frozen=True, slots=True)
-class _Noted:
-    """A command, and what is called as it is applied."""
-
-    command: Command
-    begun: Callable[[], object]
-
-    def apply(self, box: BoxParts) -> Result:
-        """Apply it."""
-        self.begun()
-        return self.command.apply(box)
 
 
 class InterpreterIntake:
@@ -126,18 +113,17 @@ class InterpreterIntake:
         if word in self._asking:
             self._asking[word].append(client)
             return
-        clients = self._asking[word] = [client]
+        self._asking[word] = [client]
 
         def done(_: object, error: Exception | None) -> None:
             answer = interpreter.acknowledge(self._queue.last_interpreted, word.value)
-            for each, count in Counter(clients).items():
+            for each, count in Counter(self._asking.pop(word)).items():
                 if error is None:
                     _send(each, count * answer)
-                elif not isinstance(error, NotRunningError):
+                else:
                     each.failed(error)
 
-        noted = _Noted(command, lambda: self._asking.pop(word))
-        self._box.steps.start(self._box.apply(noted), done)
+        self._box.submit(command, done)
 
     # --- lines
 
