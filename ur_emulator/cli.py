@@ -243,9 +243,7 @@ def serve(
 
 
 @app.command(
-    epilog=examples(
-        "ur-emulator serve --journal session.journal", "ur-emulator replay session.journal --until 75"
-    )
+    epilog=examples("ur-emulator replay session.journal", "ur-emulator replay session.journal --until 75")
 )
 def replay(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A journal, as `serve --journal` writes it.")],

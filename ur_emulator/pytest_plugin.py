@@ -45,6 +45,7 @@ OPTIONS = (
     "services",
     "tool",
     "scene",
+    "journal",
     "control_port",
     "control_token",
     "in_process",

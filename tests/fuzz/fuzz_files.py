@@ -38,6 +38,7 @@ from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.scripting.network import Network
 from ur_emulator.machine.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.program_files.compiling import load_and_compile
 from ur_emulator.program_files.folder import ProgramFolder
@@ -262,7 +263,10 @@ class _Answers:
         self._server = socket.create_server(("127.0.0.1", 0))
         self._server.setblocking(False)
         self._loop = EventLoop(precise=False)
-        self._network = LoopNetwork(self._loop, CB3.period_s, self._report, "127.0.0.1")
+        self._network = network = Network()
+        self._outside = LoopNetwork(
+            self._loop, network, CB3.period_s, network.take, self._report, "127.0.0.1"
+        )
         self._clock = Clock(CB3, 0)
         self._defects = []
 
@@ -289,6 +293,7 @@ class _Answers:
         finally:
             answering.close()
             remotes.end()
+            self._outside.carry_out(self._network.take_requests())
         assert not self._defects, self._defects
 
     def _answer(self, data):
@@ -308,6 +313,7 @@ class _Answers:
 
     def _turn(self):
         self._clock.advance()
+        self._outside.carry_out(self._network.take_requests())
         for service in tuple(self._loop._services):
             service.advance(time.monotonic())
         self._loop.call_soon(_nothing, _raise)  # so that it does not wait

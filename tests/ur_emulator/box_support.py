@@ -5,7 +5,6 @@ import struct
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -18,8 +17,10 @@ from ur_emulator.host.served_box import BoxIdentity, ServedBox
 from ur_emulator.machine.commands.programs import StartProgram
 from ur_emulator.machine.controller.command import Submitted
 from ur_emulator.machine.controller.controller import SETTLE_TIME, Controller
+from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.generations import CB3
 from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.scripting.network import Network
 from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
@@ -172,14 +173,20 @@ class Bench:
         return printed(self.events)
 
 
+def machine_of(controller):
+    """A machine that has this controller; what its scripts open is the bench's."""
+    machine = Machine.__new__(Machine)
+    machine.controller, machine.network = controller, Network()
+    return machine
+
+
 class BareBox(ServedBox):
     """A box without a loop, for its ports; what they submit is appended to `submitted`."""
 
     def __init__(self, software, controller, submitted):
         self.submitted = submitted
         identity = BoxIdentity(software, "UR3", "UR3", "20993000007")
-        machine = SimpleNamespace(controller=controller)
-        super().__init__(machine, identity, RealtimePacer(controller.period_s), None, None)
+        super().__init__(machine_of(controller), identity, RealtimePacer(controller.period_s), None, None)
 
     def submit(self, command, done=None, *, in_place_of="", urgent=True):
         self.submitted.append(command if done is None else Submitted(command, done))

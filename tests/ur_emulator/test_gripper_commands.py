@@ -5,7 +5,7 @@ from ast import literal_eval
 from dataclasses import astuple
 
 import pytest
-from box_support import FakeConnection
+from box_support import FakeConnection, machine_of
 from e_series_support import ESeriesBench
 
 from protocol import modbus
@@ -45,7 +45,7 @@ class Served(ServedBox):
         controller = self.bench.controller
         software = E_SERIES.software(SoftwareVersion(5, 25))
         identity = BoxIdentity(software, "UR5e", "UR5", "20993000007")
-        super().__init__(controller, identity, RealtimePacer(controller.period_s), None, None)
+        super().__init__(machine_of(controller), identity, RealtimePacer(controller.period_s), None, None)
         self.attach((self.steps,))
         self.journal = []
         robotiq, onrobot = controller.state.grippers
@@ -55,7 +55,7 @@ class Served(ServedBox):
 
     def cycle(self, n=1):
         for _ in range(n):
-            self.journal.append([submitted.command for submitted in self._commands.values()])
+            self.journal.append([command for command, _ in self._commands.values()])
             self.advance(len(self.journal) * (self.controller.period_s + 1e-9))  # a little after its deadline
 
     def call(self, name, *arguments):
