@@ -115,8 +115,8 @@ class ServedBox:
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         # Commands for the next cycle, by the name under which a later one replaces them, or by an object.
         self._commands: dict[object, tuple[Command, Done]] = {}
-        # Those that are no reason for a cycle, and what has arrived for scripts.
-        self._quiet: list[Command] = []
+        # Those that are no reason for a cycle, and, for a journal, what has arrived for scripts.
+        self._quiet: list[tuple[Command, Done]] = []
         self._arrived: list[Arrival] = []
         self._is_urged = False
         # What is to act in a later cycle: its number, then the order in which they came.
@@ -182,12 +182,13 @@ class ServedBox:
 
     def submit_quietly(self, command: Command) -> None:
         """Take a command for the next cycle, whenever that is: it is no reason for time to pass."""
-        self._quiet.append(command)
+        self._quiet.append((command, self._report_error))
 
     def arrive(self, arrival: Arrival) -> None:
         """Take what has arrived for a script; it is one of the inputs of the next cycle."""
         self.machine.take(arrival)
-        self._arrived.append(arrival)
+        if self.keep is not None:
+            self._arrived.append(arrival)
 
     def schedule(self, tick: int, command: Command, done: Done) -> None:
         """Take a command for the cycle of that number; in lockstep it is no reason for time to pass.
@@ -397,15 +398,14 @@ class ServedBox:
 
     def _tick(self) -> Answer:
         """Advance the machine by a cycle, and do what it asks for."""
-        arrived, self._arrived = self._arrived, []
-        quiet, self._quiet = self._quiet, []
-        submitted, self._commands = self._commands, {}
-        self._is_urged = False
-        commands = [*((command, self._report_error) for command in quiet), *submitted.values()]
+        commands = [*self._quiet, *self._commands.values()] if self._quiet or self._commands else []
         inputs: list[Input] = [command for command, _ in commands]
+        if commands:
+            self._quiet, self._commands, self._is_urged = [], {}, False
         answer = self.machine.tick(inputs)
         if self.keep is not None:
-            self.keep((*arrived, *inputs), answer)
+            self.keep((*self._arrived, *inputs), answer)
+            self._arrived = []
         for (_, done), (result, error) in zip(commands, answer.outcomes, strict=True):
             done(result, error)
         if answer.requests and self.network is not None:

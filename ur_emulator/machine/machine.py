@@ -11,9 +11,9 @@ a journal holds and `ur-emulator replay` proves.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from ur_emulator.machine.controller.command import Command, Result, Submitted
 from ur_emulator.machine.controller.controller import Controller
@@ -32,8 +32,7 @@ Input = Command | Arrival
 Outcome = tuple[Result, Exception | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """What a cycle gives; `outcomes` are those of the commands, in their order."""
 
     snapshot: Snapshot
@@ -81,16 +80,12 @@ class Machine:
     def tick(self, inputs: Iterable[Input] = ()) -> Answer:
         """Advance one control cycle. Commands act in their order; arrivals come before them."""
         outcomes: list[Outcome] = []
-
-        def done(result: Result, error: Exception | None) -> None:
-            outcomes.append((result, error))
-
-        commands = []
+        commands: list[Command] = []
         for one in inputs:
-            if isinstance(one, Arrival):
-                self.network.take(one)
+            if isinstance(one, Command):
+                commands.append(Submitted(one, lambda *outcome: outcomes.append(outcome)))
             else:
-                commands.append(Submitted(one, done))
+                self.network.take(one)
         snapshot = self.controller.tick(commands)
         return Answer(snapshot, self.controller.state.events.take(), self.network.take_requests(), outcomes)
 

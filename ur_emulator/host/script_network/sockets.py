@@ -316,7 +316,8 @@ class ScriptConnection(OutgoingConnection):
     def _received(self, data: bytes) -> None:
         self._arrive(BytesArrived(self._number, data))
         self._buffers.received(len(data))
-        self.read_on()
+        if not self._buffers.may_receive(self._unread):
+            self.read_on()
 
     def _count_unsent(self) -> None:
         before = self._counted_unsent

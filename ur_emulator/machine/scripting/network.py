@@ -406,9 +406,12 @@ class Network:
 
     # --- what the door does
 
-    def take_requests(self) -> list[Request]:
+    def take_requests(self) -> Sequence[Request]:
         """Return the requests of the cycle that has ended; what it has sent is taken for delivered."""
-        requests, self.requests = self.requests, []
+        requests = self.requests
+        if not requests:
+            return ()
+        self.requests = []
         for socket in self._senders:
             self._set_unsent(socket, socket.waiting)
         self._senders.clear()
@@ -417,30 +420,25 @@ class Network:
     def take(self, arrival: Arrival) -> None:
         """Take what comes from outside; what is for something that scripts have closed is dropped."""
         match arrival:
-            case CallEnded(call, value, error):
-                if (running := self._calls.pop(call, None)) is not None:
+            case BytesArrived(number, data):
+                if (socket := self._sockets.get(number)) is not None:
+                    socket.inbox += data
+            case SocketOpened(number, is_own):
+                if (socket := self._sockets.get(number)) is not None:
+                    socket.is_connecting, socket.is_open, socket.is_own = False, True, is_own
+            case SocketClosed(number, problem):
+                if (socket := self._sockets.get(number)) is not None:
+                    socket.is_connecting, socket.is_open, socket.problem = False, False, problem
+            case BytesUnsent(number, n_bytes):
+                if (socket := self._sockets.get(number)) is not None:
+                    socket.waiting = n_bytes
+                    self._set_unsent(socket, n_bytes)
+            case CallEnded(number, value, error):
+                if (running := self._calls.pop(number, None)) is not None:
                     running[1].finish(value, error)
-                return
-            case SignalServed(number):
+            case SignalServed(number, values, trouble, device_error, connection_error):
                 if (signal := self._signals.get(number)) is not None:
-                    signal.served(
-                        arrival.values, arrival.trouble, arrival.device_error, arrival.connection_error
-                    )
-                return
-        socket = self._sockets.get(arrival.socket)
-        if socket is None:
-            return
-        match arrival:
-            case BytesArrived(_, data):
-                socket.inbox += data
-            case SocketOpened(_, is_own):
-                socket.is_connecting, socket.is_open, socket.is_own = False, True, is_own
-            case SocketClosed(_, problem):
-                socket.is_connecting = socket.is_open = False
-                socket.problem = problem
-            case BytesUnsent(_, n_bytes):
-                socket.waiting = n_bytes
-                self._set_unsent(socket, n_bytes)
+                    signal.served(values, trouble, device_error, connection_error)
 
     def unread(self, socket: int) -> int:
         """Return how many bytes of a socket no script has read."""
