@@ -253,9 +253,22 @@ def test_what_is_no_journal_is_refused_in_one_line(file, text, told):
         replay(file)
 
 
-def test_an_input_that_is_none_ends_the_replay(session):
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"@": "os.system", "command": "true"},
+        {"@": "OperateGrippers", "units": [9], "operation": "__init__", "values": []},
+        {"@": "program", "name": "p", "text": "def p(:"},
+        {"@": "Push", "force": [1e9, 0, 0]},
+        {"@": "Push"},
+        ["Push"],
+        7,
+    ],
+    ids=str,
+)
+def test_an_input_that_is_none_ends_the_replay(session, given):
     lines = lines_of(session)
-    lines[10]["i"] = [{"@": "os.system", "command": "true"}]
+    lines[10]["i"] = [given]
     write(session, lines)
     assert "no input" in replay(session).end
 

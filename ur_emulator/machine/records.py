@@ -15,6 +15,7 @@ from zlib import crc32
 
 from ur_emulator.errors import EmulatorError
 from ur_emulator.machine.commands import client_writes, grippers, power, programs, safety, surroundings
+from ur_emulator.machine.controller.command import Command
 from ur_emulator.machine.controller.safety import boundaries, inputs, safety_state
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.machine import Answer, Input, Machine
@@ -89,6 +90,8 @@ def to_input(plain: Any, machine: Machine, catalogue: Catalogue) -> Input:
     """
     try:
         found: Input = _from_plain(plain, machine, catalogue)
+        if not isinstance(found, Command | network.Arrival):
+            raise TypeError("it is no command, and nothing that arrives")
         return found
     except (LookupError, TypeError, ValueError, AttributeError, EmulatorError, ScriptError) as error:
         raise RecordError(f"no input: {str(plain)[:80]} ({error})") from None

@@ -2,20 +2,24 @@
 
 from dataclasses import dataclass
 
+from ur_emulator.errors import ArgumentError
 from ur_emulator.machine.controller.command import BoxParts, Result
+
+# What changes a gripper: of Robotiq `set`, of OnRobot the others.
+OPERATIONS = frozenset({"set", "grip", "stop", "set_offset", "cycle_power"})
 
 
 @dataclass(frozen=True, slots=True)
 class OperateGrippers:
-    """Have each gripper with one of the units do something.
-
-    `operation` is a method of its kind that changes it (of Robotiq `set`; of OnRobot `grip`, `stop`,
-    `set_offset` and `cycle_power`), `values` are its arguments.
-    """
+    """Have each gripper with one of the units do something; `values` are the arguments of the operation."""
 
     units: tuple[int, ...]
     operation: str
     values: tuple[object, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.operation not in OPERATIONS:
+            raise ArgumentError(f"operation {self.operation!r} given: allowed are {sorted(OPERATIONS)}")
 
     def apply(self, box: BoxParts) -> None:
         for gripper in box.state.grippers:
