@@ -138,7 +138,7 @@ def test_grippers_are_explained(file):
                 assert client.recv(3) == b"ack"
             box.run_program("def p():\n  sleep(2)\nend\n", wait=True)
             client.sendall(b"GET POS\n")
-            assert client.recv(20).startswith(b"POS 2")
+            assert int(client.recv(20).split()[1]) > 100
         with connect(box, "modbus") as client:
             client.sendall(bytes.fromhex("000100000006ff0600800102"))
             assert len(client.recv(12)) == 12
