@@ -26,6 +26,7 @@ from ur_emulator.host.control_api.operations import BoxOperations
 
 if TYPE_CHECKING:
     from ur_emulator.host.pacing import Pace
+    from ur_emulator.machine.commands.operation import Operation
     from ur_emulator.machine.controller.command import Command, Done
     from ur_emulator.machine.models.robot_generation import RobotGeneration
 
@@ -49,7 +50,7 @@ class Rack(Protocol):
         """Where a box is served, and as what."""
         ...
 
-    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+    def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
         ...
 
@@ -164,10 +165,10 @@ class BoxControl(BoxOperations):
     def _served_at(self) -> ServedAt:
         return self._rack.served_at(self._index)
 
-    def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
+    def _perform(self, operation: Operation[Any]) -> Any:
         __tracebackhide__ = True
         try:
-            return self._rack.perform(self._index, name, arguments)
+            return self._rack.perform(self._index, operation)
         except EmulatorError as error:
             raise error.with_traceback(None) from None  # pytest shows the line of the test only
 

@@ -61,8 +61,8 @@ def test_a_method_hands_all_its_arguments_on(name):
     asked = {}
 
     class Recorder(BoxOperations):
-        def _perform(self, name, arguments):
-            asked[name] = arguments
+        def _perform(self, operation):
+            asked[operation.api_name] = operation.as_given
             return {"tick": 3}
 
     operation = OPERATIONS[name]

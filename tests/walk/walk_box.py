@@ -16,6 +16,7 @@ from typing import Any
 from ur_emulator.errors import EmulatorError
 from ur_emulator.host.box import Box
 from ur_emulator.host.box_options import BoxOptions
+from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.pacing import Situation
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.steps import Steps
@@ -162,7 +163,7 @@ class WalkBox:
 
     def perform(self, name: str, /, **arguments: object) -> None:
         """Have an operation of the control API done, in a cycle or some; what is refused is refused."""
-        self._do(lambda done: self._box.operations.begin(name, arguments, done))
+        self._do(lambda done: self._box.operations.begin(make(name, arguments), done))
 
     def steps(self, steps: Steps[Any]) -> None:
         """Have done what the player does in steps."""

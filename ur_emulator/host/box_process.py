@@ -16,7 +16,7 @@ import threading
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING, Any
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
 from ur_emulator.host.box_log import MAX_ENTRIES, LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt
-from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.runtime.processes import Child, Pipe, Role, framed, read_message, start_child
 
 if TYPE_CHECKING:
     from ur_emulator.host.rack import LoopRack
+    from ur_emulator.machine.commands.operation import Operation
     from ur_emulator.machine.controller.command import Command, Done
 
 # How long the user's process waits for boxes that were told to end [s].
@@ -103,14 +103,13 @@ class ProcessRack:
         """Where a box is served, and as what."""
         return self._served[index]
 
-    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+    def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
-        operation = make(name, arguments)
         if threading.current_thread() is self._reader:
             raise ControlError(
-                f"{name} called in the thread of the box's log, which cannot wait: use `submit`"
+                f"{operation.api_name} called in the thread of the box's log, which cannot wait: use `submit`"
             )
-        return self._request("perform", index, name, {key: getattr(operation, key) for key in arguments})
+        return self._request("perform", index, operation)
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Submit a command for the next cycle; `done` is called in a thread of its own."""
@@ -342,8 +341,8 @@ class _Link:
         match message:
             case ("stop",):
                 self._rack.stop()
-            case ("perform", number, index, name, arguments):
-                self._rack.boxes[index].operations.begin(name, arguments, partial(self._answer, number))
+            case ("perform", number, index, operation):
+                self._rack.boxes[index].operations.begin(operation, partial(self._answer, number))
             case ("submit", number, index, command):
                 self._rack.boxes[index].submit(command, partial(self._answer, number))
             case ("news", number):

@@ -5,7 +5,7 @@ spread over the period.
 """
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,6 +16,7 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.pacing import Pace
 from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.host.runtime.memory import MemoryWatch, own_process
+from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.controller.command import Command, Done
 
 _LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
@@ -129,9 +130,9 @@ class LoopRack:
         """Where a box is served, and as what."""
         return self.boxes[index].served_at
 
-    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+    def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done, from any thread but that of the loop; return its result."""
-        return self.boxes[index].operations.perform(name, arguments)
+        return self.boxes[index].operations.perform(operation)
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Submit a command for the next cycle, from any thread."""

@@ -9,6 +9,7 @@ import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,7 +19,7 @@ from ur_emulator.host.box_log import printable
 from ur_emulator.host.box_options import TOKEN_VARIABLE, check_token
 from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
 from ur_emulator.host.control_api.operations import OPERATIONS, make
-from ur_emulator.host.control_api.step_operations import read_script
+from ur_emulator.host.control_api.step_operations import ReadLog, read_script
 from ur_emulator.machine.commands.operation import Kind, Parameter
 from ur_hil.command_line import ExitCode
 
@@ -44,13 +45,14 @@ def main(words: Sequence[str]) -> int:
     as_json, follow = given.pop("json", False), given.pop("follow", False)
     try:
         check_token(token)
-        arguments = _arguments(name, given)
+        operation = make(name, _arguments(name, given))
     except (EmulatorError, OSError, UnicodeError) as error:
         return _complain(error, ExitCode.WRONG_USAGE)
     try:
-        if follow:
-            _follow(client, arguments, as_json)
-        result = client.whole_log(arguments) if name == "log" else client.perform(name, arguments)
+        if isinstance(operation, ReadLog):
+            result = _follow(client, operation, as_json) if follow else client.whole_log(operation)
+        else:
+            result = client.perform(operation)
     except KeyboardInterrupt:
         return ExitCode.DONE if follow else ExitCode.INTERRUPTED
     except ControlError as error:
@@ -171,7 +173,7 @@ def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
 
 
 def _arguments(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what was given as JSON has it; ArgumentError if it does not fit."""
+    """Return what was given as JSON has it."""
     arguments: dict[str, Any] = {}
     for parameter in OPERATIONS[name].parameters:
         if (path := given.get(f"{parameter.name}_file")) is not None:
@@ -179,17 +181,16 @@ def _arguments(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
         elif parameter.name in given:
             value = given[parameter.name]
             arguments[parameter.name] = parameter.parse(value if isinstance(value, str) else " ".join(value))
-    make(name, arguments)
     return arguments
 
 
-def _follow(client: ControlClient, arguments: dict[str, Any], as_json: bool) -> NoReturn:
+def _follow(client: ControlClient, asked: ReadLog, as_json: bool) -> NoReturn:
     """Print the log and what is added to it until Ctrl-C."""
     while True:
-        result = client.perform("log", arguments)
+        result = client.perform(asked)
         for entry in result["entries"]:
             print(json.dumps(entry) if as_json else _log_line(entry), flush=True)
-        arguments["after"] = result["next"]
+        asked = replace(asked, after=result["next"])
         if len(result["entries"]) < BUDGETS.log_entries:
             time.sleep(_FOLLOW_PERIOD)
 

@@ -5,16 +5,15 @@ Where the port has a token, a request must show it.
 
 import hmac
 from collections.abc import Mapping
-from typing import Any
 from urllib.parse import parse_qsl
 
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError, WaitTimeoutError
-from ur_emulator.host.control_api.operations import OPERATIONS, describe
+from ur_emulator.host.control_api.operations import OPERATIONS, describe, make
 from ur_emulator.host.control_api.runner import OperationRunner
+from ur_emulator.host.control_api.step_operations import WaitUntil
 from ur_emulator.host.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.steps import Steps
-from ur_emulator.machine.commands.operation import Operation
 
 PREFIX = "/v1/"
 LIST = "operations"
@@ -35,14 +34,22 @@ class ControlAnswers:
     def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
         """Do an operation; a client that has gone does not keep a wait alive."""
         self._check(request.headers)
-        name, arguments = parse_request(request)
+        method, name = request.method, request.path.removeprefix(PREFIX)
+        if not request.path.startswith(PREFIX) or name not in (LIST, *OPERATIONS):
+            text = f"there is no {ascii(request.path)[:60]}: GET {PREFIX}operations lists what there is"
+            raise HttpError(404, text)
+        allowed = "GET" if name == LIST or OPERATIONS[name].only_reads else "POST"
+        if method != allowed:
+            raise HttpError(405, f"{name} is asked with {allowed}, not {method[:20]}", ("Allow", allowed))
         if name == LIST:
             return HttpAnswer(200, {"operations": describe()})
-        steps = self._runner.steps(name, arguments)
         try:
+            given = _from_query(name, request.query) if method == "GET" else request.json_object()
+            operation = make(name, given)
+            steps = self._runner.steps(operation)
             while True:
                 next(steps)
-                if connection.has_ended and name == "wait_until":
+                if connection.has_ended and isinstance(operation, WaitUntil):
                     connection.close()  # it may have gone, and the wait may take an hour
                 if not connection.is_open:
                     return _GONE
@@ -62,26 +69,6 @@ class ControlAnswers:
             )
 
 
-def parse_request(request: HttpRequest) -> tuple[str, Mapping[str, Any]]:
-    """Return the operation that a request names, or `LIST`, and its arguments, not yet checked.
-
-    HttpError if the request is refused.
-    """
-    path = request.path
-    name = path.removeprefix(PREFIX) if path.startswith(PREFIX) else ""
-    operation = OPERATIONS.get(name)
-    if operation is None and name != LIST:
-        raise HttpError(404, f"there is no {ascii(path)[:60]}: GET {PREFIX}operations lists what there is")
-    allowed = "GET" if operation is None or operation.only_reads else "POST"
-    if request.method != allowed:
-        raise HttpError(405, f"{name} is asked with {allowed}, not {request.method[:20]}", ("Allow", allowed))
-    if operation is None:
-        return name, {}
-    if allowed == "GET":
-        return name, _from_query(operation, request.query)
-    return name, request.json_object()
-
-
 def shows_token(authorization: str, token: str) -> bool:
     """Return whether a header `Authorization: Bearer TOKEN` shows the token."""
     scheme, _, shown = authorization.partition(" ")
@@ -89,18 +76,18 @@ def shows_token(authorization: str, token: str) -> bool:
     return scheme.lower() == "bearer" and is_equal
 
 
-def _from_query(operation: type[Operation[Any]], query: str) -> dict[str, Any]:
-    parameters = {parameter.name: parameter for parameter in operation.parameters}
+def _from_query(name: str, query: str) -> dict[str, object]:
+    parameters = {parameter.name: parameter for parameter in OPERATIONS[name].parameters}
     try:
         given = parse_qsl(query, keep_blank_values=True, max_num_fields=20)
     except ValueError:
         raise HttpError(400, "the query has too many fields") from None
-    return {name: parameters[name].parse(text) if name in parameters else text for name, text in given}
+    return {key: parameters[key].parse(text) if key in parameters else text for key, text in given}
+
+
+# The first that an error is.
+_STATUS = ((ArgumentError, 400), (WaitTimeoutError, 408), (RefusedError, 409), (NotRunningError, 503))
 
 
 def _status_of(error: EmulatorError) -> int:
-    if isinstance(error, ArgumentError):
-        return 400
-    if isinstance(error, RefusedError):
-        return 408 if isinstance(error, WaitTimeoutError) else 409
-    return 503 if isinstance(error, NotRunningError) else 500
+    return next((status for kind, status in _STATUS if isinstance(error, kind)), 500)

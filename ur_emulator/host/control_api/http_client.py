@@ -6,6 +6,7 @@ import http.client
 import json
 import socket
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
@@ -16,8 +17,8 @@ from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTi
 from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import ServedAt
 from ur_emulator.host.control_api.box_state import BoxState, Question, ThingNow
-from ur_emulator.host.control_api.operations import OPERATIONS, make
-from ur_emulator.host.control_api.step_operations import ReadState, WaitUntil
+from ur_emulator.host.control_api.step_operations import ReadIdentity, ReadLog, ReadState, WaitUntil
+from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.models.things import BodyShape, Contact
 
 if TYPE_CHECKING:
@@ -38,14 +39,14 @@ class ControlClient:
         self.port = port
         self._headers = {} if token is None else {"Authorization": f"Bearer {token}"}
 
-    def perform(self, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    def perform(self, operation: Operation[Any]) -> dict[str, Any]:
         """Have an operation done; return its result.
 
         ArgumentError and RefusedError are those of the box; ControlError: it was not done for another reason,
         such as that no box answers.
         """
-        make(name, arguments)
-        given = {key: value for key, value in arguments.items() if value is not None}
+        name = operation.api_name
+        given = {key: value for key, value in operation.as_given.items() if value is not None}
         body = json.dumps(given)
         if len(body) > BUDGETS.body_bytes:
             raise ArgumentError(
@@ -55,7 +56,7 @@ class ControlClient:
         patience = None if given.get("wait") else PATIENCE + float(given.get("timeout", 0.0))
         connection = http.client.HTTPConnection(self.host, self.port, timeout=patience)
         try:
-            if OPERATIONS[name].only_reads:
+            if operation.only_reads:
                 query = f"?{urlencode(given)}" if given else ""
                 connection.request("GET", f"/v1/{name}{query}", headers=self._headers)
             else:
@@ -79,15 +80,15 @@ class ControlClient:
         text = str(result.get("error", result)) if isinstance(result, dict) else str(result)
         raise _ERRORS.get(response.status, ControlError)(text)
 
-    def whole_log(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    def whole_log(self, asked: ReadLog) -> dict[str, Any]:
         """Return all entries of the log as one result of `log`; the box gives some at a time."""
         entries: list[Any] = []
         while True:
-            result = self.perform("log", arguments)
+            result = self.perform(asked)
             entries += result["entries"]
             if len(result["entries"]) < BUDGETS.log_entries:
                 return {**result, "entries": entries}
-            arguments = {**arguments, "after": result["next"]}
+            asked = replace(asked, after=result["next"])
 
 
 _ERRORS = {400: ArgumentError, 408: WaitTimeoutError, 409: RefusedError}
@@ -102,7 +103,7 @@ class AttachedBox:
     def __init__(self, host: str, port: int, token: str | None) -> None:
         """Ask it who it is; ControlError if no box answers there, or not without its token."""
         self._client = ControlClient(host, port, token)
-        facts = self._client.perform("identity", {})
+        facts = self._client.perform(ReadIdentity())
         ports = facts["ports"]
         self._served_at = ServedAt(
             title=f"{facts['robot']} {facts['software']}",
@@ -126,10 +127,10 @@ class AttachedBox:
         """Where it is served, and as what."""
         return self._served_at
 
-    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+    def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
-        result = self._client.perform(name, arguments)
-        return _state_of(result) if OPERATIONS[name] in (ReadState, WaitUntil) else result
+        result = self._client.perform(operation)
+        return _state_of(result) if isinstance(operation, ReadState | WaitUntil) else result
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Raise ControlError: it takes operations only."""
@@ -137,7 +138,7 @@ class AttachedBox:
 
     def log(self, index: int) -> tuple[LogEntry, ...]:
         """Return the last entries of the log, the oldest first."""
-        entries = self._client.whole_log({})["entries"]
+        entries = self._client.whole_log(ReadLog())["entries"]
         return tuple(LogEntry(**{**entry, "level": ReportLevel[entry["level"]]}) for entry in entries)
 
     def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
@@ -145,7 +146,7 @@ class AttachedBox:
         raise ControlError("the log of a box that was attached cannot be followed: use `ctl log --follow`")
 
     def end_of(self, index: int) -> tuple[bool, Exception | None]:
-        """Nobody tells."""
+        """Tell that it has not ended: nobody says so."""
         return False, None
 
 

@@ -9,9 +9,8 @@ it, and `NotRunningError` when the box does not run; all of them are `EmulatorEr
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, overload
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from ur_emulator.errors import ArgumentError
 from ur_emulator.host.box_log import LogEntry
@@ -30,17 +29,10 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
     def call(box: BoxOperations, /, *args: P.args, **kwargs: P.kwargs) -> R:
         __tracebackhide__ = True
         try:
-            bound = signature.bind(*args, **kwargs)
+            signature.bind(*args, **kwargs)
         except TypeError as error:
-            takes = f"it takes {', '.join(signature.parameters)}" if signature.parameters else "it takes none"
-            raise ArgumentError(f"{call.__name__}: {error}; {takes}") from None
-        bound.apply_defaults()
-        # Read here: the box must not wait for a disk.
-        given = {
-            name: steps.read_script(value) if isinstance(value, Path) else value
-            for name, value in bound.arguments.items()
-        }
-        result: Any = box._perform(call.__name__, given)
+            raise ArgumentError(f"{call.__name__}: {error}; {_takes(signature.parameters)}") from None
+        result: Any = box._perform(operation(*args, **kwargs))
         returned: R = result["tick"] if isinstance(result, dict) else result
         return returned
 
@@ -55,35 +47,29 @@ def method(operation: Callable[P, Operation[R]]) -> Callable[Concatenate[BoxOper
     return call
 
 
-class ReadProperty(Generic[R]):
-    """The property for an operation that only reads; `read` asks for it, if not the loop."""
+class ReadProperty(property):
+    """The property for an operation that only reads."""
 
-    def __init__(
-        self, operation: Callable[[], Operation[R]], read: Callable[[BoxOperations], R] | None = None
-    ) -> None:
-        self.operation = operation
-        self.__doc__ = inspect.getdoc(operation)
-        self.__name__ = ""
-        self._read = read
+    operation: type[Operation[Any]]
 
-    @overload
-    def __get__(self, box: None, owner: type) -> Self: ...
-    @overload
-    def __get__(self, box: BoxOperations, owner: type) -> R: ...
-    def __get__(self, box: BoxOperations | None, owner: type) -> R | Self:
-        if box is None:
-            return self
+
+def reading(operation: type[Operation[R]], read: Callable[[BoxOperations], R] | None = None) -> R:
+    """Return the property for an operation that only reads; `read` asks for it, if not the loop."""
+
+    def ask(box: BoxOperations) -> Any:
         __tracebackhide__ = True
-        if self._read is not None:
-            return self._read(box)
-        result: R = box._perform(self.__name__, {})
-        return result
+        return box._perform(operation())
+
+    made = ReadProperty(read or ask)
+    made.__doc__ = inspect.getdoc(operation)
+    made.operation = operation
+    return cast(R, made)
 
 
 class BoxOperations:
     """What people and tests do to a box."""
 
-    def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
+    def _perform(self, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
         raise NotImplementedError
 
@@ -92,9 +78,9 @@ class BoxOperations:
         raise NotImplementedError
 
     # --- what is going on
-    state = ReadProperty(steps.ReadState)
-    log = ReadProperty(steps.ReadLog, lambda box: box._log_entries())
-    identity = ReadProperty(steps.ReadIdentity)
+    state = reading(steps.ReadState)
+    log = reading(steps.ReadLog, lambda box: box._log_entries())
+    identity = reading(steps.ReadIdentity)
     wait_until = method(steps.WaitUntil)
     at = method(steps.At)
     # --- inputs
@@ -149,24 +135,28 @@ class BoxOperations:
 OPERATIONS: dict[str, type[Operation[Any]]] = {}
 for _name, _member in vars(BoxOperations).items():
     if hasattr(_member, "operation"):
-        _member.__name__ = _name
         OPERATIONS[_name] = _member.operation
+        _member.__name__ = _member.operation.api_name = _name
 
 
 def make(name: str, arguments: Mapping[str, Any]) -> Operation[Any]:
     """Return an operation as it was asked for; ArgumentError if its name or an argument is wrong."""
     if name not in OPERATIONS:
         raise ArgumentError(f"there is no operation {ascii(name)[:60]}: choose from {', '.join(OPERATIONS)}")
-    rows = OPERATIONS[name].parameters
-    known = [row.name for row in rows]
+    rows = {row.name: row for row in OPERATIONS[name].parameters}
     for given in arguments:
-        if given not in known:
-            takes = f"it takes {', '.join(known)}" if known else "it takes none"
-            raise ArgumentError(f"{name} has no parameter {ascii(given)[:60]}: {takes}")
-    for row in rows:
+        if given not in rows:
+            raise ArgumentError(f"{name} has no parameter {ascii(given)[:60]}: {_takes(rows)}")
+    for row in rows.values():
         if row.is_required and row.name not in arguments:
             raise ArgumentError(f"{name} needs {row.name}: {row.allowed}")
-    return OPERATIONS[name](**arguments)
+    operation = OPERATIONS[name](**arguments)
+    object.__setattr__(operation, "given", tuple(arguments))
+    return operation
+
+
+def _takes(names: Iterable[str]) -> str:
+    return f"it takes {', '.join(names) or 'none'}"
 
 
 def describe() -> list[dict[str, Any]]:

@@ -4,16 +4,14 @@ All is done in the thread of the loop, step by step as cycles pass.
 """
 
 import threading
-from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
 from ur_emulator.errors import ControlError, NotRunningError
-from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.steps import Finished, Steps, settle
-from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.commands.operation import CommandOperation, Operation
 from ur_emulator.machine.controller.events import LogAdded
 
 # Longest value of an argument in the log, in characters.
@@ -30,10 +28,12 @@ class OperationRunner:
         self._awaited: set[Future[Any]] = set()
         self._is_closed = False
 
-    def perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
+    def perform(self, operation: Operation[Any]) -> Any:
         """Do an operation, from any thread but the loop's; return its result, or raise ControlError."""
         if self._loop.is_own_thread:
-            raise ControlError(f"{name} called in the thread of the box, which cannot wait: use `submit`")
+            raise ControlError(
+                f"{operation.api_name} called in the thread of the box, which cannot wait: use `submit`"
+            )
         future: Future[Any] = Future()
         with self._lock:
             if self._is_closed or not self._loop.is_running:
@@ -44,7 +44,7 @@ class OperationRunner:
 
         def start() -> None:
             if not self._is_closed:
-                self.begin(name, arguments, settle(future))
+                self.begin(operation, settle(future))
 
         self._loop.call_soon_threadsafe(start, future.set_exception)
         try:
@@ -53,20 +53,18 @@ class OperationRunner:
             with self._lock:
                 self._awaited.discard(future)
 
-    def begin(self, name: str, arguments: Mapping[str, Any], finished: Finished) -> None:
+    def begin(self, operation: Operation[Any], finished: Finished) -> None:
         """Begin with an operation, in the thread of the loop; `finished` gets its result or its error."""
-        self._context.box.steps.start(self.steps(name, arguments), finished)
+        self._context.box.steps.start(self.steps(operation), finished)
 
-    def steps(self, name: str, arguments: Mapping[str, Any]) -> Steps[Any]:
-        """Check the arguments of an operation, write it into the log, do it, and return its result."""
+    def steps(self, operation: Operation[Any]) -> Steps[Any]:
+        """Write an operation into the log, do it, and return its result."""
         box = self._context.box
-        operation = make(name, arguments)
         if operation.is_logged and not operation.only_reads:
-            given = {key: getattr(operation, key) for key in arguments}
-            box.announce(LogAdded("Control", _shown(name, given)))
+            box.announce(LogAdded("Control", _shown(operation)))
         if isinstance(operation, StepOperation):
             return (yield from operation.steps(self._context))
-        assert isinstance(operation, Command)
+        assert isinstance(operation, CommandOperation)
         result = yield from box.apply(operation)
         return {**(result or {}), "tick": box.snapshot.tick}
 
@@ -80,12 +78,11 @@ class OperationRunner:
                 future.set_exception(NotRunningError())
 
 
-def _shown(name: str, arguments: Mapping[str, Any]) -> str:
+def _shown(operation: Operation[Any]) -> str:
     """Return an operation as one line for the log."""
-    words = [name]
-    for key, value in arguments.items():
-        if value is None:
-            continue
-        text = " ".join(str(value).split())
-        words.append(f"{key}={text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + '...'}")
+    words = [operation.api_name]
+    for key, value in operation.as_given.items():
+        if value is not None:
+            text = " ".join(str(value).split())
+            words.append(f"{key}={text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + '...'}")
     return " ".join(words)

@@ -273,6 +273,11 @@ class RunProgram(StepOperation[int]):
     wait: bool = parameter("return when the program has ended, with its error if it has one", default=False)
     result: ClassVar[str] = "`program`: its name, and `tick`: the cycle in which it began"
 
+    def __post_init__(self) -> None:
+        if isinstance(self.script, Path):  # read here: the box must not wait for a disk
+            object.__setattr__(self, "script", read_script(self.script))
+        super().__post_init__()
+
     def steps(self, context: Context) -> Steps[Any]:
         """Compile and start a text, or play a file as the dashboard does; what runs is stopped before."""
         box, player, asked = context.box, context.player, monotonic()

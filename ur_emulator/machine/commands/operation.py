@@ -2,15 +2,15 @@
 
 The first sentence of its docstring is its sentence; its fields are its parameters (`parameter`); they are
 checked when the record is made. Methods of `ControlBox`, the HTTP API, `ur-emulator ctl` and docs/control.md
-follow from that (`control.operations`). The command line imports all of them: nothing heavy here.
+follow from that (`control_api.operations`). The command line imports all of them: nothing heavy here.
 """
 
 from __future__ import annotations
 
 import json
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
 from inspect import getdoc
 from itertools import islice
@@ -54,10 +54,26 @@ class Kind(Enum):
     OBJECT = "JSON object"
 
 
-# Kinds of parameters by the type of their field, beside those that `_details_of` takes apart.
-_KINDS = {float: Kind.NUMBER, int: Kind.INTEGER, bool: Kind.BOOLEAN, str: Kind.TEXT}
+# Kinds of parameters by the type of their field; one of several types, beside None, is an ANSWER.
+_KINDS: Mapping[Any, Kind] = {
+    float: Kind.NUMBER,
+    int: Kind.INTEGER,
+    bool: Kind.BOOLEAN,
+    str: Kind.TEXT,
+    Literal: Kind.CHOICE,
+    tuple: Kind.VECTOR,
+    Sequence: Kind.VECTOR,
+    Mapping: Kind.OBJECT,
+}
+# How a word of a command line or a query is read; the other kinds are texts.
+_READERS: Mapping[Kind, Callable[[str], Any]] = {
+    Kind.NUMBER: float,
+    Kind.INTEGER: int,
+    Kind.OBJECT: json.loads,
+    Kind.ANSWER: json.loads,
+}
 # Characters of a text such as a log line or a popup, and of a program.
-_LENGTHS = {Kind.TEXT: 1000, Kind.SCRIPT: 500_000}
+_LENGTHS = {Kind.TEXT: 1000, Kind.SCRIPT: 500_000, Kind.ANSWER: 1000}
 # How far computing puts a number that lies on a bound beyond it, as a share of the bound; or in its unit.
 _ROUNDING = 1e-9
 _COUNTS = {(3, 3): "three", (6, 6): "six", (0, 3): "up to three"}
@@ -85,14 +101,6 @@ class Parameter:
     high: float | None = None
     choices: tuple[str, ...] = ()
     lengths: tuple[int, int] = (3, 3)
-
-    @classmethod
-    def of(cls, declared: Field[Any], annotation: Any) -> Parameter:
-        """Return what a field of an operation, made with `parameter`, declares; `annotation` is its type."""
-        details = {**_details_of(annotation), **declared.metadata}
-        if details.get("choices"):
-            details["kind"] = Kind.CHOICE
-        return cls(declared.name, default=declared.default, **details)
 
     @property
     def is_required(self) -> bool:
@@ -134,58 +142,40 @@ class Parameter:
 
     def parse(self, text: str) -> Any:
         """Return what a word of a command line or a query means; `check` still has to look at it."""
-        match self.kind:
-            case Kind.BOOLEAN:
-                return _WORDS.get(text.lower(), text)
-            case Kind.NUMBER:
-                return _or_text(float, text)
-            case Kind.INTEGER:
-                return _or_text(int, text)
-            case Kind.VECTOR:
-                return [_or_text(float, word) for word in text.replace(",", " ").split()]
-            case Kind.OBJECT:
-                return _or_text(json.loads, text)
-            case Kind.ANSWER:
-                value = _or_text(json.loads, text)
-                return value if isinstance(value, bool | int | float | str) else text
-            case _:
-                return text
+        if self.kind is Kind.BOOLEAN:
+            return _WORDS.get(text.lower(), text)
+        if self.kind is Kind.VECTOR:
+            return [_read(float, word) for word in text.replace(",", " ").split()]
+        value = _read(_READERS.get(self.kind, str), text)
+        return text if self.kind is Kind.ANSWER and not isinstance(value, int | float | str) else value
 
     def _checked(self, value: Any) -> Any:
         """Return the value, or None if it does not fit."""
         match self.kind:
-            case Kind.BOOLEAN:
-                return bool(value) if value in (True, False) and isinstance(value, int) else None
-            case Kind.INTEGER:
-                return value if isinstance(value, int) and self._number(value) is not None else None
-            case Kind.NUMBER:
-                return self._number(value)
-            case Kind.CHOICE:
-                return value if isinstance(value, str) and value in self.choices else None
-            case Kind.TEXT | Kind.SCRIPT:
-                return value if _is_text(value, _LENGTHS[self.kind]) else None
-            case Kind.VECTOR:
-                return self._vector(value)
-            case Kind.ANSWER:
-                fits = isinstance(value, bool) or _is_number(value) or _is_text(value, _LENGTHS[Kind.TEXT])
-                return value if fits else None
-            case Kind.OBJECT:
-                return dict(value) if isinstance(value, Mapping) and _is_json(value) else None
+            case Kind.BOOLEAN if isinstance(value, int) and value in (True, False):
+                return bool(value)
+            case Kind.NUMBER if _is_number(value):
+                return self._in_range(float(value))
+            case Kind.INTEGER if isinstance(value, int) and _is_number(value):
+                return None if self._in_range(float(value)) is None else value
+            case Kind.CHOICE if isinstance(value, str) and value in self.choices:
+                return value
+            case Kind.TEXT | Kind.SCRIPT | Kind.ANSWER if _is_text(value, _LENGTHS[self.kind]):
+                return value
+            case Kind.ANSWER if isinstance(value, bool) or _is_number(value):
+                return value
+            case Kind.OBJECT if isinstance(value, Mapping) and _is_json(value):
+                return dict(value)
+            case Kind.VECTOR if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping):
+                least, most = self.lengths
+                numbers = tuple(islice(value, most + 1))
+                if least <= len(numbers) <= most and all(map(_is_number, numbers)):
+                    vector = tuple(map(float, numbers))
+                    return None if self._in_range(hypot(*vector)) is None else vector
+        return None
 
-    def _number(self, value: Any) -> float | None:
-        low, high = -inf if self.low is None else self.low, inf if self.high is None else self.high
-        return within(float(value), low, high) if _is_number(value) else None
-
-    def _vector(self, value: Any) -> tuple[float, ...] | None:
-        if not isinstance(value, Iterable) or isinstance(value, str | bytes | Mapping):
-            return None
-        least, most = self.lengths
-        numbers = tuple(islice(value, most + 1))
-        if not (least <= len(numbers) <= most and all(map(_is_number, numbers))):
-            return None
-        vector = tuple(map(float, numbers))
-        fits = self.high is None or within(hypot(*vector), high=self.high) is not None
-        return vector if fits else None
+    def _in_range(self, value: float) -> float | None:
+        return within(value, -inf if self.low is None else self.low, inf if self.high is None else self.high)
 
 
 def within(value: float, low: float = -inf, high: float = inf) -> float | None:
@@ -211,25 +201,24 @@ def parameter(
     Without a default it must be given. `details` are `kind`, `choices` or `lengths`, where the type of the
     field does not say them.
     """
+    if "choices" in details:
+        details["kind"] = Kind.CHOICE
     declared = {"meaning": meaning, "unit": unit, "low": low, "high": high, **details}
     return field(default=default, metadata=declared)
 
 
 def _details_of(annotation: Any) -> dict[str, Any]:
     """Return the kind of a field by its type, and what else the type defines."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
+    origin, arguments = get_origin(annotation) or annotation, get_args(annotation)
     if origin in (Union, UnionType):
-        types = [one for one in arguments if one is not NoneType]
-        return _details_of(types[0]) if len(types) == 1 else {"kind": Kind.ANSWER}
+        first, *others = (one for one in arguments if one is not NoneType)
+        return {"kind": Kind.ANSWER} if others else _details_of(first)
+    details: dict[str, Any] = {"kind": _KINDS[origin]}
     if origin is Literal:
-        return {"kind": Kind.CHOICE, "choices": arguments}
+        details["choices"] = arguments
     if origin is tuple:
-        return {"kind": Kind.VECTOR, "lengths": (len(arguments), len(arguments))}
-    if origin is Sequence:
-        return {"kind": Kind.VECTOR}
-    if origin is Mapping:
-        return {"kind": Kind.OBJECT}
-    return {"kind": _KINDS[annotation]}
+        details["lengths"] = (len(arguments), len(arguments))
+    return details
 
 
 def _is_json(value: Mapping[Any, Any]) -> bool:
@@ -257,9 +246,9 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _or_text(kind: Any, text: str) -> Any:
+def _read(reader: Callable[[str], Any], text: str) -> Any:
     try:
-        return kind(text)
+        return reader(text)
     except (ValueError, RecursionError):
         return text
 
@@ -275,6 +264,8 @@ class Operation(Generic[R_co]):
         result: what the JSON object that it returns holds.
         only_reads: it changes nothing: a property in Python, GET in HTTP.
         is_logged: the box's log shows that it was asked for.
+        api_name: its name in the control API, "" without one.
+        given: names of the arguments that were given, which the log shows; all, unless `make` made it.
 
     Raises:
         ArgumentError: when one is made with a value that does not fit.
@@ -285,18 +276,29 @@ class Operation(Generic[R_co]):
     result: ClassVar[str] = "`tick`: the cycle in which it was applied"
     only_reads: ClassVar[bool] = False
     is_logged: ClassVar[bool] = True
+    api_name: ClassVar[str] = ""
+    given: tuple[str, ...]
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         dataclass(frozen=True)(cls)
         types = get_type_hints(cls)
-        cls.parameters = tuple(Parameter.of(field, types[field.name]) for field in fields(cls))  # type: ignore[arg-type]
+        cls.parameters = tuple(
+            Parameter(row.name, default=row.default, **{**_details_of(types[row.name]), **row.metadata})
+            for row in fields(cls)  # type: ignore[arg-type]
+        )
+        cls.given = tuple(row.name for row in cls.parameters)
         cls.meaning = (getdoc(cls) or "").partition("\n")[0]
 
     def __post_init__(self) -> None:
         for row in self.parameters:
             object.__setattr__(self, row.name, row.check(getattr(self, row.name)))
         self.check_together()
+
+    @property
+    def as_given(self) -> dict[str, Any]:
+        """The arguments that were given, checked."""
+        return {name: getattr(self, name) for name in self.given}
 
     def check_together(self) -> None:
         """Raise ArgumentError for parameters that fit one by one but not together."""
