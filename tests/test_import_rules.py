@@ -55,8 +55,7 @@ MACHINE_ORDER = (
     {"kinematics"},
     {"motion"},
     {"plant"},
-    {"tools"},
-    {"controller"},
+    {"controller", "tools"},
     {"scripting"},
     {"commands"},
     {"machine"},
@@ -129,6 +128,8 @@ PROTOCOL_ORDER = (
 )
 ORDERS = {
     "ur_emulator": BOX_ORDER,
+    "ur_emulator.machine": MACHINE_ORDER,
+    "ur_emulator.host": HOST_ORDER,
     "ur_emulator.machine.controller": CONTROLLER_ORDER,
     "urscript": LANGUAGE_ORDER,
     "protocol": PROTOCOL_ORDER,

@@ -37,6 +37,7 @@ from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
 from ur_emulator.machine.plant.exact import ExactPlant
 from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.tools import SUPPLY
+from ur_hil.arithmetic import add_up
 from ur_hil.tools import ToolModel
 from urscript.run.host import Host
 from urscript.run.waits import Outside
@@ -102,7 +103,7 @@ def make_snapshot(
         analog_values=analog.values,
         analog_domains=analog.domains,
         tool_output_voltage=io.tool_voltage,
-        gripper_current=sum(g.supply_current for g in state.grippers) if state.grippers else 0.0,
+        gripper_current=add_up(g.supply_current for g in state.grippers) if state.grippers else 0.0,
         tool_output_modes=io.tool_output_modes,
         tool_line=io.tool_line,
         euromap_inputs=euromap.inputs,

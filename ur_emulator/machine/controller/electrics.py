@@ -11,6 +11,7 @@ from protocol.ur_types import RobotMode
 from ur_emulator.machine.controller.robot_mode import POWERED
 from ur_emulator.machine.models.robot_generation import Electrics, RobotGeneration
 from ur_emulator.machine.models.robot_model import Vector6
+from ur_hil.arithmetic import add_up
 
 # The part of the joints' currents that shows on the arm's bus, as the drives chop.
 BUS_SHARE = 0.1
@@ -24,7 +25,7 @@ ROOM_TEMPERATURE, BOARD_RISE, BOARD_TIME = 24.0, 8.0, 900.0
 
 def arm_current(supply: Electrics, joint_currents: Iterable[float]) -> float:
     """Return the current on the arm's bus [A] for those of the joints."""
-    return supply.idle_current + BUS_SHARE * sum(map(abs, joint_currents))
+    return supply.idle_current + BUS_SHARE * add_up(map(abs, joint_currents))
 
 
 def board_temperature(timestamp: float) -> float:

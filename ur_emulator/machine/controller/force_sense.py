@@ -18,6 +18,7 @@ from protocol.pose import rotvec_to_matrix
 from ur_emulator.machine.controller.settings import ToolSettings
 from ur_emulator.machine.models.robot_generation import RobotGeneration
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
+from ur_hil.arithmetic import add_up
 
 # --- a force sensor at the flange whose readings come through the RTDE input `external_force_torque`
 #
@@ -192,8 +193,8 @@ class ForceSense:
 
 
 def _mean(vectors: Sequence[Sequence[float]]) -> list[float]:
-    return [sum(column) / len(vectors) for column in zip(*vectors, strict=True)]
+    return [add_up(column) / len(vectors) for column in zip(*vectors, strict=True)]
 
 
 def _along(vector: Sequence[float], direction: Sequence[float]) -> float:
-    return sum(v * d for v, d in zip(vector, direction, strict=True))
+    return add_up(v * d for v, d in zip(vector, direction, strict=True))

@@ -12,6 +12,7 @@ from ur_emulator.machine.models.robot_generation import RobotGeneration
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion.generators import JointTarget
 from ur_emulator.machine.plant.arm_plant import PlantState
+from ur_hil.arithmetic import add_up
 
 # How far back a script may ask for joint positions [s]; the real buffer's length is not known.
 HISTORY_TIME = 1.0
@@ -69,7 +70,7 @@ class PastCycles:
             return ZERO6
         # The polynomial of second order that is orthogonal to a constant and to a line.
         squares = [(i - 0.5 * (n - 1)) ** 2 for i in range(n)]
-        weights = [square - sum(squares) / n for square in squares]
-        scale = 2.0 / (sum(w * w for w in weights) * self._generation.period_s**2)
+        weights = [square - add_up(squares) / n for square in squares]
+        scale = 2.0 / (add_up(w * w for w in weights) * self._generation.period_s**2)
         latest = islice(self.q_history, n)
-        return six([scale * sum(map(mul, weights, joint)) for joint in zip(*latest, strict=True)])
+        return six([scale * add_up(map(mul, weights, joint)) for joint in zip(*latest, strict=True)])

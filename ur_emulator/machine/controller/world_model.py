@@ -15,6 +15,7 @@ import numpy as np
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_to_matrix
 from ur_emulator.machine.controller.settings import Payload, ToolSettings
 from ur_emulator.machine.models.robot_model import ZERO6, six
+from ur_hil.arithmetic import add_up
 
 WORLD, BASE, FLANGE, TCP = "world", "base", "flange", "tcp"
 _OWN = (WORLD, BASE, FLANGE, TCP)
@@ -144,7 +145,7 @@ class WorldModel:
             for name, payload in self._masses.items()
             if FLANGE in self._chain(name) and payload.mass > 0.0
         ]
-        mass = sum(payload.mass for payload, _ in parts)
+        mass = add_up(payload.mass for payload, _ in parts)
         if not parts:
             return Payload()
         places = [np.array(pose_trans(pose, (*payload.cog, 0.0, 0.0, 0.0))[:3]) for payload, pose in parts]

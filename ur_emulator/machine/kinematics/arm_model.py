@@ -19,6 +19,7 @@ from ur_emulator.machine.models.calibration import NOMINAL, Calibration, calibra
 from ur_emulator.machine.models.joint_range import JointRange
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
 from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_hil.arithmetic import add_up
 
 # --- wrenches at other points
 
@@ -220,7 +221,7 @@ class ArmModel:
             for branch in closed_form_inverse(self.robot.dh, rotation, position, near[5])
             if (start := self._into_range(branch, near)) is not None
         ]
-        starts.sort(key=lambda start: sum((a - b) ** 2 for a, b in zip(start, near, strict=True)))
+        starts.sort(key=lambda start: add_up((a - b) ** 2 for a, b in zip(start, near, strict=True)))
         for start in starts:
             found = self._refine(start, position, rotation)
             if found is not None and (inside := self._into_range(found, near)) is not None:

@@ -29,6 +29,7 @@ from zlib import crc32
 import numpy as np
 
 from ur_emulator.errors import ModelError
+from ur_hil.arithmetic import add_up
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import Items, checked, nearest, number, record, whole, word
 
@@ -157,7 +158,7 @@ class Fidelity:
         if self.drive_damping is not None and not self.drive_lag:
             raise ValueError("drive_damping", "a filter of second order has a lag; give drive_lag above 0")
         for joint in range(6):
-            slope = sum(2.0**0.5 * ripple.rms for ripple in self.ripples if joint in ripple.joints)
+            slope = add_up(2.0**0.5 * ripple.rms for ripple in self.ripples if joint in ripple.joints)
             if slope > _LARGEST_SLOPE:
                 raise ValueError(
                     "ripples",

@@ -19,6 +19,7 @@ from ur_emulator.machine.motion.leg import Leg
 from ur_emulator.machine.motion.path import JointLine, JointPath, PoseLine, PosePath, ToolPath, measure, times
 from ur_emulator.machine.motion.path_samples import JOINT_SPEED_SHARE, Sample, reaches_end, sample_path
 from ur_emulator.machine.motion.tool import UnreachableError
+from ur_hil.arithmetic import add_up
 
 # Above this angle the arc of a movep would be too narrow: the cubic is used [rad].
 _SHARPEST_ARC = 0.9 * pi
@@ -243,7 +244,7 @@ def _corner(start: Pose, slope: Vector6, end: Pose, end_slope: Vector6, waypoint
         return None
     if abs(r - r2) > 1e-6 * min(r, r2):
         return None
-    cosine = sum(x * y for x, y in zip(d1, d2, strict=True))
+    cosine = add_up(x * y for x, y in zip(d1, d2, strict=True))
     angle = acos(max(-1.0, min(1.0, cosine)))
     if angle < 1e-4 or angle > _SHARPEST_ARC:
         return None

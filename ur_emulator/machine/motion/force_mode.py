@@ -34,6 +34,7 @@ from protocol.pose import Pose, pose_add, pose_sub, rotvec_to_matrix
 from ur_emulator.machine.models.robot_generation import ForceSensing
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion.tool import Tool
+from ur_hil.arithmetic import add_up
 
 Axes = NDArray[np.float64]
 
@@ -245,7 +246,7 @@ class ForceMode:
 
         `position_error` is that of the joints (6,) [rad].
         """
-        if self.frame.axes is None or _LONGEST_LEVER * sum(map(abs, position_error)) < self._tightest:
+        if self.frame.axes is None or _LONGEST_LEVER * add_up(map(abs, position_error)) < self._tightest:
             return None
         off = np.abs(_block_diagonal(self.frame.axes).T @ self.tool.twist(q, position_error))
         limits = np.maximum(self._limits, _LEAST_DEVIATION)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ur_emulator.errors import PlantError
 from ur_emulator.machine.models.mjcf import FLANGE, GRAVITY, LINKS, PAYLOAD
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6
+from ur_hil.arithmetic import add_up
 from ur_hil.tools import ToolModel
 
 # --- the payload body of a compiled MuJoCo arm
@@ -129,7 +130,7 @@ class Loads:
     def _weigh(self) -> None:
         """Compute what hangs on the flange beyond what is declared, and whether something is unexpected."""
         loads = [*self._true, (-self._declared[0], self._declared[1])]
-        self._excess_force = GRAVITY * sum(mass for mass, _ in loads)
+        self._excess_force = GRAVITY * add_up(mass for mass, _ in loads)
         self._excess_weight = sum((GRAVITY * mass * np.array(cog) for mass, cog in loads), np.zeros(3))
         differs = bool(self._true) and (self._excess_force != 0.0 or self._excess_weight.any())
         self.is_unexpected = self._push is not None or self._attached or bool(differs)

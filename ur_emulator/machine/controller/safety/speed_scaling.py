@@ -18,6 +18,7 @@ from ur_emulator.machine.models.robot_model import Vector6, six
 from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
 from ur_emulator.machine.motion.arm_motion import SCALING_RATE, ArmMotion
 from ur_emulator.machine.plant.arm_plant import PlantState
+from ur_hil.arithmetic import add_up
 
 TOLERANCE = radians(1.15)
 # Tolerance of the limits of TCP, force, power and momentum, as a share; chosen.
@@ -107,7 +108,7 @@ class SpeedLimiter:
         limits = self._limits.arm
         if limits == UNLIMITED:
             return None
-        power = sum(
+        power = add_up(
             abs(moment * qd) for moment, qd in zip(sensed.target_moment, sensed.actual_qd, strict=True)
         )
         for code, argument, name, unit, value, limit in (
