@@ -18,7 +18,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.host.ports import robot_api_files
-from ur_emulator.host.ports.robot_api_files import KINDS, StoreResult, write_program
+from ur_emulator.host.ports.robot_api_files import KINDS, write_program
 from ur_emulator.host.reports import report_files
 from ur_emulator.host.reports.report_files import (
     BoxFacts,
@@ -216,16 +216,16 @@ def test_uploads_have_one_total_with_the_programs_that_are_there(folder, monkeyp
     def upload(name, size, is_new=True):
         head = f'--XX\r\nContent-Disposition: form-data; name="file"; filename="{name}"\r\n\r\n'
         body = head.encode() + b"#" * size + b"\r\n--XX--\r\n"
-        return write_program(place, "multipart/form-data; boundary=XX", body, is_new, "")[1]
+        return write_program(place, "multipart/form-data; boundary=XX", body, is_new, "")
 
     n_programs = len([path for path in folder.rglob("*") if path.suffix in KINDS])
     total = (n_programs + 3) * 4_096
     monkeypatch.setattr(robot_api_files, "BUDGETS", replace(BUDGETS, uploads_bytes=total))
-    assert upload("one.script", 1) is upload("two.script", 8_192) is StoreResult.WRITTEN
+    assert (upload("one.script", 1), upload("two.script", 8_192)) == ("one", "two")
     with pytest.raises(ProgramFileError, match=f"three.script has 1 bytes, .* {total} are allowed, remove"):
         upload("three.script", 1)
-    assert upload("two.script", 4_096, is_new=False) is StoreResult.WRITTEN
-    assert upload("three.script", 1) is StoreResult.WRITTEN
+    assert upload("two.script", 4_096, is_new=False) == "two"
+    assert upload("three.script", 1) == "three"
 
 
 def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):

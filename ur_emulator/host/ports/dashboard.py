@@ -1,11 +1,9 @@
 """Port 29999, the dashboard server: the lines of a client are answered in order, one after the other.
 
-What the commands do is each a method; how they are spelt stands in `protocol`. An answer is a reply, or steps
-that end in one (see `loop.steps`).
+What the commands do stands here; how they and their replies are spelt stands in `protocol`.
 """
 
 from collections.abc import Callable
-from contextlib import suppress
 
 from protocol.dashboard.commands import OPERATIONAL_MODES, REMOTE_CONTROL_ONLY, USER_ROLES, DashboardCommand
 from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection
@@ -27,7 +25,8 @@ from ur_emulator.machine.controller.safety.inputs import OperationalMode
 # library expects them.
 UNNAMED = "<unnamed>"
 
-Answer = str | Steps[str]
+# From a row, its argument and the client's address: a reply, or steps that end in one (see `host.steps`).
+_Action = Callable[[DashboardCommand, str, str], str | Steps[str]]
 
 
 class DashboardAnswers:
@@ -42,7 +41,8 @@ class DashboardAnswers:
         self._shut_down = shut_down
         self._reports = reports
         self._user_role = "NONE"
-        self._methods: dict[str, Callable[[DashboardCommand, str, str], Answer]] = {
+        software = box.identity.software
+        self._actions: dict[str, _Action] = {
             "load": self._load,
             "play": lambda row, _, client: self._done(row, player.play(client)),
             "stop": lambda row, *_: self._done(row, player.stop()),
@@ -57,18 +57,14 @@ class DashboardAnswers:
             "addToLog": self._add_to_log,
             "isProgramSaved": lambda row, *_: row.reply(saved="true", program=self._file_name),
             "programState": lambda row, *_: row.reply(state=self._state_word(), program=self._file_name),
-            "PolyscopeVersion": lambda row, *_: row.reply(
-                version=str(box.identity.software.version), date=box.identity.software.day
-            ),
-            "version": lambda row, *_: row.reply(version=str(box.identity.software.version)),
+            "PolyscopeVersion": lambda row, *_: row.reply(version=str(software.version), date=software.day),
+            "version": lambda row, *_: row.reply(version=str(software.version)),
             "setUserRole": self._set_user_role,
             "getUserRole": lambda row, *_: row.reply(role=self._user_role),
             "set operational mode": self._set_operational_mode,
-            "get operational mode": lambda row, *_: row.reply(mode=self._operational_mode()),
-            "clear operational mode": self._clear_operational_mode,
-            "is in remote control": lambda row, *_: row.reply(
-                remote=str(bool(box.controller.state.pendant.remote_period)).lower()
-            ),
+            "get operational mode": lambda row, *_: self._mode_reply(row),
+            "clear operational mode": lambda row, *_: self._choose_mode(row, None),
+            "is in remote control": lambda row, *_: row.reply(remote=str(box.remote_period > 0).lower()),
             "power on": lambda row, *_: self._applied(row, power.PowerOn()),
             "power off": lambda row, *_: self._applied(row, power.PowerOff()),
             "brake release": lambda row, *_: self._applied(row, power.ReleaseBrakes()),
@@ -85,9 +81,19 @@ class DashboardAnswers:
             "saveLog": self._save_log,
         }
 
-    def answer(self, event: CommandReceived, client: str) -> Answer:
-        """Return the answer to a command; `client` is the address of who asks."""
-        return self._methods[event.command.name](event.command, event.argument, client)
+    def answer(self, event: CommandReceived, client: str) -> Steps[str]:
+        """Answer a command; `client` is the address of who asks.
+
+        What is refused is answered as failed; a command that has no such reply is answered as done.
+        """
+        row, argument = event.command, event.argument
+        try:
+            answer = self._actions[row.name](row, argument, client)
+            return answer if isinstance(answer, str) else (yield from answer)
+        except EmulatorError as error:
+            missing = isinstance(error, MissingFileRefusal | FileMissingError) and "not_found" in row.replies
+            key = "not_found" if missing else "failed" if "failed" in row.replies else "ok"
+            return row.reply(key, name=argument, mode=argument, role=argument, reason=error)
 
     # --- programs
 
@@ -104,73 +110,55 @@ class DashboardAnswers:
         loaded = self._player.loaded
         return row.reply(path=loaded.wire_path) if loaded else row.reply("none")
 
-    def _load(self, row: DashboardCommand, name: str, _: str) -> Answer:
+    def _load(self, row: DashboardCommand, name: str, _: str) -> Steps[str]:
         loading = self._player.load(name)
         if row.replies_when_done(self._box.identity.software.version):
-            return self._loaded(row, loading, name, lambda: _path_of(self._player.loaded))
-        try:
-            path = self._player.folder.find(name).wire_path
-        except FileMissingError:
-            return row.reply("not_found", name=name)
+            yield from loading
+            installation = _path_of(self._player.installation)
+            return row.reply(path=_path_of(self._player.loaded), installation=installation)
+        path = self._player.folder.find(name).wire_path
         self._box.start_alone(loading)
         return row.reply(path=path)
 
-    def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Answer:
-        loading = self._player.load_installation(name)
-        return self._loaded(row, loading, name, lambda: _path_of(self._player.installation))
-
-    def _loaded(
-        self, row: DashboardCommand, loading: Steps[None], name: str, path: Callable[[], str]
-    ) -> Steps[str]:
-        """Answer when a file is loaded, or is not."""
-        try:
-            yield from loading
-        except RefusedError as refusal:
-            return row.reply("not_found" if isinstance(refusal, MissingFileRefusal) else "failed", name=name)
-        return row.reply(path=path(), installation=_path_of(self._player.installation))
+    def _load_installation(self, row: DashboardCommand, name: str, _: str) -> Steps[str]:
+        yield from self._player.load_installation(name)
+        return row.reply(path=_path_of(self._player.installation))
 
     def _done(self, row: DashboardCommand, action: Steps[None]) -> Steps[str]:
         """Answer when an action is done, or, in older software, when it has begun."""
+        if row.replies_when_done(self._box.identity.software.version):
+            yield from action
+            return row.reply()
         try:
-            if row.replies_when_done(self._box.identity.software.version):
-                yield from action
-                return row.reply("ok")
             next(action)
         except StopIteration:
-            return row.reply("ok")
-        except RefusedError:
-            return row.reply("failed")
+            return row.reply()
         self._box.start_alone(action)
         return row.reply()
 
     # --- the box
 
     def _applied(self, row: DashboardCommand, command: Command) -> Steps[str]:
-        with suppress(RefusedError):
-            yield from self._box.apply(command)
+        yield from self._box.apply(command)
         return row.reply()
 
-    def _unlock(self, row: DashboardCommand, *_: str) -> Answer:
+    def _unlock(self, row: DashboardCommand, *_: str) -> str | Steps[str]:
         state, now = self._box.controller.state.safety, self._box.snapshot.timestamp
         if state.mode is SafetyMode.PROTECTIVE_STOP and not state.may_unlock(now):
             return row.reply("too_early")
         return self._applied(row, safety.UnlockProtectiveStop())
 
-    def _operational_mode(self) -> str:
-        return self._box.controller.state.operational.mode.name
+    def _mode_reply(self, row: DashboardCommand) -> str:
+        return row.reply(mode=self._box.controller.state.operational.mode.name)
 
     def _set_operational_mode(self, row: DashboardCommand, mode: str, _: str) -> Steps[str]:
-        try:
-            if mode.upper() not in OPERATIONAL_MODES:
-                raise RefusedError(f"operational mode {mode}: choose from {', '.join(OPERATIONAL_MODES)}")
-            yield from self._box.apply(power.ChooseModeByDashboard(OperationalMode[mode.upper()]))
-        except RefusedError:
-            return row.reply("failed", mode=mode)
-        return row.reply(mode=self._operational_mode())
+        if mode.upper() not in OPERATIONAL_MODES:
+            raise RefusedError(f"operational mode {mode}: choose from {', '.join(OPERATIONAL_MODES)}")
+        return self._choose_mode(row, OperationalMode[mode.upper()])
 
-    def _clear_operational_mode(self, row: DashboardCommand, *_: str) -> Steps[str]:
-        yield from self._box.apply(power.ChooseModeByDashboard(None))
-        return row.reply(mode=self._operational_mode())
+    def _choose_mode(self, row: DashboardCommand, mode: OperationalMode | None) -> Steps[str]:
+        yield from self._box.apply(power.ChooseModeByDashboard(mode))
+        return self._mode_reply(row)
 
     def _shutdown(self, row: DashboardCommand, _: str, client: str) -> Steps[str]:
         self._box.note(f"Shut down by {client}")
@@ -193,23 +181,17 @@ class DashboardAnswers:
     # --- files
 
     def _flight_report(self, row: DashboardCommand, kind: str, _: str) -> Steps[str]:
-        try:
-            return row.reply(id=(yield from self._reports.flight_report(kind)))
-        except EmulatorError as error:
-            return row.reply("failed", reason=error)
+        return row.reply(id=(yield from self._reports.flight_report(kind)))
 
     def _support_file(self, row: DashboardCommand, directory: str, _: str) -> Steps[str]:
-        try:
-            return row.reply(file=(yield from self._reports.support_file(directory)))
-        except EmulatorError as error:
-            return row.reply("failed", reason=error)
+        return row.reply(file=(yield from self._reports.support_file(directory)))
 
     def _save_log(self, row: DashboardCommand, *_: str) -> Steps[str]:
         try:
             path = yield from self._reports.save_log()
         except EmulatorError as error:
             self._box.note(f"saveLog failed: {error}")
-            return row.reply("failed")
+            raise
         self._box.note(f"Log saved to {path}")
         return row.reply()
 
@@ -252,10 +234,7 @@ class _DashboardSession(Session):
         super().__init__(connection, box)
         self.lines = DashboardConnection(box.identity.software.dashboard)
         self._answers = answers
-        self._remote_period = self._period_now()
-
-    def _period_now(self) -> int:
-        return self._box.controller.state.pendant.remote_period
+        self._remote_period = box.remote_period
 
     def _take(self, data: bytes) -> None:
         try:
@@ -269,15 +248,10 @@ class _DashboardSession(Session):
             return 0
         if not isinstance(event, CommandReceived):
             text = event.answer
-        elif event.command.needs_remote and not 0 < self._remote_period == self._period_now():
+        elif event.command.needs_remote and not 0 < self._remote_period == self._box.remote_period:
             text = REMOTE_CONTROL_ONLY
         else:
-            answer = self._answers.answer(event, self.connection.host)
-            text = answer if isinstance(answer, str) else (yield from answer)
-        self._reply(text)
-        return _LINE_COST + len(text) // _BYTES_PER_UNIT
-
-    def _reply(self, text: str) -> None:
+            text = yield from self._answers.answer(event, self.connection.host)
         # A reply may repeat what the client sent, and must stay one line of allowed length.
         line = text.replace("\r", " ").replace("\n", " ")[: MAX_LINE - 1]
         self.connection.send(self.lines.reply(line))
@@ -285,3 +259,4 @@ class _DashboardSession(Session):
             self.connection.close()  # it does not read, and a reply less would shift all that follow
         if self.lines.is_closed:
             self.connection.close_when_sent()
+        return _LINE_COST + len(text) // _BYTES_PER_UNIT

@@ -1,8 +1,7 @@
 """The Robot API of PolyScope X: a method for each call; `protocol.robot_api` lists the calls."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
-from functools import partial
 from html import escape
 from http import HTTPStatus
 from typing import Any
@@ -10,9 +9,9 @@ from typing import Any
 from protocol import robot_api
 from protocol.primary.messages import RequestedType
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
+from ur_emulator.errors import ArgumentError, EmulatorError, FileMissingError, RefusedError
 from ur_emulator.host.player.player import MissingFileRefusal, ProgramPlayer
-from ur_emulator.host.ports import robot_api_files
+from ur_emulator.host.ports import robot_api_files as files
 from ur_emulator.host.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.connection import Connection
@@ -31,7 +30,11 @@ def openapi(calls: Iterable[robot_api.ApiCall], version: str) -> dict[str, Any]:
     """Return the OpenAPI document of some calls; `version` is that of the API."""
     paths: dict[str, dict[str, Any]] = {}
     for call in calls:
-        paths.setdefault(call.path, {})[call.method.lower()] = _described(call)
+        described = paths.setdefault(call.path, {})[call.method.lower()] = {"summary": call.does}
+        if name := call.path.partition("{")[2].rstrip("}"):
+            schema = {"schema": {"type": "string"}}
+            described["parameters"] = [{"name": name, "in": "path", "required": True, **schema}]
+        described["responses"] = {"200": {"description": "done"}}
     info = {"title": "Robot API", "version": version}
     return {"openapi": "3.0.3", "info": info, "servers": [{"url": robot_api.BASE}], "paths": paths}
 
@@ -51,106 +54,31 @@ def page(calls: Iterable[robot_api.ApiCall], version: str) -> bytes:
     ).encode()
 
 
-def _described(call: robot_api.ApiCall) -> dict[str, Any]:
-    name = call.path.partition("{")[2].rstrip("}")
-    parameter = {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
-    return {
-        "summary": call.does,
-        **({"parameters": [parameter]} if name else {}),
-        "responses": {"200": {"description": "done"}},
-    }
-
-
 # Name of the program of a box that has loaded none. Source: a fresh simulator.
 DEFAULT_PROGRAM = "Default program"
-
-
-class ProgramCalls:
-    """Answers these calls."""
-
-    def __init__(self, box: ServedBox, player: ProgramPlayer) -> None:
-        self._box = box
-        self._player = player
-
-    # --- the loaded one
-
-    def state(self) -> str:
-        """Return PLAYING, PAUSED or STOPPED."""
-        if self._player.is_paused:
-            return "PAUSED"
-        return "PLAYING" if self._player.is_running else "STOPPED"
-
-    def loaded_name(self) -> str:
-        """Return the name of the loaded program."""
-        loaded = self._player.loaded
-        return loaded.file_name.rpartition(".")[0] if loaded else DEFAULT_PROGRAM
-
-    def change_state(self, request: HttpRequest) -> Steps[HttpAnswer]:
-        """Play, pause, resume or stop, and answer when that is done."""
-        player = self._player
-        actions: dict[str, Callable[[], Steps[None]]] = {
-            "play": lambda: player.play(""),
-            "pause": player.pause,
-            "resume": self._resume,
-            "stop": player.stop,
-        }
-        yield from actions[request.word("action", actions)]()
-        return HttpAnswer(200, {"state": self.state(), "details": ""})
-
-    def _resume(self) -> Steps[None]:
-        if not self._player.is_paused:
-            raise RefusedError(f"resume given: the program is {self.state()}")
-        yield from self._player.play("")
-
-    def load(self, request: HttpRequest, key: str) -> Steps[HttpAnswer]:
-        """Load the program that the body names under a key."""
-        name = request.text(key)
-        file = robot_api_files.find_program(self._player.folder, name)
-        yield from self._player.load(file.wire_path)
-        return HttpAnswer(200, {"name": name})
-
-    # --- files
-
-    def list_all(self) -> Steps[HttpAnswer]:
-        """Name all programs."""
-        programs = yield from self._box.in_worker(robot_api_files.list_programs, self._player.folder)
-        return HttpAnswer(200, {"programs": programs, "message": ""})
-
-    def send(self, name: str) -> Steps[HttpAnswer]:
-        """Send the file of a program."""
-        data = yield from self._box.in_worker(robot_api_files.read_program, self._player.folder, name)
-        return HttpAnswer(200, data)
-
-    def store(self, request: HttpRequest, *, is_new: bool) -> Steps[HttpAnswer]:
-        """Take the file of a program, a new one or one that exists."""
-        in_use = self.loaded_name() if self._player.is_running else ""
-        name, outcome = yield from self._box.in_worker(
-            robot_api_files.write_program,
-            self._player.folder,
-            request.headers.get("content-type", ""),
-            request.body,
-            is_new,
-            in_use,
-        )
-        match outcome:
-            case robot_api_files.StoreResult.EXISTS:
-                raise HttpError(400, f"there is a program {name!r} already: PUT replaces it")
-            case robot_api_files.StoreResult.MISSING:
-                raise HttpError(404, f"there is no program {name!r} yet: POST makes it")
-            case robot_api_files.StoreResult.IN_USE:
-                raise RefusedError(f"{name} is loaded and plays: stop it first")
-        return HttpAnswer(200, {"programName": name})
-
-
 # Source: the maker's API document as the client library's tests quote it.
 _LOCAL = "Not authorized to perform this operation under the current robot control mode."
-_NOT_CLOSED = {"closed": False, "message": "there is no such popup"}
-# Modes in which an action starts, or has happened already, and the effect.
+_NOT_CLOSED = HttpAnswer(409, {"closed": False, "message": "there is no such popup"})
+# Modes in which an action starts, or has happened already.
 _RESTS = frozenset({RobotMode.IDLE, RobotMode.RUNNING})
-_POWER: dict[str, tuple[frozenset[RobotMode], type[Command]]] = {
-    "POWER_ON": (_RESTS | {RobotMode.POWER_OFF}, PowerOn),
-    "BRAKE_RELEASE": (_RESTS, ReleaseBrakes),
+_POWERED_FROM = {"POWER_ON": _RESTS | {RobotMode.POWER_OFF}, "BRAKE_RELEASE": _RESTS}
+_COMMANDS: dict[str, Callable[[], Command]] = {
+    "POWER_ON": PowerOn,
+    "BRAKE_RELEASE": ReleaseBrakes,
+    "POWER_OFF": PowerOff,
+    "UNLOCK_PROTECTIVE_STOP": UnlockProtectiveStop,
+    "RESTART_SAFETY": RestartSafety,
 }
+# The first that an error is; the status of others is 422.
+_STATUS = (
+    (MissingFileRefusal, 404),
+    (FileMissingError, 404),
+    (RefusedError, 409),
+    (ArgumentError, 400),
+    (EmulatorError, 422),
+)
+# The answer to a call, or steps that end in it; what is no `HttpAnswer` is sent with status 200.
+_Method = Callable[[HttpRequest, str], object]
 
 
 class RobotApiAnswers:
@@ -165,49 +93,45 @@ class RobotApiAnswers:
         own_host: str,
     ) -> None:
         self._box = box
-        programs = ProgramCalls(box, player)
+        self._player = player
         self._reports = reports
         self._shut_down = shut_down
         self._own_host = own_host
-        self._calls = box.identity.software.robot_api
-        version = robot_api.api_version(box.identity.software.version)
-        self._methods: dict[str, Callable[[HttpRequest, str], Steps[HttpAnswer]]] = {
-            "GET /openapi.json": lambda *_: _at_once(openapi(self._calls, version)),
-            "GET /docs": lambda *_: _at_once(page(self._calls, version), "text/html; charset=utf-8"),
-            "GET /system/v1/system-time": lambda *_: _at_once(
-                {"time": clock_time(box.snapshot.timestamp).isoformat()}
-            ),
+        software, identity = box.identity.software, box.identity
+        calls = self._calls = software.robot_api
+        version = robot_api.api_version(software.version)
+        self._methods: dict[str, _Method] = {
+            "GET /openapi.json": lambda *_: openapi(calls, version),
+            "GET /docs": lambda *_: HttpAnswer(200, page(calls, version), (), "text/html; charset=utf-8"),
+            "GET /system/v1/system-time": lambda *_: {"time": clock_time(box.snapshot.timestamp).isoformat()},
             "PUT /robotstate/v1/state": self._change_robot_state,
-            "GET /robotstate/v1/robotmode": lambda *_: _at_once(
-                {"mode": robot_api.ROBOT_MODE_NAMES[RobotMode(box.snapshot.robot_mode)], "message": ""}
-            ),
-            "GET /robotstate/v1/safetymode": lambda *_: _at_once(
-                {"mode": robot_api.SAFETY_MODE_NAMES[SafetyMode(box.snapshot.safety_mode)], "message": ""}
-            ),
-            "PUT /program/v1/state": lambda request, _: programs.change_state(request),
-            "GET /program/v1/state": lambda *_: _at_once(
-                {"state": programs.state(), "message": "", "details": ""}
-            ),
-            "PUT /program/v1/load": lambda request, _: programs.load(request, "programName"),
-            "PUT /program/v1/loaded": lambda request, _: programs.load(request, "name"),
-            "GET /program/v1/loaded": lambda *_: _at_once({"name": programs.loaded_name()}),
-            "GET /system/v1/controlmode": lambda *_: _at_once(
-                {"mode": "REMOTE" if box.controller.state.pendant.remote_period else "LOCAL"}
-            ),
-            "GET /system/v1/operationalmode": lambda *_: _at_once({"mode": self._operational_mode()}),
-            "GET /programs/v1": lambda *_: programs.list_all(),
-            "POST /programs/v1": lambda request, _: programs.store(request, is_new=True),
-            "PUT /programs/v1": lambda request, _: programs.store(request, is_new=False),
-            "GET /programs/v1/{name}": lambda _, name: programs.send(name),
-            "POST /popup/v1": self._show_popup,
+            "GET /robotstate/v1/robotmode": lambda *_: {
+                "mode": robot_api.ROBOT_MODE_NAMES[RobotMode(box.snapshot.robot_mode)],
+                "message": "",
+            },
+            "GET /robotstate/v1/safetymode": lambda *_: {
+                "mode": robot_api.SAFETY_MODE_NAMES[SafetyMode(box.snapshot.safety_mode)],
+                "message": "",
+            },
+            "PUT /program/v1/state": self._change_program_state,
+            "GET /program/v1/state": lambda *_: {"state": self._program_state, "message": "", "details": ""},
+            "PUT /program/v1/load": lambda request, _: self._load(request.text("programName")),
+            "PUT /program/v1/loaded": lambda request, _: self._load(request.text("name")),
+            "GET /program/v1/loaded": lambda *_: {"name": self._loaded_name},
+            "GET /system/v1/controlmode": lambda *_: {"mode": "REMOTE" if box.remote_period else "LOCAL"},
+            "GET /system/v1/operationalmode": lambda *_: {"mode": self._operational_mode()},
+            "GET /programs/v1": self._list_programs,
+            "POST /programs/v1": lambda request, _: self._store_program(request, is_new=True),
+            "PUT /programs/v1": lambda request, _: self._store_program(request, is_new=False),
+            "GET /programs/v1/{name}": lambda _, name: box.in_worker(files.read_program, player.folder, name),
+            "POST /popup/v1": lambda request, _: self._applied(ShowPopup(request.text("message"))),
             "DELETE /popup/v1": self._close_popups,
-            "DELETE /popup/v1/safety": lambda *_: _at_once(_NOT_CLOSED, status=409),
-            "GET /versions/v1": lambda *_: _at_once(
-                {"marketingVersion": str(box.identity.software.version), "baselineVersion": ""}
-            ),
-            "GET /system/v1/information": lambda *_: _at_once(
-                {"robotType": box.identity.wire_model, "serialNumber": box.identity.serial_number}
-            ),
+            "DELETE /popup/v1/safety": lambda *_: _NOT_CLOSED,
+            "GET /versions/v1": lambda *_: {"marketingVersion": str(software.version), "baselineVersion": ""},
+            "GET /system/v1/information": lambda *_: {
+                "robotType": identity.wire_model,
+                "serialNumber": identity.serial_number,
+            },
             "PUT /system/v1/shutdown": self._shutdown,
             "POST /system/v1/log": self._add_to_log,
             "POST /supportfiles/v1": self._flight_report,
@@ -220,6 +144,9 @@ class RobotApiAnswers:
             return (yield from self._answer(request))
         except HttpError as error:
             return HttpAnswer(error.status, _error_body(error.status, str(error)), error.headers)
+        except EmulatorError as error:
+            status = next(status for kind, status in _STATUS if isinstance(error, kind))
+            return HttpAnswer(status, _error_body(status, str(error)))
 
     def _answer(self, request: HttpRequest) -> Steps[HttpAnswer]:
         check_origin(request.headers, self._own_host)
@@ -228,42 +155,26 @@ class RobotApiAnswers:
             if argument:
                 raise HttpError(405, f"{request.path} is asked with {argument}", ("Allow", argument))
             raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {robot_api.BASE}/openapi.json")
-        if call.needs_remote and not self._box.controller.state.pendant.remote_period:
+        if call.needs_remote and not self._box.remote_period:
             raise HttpError(403, _LOCAL)
-        try:
-            answer = yield from self._methods[f"{call.method} {call.path}"](request, argument)
-        except (MissingFileRefusal, FileMissingError) as error:
-            raise HttpError(404, str(error)) from None
-        except RefusedError as error:
-            raise HttpError(409, str(error)) from None
-        except EmulatorError as error:
-            raise HttpError(422, str(error)) from None
-        if call.message:
-            answer = replace(answer, result={"message": call.message} | answer.result)
-        return answer
+        answer = self._methods[f"{call.method} {call.path}"](request, argument)
+        if isinstance(answer, Generator):
+            answer = yield from answer
+        if not isinstance(answer, HttpAnswer):
+            answer = HttpAnswer(200, answer)
+        return replace(answer, result={"message": call.message} | answer.result) if call.message else answer
 
     # --- robot
 
-    def _change_robot_state(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
-        actions: dict[str, Callable[[], Steps[HttpAnswer]]] = {
-            **{action: partial(self._power, action) for action in _POWER},
-            "POWER_OFF": lambda: self._applied(PowerOff()),
-            "UNLOCK_PROTECTIVE_STOP": lambda: self._applied(UnlockProtectiveStop()),
-            "RESTART_SAFETY": lambda: self._applied(RestartSafety()),
-        }
-        action = request.word("action", actions)
-        return (yield from actions[action]())
-
-    def _power(self, action: str) -> Steps[HttpAnswer]:
-        """Power the arm or open its brakes; answer when that is done."""
-        possible, command = _POWER[action]
-        mode = RobotMode(self._box.snapshot.robot_mode)
-        if mode not in possible:
+    def _change_robot_state(self, request: HttpRequest, _: str) -> Steps[dict[str, Any]]:
+        """Do an action; where it powers the arm or opens its brakes, answer when that is done."""
+        action, mode = request.word("action", _COMMANDS), RobotMode(self._box.snapshot.robot_mode)
+        if mode not in _POWERED_FROM.get(action, RobotMode):
             raise RefusedError(f"{action} given: the robot is in {mode.name}")
-        yield from self._box.apply(command())
-        while self._box.controller.state.mode.is_changing:
+        yield from self._box.apply(_COMMANDS[action]())
+        while action in _POWERED_FROM and self._box.controller.state.mode.is_changing:
             yield
-        return HttpAnswer(200, {})
+        return {}
 
     def _operational_mode(self) -> str:
         mode = self._box.controller.state.operational.mode
@@ -274,39 +185,77 @@ class RobotApiAnswers:
         self._shut_down()
         return HttpAnswer(202, {"message": None})
 
-    # --- popups, log, reports
+    # --- the loaded program
 
-    def _show_popup(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
-        return (yield from self._applied(ShowPopup(request.text("message"))))
+    @property
+    def _program_state(self) -> str:
+        if self._player.is_paused:
+            return "PAUSED"
+        return "PLAYING" if self._player.is_running else "STOPPED"
+
+    @property
+    def _loaded_name(self) -> str:
+        loaded = self._player.loaded
+        return loaded.file_name.rpartition(".")[0] if loaded else DEFAULT_PROGRAM
+
+    def _change_program_state(self, request: HttpRequest, _: str) -> Steps[dict[str, Any]]:
+        """Play, pause, resume or stop, and answer when that is done."""
+        player = self._player
+        actions: dict[str, Callable[[], Steps[None]]] = {
+            "play": lambda: player.play(""),
+            "pause": player.pause,
+            "resume": lambda: player.play(""),
+            "stop": player.stop,
+        }
+        action = request.word("action", actions)
+        if action == "resume" and not player.is_paused:
+            raise RefusedError(f"resume given: the program is {self._program_state}")
+        yield from actions[action]()
+        return {"state": self._program_state, "details": ""}
+
+    def _load(self, name: str) -> Steps[dict[str, Any]]:
+        yield from self._player.load(files.find_program(self._player.folder, name).wire_path)
+        return {"name": name}
+
+    # --- program files
+
+    def _list_programs(self, *_: object) -> Steps[dict[str, Any]]:
+        programs = yield from self._box.in_worker(files.list_programs, self._player.folder)
+        return {"programs": programs, "message": ""}
+
+    def _store_program(self, request: HttpRequest, *, is_new: bool) -> Steps[dict[str, Any]]:
+        """Take the file of a program, a new one or one that exists."""
+        kind = request.headers.get("content-type", "")
+        in_use = self._loaded_name if self._player.is_running else ""
+        name = yield from self._box.in_worker(
+            files.write_program, self._player.folder, kind, request.body, is_new, in_use
+        )
+        return {"programName": name}
+
+    # --- popups, log, reports
 
     def _close_popups(self, *_: object) -> Steps[HttpAnswer]:
         operator = self._box.controller.state.pendant
         if not operator.shown and not any(popup.kind is RequestedType.NONE for popup in operator.requests):
-            return HttpAnswer(409, _NOT_CLOSED)
+            return _NOT_CLOSED
         yield from self._box.apply(ClosePopup())
         return HttpAnswer(200, {"closed": True})
 
-    def _add_to_log(self, request: HttpRequest, _: str) -> Steps[HttpAnswer]:
+    def _add_to_log(self, request: HttpRequest, _: str) -> dict[str, Any]:
         self._box.announce(LogAdded("Robot API", request.text("message")))
-        return (yield from _at_once({}))
+        return {}
 
-    def _flight_report(self, *_: object) -> Steps[HttpAnswer]:
+    def _flight_report(self, *_: object) -> Steps[dict[str, Any]]:
         yield from self._reports.flight_report()
-        return HttpAnswer(200, {"details": None})
+        return {"details": None}
 
     def _support_files(self, *_: object) -> Steps[HttpAnswer]:
         archive = yield from self._reports.archive()
         return HttpAnswer(200 if archive else 204, archive, content_type="application/zip")
 
-    def _applied(self, command: Command) -> Steps[HttpAnswer]:
+    def _applied(self, command: Command) -> Steps[dict[str, Any]]:
         yield from self._box.apply(command)
-        return HttpAnswer(200, {})
-
-
-def _at_once(result: object, content_type: str = "", status: int = 200) -> Steps[HttpAnswer]:
-    """Answer without a wait."""
-    return HttpAnswer(status, result, content_type=content_type)
-    yield
+        return {}
 
 
 def _error_body(status: int, text: str) -> dict[str, Any]:

@@ -6,11 +6,10 @@ All functions but `find_program` may take a while: they run in the worker proces
 from contextlib import suppress
 from email.parser import BytesParser
 from email.policy import HTTP
-from enum import Enum, auto
 from pathlib import PurePosixPath
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.errors import FileMissingError, ProgramFileError
+from ur_emulator.errors import ArgumentError, FileMissingError, ProgramFileError, RefusedError
 from ur_emulator.program_files.folder import (
     PROGRAM_SUFFIX,
     SCRIPT_SUFFIX,
@@ -20,16 +19,6 @@ from ur_emulator.program_files.folder import (
 )
 from ur_emulator.program_files.reader import ProgramReader
 from ur_emulator.program_files.urpx import Information, information_of, read_urpx
-
-
-class StoreResult(Enum):
-    """What came of a program that a client has sent."""
-
-    WRITTEN = auto()
-    EXISTS = auto()
-    MISSING = auto()
-    IN_USE = auto()
-
 
 # What a file takes of a disk at least [bytes].
 _BLOCK = 4_096
@@ -66,10 +55,8 @@ def read_program(folder: ProgramFolder, name: str) -> bytes:
     return folder.read(find_program(folder, name), BUDGETS.program_bytes)
 
 
-def write_program(
-    folder: ProgramFolder, content_type: str, body: bytes, is_new: bool, in_use: str
-) -> tuple[str, StoreResult]:
-    """Write the file of a program, a new one or one that exists; return its name, and what came of it.
+def write_program(folder: ProgramFolder, content_type: str, body: bytes, is_new: bool, in_use: str) -> str:
+    """Write the file of a program, a new one or one that exists; return its name.
 
     A `.urpx` program says itself what it is called; clients send it under any file name. Programs of other
     kinds have the name of their file.
@@ -80,7 +67,9 @@ def write_program(
         in_use: name of a program that must stay as it is.
 
     Raises:
-        FileMissingError: the name leads out of the folder, or the box has none.
+        FileMissingError: the name leads out of the folder, or the box has none; or no such program exists.
+        ArgumentError: such a program exists already.
+        RefusedError: it is in use.
         ProgramFileError: it cannot be written, is no program, or is too much beside the others.
     """
     file_name, data = _form_file(content_type, body)
@@ -93,9 +82,11 @@ def write_program(
             f"{PROGRAM_SUFFIX} or {SCRIPT_SUFFIX}"
         )
     if inside.stem == in_use:
-        return inside.stem, StoreResult.IN_USE
+        raise RefusedError(f"{inside.stem} is loaded and plays: stop it first")
     if folder.has(str(inside)) is is_new:
-        return inside.stem, StoreResult.EXISTS if is_new else StoreResult.MISSING
+        if is_new:
+            raise ArgumentError(f"there is a program {inside.stem!r} already: PUT replaces it")
+        raise FileMissingError(f"there is no program {inside.stem!r} yet: POST makes it")
     others = (size for path, size in folder.sizes() if path.suffix in KINDS and path != inside)
     held = sum(max(size, _BLOCK) for size in others)
     if held + max(len(data), _BLOCK) > BUDGETS.uploads_bytes:
@@ -104,7 +95,7 @@ def write_program(
             f"{BUDGETS.uploads_bytes} are allowed, remove some"
         )
     folder.write(inside, data)
-    return inside.stem, StoreResult.WRITTEN
+    return inside.stem
 
 
 def _form_file(content_type: str, body: bytes) -> tuple[str, bytes]:
