@@ -29,7 +29,7 @@ DOOR = {
 PLAIN = {
     "Command", "Done", "Event", "Snapshot", "Input", "Answer", "Arrival", "Request", "RobotModel", "Fidelity",
     "RobotGeneration", "Software", "Result", "Vector3", "Vector6", "CallProcedure", "ServeSignal", "ModbusSignal",
-    "UnitAddress", "SignalType", "Machine",
+    "UnitAddress", "SignalType", "Machine", "OperationalMode",
 }  # fmt: skip
 
 
