@@ -74,10 +74,10 @@ def _line(rng: random.Random, make: Make) -> tuple[str]:
 _OPERATIONS: tuple[tuple[int, str, dict[str, list[Any]]], ...] = (
     (4, "protective_stop", {}),
     (5, "unlock_protective_stop", {}),
-    (2, "emergency_stop", {"source": ["robot", "system"]}),
+    (2, "emergency_stop", {"kind": ["robot", "system"]}),
     (3, "release_emergency_stop", {}),
     (3, "safeguard_stop", {"active": [True, False]}),
-    (2, "safeguard_stop", {"active": [True, False], "kind": ["automatic mode"]}),
+    (2, "safeguard_stop", {"active": [True, False], "safeguard": ["automatic mode"]}),
     (2, "reduced_mode", {"active": [True, False]}),
     (1, "trigger_violation", {}),
     (1, "trigger_fault", {}),
@@ -251,7 +251,7 @@ class Walker:
     def _obstacle(self, is_there: bool) -> None:
         if is_there:
             self._operation("add_obstacle", (("name", "walk"), ("shape", "box"), ("size", (0.1, 0.1, 0.1)),
-                                             ("position", (0.25, -0.3, 0.05))))  # fmt: skip
+                                             ("pose", (0.25, -0.3, 0.05, 0.0, 0.0, 0.0))))  # fmt: skip
         else:
             self._operation("remove_obstacle", (("name", "walk"),))
 
@@ -277,7 +277,7 @@ class Walker:
             ("set_operational_mode", {"mode": "none"}),
             ("enabling_device", {"position": "none"}),
             ("require_safeguard_reset", {"required": False}),
-            ("safeguard_stop", {"active": False, "kind": "automatic mode"}),
+            ("safeguard_stop", {"active": False, "safeguard": "automatic mode"}),
             ("safeguard_stop", {"active": False}),
             ("reset_safeguard", {}),
             ("press_button", {"button": "teach", "pressed": False}),
