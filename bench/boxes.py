@@ -10,7 +10,7 @@ from bench.box_process import box_process
 from bench.length import FULL, Length
 from bench.side_process import SideProcesses
 from ur_emulator import ControlBox
-from ur_emulator.models.robots import robot_by_name
+from ur_emulator.machine.models.robots import robot_by_name
 
 _STARTS = 20
 _SETTLE = 1.0  # s

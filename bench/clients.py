@@ -7,7 +7,7 @@ import time
 from bench.box_process import box_process
 from bench.length import FULL, Length
 from bench.side_process import SideProcesses
-from ur_emulator.models.generations import CB3
+from ur_emulator.machine.models.generations import CB3
 
 N_RTDE, N_REALTIME = 50, 50
 _SETTLE = 1.0  # s; until the box has settled

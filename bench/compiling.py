@@ -10,7 +10,7 @@ from bench.box_process import box_process
 from bench.length import FULL, Length
 from bench.script import driver_like_script
 from bench.side_process import SideProcesses
-from ur_emulator.models.generations import CB3
+from ur_emulator.machine.models.generations import CB3
 
 _EVERY = 1.0  # s, from one program to the next
 _LIMIT = 30.0  # s

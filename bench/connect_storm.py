@@ -15,7 +15,7 @@ from bench.box_process import BoxProcess, box_process
 from bench.length import FULL, Length
 from bench.side_process import SideProcesses
 from protocol.ur_types import Ports
-from ur_emulator.models.generations import CB3
+from ur_emulator.machine.models.generations import CB3
 
 RATE = 200.0  # connections a second
 # Before memory is compared the box must have seen everything once, and its bounded log must be full.

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import mujoco
 
 from bench.length import FULL, Length
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.plant import Plant
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.plant import Plant
 
 FRAME, COMMAND = 1140, 28  # bytes of a realtime frame, and of a velocity command with its mode
 BATCHES, BATCH = 200, 20

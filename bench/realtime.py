@@ -16,7 +16,7 @@ from bench.box_process import box_process
 from bench.length import FULL, Length
 from protocol.frame_buffer import FrameBuffer
 from protocol.realtime.layout import MAX_FRAME_SIZE, layout_for_size
-from ur_emulator.models.robots import robot_by_name
+from ur_emulator.machine.models.robots import robot_by_name
 
 # What starts and takes memory is a box with everything switched on.
 _PROGRAMS = Path(__file__).parent.parent / "examples" / "scripts"

@@ -5,15 +5,14 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable
-from functools import partial
 
 from bench.length import FULL, Length
 from bench.script import SYNC_THREADS
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.controller import Controller
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.machine import Machine
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import robot_by_name
 from urscript import CompiledProgram, compile_program
 from urscript.syntax.parser import prepare
 
@@ -54,8 +53,7 @@ def measure_script_in_box(length: Length = FULL) -> dict[str, float]:
 
 
 def _box() -> Controller:
-    hosts = partial(robot_hosts, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    return Controller(robot_by_name("ur3"), CB3.fidelity("typical"), 7, hosts)
+    return Machine(robot_by_name("ur3"), CB3.fidelity("typical"), 7).controller
 
 
 def _box_running(n_threads: int) -> Controller:

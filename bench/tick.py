@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import mujoco
 
 from bench.length import FULL, Length
 from bench.limit import best_of
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.controller import Controller
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.machine import Machine
+from ur_emulator.machine.models.robots import robot_by_name
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.syntax.parser import prepare
@@ -40,23 +37,19 @@ def measure_tick(length: Length = FULL, robot: str = "ur3") -> dict[str, float]:
     arm = robot_by_name(robot)
     n_steps = arm.generation.n_substeps
     catalogue = catalogue_for(arm.default_software)
-    hosts = partial(robot_hosts, network=None)  # type: ignore[arg-type]  # nothing here opens a socket
-    controller = Controller(arm, arm.generation.fidelity("typical"), 7, hosts)
-    controller.tick([StartProgram(compile_program(_SPEEDJ, catalogue=catalogue))])
+    machine = Machine(arm, arm.generation.fidelity("typical"), 7)
+    machine.tick([StartProgram(compile_program(_SPEEDJ, catalogue=catalogue))])
     for _ in range(WARM_UP):
-        controller.tick(())
-    model, data = controller.plant._physics.model, controller.plant._physics.data
+        machine.tick()
+    physics = machine.controller.plant._physics
+    model, data = physics.model, physics.data
     # A second state of the same arm: the steps must not move the one that ticks.
     beside = mujoco.MjData(model)
     mujoco.mj_copyData(beside, model, data)
 
-    def tick() -> None:
-        controller.tick(())
-        controller.state.events.take()
-
     def steps() -> None:
         mujoco.mj_step(model, beside, n_steps)
 
-    pairs = [(best_of(tick, length), best_of(steps, length)) for _ in range(length.part_of(ROUNDS))]
+    pairs = [(best_of(machine.tick, length), best_of(steps, length)) for _ in range(length.part_of(ROUNDS))]
     tick_us, steps_us = (min(times) for times in zip(*pairs, strict=True))
     return {"tick_us": tick_us, "tick_steps_us": steps_us, "tick_x_steps": tick_us / steps_us}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,16 +18,15 @@ import mujoco
 import numpy as np
 
 from protocol.ur_types import ControlMode, SafetyMode
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.commands.surroundings import Push
-from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import ErrorReported
-from ur_emulator.models.calibration import calibrated_dh
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import TYPICAL
-from ur_emulator.models.mjcf import LINKS, arm_spec, to_body
-from ur_emulator.plant.arm_physics import TABLE_HEIGHT
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.commands.surroundings import Push
+from ur_emulator.machine.controller.events import ErrorReported
+from ur_emulator.machine.machine import Machine
+from ur_emulator.machine.models.calibration import calibrated_dh
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import TYPICAL
+from ur_emulator.machine.models.mjcf import LINKS, arm_spec, to_body
+from ur_emulator.machine.plant.arm_physics import TABLE_HEIGHT
 from urscript import compile_program
 
 mpl.use("agg")
@@ -43,18 +41,11 @@ PUSH, CONTACT = (0.85, 0.20, 0.15, 1.0), (0.10, 0.55, 0.25, 1.0)
 BLUE, GREEN, RED, GREY = "#20629c", "#1a8c40", "#d93326", "#9a9a9a"
 
 
-class NoNetwork:
-    """These programs open no sockets."""
-
-    def open(self, host, port):
-        raise OSError("no network in pictures")
-
-
 class Run:
     """A program on a box, and what it left behind, cycle by cycle."""
 
     def __init__(self, start_z, program):
-        self.controller = Controller(UR3, TYPICAL, SEED, partial(robot_hosts, network=NoNetwork()))
+        self.controller = Machine(UR3, TYPICAL, SEED).controller
         self._play(f"movej({DOWN.format(z=start_z)}, a=3, v=2)")
         self.rows = []
         self.errors = []
@@ -79,8 +70,8 @@ class Run:
                 {
                     "q": plant.q_true,
                     "target_q": np.array(snapshot.target_q),
-                    "place": plant.flange_position,
-                    "contact": plant.contact_wrench,
+                    "place": plant.physics.flange_position.copy(),
+                    "contact": plant.physics.contact_wrench,
                     "felt": np.array(snapshot.actual_tcp_force),
                     "speed": np.array(snapshot.actual_tcp_speed),
                     "target_pose": np.array(snapshot.target_tcp_pose),

@@ -34,7 +34,7 @@ import pc_client.cli
 import ur_emulator.cli
 import urscript.cli
 from docs.generate.sessions import played
-from ur_emulator.control_api import command_line
+from ur_emulator.host.control_api import command_line
 from urscript import compile_program
 
 ROOT = Path(__file__).parents[1]

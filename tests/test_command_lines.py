@@ -14,8 +14,8 @@ from page_blocks import APPS, ROOT, parsed
 
 import ur_emulator.cli
 import ur_hil
-from ur_emulator.control_api import command_line
-from ur_emulator.control_api.operations import OPERATIONS
+from ur_emulator.host.control_api import command_line
+from ur_emulator.host.control_api.operations import OPERATIONS
 from ur_hil.command_line import EXIT_CODES, ExitCode
 
 MODULES = {"ur-client": "pc_client.cli", "ur-emulator": "ur_emulator.cli", "urscript": "urscript.cli"}

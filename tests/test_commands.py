@@ -38,6 +38,7 @@ ALONE = {
 }
 # Where the others begin and end, if not in the blocks of a page. CI begins with .ci/run, outside of any test.
 ELSEWHERE = {
+    "ur-emulator replay": "ur_emulator/test_journal.py::test_another_process_with_another_hash_seed_finds_the_same",
     "make ablation": "test_examples.py::test_ablation",
     "make attack": "test_commands.py::test_a_target_begins_and_ends",
     "make bench": "test_commands.py::test_a_target_begins_and_ends",

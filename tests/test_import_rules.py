@@ -26,8 +26,7 @@ MAY_IMPORT = {
 EFFECTS = {"socket", "threading", "time", "selectors", "select", "subprocess", "asyncio"}
 MAY_HAVE_EFFECTS = {
     "protocol": {"__main__.py"},
-    "ur_emulator": {"loop", "outgoing", "polyscope", "ports", "control_api"}
-    | {f"{part}.py" for part in ("box", "rack", "box_process", "cli", "pytest_plugin")},
+    "ur_emulator": {"host", "cli.py", "pytest_plugin.py"},
     "pc_client": {
         "driver",
         "experiment",
@@ -45,34 +44,46 @@ MAY_HAVE_EFFECTS = {
 # Inside a package: each part imports those before it, also for types only; those on one line import each other.
 BOX_ORDER = (
     {"budgets", "errors"},
+    {"machine"},
+    {"program_files"},
+    {"host"},
+    {"emulator"},
+    {"__main__", "cli", "pytest_plugin", "script_robots", "script_run"},
+)
+MACHINE_ORDER = (
     {"models"},
     {"kinematics"},
     {"motion"},
     {"plant"},
-    {"controller"},
+    {"controller", "tools"},
     {"scripting"},
-    {"box_log"},
     {"commands"},
-    {"program_files"},
-    {"loop"},
-    {"outgoing"},
-    {"polyscope"},
+    {"machine"},
+    {"records"},
+)
+HOST_ORDER = (
+    {"box_log"},
+    {"runtime"},
+    {"script_network"},
+    {"pacing", "served_box", "steps"},
+    {"player", "reports"},
     {"ports"},
     {"box_options"},
     {"control_api"},
+    {"journal"},
     {"box"},
+    {"replay"},
     {"rack"},
     {"box_process"},
-    {"emulator"},
-    {"__main__", "cli", "pytest_plugin", "script_robots", "script_run"},
 )
 CONTROLLER_ORDER = (
     {"events"},
     {"arm_in_space", "clock", "interpreter_queue", "pendant", "robot_mode"},
     {"io"},
-    {"grippers", "safety"},
+    {"safety"},
     {"settings"},
     {"arm_dynamics", "client_inputs", "world_model"},
+    {"electrics", "status_words"},
     {"snapshot"},
     {"past_cycles"},
     {"compliance", "force_sense"},
@@ -117,7 +128,9 @@ PROTOCOL_ORDER = (
 )
 ORDERS = {
     "ur_emulator": BOX_ORDER,
-    "ur_emulator.controller": CONTROLLER_ORDER,
+    "ur_emulator.machine": MACHINE_ORDER,
+    "ur_emulator.host": HOST_ORDER,
+    "ur_emulator.machine.controller": CONTROLLER_ORDER,
     "urscript": LANGUAGE_ORDER,
     "protocol": PROTOCOL_ORDER,
 }
@@ -218,7 +231,7 @@ def test_effects_stay_at_the_rim(package):
         ("protocol", {"urscript", "ur_emulator", "pc_client", "mujoco", "scipy", "lark"}),
         ("urscript", {"ur_emulator", "pc_client", "mujoco", "scipy"}),
         (
-            "ur_emulator.rack",
+            "ur_emulator.host.rack",
             {
                 "pc_client",
                 "scipy",
@@ -227,11 +240,11 @@ def test_effects_stay_at_the_rim(package):
                 "mcap",
                 "asyncio",
                 "pydantic",
-                "ur_emulator.ports.http",
+                "ur_emulator.host.ports.http",
             },
         ),
         ("ur_emulator.emulator", {"mujoco", "numpy", "lark"}),
-        ("ur_emulator.loop.worker", {"mujoco"}),
+        ("ur_emulator.host.runtime.worker", {"mujoco"}),
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
     ],
 )

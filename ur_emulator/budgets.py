@@ -263,7 +263,12 @@ class Budgets:
     # Beyond it one that takes more than 1 s ends, and others take turns.
     long_tasks: int = _budget(1, "programs, files or reports", "that take more than 1 s", "they are refused")
 
-    # --- log ---
+    # --- journal and log ---
+
+    # Two seconds of an e-Series box.
+    journal_cycles: int = _budget(
+        1_000, "cycles", "a journal that are not written yet", "the next are lost; lockstep waits"
+    )
 
     # 300 kB of lines as they usually are.
     log_lines: int = _budget(

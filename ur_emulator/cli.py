@@ -21,8 +21,9 @@ from typer.core import TyperCommand
 
 from protocol.errors import ProtocolError
 from ur_emulator import check_platform
-from ur_emulator.box_log import LogEntry, printable
-from ur_emulator.box_options import (
+from ur_emulator.errors import EmulatorError
+from ur_emulator.host.box_log import LogEntry, printable
+from ur_emulator.host.box_options import (
     PAGE_TOKEN_VARIABLE,
     TOKEN_VARIABLE,
     BoxOptions,
@@ -30,12 +31,11 @@ from ur_emulator.box_options import (
     counted_up,
     is_loopback,
 )
-from ur_emulator.errors import EmulatorError
 from ur_hil import PENDANT_PORT
 from ur_hil.command_line import ExitCode, examples, new_app, run_app
 
 if TYPE_CHECKING:
-    from ur_emulator.loop.line_writer import LineWriter
+    from ur_emulator.host.runtime.line_writer import LineWriter
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Enough for hundreds of boxes with hundreds of clients, and a number that every system grants.
@@ -143,6 +143,10 @@ def serve(
     ready_file: Annotated[
         Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
     ] = None,
+    journal: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the inputs of each cycle here, for `ur-emulator replay`."),
+    ] = None,
     log: Annotated[
         bool,
         typer.Option("--log", "-v", help="Show the log of the box on stderr: programs, errors, clients."),
@@ -154,7 +158,7 @@ def serve(
     except ImportError as error:
         _complain(str(error))
         raise typer.Exit(ExitCode.FAILED) from None
-    from ur_emulator.loop.processes import Role, prepare_children
+    from ur_emulator.host.runtime.processes import Role, prepare_children
 
     has_pendant = pendant or pendant_view
     if has_pendant:
@@ -167,8 +171,8 @@ def serve(
     raise_descriptor_limit()
     prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
-    from ur_emulator.loop.line_writer import LineWriter
-    from ur_emulator.rack import LoopRack
+    from ur_emulator.host.rack import LoopRack
+    from ur_emulator.host.runtime.line_writer import LineWriter
 
     try:
         first = BoxOptions(
@@ -188,6 +192,7 @@ def serve(
             skip_unknown_nodes=skip_unknown_nodes,
             remote_control=remote_control,
             services=services.replace(",", " ").split(),
+            journal=journal,
         )
         options = counted_up(boxes, first)
         tokens |= {} if token is None else {TOKEN_VARIABLE: token}
@@ -237,6 +242,31 @@ def serve(
         err.close()
 
 
+@app.command(
+    epilog=examples("ur-emulator replay session.journal", "ur-emulator replay session.journal --until 75")
+)
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A journal, as `serve --journal` writes it.")],
+    until: Annotated[
+        float | None, typer.Option(metavar="T", help="Time of the robot at which to end [s].")
+    ] = None,
+) -> None:
+    """Feed a bare machine with the inputs of a journal; each cycle must give the same, bit for bit."""
+    os.environ.setdefault("MUJOCO_GL", "disabled")
+    from ur_emulator.host.replay import replay as run
+
+    try:
+        found = run(file, until)
+    except EmulatorError as error:
+        _complain(str(error))
+        raise typer.Exit(ExitCode.WRONG_USAGE) from None
+    for note in found.notes:
+        _complain(note)
+    typer.echo(str(found))
+    if found.difference is not None or found.end:
+        raise typer.Exit(ExitCode.FAILED)
+
+
 class _CtlCommand(TyperCommand):
     """Its options are words of its argument, for the parser of `ctl`: also when the shell completes them."""
 
@@ -246,7 +276,7 @@ class _CtlCommand(TyperCommand):
 
 
 def _next_words(context: typer.Context, incomplete: str) -> list[str]:
-    from ur_emulator.control_api.command_line import next_words
+    from ur_emulator.host.control_api.command_line import next_words
 
     words = next_words(context.params.get("words") or [])
     return [word for word in words if word.startswith(incomplete)]
@@ -263,7 +293,7 @@ def ctl(
     ] = None,
 ) -> None:
     """Do something to a box that runs with --control-port: set inputs, push, stop, answer, read the log."""
-    from ur_emulator.control_api.command_line import main as control
+    from ur_emulator.host.control_api.command_line import main as control
 
     raise typer.Exit(control(words or ()))
 

@@ -18,16 +18,17 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, Self, overload
 
 from protocol.ur_types import Ports
-from ur_emulator.box_log import LogEntry
-from ur_emulator.box_options import BoxOptions, ServedAt, check_count, counted_up
-from ur_emulator.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
-from ur_emulator.control_api.operations import BoxOperations
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.box_log import LogEntry
+from ur_emulator.host.box_options import BoxOptions, ServedAt, check_count, counted_up
+from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
+from ur_emulator.host.control_api.operations import BoxOperations
 
 if TYPE_CHECKING:
-    from ur_emulator.controller.command import Command, Done
-    from ur_emulator.loop.pacing import Pace
-    from ur_emulator.models.robot_generation import RobotGeneration
+    from ur_emulator.host.pacing import Pace
+    from ur_emulator.machine.commands.operation import Operation
+    from ur_emulator.machine.controller.command import Command, Done
+    from ur_emulator.machine.models.robot_generation import RobotGeneration
 
 
 class Rack(Protocol):
@@ -49,7 +50,7 @@ class Rack(Protocol):
         """Where a box is served, and as what."""
         ...
 
-    def perform(self, index: int, name: str, arguments: Mapping[str, Any]) -> Any:
+    def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
         ...
 
@@ -77,10 +78,10 @@ def make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
     """
     check_count(len(options))
     if in_process:
-        from ur_emulator.rack import LoopRack
+        from ur_emulator.host.rack import LoopRack
 
         return LoopRack(options)
-    from ur_emulator.box_process import ProcessRack
+    from ur_emulator.host.box_process import ProcessRack
 
     return ProcessRack(options)
 
@@ -144,7 +145,7 @@ class BoxControl(BoxOperations):
         """Ask for something as a client of the box would; it acts in the next cycle.
 
         Args:
-            command: one of `ur_emulator.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
+            command: one of `machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
             done: called when it was applied, in another thread: with its result and None, or with None and
                 the error, a `RefusedError` if it was refused.
 
@@ -164,10 +165,10 @@ class BoxControl(BoxOperations):
     def _served_at(self) -> ServedAt:
         return self._rack.served_at(self._index)
 
-    def _perform(self, name: str, arguments: Mapping[str, Any]) -> Any:
+    def _perform(self, operation: Operation[Any]) -> Any:
         __tracebackhide__ = True
         try:
-            return self._rack.perform(self._index, name, arguments)
+            return self._rack.perform(self._index, operation)
         except EmulatorError as error:
             raise error.with_traceback(None) from None  # pytest shows the line of the test only
 
@@ -222,6 +223,7 @@ class ControlBox(_Running, BoxControl):
         services: of a PolyScope X box, closed until they are enabled: "primary" and "rtde".
         tool: on the flange, such as "robotiq-2f85", or a file (docs/grippers.md).
         scene: what stands around the arm, and things to grip: a cell file (TOML) or a fragment of MJCF.
+        journal: file for the inputs of each cycle, to be replayed (docs/journal.md).
         in_process: run in a thread of this process. A client that holds Python's lock while it waits for the
             box then waits for ever.
 
@@ -247,6 +249,7 @@ class ControlBox(_Running, BoxControl):
         services: Collection[str] = (),
         tool: str | PathLike[str] = "none",
         scene: str | PathLike[str] | None = None,
+        journal: str | PathLike[str] | None = None,
         *,
         in_process: bool = False,
         generation: RobotGeneration | None = None,
@@ -270,6 +273,7 @@ class ControlBox(_Running, BoxControl):
             generation,
             tool,
             scene,
+            journal,
         )
         super().__init__(make_rack([options], in_process=in_process))
 

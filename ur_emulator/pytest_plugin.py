@@ -16,6 +16,7 @@ fixture is used, so that a test-suite without boxes pays nothing.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -27,7 +28,7 @@ from ur_emulator.errors import ControlError, EmulatorError, ModelError, PortErro
 
 if TYPE_CHECKING:
     from ur_emulator import ControlBox
-    from ur_emulator.models.robot_model import RobotModel
+    from ur_emulator.machine.models.robot_model import RobotModel
 
 # What `@pytest.mark.ur(...)` and `ur_box_factory(...)` take.
 OPTIONS = (
@@ -45,6 +46,7 @@ OPTIONS = (
     "services",
     "tool",
     "scene",
+    "journal",
     "control_port",
     "control_token",
     "in_process",
@@ -54,6 +56,8 @@ DEFAULT_ROBOT = "ur3"
 DEFAULTS: dict[str, Any] = {"pace": "lockstep", "port_base": None}
 # Entries of a log that a failing test shows.
 MAX_SHOWN = 200
+# What the name of a file does not have of that of a test.
+_NO_NAME = re.compile(r"[^A-Za-z0-9_.]+")
 # How many addresses are tried for a box with the standard ports.
 MAX_ADDRESSES = 100
 
@@ -68,6 +72,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--ur-robot", default=DEFAULT_ROBOT, metavar="NAME", help="type of the arm, unless a test names one"
     )
     group.addoption("--ur-version", default=None, metavar="X.Y.Z", help="software, unless a test names one")
+    group.addoption(
+        "--ur-journal", type=Path, default=None, metavar="DIR", help="folder for the journal of each box"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -96,6 +103,11 @@ def ur_box_factory(request: pytest.FixtureRequest) -> Iterator[BoxFactory]:
 
         def make(**options: Any) -> ControlBox:
             defaults = _defaults(request.config, options.get("robot"))
+            folder: Path | None = request.config.getoption("--ur-journal")
+            if folder is not None:
+                folder.mkdir(parents=True, exist_ok=True)
+                name = _NO_NAME.sub("-", request.node.nodeid).strip("-")
+                defaults["journal"] = (folder / f"{name}-{len(boxes) + 1}.journal").absolute()
             box = _start({**defaults, **_checked(options, request.path.parent)}, stack)
             boxes.append(box)
             return box
@@ -165,7 +177,7 @@ def _defaults(config: pytest.Config, robot: str | None) -> dict[str, Any]:
 
 def _robot(name: str, version: str | None) -> RobotModel:
     """Return an arm that runs a version of the software; ModelError if there is none."""
-    from ur_emulator.models.robots import robot_by_name
+    from ur_emulator.machine.models.robots import robot_by_name
 
     robot = robot_by_name(name, version)
     robot.software_version(version)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from ur_emulator.errors import ModelError
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import ROBOTS, robot_by_name
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
 
 if TYPE_CHECKING:
     from ur_emulator.script_run import ScriptBox

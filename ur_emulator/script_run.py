@@ -9,21 +9,19 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from protocol.primary.messages import RequestedType
-from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram, StopProgram
-from ur_emulator.controller import events as ev
-from ur_emulator.controller.command import Command
-from ur_emulator.controller.controller import Controller
-from ur_emulator.errors import ArgumentError
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.move import Move
-from ur_emulator.outgoing.loop_network import LoopNetwork
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.errors import ArgumentError, RefusedError
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.script_network.loop_network import LoopNetwork
+from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, StartProgram, StopProgram
+from ur_emulator.machine.controller import events as ev
+from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.machine import Answer, Machine
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.motion.move import Move
 from urscript.robot import Report, ReportKind, RunEnd, RunStatus
 
 if TYPE_CHECKING:
@@ -63,13 +61,10 @@ class ScriptBox:
         model = robot_by_name(robot, asked)
         version = model.software_version(asked)
         self._loop = EventLoop()
-        self._controller = Controller(
-            model,
-            model.generation.fidelity(fidelity),
-            seed,
-            partial(robot_hosts, network=LoopNetwork(self._loop, model.generation.period_s, _raise)),
-            version=(version.major, version.minor),
+        self._machine = Machine(
+            model, model.generation.fidelity(fidelity), seed, version=(version.major, version.minor)
         )
+        self._controller = self._machine.controller
         self._answers = deque(answers)
         self._start_tick = self._controller.snapshot.tick
         self.title = f"{model.title}, fidelity {fidelity}, seed {seed}"
@@ -82,7 +77,7 @@ class ScriptBox:
 
     def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
         """Run a program to its end and the arm to rest; see urscript.robot.ScriptRobot."""
-        run = _Run(self._controller, self._loop, self._answers, limit, report)
+        run = _Run(self._machine, self._loop, self._answers, limit, report)
         run.submit(StartProgram(program, loaded=True))
         self._loop.add(run)
         try:
@@ -105,7 +100,7 @@ class _Run:
 
     def __init__(
         self,
-        controller: Controller,
+        machine: Machine,
         loop: EventLoop,
         answers: deque[str],
         limit: float,
@@ -113,7 +108,9 @@ class _Run:
     ) -> None:
         self.status = RunStatus.RUNNING
         self.robot_time = self.real_time = 0.0
-        self._controller = controller
+        self._machine = machine
+        self._controller = controller = machine.controller
+        self._network = LoopNetwork(loop, machine.network, controller.period_s, machine.take, _raise)
         self._loop = loop
         self._answers = answers
         self._limit_cycles = round(min(limit / controller.period_s, 1e15))
@@ -136,7 +133,7 @@ class _Run:
         """End the program at once, after Ctrl-C."""
         if not self._is_over:
             self._end(RunStatus.INTERRUPTED)
-        self._controller.tick((*self._commands, StopProgram()))
+        self._tick((*self._commands, StopProgram()))
 
     # --- the loop
 
@@ -154,13 +151,22 @@ class _Run:
         commands, self._commands = self._commands, []
         motion = self._controller.state.motion
         self._move = motion.move or self._move
-        self._controller.tick(commands)
+        answer = self._tick(commands)
         self._due = now + self._controller.period_s
-        for event in self._controller.state.events.take():
+        for event in answer.events:
             self._take(event)
         if self._is_at_rest():
             self._loop.stop()
         return now
+
+    def _tick(self, commands: Iterable[Command]) -> Answer:
+        """Advance the machine by a cycle; an error of ours in a command ends the run."""
+        answer = self._machine.tick(commands)
+        for _, error in answer.outcomes:
+            if error is not None and not isinstance(error, RefusedError):
+                raise error
+        self._network.carry_out(answer.requests)
+        return answer
 
     def failed(self, error: Exception) -> None:
         """Let an error end the run."""

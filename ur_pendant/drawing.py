@@ -24,8 +24,8 @@ from pc_client.kinematics.clearance import housings, load_meshes
 from pc_client.kinematics.model import RobotModel, dh_lengths, load_pinocchio_model, model_of_arm
 from protocol.pose import pose_inv, pose_to_T, pose_trans, rpy_to_rotvec
 from protocol.primary.layout import KinematicsInfo
-from ur_emulator.control_api.box_state import BoxState
-from ur_emulator.models.things import BodyShape
+from ur_emulator.host.control_api.box_state import BoxState
+from ur_emulator.machine.models.things import BodyShape
 from ur_hil.cell import NO_CELL, Cell, Three
 from ur_pendant.robot import Robot
 

@@ -23,8 +23,9 @@ from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import ClientError
 from protocol.rtde.types import RtdeValue
 from protocol.ur_types import ProgramState, RobotMode, SoftwareVersion
-from ur_emulator.control_api.http_client import ControlClient
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.control_api.http_client import ControlClient
+from ur_emulator.host.control_api.operations import make
 from ur_pendant.robot import Robot
 
 
@@ -138,7 +139,7 @@ class Hands:
             raise HandError("only the control API of a box can do this: serve it with --control-port")
         client = ControlClient(address.host, address.control_port, address.token)
         try:
-            return client.perform(operation, arguments)
+            return client.perform(make(operation, arguments))
         except EmulatorError as error:
             raise HandError(str(error)) from None
 

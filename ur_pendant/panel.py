@@ -27,9 +27,10 @@ from pc_client.arrays import Array
 from pc_client.kinematics.model import RobotModel, solve_ik
 from protocol.pose import pose_inv, pose_to_T
 from protocol.ur_types import JOINT_NAMES, ProgramState, RobotMode, SafetyStatus
-from ur_emulator.commands.surroundings import MAX_FORCE, SIZES, THING_SIZES
-from ur_emulator.control_api.box_state import Question
-from ur_emulator.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
+from ur_emulator.host.control_api.box_state import Question
+from ur_emulator.machine.commands.surroundings import MAX_FORCE
+from ur_emulator.machine.controller.io.lines import DIGITAL_GROUPS, DigitalGroup
+from ur_emulator.machine.models.things import SIZES
 from ur_pendant.drawing import ArmDrawing, RobotDrawing
 from ur_pendant.hands import ACCELERATION, KEYS, SPEED, HandError, Hands
 from ur_pendant.robot import PLOTTED, RATE, Robot, Sample, Signal
@@ -334,9 +335,8 @@ class Panel:
 
     def _make_world(self) -> None:
         gui, robot, hands = self._gui, self._robot, self._hands
-        sizes: Mapping[Any, tuple[str, ...]] = {**SIZES, **THING_SIZES}
         name = gui.add_text("Name", "box")
-        shape = gui.add_dropdown("Shape", tuple(sizes))
+        shape = gui.add_dropdown("Shape", tuple(SIZES))
         size = gui.add_vector3("Size m", (0.1, 0.1, 0.1), step=0.01, hint="edges; or radius, length")
         at = gui.add_vector3("At m", (0.4, 0.2, 0.1), step=0.01, hint="of its middle, in the base frame")
         mass = gui.add_number("Mass kg", 0.5, min=0.0, max=20.0, step=0.1)
@@ -353,7 +353,7 @@ class Panel:
 
         def put(operation: str, **more: float) -> None:
             given = {"name": name.value, "shape": shape.value, "pose": (*at.value, 0.0, 0.0, 0.0)}
-            hands.operate(operation, size=size.value[: len(sizes[shape.value])], **given, **more)
+            hands.operate(operation, size=size.value[: len(SIZES[shape.value])], **given, **more)
 
         def found(robot: Robot) -> Mapping[str, Deed]:
             things, obstacles = getattr(robot.state, "things", ()), getattr(robot.state, "obstacles", ())

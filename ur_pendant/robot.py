@@ -34,9 +34,10 @@ from protocol.primary.messages import (
 )
 from protocol.primary.values import TypedValue
 from protocol.ur_types import JOINT_NAMES, Ports
-from ur_emulator.control_api.box_state import BoxState, Question
-from ur_emulator.control_api.http_client import AttachedBox
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.control_api.box_state import BoxState, Question
+from ur_emulator.host.control_api.http_client import AttachedBox
+from ur_emulator.host.control_api.step_operations import ReadLog, ReadState
 
 RATE = 30.0
 """Packages a second that RTDE is asked for: a screen shows twice as many at best."""
@@ -254,9 +255,9 @@ class Robot:
                     self.log.clear()
                     # Which ports it has: that of the dashboard server is not there with PolyScope X.
                     self.address = replace(at, ports=box.served_at(0).ports)
-                state: BoxState = box.perform(0, "state", {})
+                state: BoxState = box.perform(0, ReadState())
                 if next(turns) % _LOG_EVERY == 0:
-                    news = box.perform(0, "log", {"after": seen})
+                    news = box.perform(0, ReadLog(after=seen))
                     seen = news["next"]
                     self.log.extend(LogLine(entry["time"], entry["text"]) for entry in news["entries"])
             except EmulatorError:

@@ -27,7 +27,7 @@ import websockets.asyncio.server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from ur_emulator.box_options import check_token, is_loopback
+from ur_emulator.host.box_options import check_token, is_loopback
 
 MOST_PAGES = 20
 """Pages that may be open at once."""

@@ -18,8 +18,8 @@ from pc_client.errors import ClientError
 from pc_client.kinematics.tool import surroundings
 from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
-from ur_emulator.box_log import printable
-from ur_emulator.box_options import PAGE_TOKEN_VARIABLE, TOKEN_VARIABLE
+from ur_emulator.host.box_log import printable
+from ur_emulator.host.box_options import PAGE_TOKEN_VARIABLE, TOKEN_VARIABLE
 from ur_hil.command_line import ExitCode
 from ur_pendant.drawing import RobotDrawing
 from ur_pendant.hands import Hands

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from protocol import pose as algebra
+from ur_hil.arithmetic import add_up
 from urscript import values
 from urscript.dialect import LONGEST_LIST
 from urscript.errors import ScriptRuntimeError
@@ -187,7 +188,7 @@ def normalize(v: list[float]) -> list[float]:
     Raises:
         ScriptRuntimeError: the sum of the squares is zero.
     """
-    square = sum(part * part for part in v)
+    square = add_up(part * part for part in v)
     if square == 0:
         raise ScriptRuntimeError("normalize: the sum of all squared elements is zero")
     length = math.sqrt(square)

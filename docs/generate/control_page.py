@@ -9,13 +9,13 @@ from dataclasses import fields
 from typing import Any
 
 from protocol.ur_types import Ports
-from ur_emulator.box_options import TOKEN_VARIABLE, ServedAt
 from ur_emulator.budgets import BUDGETS, KIB
-from ur_emulator.commands.operation import Kind, Operation, Parameter
-from ur_emulator.control_api.box_state import BoxState, Question
-from ur_emulator.control_api.http_client import DEFAULT_PORT
-from ur_emulator.control_api.operations import OPERATIONS
-from ur_emulator.control_api.step_operations import ReadState
+from ur_emulator.host.box_options import TOKEN_VARIABLE, ServedAt
+from ur_emulator.host.control_api.box_state import BoxState, Question
+from ur_emulator.host.control_api.http_client import DEFAULT_PORT
+from ur_emulator.host.control_api.operations import OPERATIONS
+from ur_emulator.host.control_api.step_operations import ReadState
+from ur_emulator.machine.commands.operation import Kind, Operation, Parameter
 
 
 def _attributes(described: type, names: Iterable[str]) -> Iterator[str]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from protocol.robotiq import INPUTS, OUTPUTS, VARIABLES, Variable
-from ur_emulator.controller.grippers.onrobot import STATUS
-from ur_emulator.ports.onrobot import METHODS
+from ur_emulator.host.ports.onrobot import METHODS
+from ur_emulator.machine.tools.onrobot import STATUS
 
 _INTRODUCTION = """\
 # Grippers: what is answered, and how well
 
-Made from `protocol/robotiq.py` and `ur_emulator/ports/onrobot.py` by `make docs`.
+Made from `protocol/robotiq.py` and `ur_emulator/host/ports/onrobot.py` by `make docs`.
 [Grippers](../grippers.md) explains how they are used, [fidelity.md](../fidelity.md) what was chosen.
 *Exact*: as sources describe a real one. *Approximate*:
 the same kind of answer, from a simpler model. *Declared*: kept and read back, or constant.

@@ -8,7 +8,7 @@ from docs.generate.page_parts import table
 from protocol.interpreter import CLEANED_UP, INVALID_STATE, MAX_LINE, TOO_MANY, Word
 from protocol.ur_types import Ports
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.models.generations import E_SERIES
+from ur_emulator.machine.models.generations import E_SERIES
 
 _DOES = {
     Word.ABORT: "end the `movej` or `movel` that moves the arm, of whatever program; the arm comes to rest",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from docs.generate.page_parts import modes
 from protocol.ur_types import JointMode, RobotMode, SafetyMode
-from ur_emulator.controller.modbus_map import COILS, REGISTERS, WORD_MAX, MapRow
+from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS, WORD_MAX, MapRow
 
 _INTRODUCTION = """\
 # Modbus TCP
 
-Made from `ur_emulator/controller/modbus_map.py` by `make docs`.
+Made from `ur_emulator/machine/controller/modbus_map.py` by `make docs`.
 
 ## The box as a server: port 502
 

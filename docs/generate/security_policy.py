@@ -9,7 +9,7 @@ from docs.generate.page_parts import table
 from pc_client.files import FILE_KINDS
 from protocol.ur_types import Ports
 from ur_emulator.budgets import rows
-from ur_emulator.control_api.http_client import DEFAULT_PORT
+from ur_emulator.host.control_api.http_client import DEFAULT_PORT
 from ur_hil import PENDANT_PORT
 from ur_hil.input_files import MIB
 

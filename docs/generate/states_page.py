@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
-from ur_emulator.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
-from ur_emulator.controller.safety.boundaries import (
+from ur_emulator.machine.controller.robot_mode import JOINT_MODES, PASSING_TIME, TRANSITIONS
+from ur_emulator.machine.controller.safety.boundaries import (
     DIRECTION_TOLERANCE,
     MOST_PLANES,
     PLANE_TOLERANCE,
     TRIGGER_BAND,
     BoundaryMode,
 )
-from ur_emulator.controller.safety.inputs import (
+from ur_emulator.machine.controller.safety.inputs import (
     ACTIVE,
     OPERATIONAL_MODES,
     STOPPING,
@@ -27,13 +27,13 @@ from ur_emulator.controller.safety.inputs import (
     OperationalMode,
     SafetyInput,
 )
-from ur_emulator.controller.safety.inputs import TRANSITIONS as ENABLING_TRANSITIONS
-from ur_emulator.controller.safety.modes import EVENTS, MODES, after, mode_of
-from ur_emulator.controller.snapshot import safety_status_bits
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.motion.generators import Kind
-from ur_emulator.motion.ownership import TABLE as ARM_ROWS
-from ur_emulator.motion.ownership import ArmState, Row
+from ur_emulator.machine.controller.safety.inputs import TRANSITIONS as ENABLING_TRANSITIONS
+from ur_emulator.machine.controller.safety.modes import MODES, SafetyEvent, after, mode_of
+from ur_emulator.machine.controller.status_words import safety_status_bits
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.motion.generators import Kind
+from ur_emulator.machine.motion.ownership import TABLE as ARM_ROWS
+from ur_emulator.machine.motion.ownership import ArmState, Row
 
 
 class ProgramTransition(NamedTuple):
@@ -73,11 +73,11 @@ PROGRAM_TRANSITIONS: tuple[ProgramTransition, ...] = (
 _HEAD = """\
 # States of the box
 
-Made from `ur_emulator/controller/safety/modes.py`, `robot_mode.py`,
-`ur_emulator/motion/ownership.py` and `docs/generate/states_page.py` by `make docs`.
+Made from `ur_emulator/machine/controller/safety/modes.py`, `robot_mode.py`,
+`ur_emulator/machine/motion/ownership.py` and `docs/generate/states_page.py` by `make docs`.
 Letters: D documented, O observed, I inferred, C chosen; see [fidelity.md](fidelity.md).
 
-Commands are those of `ur_emulator.commands`; `ControlBox.submit` takes them.
+Commands are those of `ur_emulator.machine.commands`; `ControlBox.submit` takes them.
 
 ## Safety mode
 
@@ -220,13 +220,13 @@ def render() -> str:
             ("event", "brings", "ends", "comes from"),
             (
                 (
-                    event.value,
+                    row.title,
                     row.brings.name if row.brings else "",
                     ", ".join(mode.name for mode in _ranked(row.takes))
                     + (", and the power" if row.cuts_power else ""),
                     row.meaning,
                 )
-                for event, row in EVENTS.items()
+                for row in (event.value for event in SafetyEvent)
             ),
         ),
         _MATRIX,
@@ -357,23 +357,23 @@ def _safety_edges() -> Iterator[tuple[str, str, str]]:
     for row in reversed(MODES):
         if row.mode is SafetyMode.NORMAL:
             continue
-        for event, event_row in EVENTS.items():
-            if event_row.brings is row.mode:
-                yield SafetyMode.NORMAL.name, row.mode.name, event.value
-        ends = [event.value for event, event_row in EVENTS.items() if row.mode in event_row.takes]
+        for event in SafetyEvent:
+            if event.value.brings is row.mode:
+                yield SafetyMode.NORMAL.name, row.mode.name, event.value.title
+        ends = [event.value.title for event in SafetyEvent if row.mode in event.value.takes]
         yield row.mode.name, SafetyMode.NORMAL.name, ", ".join(ends)
 
 
 def _matrix() -> Iterator[str]:
     order = [row.mode for row in reversed(MODES)]
     rows = []
-    for event in EVENTS:
+    for event in SafetyEvent:
         cells = []
         for mode in order:
             causes = frozenset() if mode is SafetyMode.NORMAL else frozenset({mode})
             then = mode_of(after(causes, event))
             cells.append("." if then is mode else then.name)
-        rows.append((event.value, *cells))
+        rows.append((event.value.title, *cells))
     return _table(("event", *(mode.name for mode in order)), rows)
 
 

@@ -29,7 +29,7 @@ import psutil
 
 from protocol.realtime.layout import RealtimeLayout, layout_for_version
 from protocol.ur_types import Ports
-from ur_emulator.models.robots import robot_by_name
+from ur_emulator.machine.models.robots import robot_by_name
 
 PATIENCE = 60.0  # s; a box that has not answered by then does not answer
 MOST_MEMORY = 300.0  # MB; of the box and its worker processes together

@@ -12,7 +12,7 @@ from gripper_support import block_between_pads, move_to_place
 from onRobot.gripper import RG2
 
 from ur_emulator import ControlBox
-from ur_emulator.controller.grippers.onrobot import STATUS
+from ur_emulator.machine.tools.onrobot import STATUS
 from ur_hil.tools import TOOLS
 
 TOOL = TOOLS["onrobot-rg2"]

@@ -24,10 +24,10 @@ from strict_clients import (
 from protocol.primary.layout import ConfigurationData
 from protocol.rtde.fields import OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.controller.safety.safety_state import limits_of
-from ur_emulator.models.generations import E_SERIES
-from ur_emulator.models.robots import ROBOTS
-from ur_emulator.ports.primary.robot_state import setup_records
+from ur_emulator.host.ports.primary.robot_state import setup_records
+from ur_emulator.machine.controller.safety.safety_state import limits_of
+from ur_emulator.machine.models.generations import E_SERIES
+from ur_emulator.machine.models.robots import ROBOTS
 
 # What a driver is started for: type code and series of the arm.
 UR_TYPES = {

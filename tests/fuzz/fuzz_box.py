@@ -28,15 +28,15 @@ from protocol.rtde.client_connection import DataReceived, RtdeClientConnection
 from protocol.rtde.codec import RequestProtocolVersion, SetupOutputs, Start
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.commands.power import (
+from ur_emulator.machine.commands.power import (
     MoveEnablingDevice,
     PowerOn,
     ReleaseBrakes,
     SetOperationalMode,
     SwitchRemoteControl,
 )
-from ur_emulator.commands.programs import StartProgram, StopProgram
-from ur_emulator.commands.safety import (
+from ur_emulator.machine.commands.programs import StartProgram, StopProgram
+from ur_emulator.machine.commands.safety import (
     AssignSafetyInput,
     ConfirmSafety,
     PressButton,
@@ -46,9 +46,9 @@ from ur_emulator.commands.safety import (
     SafeguardStop,
     UnlockProtectiveStop,
 )
-from ur_emulator.commands.surroundings import AttachPayload, Push
-from ur_emulator.controller.events import RobotModeChanged, SafetyModeChanged
-from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS
+from ur_emulator.machine.commands.surroundings import AttachPayload, Push
+from ur_emulator.machine.controller.events import RobotModeChanged, SafetyModeChanged
+from ur_emulator.machine.controller.safety.inputs import N_INPUT_PAIRS
 from urscript import compile_program
 
 # Kinds of boxes, as options.
@@ -72,7 +72,7 @@ _NEVER = 60.0  # s; no service is due
 # Memory of this process beyond what it had at the beginning, and of the worker process [bytes].
 _MOST_GROWTH = 120 << 20
 _MOST_OF_WORKER = 300 << 20
-# How the box reports an error of its own (ur_emulator/loop/barrier.py).
+# How the box reports an error of its own (ur_emulator/host/runtime/barrier.py).
 _DEFECT = re.compile(r" line \d+ of \w+\.py$")
 QUESTIONS = {
     "dashboard": b"robotmode\n",

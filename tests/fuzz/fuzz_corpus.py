@@ -24,9 +24,9 @@ from protocol.rtde.codec import (
 )
 from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.script_channel import CONTROLLER_WORDS
-from ur_emulator.commands.operation import Kind
-from ur_emulator.control_api.operations import OPERATIONS
-from ur_emulator.ports.onrobot import METHODS
+from ur_emulator.host.control_api.operations import OPERATIONS
+from ur_emulator.host.ports.onrobot import METHODS
+from ur_emulator.machine.commands.operation import Kind
 
 # Words and operations by which something else than a program may move the arm.
 MOVING_WORDS = {"set robotmode freedrive"}

@@ -33,15 +33,16 @@ from pc_client.movements.movement import load_movement
 from pc_client.recording.recording import load_recording
 from pc_client.studies.extraction.pen import contents, parse_pen, pen_sources
 from pc_client.studies.sweep.settings import read_config
-from ur_emulator.controller.clock import Clock
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.models.generations import CB3
-from ur_emulator.outgoing.loop_network import LoopNetwork
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.script_network.loop_network import LoopNetwork
+from ur_emulator.machine.controller.clock import Clock
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.scripting.network import Network
+from ur_emulator.machine.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.program_files.compiling import load_and_compile
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation_reader import NEW_BOX, load_installation
-from ur_emulator.scripting.rpc_builtins import RpcBuiltins
 from ur_hil.cell import load_cell
 from urscript.errors import ScriptRuntimeError
 
@@ -262,7 +263,10 @@ class _Answers:
         self._server = socket.create_server(("127.0.0.1", 0))
         self._server.setblocking(False)
         self._loop = EventLoop(precise=False)
-        self._network = LoopNetwork(self._loop, CB3.period_s, self._report, "127.0.0.1")
+        self._network = network = Network()
+        self._outside = LoopNetwork(
+            self._loop, network, CB3.period_s, network.take, self._report, "127.0.0.1"
+        )
         self._clock = Clock(CB3, 0)
         self._defects = []
 
@@ -289,6 +293,7 @@ class _Answers:
         finally:
             answering.close()
             remotes.end()
+            self._outside.carry_out(self._network.take_requests())
         assert not self._defects, self._defects
 
     def _answer(self, data):
@@ -308,6 +313,7 @@ class _Answers:
 
     def _turn(self):
         self._clock.advance()
+        self._outside.carry_out(self._network.take_requests())
         for service in tuple(self._loop._services):
             service.advance(time.monotonic())
         self._loop.call_soon(_nothing, _raise)  # so that it does not wait

@@ -34,10 +34,10 @@ from protocol.rtde.fields import output_fields  # noqa: E402
 from protocol.rtde.recipe import snapshot_encoder  # noqa: E402
 from protocol.ur_types import SoftwareVersion  # noqa: E402
 from ur_emulator import ControlBox  # noqa: E402
-from ur_emulator.controller.modbus_map import read_register  # noqa: E402
-from ur_emulator.models.generations import CB3  # noqa: E402
-from ur_emulator.ports.primary.port import message_for  # noqa: E402
-from ur_emulator.ports.primary.robot_state import StateEncoder  # noqa: E402
+from ur_emulator.host.ports.primary.port import message_for  # noqa: E402
+from ur_emulator.host.ports.primary.robot_state import StateEncoder  # noqa: E402
+from ur_emulator.machine.controller.modbus_map import read_register  # noqa: E402
+from ur_emulator.machine.models.generations import CB3  # noqa: E402
 from urscript.check.checking import check_program  # noqa: E402
 
 VERSION = SoftwareVersion(3, 15, 8)

@@ -23,7 +23,7 @@ from integration_support import (
     run_in_movement,
 )
 
-import ur_emulator.loop.pacing as pacing
+import ur_emulator.host.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
 from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork

@@ -29,9 +29,9 @@ from integration_support import (
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage
 from protocol.ur_types import Ports
 from ur_emulator import ControlBox
-from ur_emulator.box_options import TOKEN_VARIABLE
 from ur_emulator.cli import WANTED_DESCRIPTORS
 from ur_emulator.errors import EmulatorError
+from ur_emulator.host.box_options import TOKEN_VARIABLE
 
 
 def serve(*arguments):

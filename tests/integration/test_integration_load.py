@@ -29,12 +29,12 @@ from integration_support import (
     serving,
 )
 
-import ur_emulator.loop.pacing as pacing
+import ur_emulator.host.pacing as pacing
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from protocol.ur_types import ProgramState
 from ur_emulator import ControlBox
-from ur_emulator.box_log import MAX_ENTRIES, LogEntry
-from ur_emulator.controller.snapshot import Snapshot
+from ur_emulator.host.box_log import MAX_ENTRIES, LogEntry
+from ur_emulator.machine.controller.snapshot import Snapshot
 
 NAMES = b"timestamp,actual_q,actual_qd"
 SCRIPT = b"def f():\n  textmsg(1)\nend\n"

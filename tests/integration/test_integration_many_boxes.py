@@ -32,9 +32,9 @@ from pc_client.kinematics.model import robot_model
 from pc_client.planning.approach import JointLines
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import BoxRack, ControlBox
-from ur_emulator.box_options import MAX_BOXES
 from ur_emulator.errors import EmulatorError, PortError
-from ur_emulator.loop import event_loop
+from ur_emulator.host.box_options import MAX_BOXES
+from ur_emulator.host.runtime import event_loop
 
 own_addresses = pytest.mark.skipif(
     sys.platform == "darwin", reason="only 127.0.0.1 is an address of a Mac unless others are added"

@@ -18,7 +18,7 @@ from integration_support import (
     send,
 )
 
-import ur_emulator.loop.pacing as pacing
+import ur_emulator.host.pacing as pacing
 from protocol.primary.messages import ErrorCodeMessage, KeyMessage, RuntimeExceptionMessage, TextMessage
 from protocol.ur_types import Ports, ProgramState
 from ur_emulator import ControlBox

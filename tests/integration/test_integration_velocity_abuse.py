@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from integration_support import HELLO_PROGRAM, Messages, VelocitySession, is_closed, send
 
-import ur_emulator.loop.pacing as pacing
+import ur_emulator.host.pacing as pacing
 from protocol.primary.messages import (
     ErrorCodeMessage,
     KeyMessage,
@@ -18,7 +18,7 @@ from protocol.primary.messages import (
     TextMessage,
 )
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.models.robots import robot_by_name
+from ur_emulator.machine.models.robots import robot_by_name
 
 UR3 = robot_by_name("ur3")
 INT_MIN, INT_MAX = -(2**31), 2**31 - 1

@@ -100,7 +100,7 @@ def test_a_delay_and_an_offset_count_until_they_are_named(drawing):
     assert verdict.planned_aligned.snr_t_db > 60.0
     assert verdict.offset == pytest.approx(math.hypot(0.001, 0.002), rel=1e-3)
     assert verdict.off_sheet == pytest.approx(0.003 * math.sqrt(0.5), rel=0.1)
-    assert verdict.human_aligned.snr_v_db == pytest.approx(perfect.human.snr_v_db, abs=0.5)
+    assert verdict.human_aligned.snr_v_db == pytest.approx(perfect.human.snr_v_db, abs=1.5)
 
 
 def test_an_offset_alone_does_not_touch_the_velocity(drawing):

@@ -157,7 +157,7 @@ def test_a_file_that_is_not_there(tmp_path):
 
 
 def test_fidelities_are_those_of_the_box():
-    from ur_emulator.models.fidelity import FIDELITIES as OF_THE_BOX
+    from ur_emulator.machine.models.fidelity import FIDELITIES as OF_THE_BOX
 
     assert set(FIDELITIES) == {it.name for it in OF_THE_BOX}
 

@@ -12,14 +12,16 @@ from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.command import Submitted
-from ur_emulator.controller.controller import SETTLE_TIME, Controller
-from ur_emulator.loop.pacing import RealtimePacer
-from ur_emulator.loop.served_box import BoxIdentity, ServedBox
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.host.pacing import RealtimePacer
+from ur_emulator.host.served_box import BoxIdentity, ServedBox
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.command import Submitted
+from ur_emulator.machine.controller.controller import SETTLE_TIME, Controller
+from ur_emulator.machine.machine import Machine
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.scripting.network import Network
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
 VERSION = SoftwareVersion(3, 15, 8)
@@ -78,6 +80,9 @@ class FakeModbusUnit:
         if signal.output is None or signal.reads_back:
             read = range(signal.address, signal.address + signal.count)
             signal.values = tuple(self.memory.get((kind, address), 0) for address in read)
+
+    def describe(self, signal):
+        pass
 
     def forget(self, signal):
         self.log.append((signal.name, "forgotten"))
@@ -168,16 +173,25 @@ class Bench:
         return printed(self.events)
 
 
+def machine_of(controller):
+    """A machine that has this controller; what its scripts open is the bench's."""
+    machine = Machine.__new__(Machine)
+    machine.controller, machine.network = controller, Network()
+    return machine
+
+
 class BareBox(ServedBox):
     """A box without a loop, for its ports; what they submit is appended to `submitted`."""
 
     def __init__(self, software, controller, submitted):
         self.submitted = submitted
         identity = BoxIdentity(software, "UR3", "UR3", "20993000007")
-        super().__init__(controller, identity, RealtimePacer(controller.period_s), None, None)
+        super().__init__(machine_of(controller), identity, RealtimePacer(controller.period_s), None, None)
 
-    def submit(self, command, done=None, *, in_place_of=""):
+    def submit(self, command, done=None, *, in_place_of="", urgent=True):
         self.submitted.append(command if done is None else Submitted(command, done))
+
+    submit_quietly = submit
 
     def report(self, what, error):
         raise error

@@ -17,9 +17,9 @@ push 0 0 -20          push the flange, base axes, N; zeros end it
 
 from ast import literal_eval
 
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.power import PowerOff
-from ur_emulator.commands.programs import (
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.power import PowerOff
+from ur_emulator.machine.commands.programs import (
     AbortMove,
     AnswerRequest,
     AppendStatements,
@@ -31,8 +31,8 @@ from ur_emulator.commands.programs import (
     StartProgram,
     StopProgram,
 )
-from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.controller.io.lines import CONFIGURABLE, TOOL
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.machine.controller.io.lines import CONFIGURABLE, TOOL
 from ur_emulator.program_files.compiling import compile_line
 from urscript import compile_program
 

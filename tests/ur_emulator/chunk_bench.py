@@ -9,8 +9,8 @@ from chunk_actions import act
 from chunk_peers import ChunkNetwork
 
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.commands.programs import AnswerRequest, ClosePopup, StartProgram
-from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, StartProgram
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.check.checking import check_program

@@ -8,7 +8,7 @@ from ast import literal_eval
 from box_support import FakeModbusUnit
 from chunk_marks import latin
 
-from ur_emulator.scripting.network import RemoteCallError
+from ur_emulator.machine.scripting.network import RemoteCallError
 
 
 class ChunkSocket:

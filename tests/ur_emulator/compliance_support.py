@@ -3,7 +3,7 @@
 import numpy as np
 from box_support import Bench
 
-from ur_emulator.controller.events import ErrorReported
+from ur_emulator.machine.controller.events import ErrorReported
 
 TABLE = -0.02  # m, height of the table
 DOWN = "p[0.3,0,{z},3.14159265,0,0]"  # tool down, far from singularities
@@ -23,13 +23,13 @@ def truth(bench, n):
     forces, places = [], []
     for _ in range(n):
         bench.tick()
-        forces.append(bench.controller.plant.contact_wrench[:3])
-        places.append(bench.controller.plant.flange_position)
+        forces.append(bench.controller.plant.physics.contact_wrench[:3])
+        places.append(bench.controller.plant.physics.flange_position.copy())
     return np.array(forces), np.array(places)
 
 
 def place(bench):
-    return bench.controller.plant.flange_position
+    return bench.controller.plant.physics.flange_position.copy()
 
 
 def push(bench, *force):

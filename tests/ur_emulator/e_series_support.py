@@ -3,8 +3,8 @@
 from box_support import Bench
 from box_support import program as program
 
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.models.generations import E_SERIES
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.models.generations import E_SERIES
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -7,9 +7,9 @@ from protocol.dashboard.commands import COMMANDS
 from protocol.primary.layout import ForceModeData
 from protocol.robot_api import CALLS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robot_generation import Electrics, ForceSensing, RobotGeneration
-from ur_emulator.models.safety_limits import ArmLimits, SafetyLimits
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robot_generation import Electrics, ForceSensing, RobotGeneration
+from ur_emulator.machine.models.safety_limits import ArmLimits, SafetyLimits
 
 MISSING_BUILTIN = "popup"
 

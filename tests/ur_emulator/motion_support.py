@@ -6,14 +6,14 @@ import math
 import numpy as np
 
 from protocol.pose import pose_trans
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.motion.leg import move_tool
-from ur_emulator.motion.move import Follow, Move
-from ur_emulator.motion.path import PoseLine
-from ur_emulator.motion.tool import Tool
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.motion.leg import move_tool
+from ur_emulator.machine.motion.move import Follow, Move
+from ur_emulator.machine.motion.path import PoseLine
+from ur_emulator.machine.motion.tool import Tool
 
 DT = 0.008
 ARM = ArmModel(robot_by_name("ur3"))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.motion.generators import JointTarget
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.motion.generators import JointTarget
 
 PERIOD = 0.008
 ZERO = (0.0,) * 6

@@ -7,8 +7,8 @@ Nothing comes within the cycle in which it is asked for.
 from box_support import Bench, FakeNetwork
 
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
-from ur_emulator.commands.programs import StartProgram, StopProgram
-from ur_emulator.scripting.network import RemoteCallError
+from ur_emulator.machine.commands.programs import StartProgram, StopProgram
+from ur_emulator.machine.scripting.network import RemoteCallError
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError

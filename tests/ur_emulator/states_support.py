@@ -9,8 +9,9 @@ from protocol.primary.packages import decode_package, encode_state
 from protocol.realtime.layout import layout_for_version
 from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
-from ur_emulator.commands.safety import (
+from ur_emulator.host.ports.primary.robot_state import state_records
+from ur_emulator.machine.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.machine.commands.safety import (
     PressEmergencyStop,
     ReducedMode,
     ReleaseEmergencyStop,
@@ -21,10 +22,9 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.events import ErrorReported, SafetyModeChanged, ScriptFailed
-from ur_emulator.controller.modbus_map import read_coil, read_register
-from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.ports.primary.robot_state import state_records
+from ur_emulator.machine.controller.events import ErrorReported, SafetyModeChanged, ScriptFailed
+from ur_emulator.machine.controller.modbus_map import read_coil, read_register
+from ur_emulator.machine.controller.safety.modes import SafetyEvent
 
 ENDLESS = (
     "def endless():\n  q = get_actual_joint_positions()\n  while True:\n"

@@ -8,9 +8,9 @@ from chunk_bench import ChunkBench
 from chunk_marks import BoxChunk
 
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.power import ReleaseBrakes
-from ur_emulator.commands.programs import StartProgram, StopProgram
-from ur_emulator.commands.safety import UnlockProtectiveStop
+from ur_emulator.machine.commands.power import ReleaseBrakes
+from ur_emulator.machine.commands.programs import StartProgram, StopProgram
+from ur_emulator.machine.commands.safety import UnlockProtectiveStop
 from urscript import compile_program
 from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15

@@ -12,8 +12,8 @@ from box_support import Bench
 from chunk_bench import compiled, run_box_chunk
 from chunk_marks import load_box_chunks
 
-import ur_emulator.scripting
-from ur_emulator.scripting.robot_host import robot_hosts
+import ur_emulator.machine.scripting
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript.builtins import PURE
 from urscript.catalogue import CB3_3_15, catalogue_for
 from urscript.catalogue.types import Support
@@ -60,7 +60,7 @@ def test_the_box_offers_nothing_that_the_language_does_not_know():
     assert {name for name in offered() if not any(name in each for each in (CB3_3_15, *e_series))} == set()
 
 
-SCRIPTING = Path(ur_emulator.scripting.__file__).parent
+SCRIPTING = Path(ur_emulator.machine.scripting.__file__).parent
 FILES = sorted(Path(__file__).parent.glob("chunks/*.script"))
 CHUNKS = load_box_chunks(*FILES)
 

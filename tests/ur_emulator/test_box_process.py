@@ -12,7 +12,6 @@ from control_support import control_box
 from dashboard_support import Dashboard
 
 from ur_emulator import ControlBox
-from ur_emulator.commands.programs import ClosePopup
 from ur_emulator.errors import (
     ArgumentError,
     ControlError,
@@ -21,7 +20,8 @@ from ur_emulator.errors import (
     RefusedError,
     WaitTimeoutError,
 )
-from ur_emulator.loop import processes
+from ur_emulator.host.runtime import processes
+from ur_emulator.machine.commands.programs import ClosePopup
 
 LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
 TOKEN = "secret"
@@ -48,7 +48,7 @@ def test_a_box_that_is_killed_says_so_and_keeps_its_log():
 
 
 def test_a_box_that_hangs_is_killed_at_its_end(monkeypatch):
-    monkeypatch.setattr("ur_emulator.box_process._END_TIMEOUT", 0.1)
+    monkeypatch.setattr("ur_emulator.host.box_process._END_TIMEOUT", 0.1)
     box = ControlBox(pace="lockstep", port_base=None)
     box.__enter__()
     process = process_of(box)

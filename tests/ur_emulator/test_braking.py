@@ -15,10 +15,10 @@ from pc_client.driver.watchdog import REST_SPEED
 from pc_client.kinematics.arms import ROBOTS as CLIENT_ARMS
 from protocol.ur_types import ProgramState, SafetyMode
 from protocol.velocity_stream import VelocityMode, encode_velocity
-from ur_emulator.commands.programs import ResumeProgram, SetSpeedSlider
-from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.models.fidelity import TYPICAL
-from ur_emulator.models.robots import ROBOTS, robot_by_name
+from ur_emulator.machine.commands.programs import ResumeProgram, SetSpeedSlider
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.machine.models.fidelity import TYPICAL
+from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
 
 # Stretched; the shoulder turns down, from upright to some 40 degrees above the horizontal.
 START = {0: (-1.2, -0.35, 0.0, -1.57, 0.0, 0.0), 1: (0.0, -1.57, 0.0, -1.57, 0.0, 0.0)}

@@ -10,16 +10,16 @@ from plant_support import HOME, hold, target
 from states_support import infos
 
 from protocol.ur_types import ControlMode, SafetyMode
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.safety import UnlockProtectiveStop
-from ur_emulator.commands.surroundings import AddObstacle, RemoveObstacle
-from ur_emulator.controller.events import ErrorReported
 from ur_emulator.errors import EmulatorError
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.plant.obstacles import SLOTS
-from ur_emulator.plant.plant import Plant
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.commands.safety import UnlockProtectiveStop
+from ur_emulator.machine.commands.surroundings import AddObstacle, RemoveObstacle
+from ur_emulator.machine.controller.events import ErrorReported
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.machine.plant.obstacles import SLOTS
+from ur_emulator.machine.plant.plant import Plant
 
 DEEP = DOWN.format(z=-0.15)
 
@@ -177,10 +177,10 @@ def test_a_hung_load_stays_when_another_one_is_declared():
     plant.attach_load(1.0)
     plant.set_payload(1.0, (0.0, 0.0, 0.0))
     states = hold(plant, HOME, 100)
-    assert states[-1].tcp_force[2] == pytest.approx(0.0, abs=0.3)
+    assert states[-1].estimated_force[2] == pytest.approx(0.0, abs=0.3)
     plant.set_payload(0.0, (0.0, 0.0, 0.0))
     states = hold(plant, HOME, 100)
-    assert states[-1].tcp_force[2] == pytest.approx(-9.81, abs=0.3)
+    assert states[-1].estimated_force[2] == pytest.approx(-9.81, abs=0.3)
     assert np.abs(plant.q_true - HOME).max() < 1e-4  # the outer loop carries it anyway
 
 
@@ -222,13 +222,13 @@ def bench():
 
 
 def y(bench):
-    return bench.controller.plant.flange_position[1]
+    return bench.controller.plant.physics.flange_position[1]
 
 
 @pytest.mark.parametrize("kind", OBSTACLES)
 def test_the_arm_is_stopped(bench, kind):
     bench.tick(1, OBSTACLES[kind])
-    assert bench.controller.plant.obstacles.names == ("it",)
+    assert bench.controller.plant.physics.obstacles.names == ("it",)
     bench.start(PUSH_ON)
     reached = []
     for _ in range(400):
@@ -246,7 +246,7 @@ def test_after_the_obstacle_is_gone_the_path_is_free(bench):
     bench.start(PUSH_ON)
     bench.tick(400)
     bench.tick(1, RemoveObstacle("it"), UnlockProtectiveStop())
-    assert bench.controller.plant.obstacles.names == ()
+    assert bench.controller.plant.physics.obstacles.names == ()
     bench.run(PUSH_ON)
     assert y(bench) == pytest.approx(0.3, abs=1e-3)
 
@@ -257,14 +257,14 @@ def test_the_touch_is_felt_as_a_force_that_pushes_back(bench):
     forces = []
     for _ in range(300):
         bench.tick()
-        forces.append(bench.controller.plant.contact_wrench[:3])
+        forces.append(bench.controller.plant.physics.contact_wrench[:3])
     assert min(force[1] for force in forces) < -50.0
 
 
 def test_an_obstacle_of_the_same_name_is_replaced(bench):
     bench.tick(1, OBSTACLES["box"])
     bench.tick(1, AddObstacle("it", "sphere", (0.05,), (0.3, -0.4, 0.15, *UPRIGHT)))
-    assert bench.controller.plant.obstacles.names == ("it",)
+    assert bench.controller.plant.physics.obstacles.names == ("it",)
     bench.run(PUSH_ON)
     assert bench.now.safety_mode == SafetyMode.NORMAL
     assert y(bench) == pytest.approx(0.3, abs=1e-3)
@@ -274,7 +274,7 @@ def test_what_would_stand_in_the_arm_is_refused_and_nothing_moves(bench):
     before = bench.now.actual_q
     bench.tick(1, AddObstacle("it", "box", (0.2, 0.2, 0.2), (0.3, 0.0, 0.2, *UPRIGHT)))
     bench.tick(20)
-    assert bench.controller.plant.obstacles.names == ()
+    assert bench.controller.plant.physics.obstacles.names == ()
     assert infos(bench) == ["obstacle it: the arm is where it should stand, move one of them"]
     assert bench.now.actual_q == pytest.approx(before, abs=1e-4)
     assert bench.now.safety_mode == SafetyMode.NORMAL
@@ -283,13 +283,13 @@ def test_what_would_stand_in_the_arm_is_refused_and_nothing_moves(bench):
 def test_a_move_into_the_arm_leaves_the_old_one_where_it_was(bench):
     for i in range(SLOTS):
         bench.tick(1, AddObstacle(f"{i}", "sphere", (0.01,), (0.3, 0.4, 0.1 + 0.03 * i, *UPRIGHT)))
-    assert len(bench.controller.plant.obstacles.names) == SLOTS
+    assert len(bench.controller.plant.physics.obstacles.names) == SLOTS
     bench.tick(1, AddObstacle("more", "sphere", (0.01,), (0.5, 0.4, 0.1, *UPRIGHT)))
     assert infos(bench) == [f"obstacle more: there are {SLOTS} already, remove one first"]
     bench.tick(1, AddObstacle("3", "box", (0.2, 0.2, 0.2), (0.3, 0.0, 0.2, *UPRIGHT)))
     assert "the arm is where it should stand" in infos(bench)[-1]
     bench.tick(1, AddObstacle("3", "box", (0.4, 0.1, 0.4), (0.3, 0.25, 0.15, *UPRIGHT)))
-    assert len(bench.controller.plant.obstacles.names) == SLOTS
+    assert len(bench.controller.plant.physics.obstacles.names) == SLOTS
     bench.start(PUSH_ON)
     bench.tick(400)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP

@@ -8,10 +8,10 @@ from box_support import Bench, program
 from compliance_support import TABLE, above_table, place, push, reported, truth
 
 from protocol.ur_types import ControlMode
-from ur_emulator.commands.power import PowerOff
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
-from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.machine.commands.power import PowerOff
+from ur_emulator.machine.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 
 BASE = "p[0,0,0,0,0,0]"
 LIMITS = "[0.05,0.05,0.05,0.2,0.2,0.2]"
@@ -416,7 +416,7 @@ def test_a_force_that_no_arm_has_ends_in_a_protective_stop_not_in_numbers(wrench
 
 
 def test_what_is_not_in_use_is_not_looked_after(monkeypatch):
-    from ur_emulator.controller.compliance import Compliance
+    from ur_emulator.machine.controller.compliance import Compliance
 
     def never(*_):
         raise AssertionError("compliance was looked after in a cycle that needs none")

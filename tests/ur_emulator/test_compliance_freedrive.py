@@ -11,12 +11,12 @@ from e_series_support import DT, ESeriesBench, program
 
 from protocol.pose import pose_inv, pose_trans, rotvec_to_matrix
 from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
-from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.commands.surroundings import AttachPayload, Push
 from ur_emulator.errors import ArgumentError
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.machine.commands.surroundings import AttachPayload, Push
 
 FREE = "  freedrive_mode()\n  sleep(100)"
 

@@ -17,8 +17,17 @@ from hypothesis import strategies as st
 from protocol.pose import pose_to_T
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.programs import AnswerRequest, StopProgram
-from ur_emulator.commands.surroundings import (
+from ur_emulator.errors import (
+    ArgumentError,
+    ControlError,
+    EmulatorError,
+    NotRunningError,
+    RefusedError,
+    WaitTimeoutError,
+)
+from ur_emulator.host import served_box
+from ur_emulator.machine.commands.programs import AnswerRequest, StopProgram
+from ur_emulator.machine.commands.surroundings import (
     FARTHEST,
     MAX_FORCE,
     MAX_LEVER,
@@ -29,16 +38,7 @@ from ur_emulator.commands.surroundings import (
     SetAnalogInput,
     SetDigitalInput,
 )
-from ur_emulator.errors import (
-    ArgumentError,
-    ControlError,
-    EmulatorError,
-    NotRunningError,
-    RefusedError,
-    WaitTimeoutError,
-)
-from ur_emulator.loop import served_box
-from ur_emulator.models.generations import E_SERIES
+from ur_emulator.machine.models.generations import E_SERIES
 
 MOVE = "def move():\n  movej([0.5, -1.5, -1.8, 0, 1.2, 1.5])\nend\n"
 LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"

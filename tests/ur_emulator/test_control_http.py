@@ -9,11 +9,11 @@ from control_support import Http, control_box
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator import ControlBox
-from ur_emulator.box_options import MAX_TOKEN
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.control_api.operations import OPERATIONS
 from ur_emulator.errors import EmulatorError
-from ur_emulator.ports.http import MAX_HEADER
+from ur_emulator.host.box_options import MAX_TOKEN
+from ur_emulator.host.control_api.operations import OPERATIONS
+from ur_emulator.host.ports.http import MAX_HEADER
 
 JSON = "Content-Type: application/json"
 

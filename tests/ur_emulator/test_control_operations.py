@@ -14,16 +14,16 @@ from control_support import control_box
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ur_emulator.box_options import TOKEN_VARIABLE
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.operation import Kind
-from ur_emulator.commands.surroundings import SIZES
-from ur_emulator.control_api.command_line import main, plain
-from ur_emulator.control_api.operations import OPERATIONS, BoxOperations, ReadProperty, describe, make
-from ur_emulator.control_api.step_operations import CONDITIONS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ArgumentError
-from ur_emulator.plant.obstacles import SHAPES
+from ur_emulator.host.box_options import TOKEN_VARIABLE
+from ur_emulator.host.control_api.command_line import main, plain
+from ur_emulator.host.control_api.operations import OPERATIONS, BoxOperations, ReadProperty, describe, make
+from ur_emulator.host.control_api.step_operations import CONDITIONS
+from ur_emulator.machine.commands.operation import Kind
+from ur_emulator.machine.models.things import SIZES
+from ur_emulator.machine.plant.shapes import SHAPES
 
 ROOT = Path(__file__).parents[2]
 EVERY = pytest.mark.parametrize("name", OPERATIONS)
@@ -61,8 +61,8 @@ def test_a_method_hands_all_its_arguments_on(name):
     asked = {}
 
     class Recorder(BoxOperations):
-        def _perform(self, name, arguments):
-            asked[name] = arguments
+        def _perform(self, operation):
+            asked[operation.api_name] = operation.as_given
             return {"tick": 3}
 
     operation = OPERATIONS[name]
@@ -167,7 +167,7 @@ def test_the_table_is_json():
 
 
 def test_the_command_line_loads_no_physics():
-    code = "import sys, ur_emulator.control_api.command_line; print(*sorted({'mujoco', 'numpy', 'lark'} & set(sys.modules)))"
+    code = "import sys, ur_emulator.host.control_api.command_line; print(*sorted({'mujoco', 'numpy', 'lark'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.strip() == ""
 

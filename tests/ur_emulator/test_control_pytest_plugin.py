@@ -8,6 +8,7 @@ import numpy  # noqa: F401 - cannot be loaded a second time, as pytester would
 import pytest
 
 from ur_emulator import ControlBox
+from ur_emulator.host.replay import replay
 from ur_emulator.pytest_plugin import OPTIONS, _own_addresses
 
 pytest_plugins = ["pytester"]
@@ -239,3 +240,16 @@ def test_the_plug_in_loads_nothing_heavy():
     code = f"import sys, ur_emulator.pytest_plugin; print(*sorted({heavy!r} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def test_each_box_may_keep_a_journal(suite, tmp_path):
+    result = suite(
+        "def test_it(ur_box, ur_box_factory):\n"
+        "    ur_box.set_digital_input('standard', 0, True)\n"
+        "    ur_box_factory(seed=2).set_digital_input('standard', 1, True)\n",
+        f"--ur-journal={tmp_path / 'kept'}",
+    )
+    result.assert_outcomes(passed=1)
+    files = sorted((tmp_path / "kept").iterdir())
+    assert [file.name.partition("test_it-")[2] for file in files] == ["1.journal", "2.journal"]
+    assert all(str(replay(file)).startswith("identical: ") for file in files)

@@ -10,12 +10,15 @@ from plant_support import dh_frames
 from protocol.pose import pose_to_T
 from protocol.realtime.layout import SNAPSHOT_FIELDS
 from protocol.ur_types import ProgramState, RobotMode
-from ur_emulator.commands.programs import AnswerRequest, ClosePopup, SetSpeedSlider, StopProgram
-from ur_emulator.controller.safety.limit_checks import MAX_POSITION_DEVIATION
-from ur_emulator.controller.settings import ErrorSettings
-from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import ArgumentError
-from ur_emulator.models.calibration import calibrated_dh
+from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, SetSpeedSlider, StopProgram
+from ur_emulator.machine.controller.safety.limit_checks import MAX_POSITION_DEVIATION
+from ur_emulator.machine.controller.settings import ErrorSettings
+from ur_emulator.machine.controller.snapshot import Snapshot
+from ur_emulator.machine.models.calibration import calibrated_dh
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.arm_plant import PlantState
+from ur_emulator.machine.plant.sensors import Reading
 
 MOVE = "def move():\n  movej([0.6,-1.2,-1.9,-0.5,1.0,1.2], a=1.4, v=1.05)\nend\n"
 
@@ -30,6 +33,13 @@ def moved():
 def test_the_snapshot_has_every_column_of_the_realtime_interface():
     assert all(hasattr(Snapshot, name) for name in SNAPSHOT_FIELDS)
     assert set(SNAPSHOT_FIELDS) <= set(Bench().now.as_dict())
+
+
+def test_what_the_sensors_say_keeps_its_names_to_the_snapshot():
+    """Records follow each other by position: their names and order must agree."""
+    assert Snapshot._fields[2:5] == tuple(f"target_{name}" for name in JointTarget._fields)
+    assert Snapshot._fields[5 : 5 + len(PlantState._fields)] == PlantState._fields
+    assert PlantState._fields[: len(Reading._fields)] == Reading._fields
 
 
 def test_every_value_is_finite_in_motion(moved):

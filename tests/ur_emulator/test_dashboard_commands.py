@@ -16,9 +16,9 @@ from dashboard_support import Dashboard, external_control, urp, write_programs
 from protocol.dashboard.commands import COMMANDS, commands_of, match_command
 from protocol.primary.messages import PopupMessage
 from protocol.ur_types import RobotMode, SoftwareVersion
-from ur_emulator.commands.safety import TriggerProtectiveStop
 from ur_emulator.emulator import ControlBox
-from ur_emulator.polyscope.report_files import BoxFacts
+from ur_emulator.host.reports.report_files import BoxFacts
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop
 
 OPTIONS = {"pace": "lockstep", "port_base": None, "seed": 7}
 

@@ -17,7 +17,7 @@ from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import EmulatorError, FileMissingError, ProgramFileError
-from ur_emulator.polyscope.external_control import request_program
+from ur_emulator.host.player.external_control import request_program
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import ExternalControlPc
 from ur_emulator.program_files.installation_reader import load_installation

@@ -5,8 +5,8 @@ import pytest
 from e_series_support import DT, ESeriesBench, program
 
 from protocol.ur_types import ControlMode, ProgramState, SafetyMode
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StopProgram
-from ur_emulator.commands.surroundings import Push
+from ur_emulator.machine.commands.programs import PauseProgram, ResumeProgram, StopProgram
+from ur_emulator.machine.commands.surroundings import Push
 
 ALL = "viscous_scale=[1,1,1,1,1,1], coulomb_scale=[1,1,1,1,1,1]"
 NONE = "viscous_scale=[0,0,0,0,0,0], coulomb_scale=[0,0,0,0,0,0]"

@@ -20,21 +20,21 @@ from e_series_support import ESeriesBench, program
 from plant_support import target
 
 from protocol.ur_types import SafetyMode
-from ur_emulator.commands.safety import UnlockProtectiveStop
-from ur_emulator.controller.arm_in_space import ArmInSpace
-from ur_emulator.controller.safety.limit_checks import clamping_gap
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.calibration import NOMINAL
-from ur_emulator.models.e_series_arms import UR5E, UR10E
-from ur_emulator.models.fidelity import REVERSAL_SPEED
-from ur_emulator.models.generations import E_SERIES
-from ur_emulator.models.mjcf import GRAVITY
-from ur_emulator.models.robots import ROBOTS, robot_by_name
-from ur_emulator.plant.arm_physics import compile_physics, physics_spec
-from ur_emulator.plant.drives import ServoGains
-from ur_emulator.plant.friction import Friction
-from ur_emulator.plant.inverse_dynamics import InverseDynamics
-from ur_emulator.plant.plant import Plant
+from ur_emulator.machine.commands.safety import UnlockProtectiveStop
+from ur_emulator.machine.controller.arm_in_space import ArmInSpace
+from ur_emulator.machine.controller.safety.limit_checks import clamping_gap
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.calibration import NOMINAL
+from ur_emulator.machine.models.e_series_arms import UR5E, UR10E
+from ur_emulator.machine.models.fidelity import REVERSAL_SPEED
+from ur_emulator.machine.models.generations import E_SERIES
+from ur_emulator.machine.models.mjcf import GRAVITY
+from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
+from ur_emulator.machine.plant.arm_physics import compile_physics, physics_spec
+from ur_emulator.machine.plant.drives import ServoGains
+from ur_emulator.machine.plant.friction import Friction
+from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.machine.plant.plant import Plant
 
 Q = (0.3, -1.2, 1.9, -0.7, 1.1, 0.4)
 QD = (0.5, -0.8, 1.3, 0.9, -1.1, 2.0)
@@ -171,7 +171,7 @@ def test_payload_transition_is_smooth_and_the_arm_carries_it():
 
 def space(robot, qdd):
     model, data = pinocchio_arm(robot, (2.0, (0.01, 0.02, 0.05), np.zeros((3, 3))))
-    arm = ArmInSpace(ArmModel(robot), (Q, QD), qdd, (Q, QD), (0.0,) * 6, TCP, force_at_flange=True)
+    arm = ArmInSpace(ArmModel(robot), (Q, QD), qdd, (Q, QD), (0.0,) * 6, TCP, True)
     return model, data, arm
 
 

@@ -10,14 +10,14 @@ import pytest
 from plant_support import HOME, PERIOD, SpeedRamp, column, hold
 
 from ur_emulator.errors import ModelError
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.e_series_arms import UR5E
-from ur_emulator.models.fidelity import IDEAL, POOR, TYPICAL, Ripple, dead_cycles
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.plant.feedback import GearRipple, GearWithPlay
-from ur_emulator.plant.friction import Presliding
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.sensors import Record
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.e_series_arms import UR5E
+from ur_emulator.machine.models.fidelity import IDEAL, POOR, TYPICAL, Ripple, dead_cycles
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.plant.feedback import GearRipple, GearWithPlay
+from ur_emulator.machine.plant.friction import Presliding
+from ur_emulator.machine.plant.plant import Plant
+from ur_emulator.machine.plant.sensors import Record
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "fidelity").glob("*.toml"))
 OPTIONS = {

@@ -22,13 +22,13 @@ from protocol.primary.messages import VersionMessage
 from protocol.rtde import codec as R
 from protocol.ur_types import SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.controller.safety.safety_state import limits_of
-from ur_emulator.controller.safety.speed_scaling import ModeLimits, limits_of_mode
 from ur_emulator.errors import ArgumentError, EmulatorError
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.safety_limits import ArmLimits
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.machine.controller.safety.safety_state import limits_of
+from ur_emulator.machine.controller.safety.speed_scaling import ModeLimits, limits_of_mode
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.safety_limits import ArmLimits
 
 
 @pytest.fixture(scope="module")

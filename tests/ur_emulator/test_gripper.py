@@ -11,18 +11,18 @@ from e_series_support import ESeriesBench
 from protocol.robotiq import Fault, Objects, Status
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
-from ur_emulator.controller.grippers.robotiq import RobotiqGripper
-from ur_emulator.controller.io.lines import InputOutput
 from ur_emulator.errors import ArgumentError, ModelError, RefusedError
-from ur_emulator.models.generations import E_SERIES
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.things import Thing
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.hand import FingerCommand, FingerState
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.scene import load_scene
-from ur_emulator.ports.robotiq import RobotiqPort
-from ur_emulator.ports.tool_line import ToolLinePort
+from ur_emulator.host.ports.robotiq import RobotiqPort
+from ur_emulator.host.ports.tool_line import ToolLinePort
+from ur_emulator.machine.controller.io.lines import InputOutput
+from ur_emulator.machine.models.generations import E_SERIES
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.models.things import Thing
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.hand import FingerCommand, FingerState
+from ur_emulator.machine.plant.plant import Plant
+from ur_emulator.machine.plant.scene import load_scene
+from ur_emulator.machine.tools.robotiq import RobotiqGripper
 from ur_hil.tools import TOOLS, tools_by_name
 
 PERIOD = 0.008
@@ -51,8 +51,7 @@ class Fingers:
                 self.width = stopped
 
     def set(self, **values):
-        for name, value in values.items():
-            self.gripper.set(name, value)
+        self.gripper.set(*values.items())
 
     def get(self, *names):
         return tuple(self.gripper.get(name) for name in names)
@@ -260,10 +259,10 @@ def test_a_block_slips_at_the_load_that_friction_carries(share, holds):
 def test_the_load_that_nobody_declared_is_felt():
     bench = Bench(mass=1.0)
     bench.grip(100.0)
-    with_block = bench.plant.sense().tcp_force[2]
+    with_block = bench.plant.sense().estimated_force[2]
     bench.scene.remove("block")
     bench.run(0.5, 0.0, 100.0)
-    assert bench.plant.sense().tcp_force[2] - with_block == pytest.approx(9.81, abs=2.0)
+    assert bench.plant.sense().estimated_force[2] - with_block == pytest.approx(9.81, abs=2.0)
 
 
 def test_things_come_and_go_and_the_arm_stays():
@@ -488,7 +487,7 @@ def test_a_client_of_the_serial_line_may_leave_before_its_answer(n_others):
     bench, commands = ESeriesBench(version=(5, 25), tools=[HAND]), []
     bench.tick()  # the gripper has its supply
     bare = BareBox(E_SERIES.software(SoftwareVersion(5, 25)), bench.controller, commands)
-    port = ToolLinePort(bare, bench.controller.state.grippers, RobotiqPort(bare, []))
+    port = ToolLinePort(bare, [RobotiqPort(bare, [])])
     client = FakeConnection(port)
     others = [FakeConnection(port) for _ in range(n_others)]
     client.say(STATUS_REQUEST)
@@ -622,9 +621,9 @@ def furnished(scene):
 
 def test_a_cell_file_is_the_scene_of_a_box_and_the_surroundings_of_a_plan():
     plant = furnished(load_scene(EXAMPLE))
-    assert plant.scene.names == ("block", "can")
-    assert plant.scene.state("block").pose[2] == pytest.approx(0.0, abs=1e-3)  # on the floor
-    assert plant.scene.state("can").pose[2] == pytest.approx(0.13, abs=1e-3)  # on the shelf
+    assert plant.physics.scene.names == ("block", "can")
+    assert plant.physics.scene.state("block").pose[2] == pytest.approx(0.0, abs=1e-3)  # on the floor
+    assert plant.physics.scene.state("can").pose[2] == pytest.approx(0.13, abs=1e-3)  # on the shelf
     cell = load_scene(EXAMPLE)
     assert [solid.name for solid in cell.solids] == ["shelf"]
 
@@ -633,11 +632,11 @@ def test_a_fragment_of_mjcf_is_a_scene(tmp_path):
     path = tmp_path / "kitchen.xml"
     path.write_text(MJCF)
     plant = furnished(load_scene(path))
-    assert plant.scene.names == ("mug",)
-    assert plant.scene.state("mug").pose[2] == pytest.approx(0.13, abs=1e-3)
-    plant.scene.remove("mug")
-    plant.scene.put(Thing("mug", "sphere", (0.03,), 0.1, 0.5, (0.5, -0.3, 0.2, 0.0, 0.0, 0.0)))
-    assert plant.scene.names == ("mug",)
+    assert plant.physics.scene.names == ("mug",)
+    assert plant.physics.scene.state("mug").pose[2] == pytest.approx(0.13, abs=1e-3)
+    plant.physics.scene.remove("mug")
+    plant.physics.scene.put(Thing("mug", "sphere", (0.03,), 0.1, 0.5, (0.5, -0.3, 0.2, 0.0, 0.0, 0.0)))
+    assert plant.physics.scene.names == ("mug",)
 
 
 @pytest.mark.parametrize(

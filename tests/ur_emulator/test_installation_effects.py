@@ -12,19 +12,19 @@ from installation_support import SAFETY, TCP, installation, listed, pose_feature
 from protocol.primary.layout import ConfigurationData, SafetyData
 from protocol.primary.messages import TextMessage
 from protocol.ur_types import SafetyMode
-from ur_emulator.commands.programs import SetUp, StartProgram
-from ur_emulator.commands.surroundings import Push
-from ur_emulator.controller.io.lines import RunState
-from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.controller.safety.inputs import SafetyInput
-from ur_emulator.controller.safety.safety_state import SafetySettings, limits_of
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import RefusedError
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.models.safety_limits import ArmLimits
-from ur_emulator.ports.primary.robot_state import safety_checksum
+from ur_emulator.host.ports.primary.robot_state import safety_checksum
+from ur_emulator.machine.commands.programs import SetUp, StartProgram
+from ur_emulator.machine.commands.surroundings import Push
+from ur_emulator.machine.controller.io.lines import RunState
+from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.safety.inputs import SafetyInput
+from ur_emulator.machine.controller.safety.safety_state import SafetySettings, limits_of
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.models.safety_limits import ArmLimits
 from ur_emulator.program_files.installation import (
     DeclaredPayload,
     DeclaredSignal,

@@ -11,9 +11,9 @@ from box_support import TIMEOUT, connect
 
 from protocol.interpreter import CLEANED_UP, INVALID_STATE, MAX_ID, TOO_MANY
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import RefusedError
+from ur_emulator.machine.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.program_files.compiling import compile_line
 from urscript.catalogue import catalogue_for
 from urscript.compile.interpreter_mode import NO_NAMES

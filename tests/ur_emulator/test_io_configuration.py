@@ -10,11 +10,11 @@ from box_support import Bench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.controller import modbus_map as port_map
-from ur_emulator.controller.io.encoders import RANGES, Decoder, Encoder
-from ur_emulator.controller.modbus_map import COILS, REGISTERS, MapAddressError
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop
+from ur_emulator.machine.controller import modbus_map as port_map
+from ur_emulator.machine.controller.io.encoders import RANGES, Decoder, Encoder
+from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS, MapAddressError
 
 
 @pytest.fixture

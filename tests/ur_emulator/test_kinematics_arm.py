@@ -10,12 +10,12 @@ from plant_support import dh_frames
 
 from protocol.pose import pose_to_T, pose_trans, rotvec_from_flat
 from ur_emulator.errors import KinematicsError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.kinematics.closed_form import closed_form_inverse
-from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import TYPICAL
-from ur_emulator.models.robots import ROBOTS
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.kinematics.closed_form import closed_form_inverse
+from ur_emulator.machine.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import TYPICAL
+from ur_emulator.machine.models.robots import ROBOTS
 
 TCP = (0.01, -0.02, 0.13, 0.3, -0.2, 0.7)
 

@@ -16,10 +16,10 @@ from protocol.rtde.codec import MAX_NAMES_SIZE
 from protocol.rtde.server_connection import request_limits
 from protocol.script_channel import MAX_LINE
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.box_log import MAX_TEXT
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
-from ur_emulator.ports.http import MAX_HEADER
+from ur_emulator.host.box_log import MAX_TEXT
+from ur_emulator.host.ports.http import MAX_HEADER
 from urscript.dialect import LONGEST_LABEL, LONGEST_NAME, LONGEST_STRING
 from urscript.values import TEXT_LIMIT
 

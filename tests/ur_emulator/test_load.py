@@ -17,10 +17,11 @@ from rtde_support import RtdeClient, input_package
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError
-from ur_emulator.loop import listener, served_box
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.listener import PAUSE, ClientLimits, ClientLines, Listener, SpareDescriptor
-from ur_emulator.ports.dashboard import DashboardAnswers
+from ur_emulator.host import served_box
+from ur_emulator.host.ports.dashboard import DashboardAnswers
+from ur_emulator.host.runtime import listener
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.runtime.listener import PAUSE, ClientLimits, ClientLines, Listener, SpareDescriptor
 
 
 @pytest.fixture

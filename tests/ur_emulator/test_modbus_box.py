@@ -14,7 +14,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from protocol.modbus import encode_frame
 from protocol.primary.messages import RuntimeExceptionMessage
 from ur_emulator.emulator import ControlBox
-from ur_emulator.outgoing import modbus_units
+from ur_emulator.host.script_network import modbus_units
 
 # Function codes by which pymodbus reaches its four memories.
 COILS, INPUTS, HOLDING, INPUT_REGISTERS = 1, 2, 3, 4

@@ -7,14 +7,7 @@ from hypothesis import strategies as st
 
 from protocol.modbus import ExceptionCode, encode_frame
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.io.modbus_signals import (
-    DISCONNECTED,
-    NO_ANSWER,
-    ModbusSignal,
-    SignalType,
-    UnitAddress,
-)
-from ur_emulator.outgoing.modbus_units import (
+from ur_emulator.host.script_network.modbus_units import (
     ANSWER_TIMEOUT,
     CONNECT_TIMEOUT,
     FIRST_RETRY,
@@ -23,6 +16,13 @@ from ur_emulator.outgoing.modbus_units import (
     MAX_UNEXPECTED,
     TOLERANCE,
     ModbusLink,
+)
+from ur_emulator.machine.controller.io.modbus_signals import (
+    DISCONNECTED,
+    NO_ANSWER,
+    ModbusSignal,
+    SignalType,
+    UnitAddress,
 )
 
 UNIT = UnitAddress("10.0.0.2")

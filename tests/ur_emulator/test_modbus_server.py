@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from protocol.modbus import decode_values, encode_frame, encode_read
-from ur_emulator import ControlBox, cli, rack
+from ur_emulator import ControlBox, cli
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.modbus_map import COILS, REGISTERS, read_coil, read_register
 from ur_emulator.errors import PortError, PortPermissionError
-from ur_emulator.loop import listener
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.listener import ClientLimits, Listener
-from ur_emulator.ports.modbus import ModbusPort
+from ur_emulator.host import rack
+from ur_emulator.host.ports.modbus import ModbusPort
+from ur_emulator.host.runtime import listener
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.runtime.listener import ClientLimits, Listener
+from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS, read_coil, read_register
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 READ_VERSION, VERSION = bytes.fromhex("0301000002"), bytes.fromhex("03040003000f")

@@ -24,17 +24,17 @@ from protocol.primary.layout import calibration_hash
 from protocol.serial_numbers import parse_serial
 from protocol.ur_types import RobotType
 from ur_emulator import ControlBox
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.controller import Controller
 from ur_emulator.errors import EmulatorError, ModelError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL, random_stream
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.models.mjcf import GRAVITY, arm_spec
-from ur_emulator.models.robots import ROBOTS, robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL, random_stream
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.models.mjcf import GRAVITY, arm_spec
+from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
+from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
 
@@ -211,7 +211,7 @@ def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(name, fidelity
     assert not [event for event in events if type(event).__name__ in ("ErrorReported", "ScriptFailed")]
     snapshot = controller.snapshot
     assert snapshot.actual_q == pytest.approx(snapshot.target_q, abs=2e-4)
-    assert controller.plant.n_contacts == 0
+    assert controller.plant.physics.n_contacts == 0
 
 
 @pytest.mark.parametrize("name", ["ur3", "ur5e", "ur20"])

@@ -24,16 +24,16 @@ from motion_support import (
 )
 
 from protocol.ur_types import SafetyMode
-from ur_emulator.controller.events import ErrorReported, ScriptFailed
-from ur_emulator.controller.safety.limit_checks import SetpointCheck
-from ur_emulator.controller.safety.safety_state import limits_of
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.motion.leg import move_j, move_tool
-from ur_emulator.motion.move import Follow, Move
-from ur_emulator.motion.path import PoseLine, arc_through
-from ur_emulator.motion.path_samples import JOINT_ACCELERATION
-from ur_emulator.motion.tool import UnreachableError
+from ur_emulator.machine.controller.events import ErrorReported, ScriptFailed
+from ur_emulator.machine.controller.safety.limit_checks import SetpointCheck
+from ur_emulator.machine.controller.safety.safety_state import limits_of
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.motion.leg import move_j, move_tool
+from ur_emulator.machine.motion.move import Follow, Move
+from ur_emulator.machine.motion.path import PoseLine, arc_through
+from ur_emulator.machine.motion.path_samples import JOINT_ACCELERATION
+from ur_emulator.machine.motion.tool import UnreachableError
 
 V, A = 0.25, 1.2
 # Moves close to a singularity at the least speed take longer [s]; they are not tested.

@@ -26,14 +26,14 @@ from motion_support import (
 )
 
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.commands.programs import SetSpeedSlider
-from ur_emulator.controller.events import ErrorReported
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.motion.leg import move_j
-from ur_emulator.motion.move import Follow, Move
+from ur_emulator.machine.commands.programs import SetSpeedSlider
+from ur_emulator.machine.controller.events import ErrorReported
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.motion.leg import move_j
+from ur_emulator.machine.motion.move import Follow, Move
 
 offsets = st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 V, A = 0.25, 1.2

@@ -17,16 +17,11 @@ from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, Swing, at, line, run_cycles
 
 from protocol.pose import pose_add, pose_inv, pose_sub, pose_trans, rotvec_to_matrix
-from ur_emulator.controller.io.encoders import RANGES, Encoder
-from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.generators import SpeedJ
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.overlay import (
-    CATCH_UP_ACCELERATION,
-    BeltEstimate,
-    Conveyor,
-    LinearBelt,
-)
+from ur_emulator.machine.controller.io.encoders import RANGES, Encoder
+from ur_emulator.machine.motion.arm_motion import ArmMotion
+from ur_emulator.machine.motion.conveyor import CATCH_UP_ACCELERATION, BeltEstimate, Conveyor, LinearBelt
+from ur_emulator.machine.motion.generators import SpeedJ
+from ur_emulator.machine.motion.move import Move
 
 
 @pytest.fixture
@@ -113,11 +108,11 @@ def test_a_stream_goes_on_from_the_displaced_target(motion):
     motion.add_overlay(swing)
     command = motion.command("me", SpeedJ((0.1,) * 6, 2.0))
     for _ in range(60):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     before = motion.target
     motion.remove_overlay(swing)
-    command.renew()
+    command.is_renewed = True
     after = motion.step(DT, 1.0)
     assert np.abs(np.subtract(after.qd, before.qd)).max() <= 2.0 * DT * 1.001
 

@@ -12,20 +12,20 @@ import pytest
 from motion_support import DT, HOME, START, TOOL, Swing, line, run_cycles
 
 from protocol.pose import pose_trans
-from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
-from ur_emulator.motion.generators import (
+from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
+from ur_emulator.machine.motion.generators import (
     DirectTorque,
     JointTarget,
     Kind,
     ServoJ,
     SpeedJ,
-    SpeedL,
     StopJ,
     TorqueCommand,
 )
-from ur_emulator.motion.leg import move_j
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.ownership import TABLE, TRANSITIONS, ArmState, Event, Fate
+from ur_emulator.machine.motion.leg import move_j
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.ownership import TABLE, TRANSITIONS, ArmState, Event, Fate
+from ur_emulator.machine.motion.tool_streams import SpeedL
 
 SIX = (0.0,) * 6
 QD = (0.4, -0.3, 0.2, 0.1, 0.0, 0.5)
@@ -110,7 +110,7 @@ def test_whatever_happens_set_points_go_on_without_a_step(seed):
             except OwnershipError:
                 assert motion._time.paused
         if command is not None and rng.random() < 0.9:
-            command.renew()
+            command.is_renewed = True
         scale = rng.choice([scale] * 20 + [0.0, 0.3, 1.0])
         before, was_paused = motion.target, motion.is_paused
         is_move = motion.move is not None
@@ -190,7 +190,7 @@ def test_a_paused_stream_that_goes_on_before_it_rests_keeps_its_speed():
         def cycles(n, scale, *, renews=True, motion=motion, command=command, targets=targets):
             for _ in range(n):
                 if renews:
-                    command.renew()
+                    command.is_renewed = True
                 targets.append(motion.step(DT, scale))
 
         cycles(120, before)
@@ -209,12 +209,12 @@ def test_a_stream_that_was_lost_is_renewed_where_it_is():
     motion = ArmMotion(HOME, 20.0)
     command = motion.command("me", SpeedJ(QD, 2.0))
     for _ in range(100):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     run_cycles(motion, 3)
     assert motion.state is ArmState.BRAKING
     assert command.fate is Fate.SUSPENDED
-    command.renew()
+    command.is_renewed = True
     motion.step(DT, 1.0)
     assert motion.state is ArmState.STREAMING
     run_cycles(motion, 100)

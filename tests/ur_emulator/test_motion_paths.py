@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from motion_support import START, at, line
 
 from protocol.pose import pose_sub
-from ur_emulator.motion.blend import blend
-from ur_emulator.motion.path import TURN_LEVER, PoseArc, PoseLine, arc_through
-from ur_emulator.motion.speed_plan import Interval, plan, stopping_curve
+from ur_emulator.machine.motion.blend import blend
+from ur_emulator.machine.motion.path import TURN_LEVER, PoseArc, PoseLine, arc_through
+from ur_emulator.machine.motion.speed_plan import Interval, plan, stopping_curve
 
 coordinates = st.floats(-0.5, 0.5)
 turns = st.floats(-1.0, 1.0)

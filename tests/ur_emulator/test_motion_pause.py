@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, Swing, at, distance_to_polyline, line, positions, run_cycles
 
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.generators import PAUSE_DECELERATION, ServoJ, SpeedJ
-from ur_emulator.motion.leg import move_j, move_tool
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.ownership import Fate
-from ur_emulator.motion.path import arc_through
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.arm_motion import ArmMotion
+from ur_emulator.machine.motion.generators import PAUSE_DECELERATION, JointTarget, ServoJ, SpeedJ
+from ur_emulator.machine.motion.leg import move_j, move_tool
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.ownership import Fate
+from ur_emulator.machine.motion.path import arc_through
 
 CORNERS = [START, at(0.06, 0, 0), at(0.06, 0.06, 0)]
 
@@ -95,7 +95,7 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
     held = motion.target
     assert held.qd == ZERO6
     for _ in range(100):
-        assert motion.step(DT, 1.0) == held.at_rest()
+        assert motion.step(DT, 1.0) == JointTarget(held.q)
     motion.resume()
     assert motion.is_moving
     assert motion.owner == "me"
@@ -110,7 +110,7 @@ def test_a_pause_rests_after_a_quarter_of_a_second_and_lasts_as_long_as_it_is_as
 def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
     command = motion.command("me", stream)
     for _ in range(40):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     motion.pause()
     before = motion.target
@@ -121,7 +121,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
         before = after
     motion.resume()
     for _ in range(200):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     if isinstance(stream, SpeedJ):
         assert motion.target.qd == pytest.approx((0.5,) * 6)
@@ -134,7 +134,7 @@ def test_a_stream_ramps_to_rest_and_goes_on_if_it_is_renewed(motion, stream):
 def test_a_stream_that_nobody_renews_after_the_pause_stays_at_rest(motion):
     command = motion.command("me", SpeedJ((0.5,) * 6, 2.0))
     for _ in range(20):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     motion.pause()
     run_cycles(motion, 60)
@@ -225,7 +225,7 @@ def test_a_stream_under_an_overlay_comes_to_rest_without_a_jump(motion):
     motion.add_overlay(Swing())
     command = motion.command("me", SpeedJ((1.5, 0, 0, 0, 0, 0), 4.0))
     for _ in range(60):
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     targets = [motion.target]
     motion.pause()

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.pose import rotvec_to_matrix
-from ur_emulator.models.generations import E_SERIES
-from ur_emulator.motion.speed_plan import Interval, SmoothPlan, plan
+from ur_emulator.machine.models.generations import E_SERIES
+from ur_emulator.machine.motion.speed_plan import Interval, SmoothPlan, plan
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from motion_support import ARM, DT, HOME, START, TOOL, tool_accelerations, tool_velocities
 
 from protocol.pose import pose_sub
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.motion.arm_motion import ArmMotion, OwnershipError
-from ur_emulator.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedJ, SpeedL, StopJ, StopL
-from ur_emulator.motion.leg import move_j
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.tool import Tool
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.motion.arm_motion import ArmMotion, OwnershipError
+from ur_emulator.machine.motion.generators import LOST_DECELERATION, JointTarget, ServoJ, SpeedJ, StopJ
+from ur_emulator.machine.motion.leg import move_j
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.tool import Tool
+from ur_emulator.machine.motion.tool_streams import SpeedL, StopL
 
 FAST = (math.inf,) * 6  # no joint is too slow
 
@@ -124,7 +125,7 @@ def test_speedl_stays_on_its_line_for_ten_seconds_and_through_the_stop(renewed):
     for k in range(1250):
         if k % renewed == 0:
             command = motion.command(owner, SpeedL(tuple(v), 1.0, 1.0, TOOL))
-        command.renew()
+        command.is_renewed = True
         motion.step(DT, 1.0)
     half = TOOL.pose(motion.target.q)
     motion.command(owner, StopL(1.0, 1.0, TOOL))

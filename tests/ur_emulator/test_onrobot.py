@@ -9,10 +9,10 @@ from pymodbus.client import ModbusTcpClient
 
 from protocol.modbus_rtu import encode_rtu
 from ur_emulator import ControlBox
-from ur_emulator.controller.grippers.onrobot import STATUS, OnRobotGripper
-from ur_emulator.controller.io.lines import TOOL, InputOutput
-from ur_emulator.plant.hand import FingerState
-from ur_emulator.ports.onrobot import METHODS
+from ur_emulator.host.ports.onrobot import METHODS
+from ur_emulator.machine.controller.io.lines import TOOL, InputOutput
+from ur_emulator.machine.plant.hand import FingerState
+from ur_emulator.machine.tools.onrobot import STATUS, OnRobotGripper
 from ur_hil.tools import TOOLS
 
 PERIOD = 0.008

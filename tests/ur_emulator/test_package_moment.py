@@ -5,8 +5,8 @@ from box_support import VERSION, Bench
 
 from protocol.rtde.fields import output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes
-from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.machine.commands.power import PowerOff, PowerOn, ReleaseBrakes
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 
 FIELDS = output_fields(VERSION)
 NAMES = ("target_q", "output_double_register_1", "actual_q")

@@ -17,15 +17,15 @@ from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import EmulatorError, ModelError, PlantError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.calibration import draw_calibration
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.e_series_arms import UR3E, UR5E
-from ur_emulator.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.plant.exact import ExactPlant
-from ur_emulator.plant.plant import Plant
-from ur_emulator.plant.sensors import Record, Sensors
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.calibration import draw_calibration
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.e_series_arms import UR3E, UR5E
+from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.plant.exact import ExactPlant
+from ur_emulator.machine.plant.plant import Plant
+from ur_emulator.machine.plant.sensors import Record, Sensors
 
 IN_ARM_PLANE = np.cos(HOME[0])  # share of a lever along x that the shoulder feels
 
@@ -83,7 +83,7 @@ def test_currents_carry_the_gravity_torque(resting):
 
 def test_accelerometer_shows_gravity_along_the_tool(resting):
     _, states = resting
-    measured = column(states, "tool_accelerometer").mean(axis=0)
+    measured = column(states, "actual_tool_accelerometer").mean(axis=0)
     # The tool axis points forward and 45 degrees down, so both show .707 g upwards.
     assert np.linalg.norm(measured) == pytest.approx(9.81, abs=0.05)
     assert measured[2] == pytest.approx(-6.94, abs=0.1)
@@ -108,7 +108,7 @@ def test_the_force_is_what_the_motors_give_beyond_the_target_current():
     for state in SpeedRamp(HOME, 2.0).run(plant, (0.5, 0.3, -0.4, 0.2, 0.0, 0.1), 120)[1]:
         beyond = np.subtract(state.actual_current, state.target_current) * UR3.torque_constant
         wrench = -np.linalg.solve(arm.jacobian(state.actual_q).T, beyond)
-        assert state.tcp_force == pytest.approx(wrench, rel=0.02, abs=0.05)
+        assert state.estimated_force == pytest.approx(wrench, rel=0.02, abs=0.05)
 
 
 def test_near_a_singularity_the_error_of_the_force_grows_and_stays_finite():
@@ -117,7 +117,7 @@ def test_near_a_singularity_the_error_of_the_force_grows_and_stays_finite():
     for wrist in (-1.57, -0.05, 0.0):
         q = (*HOME[:4], wrist, HOME[5])
         plant.reset(q)
-        forces = column(hold(plant, q, 300)[100:], "tcp_force")[:, :3]
+        forces = column(hold(plant, q, 300)[100:], "estimated_force")[:, :3]
         sizes.append(np.linalg.norm(forces, axis=1).max())
     assert 2.0 * sizes[0] < sizes[1] < 200.0
     assert sizes[2] < 200.0
@@ -157,7 +157,9 @@ def test_brakes_hold_without_any_sag():
     assert np.all(column(states, "actual_qd") == 0.0)
     assert np.all(column(states, "target_moment") == 0.0)
     assert np.abs(column(states, "actual_current").mean(axis=0)).max() < 0.01
-    assert np.linalg.norm(column(states, "tool_accelerometer").mean(axis=0)) == pytest.approx(9.81, abs=0.05)
+    assert np.linalg.norm(column(states, "actual_tool_accelerometer").mean(axis=0)) == pytest.approx(
+        9.81, abs=0.05
+    )
 
 
 def test_releasing_the_brakes_does_not_shake_the_arm():
@@ -187,8 +189,8 @@ def test_the_physical_flange_is_where_the_controller_computes_it():
     for q in np.random.default_rng(1).uniform(-2.0, 2.0, (10, 6)):
         plant.reset(q)
         # The gear's error of .3 mrad is in the encoders, not in the links.
-        assert plant.flange_position == pytest.approx(arm.fk(q)[:3], abs=4e-4)
-        assert np.abs(plant.flange_position - ArmModel(UR3).fk(q)[:3]).max() > 1e-5
+        assert plant.physics.flange_position == pytest.approx(arm.fk(q)[:3], abs=4e-4)
+        assert np.abs(plant.physics.flange_position - ArmModel(UR3).fk(q)[:3]).max() > 1e-5
 
 
 # --- loads ---
@@ -215,19 +217,19 @@ def test_a_push_is_resisted_and_seen_in_force_and_current():
     assert 1e-4 < np.abs(plant.q_true - HOME).max() < 2e-2
     pushed = hold(plant, HOME, 200)[-1]
     assert np.abs(plant.q_true - HOME).max() < 2e-5
-    assert pushed.tcp_force[:3] == pytest.approx((0.0, 0.0, -30.0), abs=0.5)
+    assert pushed.estimated_force[:3] == pytest.approx((0.0, 0.0, -30.0), abs=0.5)
     extra = (pushed.actual_current[1] - quiet.actual_current[1]) * UR3.torque_constant[1]
     assert extra == pytest.approx(30 * 0.35 * IN_ARM_PLANE, rel=0.02)
     assert not any(state.torque_saturated for state in first)
     plant.push((0.0, 0.0, 0.0))
-    assert hold(plant, HOME, 200)[-1].tcp_force[:3] == pytest.approx((0.0, 0.0, 0.0), abs=0.5)
+    assert hold(plant, HOME, 200)[-1].estimated_force[:3] == pytest.approx((0.0, 0.0, 0.0), abs=0.5)
     assert np.abs(plant.q_true - HOME).max() < 2e-5
 
 
 def test_a_push_beside_the_flange_has_a_moment():
     plant = Plant(UR3, IDEAL, 3)
     plant.push((0.0, 0.0, -10.0), point=(0.0, 0.1, 0.0))
-    wrench = hold(plant, HOME, 100)[-1].tcp_force
+    wrench = hold(plant, HOME, 100)[-1].estimated_force
     # The flange's y axis is the base's y axis at home: (0, .1, 0) x (0, 0, -10).
     assert wrench[3:] == pytest.approx((-1.0, 0.0, 0.0), abs=0.05)
 
@@ -284,7 +286,7 @@ def test_speed_ripple_is_that_of_a_real_arm(speed):
     ramp = SpeedRamp(RAISED)
     ramp.run(plant, speed, 70)
     _, states = ramp.run(plant, speed, n)
-    assert plant.n_contacts == 0
+    assert plant.physics.n_contacts == 0
     ripple = (column(states, "actual_qd") - speed) / speed
     assert np.all(np.abs(ripple.mean(axis=0)) < 0.004)
     # Source: a real UR3.
@@ -419,12 +421,12 @@ def press_down(plant, n):
 def test_the_table_stops_the_arm_and_is_felt():
     plant = Plant(UR3, IDEAL, 0)
     states = press_down(plant, 260)
-    assert plant.n_contacts > 0
+    assert plant.physics.n_contacts > 0
     assert plant.q_true[1] < 0.7
     last = states[-1]
     assert last.torque_saturated
     assert last.position_error[1] > 0.01
-    assert last.tcp_force[2] > 50.0
+    assert last.estimated_force[2] > 50.0
     assert not states[20].torque_saturated
     # The wrist yields, the table does not.
     assert np.all(plant._physics.data.contact.dist > -5e-4)
@@ -434,7 +436,7 @@ def test_the_arm_cannot_fold_into_itself():
     plant = Plant(UR3, IDEAL, 0)
     ramp = SpeedRamp(HOME)
     ramp.run(plant, (0, 0, -0.6, 0, 0, 0), 180)
-    assert plant.n_contacts > 0
+    assert plant.physics.n_contacts > 0
     assert plant.q_true[2] > ramp.q[2] + 0.1
 
 
@@ -444,7 +446,7 @@ def test_home_and_the_work_box_are_clear():
         for q3 in (-2.6, -1.1):
             plant.reset((q1, -1.8, q3, -0.1, 1.3, 1.8))
             hold(plant, (q1, -1.8, q3, -0.1, 1.3, 1.8), 2)
-            assert plant.n_contacts == 0
+            assert plant.physics.n_contacts == 0
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf"), 1e308])
@@ -517,9 +519,14 @@ EVENTS = {
     "hang": lambda plant: plant.attach_load(0.5),
     "push": lambda plant: plant.push((5.0, 0.0, -3.0)),
     "end of push": lambda plant: plant.push((0.0, 0.0, 0.0)),
-    "obstacle": lambda plant: plant.obstacles.put("ball", "sphere", (0.1,), POSE),
-    "no obstacle": lambda plant: plant.obstacles.remove("ball"),
-    "look": lambda plant: (plant.q_true, plant.qd_true, plant.flange_position, plant.contact_wrench),
+    "obstacle": lambda plant: plant.put_obstacle("ball", "sphere", (0.1,), POSE),
+    "no obstacle": lambda plant: plant.physics.obstacles.remove("ball"),
+    "look": lambda plant: (
+        plant.q_true,
+        plant.qd_true,
+        plant.physics.flange_position,
+        plant.physics.contact_wrench,
+    ),
     "trim rests": lambda plant: plant.hold_trim(),
     "reset": lambda plant: plant.reset(HOME),
 }
@@ -552,7 +559,7 @@ def states(plant, cycles, *, ahead):
         said.append(plant.sense())
         if ahead:
             plant.complete_cycle()
-    return [*said, plant.q_true.tolist(), plant.qd_true.tolist(), plant.flange_position.tolist()]
+    return [*said, plant.q_true.tolist(), plant.qd_true.tolist(), plant.physics.flange_position.tolist()]
 
 
 ARMS = [

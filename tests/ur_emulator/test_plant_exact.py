@@ -8,14 +8,14 @@ import pytest
 from box_support import Bench
 
 from protocol.ur_types import ControlMode
-from ur_emulator.commands.power import StartFreedrive
-from ur_emulator.commands.programs import SetSpeedSlider
-from ur_emulator.commands.surroundings import Push
 from ur_emulator.errors import PlantError, RefusedError
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import EXACT
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.exact import ExactPlant
+from ur_emulator.machine.commands.power import StartFreedrive
+from ur_emulator.machine.commands.programs import SetSpeedSlider
+from ur_emulator.machine.commands.surroundings import Push
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import EXACT
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.exact import ExactPlant
 
 MOVES = """
 def p():
@@ -80,7 +80,7 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
     [
         lambda plant: plant.push((50.0, 0.0, 0.0)),
         lambda plant: plant.attach_load(3.0),
-        lambda plant: plant.obstacles.put("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)),
+        lambda plant: plant.put_obstacle("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)),
     ],
 )
 def test_what_would_act_on_the_arm_is_refused_in_one_line(act):

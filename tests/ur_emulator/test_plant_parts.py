@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 from plant_support import dh_frames
 
-from ur_emulator.models.calibration import NOMINAL, calibrated_dh, draw_calibration
-from ur_emulator.models.cb3_arms import UR3
-from ur_emulator.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.command_path import CommandPath, trace_cycle
-from ur_emulator.plant.drives import ServoGains
-from ur_emulator.plant.feedback import GearRipple
-from ur_emulator.plant.friction import Friction
-from ur_emulator.plant.inverse_dynamics import InverseDynamics
-from ur_emulator.plant.plant import Thermometers
-from ur_emulator.plant.sensors import ForceDrift
+from ur_emulator.machine.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.machine.models.cb3_arms import UR3
+from ur_emulator.machine.models.fidelity import IDEAL, TYPICAL
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.command_path import CommandPath, trace_cycle
+from ur_emulator.machine.plant.drives import ServoGains
+from ur_emulator.machine.plant.feedback import GearRipple
+from ur_emulator.machine.plant.friction import Friction
+from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.machine.plant.sensors import ForceDrift
+from ur_emulator.machine.plant.thermometers import Thermometers
 
 Q = np.array([0.4, -1.3, 1.1, -0.6, 0.9, 2.0])
 STILL = np.zeros(6)

@@ -23,14 +23,14 @@ from protocol.primary.messages import (
 from protocol.primary.packages import RobotState, decode_package
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
-from ur_emulator.commands.programs import ResumeProgram, StartProgram
-from ur_emulator.commands.safety import UnlockProtectiveStop
-from ur_emulator.controller import events
-from ur_emulator.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
-from ur_emulator.models.generations import CB3
-from ur_emulator.ports.primary.port import PrimaryPort
-from ur_emulator.ports.primary.robot_state import StateEncoder
+from ur_emulator.host.box_log import MAX_ENTRIES, MAX_TEXT, BoxLog, LogEntry
+from ur_emulator.host.ports.primary.port import PrimaryPort
+from ur_emulator.host.ports.primary.robot_state import StateEncoder
+from ur_emulator.machine.commands.programs import ResumeProgram, StartProgram
+from ur_emulator.machine.commands.safety import UnlockProtectiveStop
+from ur_emulator.machine.controller import events
+from ur_emulator.machine.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
+from ur_emulator.machine.models.generations import CB3
 from urscript import compile_program
 
 BUDGET = (

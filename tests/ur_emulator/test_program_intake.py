@@ -8,13 +8,13 @@ import pytest
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.power import PowerOff
-from ur_emulator.commands.programs import PauseProgram, SetSpeedSlider, StartProgram, StopProgram
-from ur_emulator.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.errors import WorkerError
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.ports import script_intake as module
-from ur_emulator.ports.script_intake import ProgramIntake, Sender
+from ur_emulator.host.ports import script_intake as module
+from ur_emulator.host.ports.script_intake import ProgramIntake, Sender
+from ur_emulator.machine.commands.power import PowerOff
+from ur_emulator.machine.commands.programs import PauseProgram, SetSpeedSlider, StartProgram, StopProgram
+from ur_emulator.machine.controller.events import ErrorReported, ScriptFailed
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 
 
 class Tasks:

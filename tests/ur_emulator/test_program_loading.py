@@ -13,9 +13,9 @@ from dashboard_support import Dashboard, external_control, script_line, urp
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import ProgramFileError
+from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.program_files import reader
 from ur_emulator.program_files.compiling import compile_loaded
 from ur_emulator.program_files.folder import ProgramFolder

@@ -14,10 +14,17 @@ from protocol.primary.messages import KeyMessage, ReportLevel, TextMessage
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator import ControlBox
-from ur_emulator.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
-from ur_emulator.commands.programs import ClosePopup, PauseProgram, ResumeProgram, SetSpeedSlider, StopProgram
-from ur_emulator.commands.safety import SafeguardStop, TriggerProtectiveStop, UnlockProtectiveStop
-from ur_emulator.controller.events import (
+from ur_emulator.host.ports.primary.robot_state import state_records
+from ur_emulator.machine.commands.power import PowerOff, ReleaseBrakes, StartFreedrive
+from ur_emulator.machine.commands.programs import (
+    ClosePopup,
+    PauseProgram,
+    ResumeProgram,
+    SetSpeedSlider,
+    StopProgram,
+)
+from ur_emulator.machine.commands.safety import SafeguardStop, TriggerProtectiveStop, UnlockProtectiveStop
+from ur_emulator.machine.controller.events import (
     ErrorReported,
     ProgramPaused,
     ProgramResumed,
@@ -25,8 +32,7 @@ from ur_emulator.controller.events import (
     ProgramStopped,
     SafetyModeChanged,
 )
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.ports.primary.robot_state import state_records
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 
 COUNT = "def count():\n  n = 0\n  while True:\n    n = n + 1\n    write_output_integer_register(0, n)\n    sync()\n  end\nend\n"
 GOAL = [0.9, -1.6, -1.9, -0.2, 1.2, 1.6]

@@ -17,8 +17,10 @@ from dashboard_support import Dashboard, script_line, urp, write_programs
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.errors import FileMissingError, ProgramFileError
-from ur_emulator.polyscope import report_files
-from ur_emulator.polyscope.report_files import (
+from ur_emulator.host.ports import robot_api_files
+from ur_emulator.host.ports.robot_api_files import KINDS, write_program
+from ur_emulator.host.reports import report_files
+from ur_emulator.host.reports.report_files import (
     BoxFacts,
     TemporaryFolder,
     flight_report,
@@ -26,8 +28,6 @@ from ur_emulator.polyscope.report_files import (
     save_log,
     support_file,
 )
-from ur_emulator.ports import robot_api_files
-from ur_emulator.ports.robot_api_files import KINDS, StoreResult, write_program
 from ur_emulator.program_files.folder import PART_NAME, FoundFile, ProgramFolder
 from ur_emulator.program_files.loading import load_program
 
@@ -216,16 +216,16 @@ def test_uploads_have_one_total_with_the_programs_that_are_there(folder, monkeyp
     def upload(name, size, is_new=True):
         head = f'--XX\r\nContent-Disposition: form-data; name="file"; filename="{name}"\r\n\r\n'
         body = head.encode() + b"#" * size + b"\r\n--XX--\r\n"
-        return write_program(place, "multipart/form-data; boundary=XX", body, is_new, "")[1]
+        return write_program(place, "multipart/form-data; boundary=XX", body, is_new, "")
 
     n_programs = len([path for path in folder.rglob("*") if path.suffix in KINDS])
     total = (n_programs + 3) * 4_096
     monkeypatch.setattr(robot_api_files, "BUDGETS", replace(BUDGETS, uploads_bytes=total))
-    assert upload("one.script", 1) is upload("two.script", 8_192) is StoreResult.WRITTEN
+    assert (upload("one.script", 1), upload("two.script", 8_192)) == ("one", "two")
     with pytest.raises(ProgramFileError, match=f"three.script has 1 bytes, .* {total} are allowed, remove"):
         upload("three.script", 1)
-    assert upload("two.script", 4_096, is_new=False) is StoreResult.WRITTEN
-    assert upload("three.script", 1) is StoreResult.WRITTEN
+    assert upload("two.script", 4_096, is_new=False) == "two"
+    assert upload("three.script", 1) == "three"
 
 
 def test_a_folder_of_too_many_files_gets_no_reports(folder, monkeypatch):
@@ -286,7 +286,7 @@ def test_without_a_temporary_folder_it_is_one_line(tmp_path, monkeypatch):
 def test_the_temporary_folder_of_a_killed_box_goes_with_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     code = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}\n" + (
-        "import os, signal\nfrom ur_emulator.polyscope.report_files import TemporaryFolder\n"
+        "import os, signal\nfrom ur_emulator.host.reports.report_files import TemporaryFolder\n"
         "folder = TemporaryFolder()\n(folder.path / 'log_history.txt').touch()\nos.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], check=False)

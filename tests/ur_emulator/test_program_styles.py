@@ -16,8 +16,8 @@ from driver_program import (
 )
 from program_support import Box, frames
 
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.programs import AnswerRequest, ClosePopup
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup
 from urscript.check.checking import check_program
 
 ABOVE = [-0.462, -1.757, -1.667, -1.289, 1.57, -0.462]

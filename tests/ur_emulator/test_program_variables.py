@@ -25,11 +25,9 @@ from protocol.primary.values import (
 from protocol.ur_types import SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.programs import StopProgram
-from ur_emulator.models.generations import CB3
-from ur_emulator.ports.primary import program_reports
-from ur_emulator.ports.primary.port import PrimaryPort
-from ur_emulator.ports.primary.program_reports import (
+from ur_emulator.host.ports.primary import program_reports
+from ur_emulator.host.ports.primary.port import PrimaryPort
+from ur_emulator.host.ports.primary.program_reports import (
     MAX_BODY,
     MAX_THREADS,
     MAX_VALUE,
@@ -38,7 +36,9 @@ from ur_emulator.ports.primary.program_reports import (
     size_of,
     typed_value,
 )
-from ur_emulator.ports.primary.robot_state import StateEncoder
+from ur_emulator.host.ports.primary.robot_state import StateEncoder
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.models.generations import CB3
 from urscript import Matrix, Pose, RunningProgram
 
 FOREVER = "  while True:\n    sync()\n  end\nend\n"

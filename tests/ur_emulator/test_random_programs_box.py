@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from program_support import Box, frames
 
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.programs import StopProgram
-from ur_emulator.commands.safety import UnlockProtectiveStop
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.commands.safety import UnlockProtectiveStop
 from urscript.catalogue import CB3_3_15
 
 HOME = "[0.0, -1.57, 0.0, -1.57, 0.0, 0.0]"

@@ -6,11 +6,11 @@ from control_support import Http, control_box
 from dashboard_support import Dashboard
 
 from protocol.primary.messages import LONGEST_TITLE, PopupMessage, ReportLevel
-from ur_emulator.commands.power import PowerOff
-from ur_emulator.control_api.step_operations import ReadState
-from ur_emulator.loop import listener
-from ur_emulator.outgoing.sockets import ScriptConnection
-from ur_emulator.ports.session import Session
+from ur_emulator.host.control_api.step_operations import ReadState
+from ur_emulator.host.ports.session import Session
+from ur_emulator.host.runtime import listener
+from ur_emulator.host.script_network.sockets import ScriptConnection
+from ur_emulator.machine.commands.power import PowerOff
 
 DEFECT = "KeyError('defect') in fail, line "
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.primary.messages import ReportLevel
-from ur_emulator.box_log import LogEntry, printable
-from ur_emulator.loop import line_writer
-from ur_emulator.loop.line_writer import LineWriter
+from ur_emulator.host.box_log import LogEntry, printable
+from ur_emulator.host.runtime import line_writer
+from ur_emulator.host.runtime.line_writer import LineWriter
 
 _LOST = ["lines", "of", "the", "log", "were", "lost:", "they", "were", "not", "read", "in", "time"]
 

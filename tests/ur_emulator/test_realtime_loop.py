@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from ur_emulator import rack
-from ur_emulator.loop.event_loop import EventLoop
+from ur_emulator.host import rack
+from ur_emulator.host.runtime.event_loop import EventLoop
 
 
 @pytest.fixture

@@ -1,16 +1,11 @@
 """When the next cycle of a box begins, in real time and in lockstep; the clock is a number."""
 
 from dataclasses import dataclass
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
 
-from ur_emulator.commands.programs import SetSpeedSlider
-from ur_emulator.commands.safety import TriggerFault
-from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import SafetyModeChanged
-from ur_emulator.loop.pacing import (
+from ur_emulator.host.pacing import (
     FIRST_READ_LIMIT,
     HANG_LIMIT,
     MAX_BACKLOG,
@@ -18,10 +13,13 @@ from ur_emulator.loop.pacing import (
     LockstepPacer,
     RealtimePacer,
 )
-from ur_emulator.loop.served_box import ServedBox
-from ur_emulator.models.generations import CB3
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.scripting.robot_host import robot_hosts
+from ur_emulator.host.served_box import ServedBox
+from ur_emulator.machine.commands.programs import SetSpeedSlider
+from ur_emulator.machine.commands.safety import TriggerFault
+from ur_emulator.machine.controller.events import SafetyModeChanged
+from ur_emulator.machine.machine import Machine
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.models.robots import robot_by_name
 
 PERIOD = 0.008
 
@@ -97,9 +95,8 @@ def test_the_lead_is_at_most_a_quarter_of_a_short_period():
 
 def served_box():
     """A box in real time, alone in its loop."""
-    hosts = partial(robot_hosts, network=None)
-    controller = Controller(robot_by_name("ur3"), CB3.fidelity("exact"), 0, hosts)
-    return ServedBox(controller, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
+    machine = Machine(robot_by_name("ur3"), CB3.fidelity("exact"), 0)
+    return ServedBox(machine, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
 
 
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():

@@ -14,10 +14,10 @@ from box_support import TIMEOUT
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
-from ur_emulator.loop import processes
-from ur_emulator.loop import worker as module
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.worker import Ticket
+from ur_emulator.host.runtime import processes
+from ur_emulator.host.runtime import worker as module
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.runtime.worker import Ticket
 from ur_emulator.program_files.compiling import compile_text
 from urscript.catalogue import catalogue_for
 from urscript.program import ProgramStatus, compile_program

@@ -14,11 +14,11 @@ from pc_client.driver.watchdog import refusal
 from pc_client.experiment.preflight import model_of, preflight
 from ur_emulator import ControlBox
 from ur_emulator.errors import EmulatorError, ModelError, RefusedError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.generations import CB3, POLYSCOPE_X
-from ur_emulator.models.robots import ROBOTS, robot_by_name
-from ur_emulator.motion.generators import JointTarget
-from ur_emulator.plant.plant import Plant
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.generations import CB3, POLYSCOPE_X
+from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
+from ur_emulator.machine.motion.generators import JointTarget
+from ur_emulator.machine.plant.plant import Plant
 from ur_hil.cell import NO_CELL
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "arms" / "long_ur5e.toml"

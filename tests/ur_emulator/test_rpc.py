@@ -17,11 +17,11 @@ from box_support import TIMEOUT, Bench, MessageReader, connect, inside, listenin
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.commands.programs import StopProgram
 from ur_emulator.emulator import ControlBox
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.outgoing import xmlrpc as module
-from ur_emulator.scripting import rpc_builtins
+from ur_emulator.host.script_network import xmlrpc as module
+from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.scripting import network, rpc_builtins
 
 
 class FakeCall:
@@ -125,7 +125,7 @@ def test_the_handle_closes_its_connection_itself():
     )
     assert bench.texts == ["on"]
     assert bench.servers[0].calls == []
-    assert bench.servers[0].closed == 2  # by the script, and at the end of the program
+    assert bench.servers[0].closed == 0  # nothing was called: there is no connection
 
 
 def test_a_program_that_is_stopped_closes_what_it_opened():
@@ -386,7 +386,7 @@ def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
 
 
 def test_more_calls_at_the_same_time_than_connections_fail(box, monkeypatch):
-    monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, remote_connections=2))
+    monkeypatch.setattr(network, "BUDGETS", replace(BUDGETS, remote_connections=2))
     with listening_socket() as server, connect(box, "primary") as sock:
         url = f"http://127.0.0.1:{server.getsockname()[1]}/RPC2"
         threads = [

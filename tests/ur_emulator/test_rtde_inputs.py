@@ -12,10 +12,10 @@ from protocol.rtde.fields import INPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RtdeType
 from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.programs import ResumeProgram
-from ur_emulator.commands.safety import TriggerProtectiveStop
-from ur_emulator.controller.snapshot import safety_status_bits
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.programs import ResumeProgram
+from ur_emulator.machine.commands.safety import TriggerProtectiveStop
+from ur_emulator.machine.controller.status_words import safety_status_bits
 
 V3_15 = SoftwareVersion(3, 15, 8)
 

@@ -25,12 +25,12 @@ from hypothesis import strategies as st
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.outgoing import addresses, loop_network, sockets
-from ur_emulator.outgoing.addresses import LookUp, LookUps
-from ur_emulator.scripting import socket_builtins
-from ur_emulator.scripting.socket_builtins import SocketReader, TextSearch
+from ur_emulator.host.script_network import addresses, loop_network, sockets
+from ur_emulator.host.script_network.addresses import LookUp, LookUps
+from ur_emulator.machine.scripting import network, socket_builtins
+from ur_emulator.machine.scripting.socket_builtins import SocketReader, TextSearch
 
-USERS = (addresses, loop_network, sockets, socket_builtins)
+USERS = (addresses, loop_network, network, sockets, socket_builtins)
 
 
 def lower(monkeypatch, **budgets):

@@ -6,9 +6,9 @@ import pytest
 from box_support import Bench
 
 from ur_emulator.budgets import BUDGETS, of_cycle
-from ur_emulator.commands.programs import StartProgram
-from ur_emulator.controller.events import ScriptFailed, TextPrinted
-from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.machine.commands.programs import StartProgram
+from ur_emulator.machine.controller.events import ScriptFailed, TextPrinted
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 from urscript import ProgramStatus, RecordingHost, compile_program
 from urscript.dialect import STATEMENT_BUDGET
 from urscript.recording_host import FakeSocket
@@ -270,7 +270,7 @@ def test_on_an_e_series_a_cycle_takes_the_longer_the_more_programs_do():
 @pytest.fixture
 def few_secondary_units(monkeypatch):
     few = replace(BUDGETS, secondary_units=5_000, secondary_units_saved=5_000)
-    monkeypatch.setattr("ur_emulator.controller.program_runner.BUDGETS", few)
+    monkeypatch.setattr("ur_emulator.machine.controller.program_runner.BUDGETS", few)
 
 
 @pytest.mark.usefixtures("few_secondary_units")

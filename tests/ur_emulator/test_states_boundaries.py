@@ -14,16 +14,17 @@ from states_support import BRAKING, modes, power_up
 from protocol.pose import rotvec_to_matrix
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import RobotMode, SafetyMode
-from ur_emulator.commands.power import PowerOn, ReleaseBrakes
-from ur_emulator.commands.safety import (
+from ur_emulator.errors import ArgumentError, RefusedError
+from ur_emulator.machine.commands.power import PowerOn, ReleaseBrakes
+from ur_emulator.machine.commands.safety import (
     LimitToolDirection,
     ReducedMode,
     RestartSafety,
     SetSafetyPlane,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.events import ErrorReported
-from ur_emulator.controller.safety.boundaries import (
+from ur_emulator.machine.controller.events import ErrorReported
+from ur_emulator.machine.controller.safety.boundaries import (
     DIRECTION_TOLERANCE,
     MOST_PLANES,
     PLANE_TOLERANCE,
@@ -32,11 +33,10 @@ from ur_emulator.controller.safety.boundaries import (
     SafetyPlane,
     ToolDirection,
 )
-from ur_emulator.errors import ArgumentError, RefusedError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.models.robot_model import ZERO6
-from ur_emulator.models.robots import robot_by_name
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.models.robot_model import ZERO6
+from ur_emulator.machine.models.robots import robot_by_name
 
 GENERATIONS = pytest.mark.parametrize(
     "arm", [{}, {"robot": "ur5e", "generation": E_SERIES}], ids=["CB3", "e"]

@@ -8,14 +8,15 @@ from states_support import BRAKING, ENDLESS, failures, infos
 
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
-from ur_emulator.commands.power import (
+from ur_emulator.errors import RefusedError
+from ur_emulator.machine.commands.power import (
     ChooseModeByDashboard,
     MoveEnablingDevice,
     ReleaseBrakes,
     SetOperationalMode,
     StartFreedrive,
 )
-from ur_emulator.commands.safety import (
+from ur_emulator.machine.commands.safety import (
     AssignSafetyInput,
     PressButton,
     ReducedMode,
@@ -23,8 +24,8 @@ from ur_emulator.commands.safety import (
     ResetSafeguard,
     SafeguardStop,
 )
-from ur_emulator.commands.surroundings import SetDigitalInput
-from ur_emulator.controller.safety.inputs import (
+from ur_emulator.machine.commands.surroundings import SetDigitalInput
+from ur_emulator.machine.controller.safety.inputs import (
     OPERATIONAL_MODES,
     EnablingAct,
     EnablingDevice,
@@ -33,9 +34,8 @@ from ur_emulator.controller.safety.inputs import (
     OperationalMode,
     OperationalModeChoice,
 )
-from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.errors import RefusedError
-from ur_emulator.models.generations import CB3, E_SERIES
+from ur_emulator.machine.controller.safety.modes import SafetyEvent
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 
 MANUAL, AUTOMATIC = SetOperationalMode("manual"), SetOperationalMode("automatic")
 PRESS, RELEASE = MoveEnablingDevice("pressed"), MoveEnablingDevice("released")

@@ -9,9 +9,10 @@ from states_support import BRAKING, ENDLESS, failures, modes, moving, power_up
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
-from ur_emulator.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
-from ur_emulator.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
-from ur_emulator.commands.safety import (
+from ur_emulator.errors import EmulatorError, RefusedError
+from ur_emulator.machine.commands.power import PowerOff, PowerOn, ReleaseBrakes, StartFreedrive
+from ur_emulator.machine.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
+from ur_emulator.machine.commands.safety import (
     AssignSafetyInput,
     ChangeSafetySettings,
     ConfirmSafety,
@@ -28,13 +29,12 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.controller.command import Submitted
-from ur_emulator.controller.events import ErrorReported, ProgramPaused, ProgramResumed
-from ur_emulator.controller.safety.speed_scaling import TOLERANCE
-from ur_emulator.errors import EmulatorError, RefusedError
-from ur_emulator.models.generations import CB3
-from ur_emulator.motion.arm_motion import ArmMotion
-from ur_emulator.motion.generators import SpeedJ
+from ur_emulator.machine.controller.command import Submitted
+from ur_emulator.machine.controller.events import ErrorReported, ProgramPaused, ProgramResumed
+from ur_emulator.machine.controller.safety.speed_scaling import TOLERANCE
+from ur_emulator.machine.models.generations import CB3
+from ur_emulator.machine.motion.arm_motion import ArmMotion
+from ur_emulator.machine.motion.generators import SpeedJ
 from urscript import compile_program
 
 PRESS, RELEASE = PressEmergencyStop("robot"), ReleaseEmergencyStop()

@@ -29,12 +29,12 @@ from urp_support import NEW_BOX, lines_of, script_of, undefined_in
 
 from protocol.pose import pose_inv, pose_trans
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.events import ErrorReported, PopupShown, ScriptFailed
-from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.kinematics.arm_model import ArmModel
-from ur_emulator.models.cb3_arms import UR5
-from ur_emulator.models.robot_model import ZERO6
+from ur_emulator.machine.controller.events import ErrorReported, PopupShown, ScriptFailed
+from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.kinematics.arm_model import ArmModel
+from ur_emulator.machine.models.cb3_arms import UR5
+from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.program_files import urp_nodes
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import NEW_HOME, DeclaredSignal, Feature, Installation

@@ -19,16 +19,16 @@ from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from protocol.wire_record import ValueOrigin, wire_fields
 from ur_emulator import ControlBox
-from ur_emulator.commands.power import ReleaseBrakes
-from ur_emulator.commands.safety import (
+from ur_emulator.host.ports.primary.robot_state import StateEncoder
+from ur_emulator.machine.commands.power import ReleaseBrakes
+from ur_emulator.machine.commands.safety import (
     ChangeSafetySettings,
     PressEmergencyStop,
     ReleaseEmergencyStop,
     TriggerProtectiveStop,
 )
-from ur_emulator.controller.safety.modes import SafetyEvent
-from ur_emulator.models.generations import CB3
-from ur_emulator.ports.primary.robot_state import StateEncoder
+from ur_emulator.machine.controller.safety.modes import SafetyEvent
+from ur_emulator.machine.models.generations import CB3
 
 V3_15 = SoftwareVersion(3, 15, 8)
 

@@ -14,8 +14,11 @@ from protocol.primary.packages import RobotState, SafetyTolerances, decode_packa
 from protocol.primary.values import ProgramStateMessage
 from protocol.script_channel import CONTROLLER_WORDS
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator.commands.power import PowerOff, ReleaseBrakes
-from ur_emulator.commands.safety import (
+from ur_emulator.host.ports.primary.port import PrimaryPort, message_for
+from ur_emulator.host.ports.primary.robot_state import StateEncoder, dexterity, setup_records
+from ur_emulator.host.ports.script_intake import SPEED_WORD, WORDS, Sender
+from ur_emulator.machine.commands.power import PowerOff, ReleaseBrakes
+from ur_emulator.machine.commands.safety import (
     PressEmergencyStop,
     ReducedMode,
     SafeguardStop,
@@ -23,15 +26,12 @@ from ur_emulator.commands.safety import (
     TriggerProtectiveStop,
     TriggerViolation,
 )
-from ur_emulator.controller import events
-from ur_emulator.controller.safety.limit_checks import most_loaded_joint
-from ur_emulator.controller.safety.safety_state import limits_of
-from ur_emulator.models.calibration import calibrated_dh
-from ur_emulator.models.generations import CB3, E_SERIES
-from ur_emulator.models.robots import robot_by_name
-from ur_emulator.ports.primary.port import PrimaryPort, message_for
-from ur_emulator.ports.primary.robot_state import StateEncoder, dexterity, setup_records
-from ur_emulator.ports.script_intake import SPEED_WORD, WORDS, Sender
+from ur_emulator.machine.controller import events
+from ur_emulator.machine.controller.safety.limit_checks import most_loaded_joint
+from ur_emulator.machine.controller.safety.safety_state import limits_of
+from ur_emulator.machine.models.calibration import calibrated_dh
+from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.models.robots import robot_by_name
 
 V3_15 = SoftwareVersion(3, 15, 8)
 VERSIONS = [

@@ -14,7 +14,7 @@ def made(folder, data, installation=NEW_BOX, name="sample.urp", **options):
     (folder / name).write_bytes(data)
     reader = ProgramReader(ProgramFolder(folder))
     file = reader.folder.find(name)
-    return make_script(file, reader.xml(file), reader, installation, **options)
+    return make_script(reader.xml(file), reader, installation, **options)
 
 
 def script_of(folder, data, installation=NEW_BOX, **options):

@@ -6,16 +6,16 @@
 from box_support import Bench
 
 from protocol.ur_types import RobotMode
-from ur_emulator.commands.client_writes import WriteInputs
-from ur_emulator.commands.power import ReleaseBrakes
-from ur_emulator.commands.programs import (
+from ur_emulator.machine.commands.client_writes import WriteInputs
+from ur_emulator.machine.commands.power import ReleaseBrakes
+from ur_emulator.machine.commands.programs import (
     PauseProgram,
     ResumeProgram,
     SetSpeedSlider,
     StartProgram,
     StopProgram,
 )
-from ur_emulator.commands.safety import (
+from ur_emulator.machine.commands.safety import (
     BUTTON_BITS,
     PressButton,
     PressEmergencyStop,
@@ -27,8 +27,8 @@ from ur_emulator.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.commands.surroundings import Push
-from ur_emulator.controller.modbus_map import read_register
+from ur_emulator.machine.commands.surroundings import Push
+from ur_emulator.machine.controller.modbus_map import read_register
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -19,7 +19,7 @@ from pc_client.kinematics.tool import surroundings
 from protocol.pose import T_to_pose, pose_to_T
 from protocol.primary.layout import KinematicsInfo
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.models.things import BodyShape, Contact
+from ur_emulator.machine.models.things import BodyShape, Contact
 from ur_hil.cell import parse_cell
 from ur_pendant.drawing import ArmDrawing, RobotDrawing, model_of
 

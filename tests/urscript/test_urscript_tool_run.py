@@ -14,7 +14,7 @@ from program_texts import program_of
 from typer.testing import CliRunner
 
 import urscript.commands.run_command
-from ur_emulator.models.robots import ROBOTS
+from ur_emulator.machine.models.robots import ROBOTS
 from ur_emulator.script_robots import MAKER
 from urscript.cli import app
 from urscript.commands.run_command import LineTracer

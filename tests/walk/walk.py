@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from walk_box import KINDS, WalkBox, rtde
+from walk_box import JOURNAL, KINDS, WalkBox, rtde
 from walk_programs import KEPT_OUTPUT, program, statements_of
 from walk_rules import BrokenRule, Rules
 
@@ -22,6 +22,8 @@ sys.path.append(str(Path(__file__).parent.parent / "ur_emulator"))
 from dashboard_support import external_control, installation, urp
 
 from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SoftwareVersion
+from ur_emulator.host.replay import replay
+from ur_emulator.machine.commands.client_writes import WriteInputs
 
 LOADED = 9  # program files of a walk; the last one asks a PC for its program
 
@@ -72,10 +74,10 @@ def _line(rng: random.Random, make: Make) -> tuple[str]:
 _OPERATIONS: tuple[tuple[int, str, dict[str, list[Any]]], ...] = (
     (4, "protective_stop", {}),
     (5, "unlock_protective_stop", {}),
-    (2, "emergency_stop", {"source": ["robot", "system"]}),
+    (2, "emergency_stop", {"kind": ["robot", "system"]}),
     (3, "release_emergency_stop", {}),
     (3, "safeguard_stop", {"active": [True, False]}),
-    (2, "safeguard_stop", {"active": [True, False], "kind": ["automatic mode"]}),
+    (2, "safeguard_stop", {"active": [True, False], "safeguard": ["automatic mode"]}),
     (2, "reduced_mode", {"active": [True, False]}),
     (1, "trigger_violation", {}),
     (1, "trigger_fault", {}),
@@ -249,7 +251,7 @@ class Walker:
     def _obstacle(self, is_there: bool) -> None:
         if is_there:
             self._operation("add_obstacle", (("name", "walk"), ("shape", "box"), ("size", (0.1, 0.1, 0.1)),
-                                             ("position", (0.25, -0.3, 0.05))))  # fmt: skip
+                                             ("pose", (0.25, -0.3, 0.05, 0.0, 0.0, 0.0))))  # fmt: skip
         else:
             self._operation("remove_obstacle", (("name", "walk"),))
 
@@ -275,7 +277,7 @@ class Walker:
             ("set_operational_mode", {"mode": "none"}),
             ("enabling_device", {"position": "none"}),
             ("require_safeguard_reset", {"required": False}),
-            ("safeguard_stop", {"active": False, "kind": "automatic mode"}),
+            ("safeguard_stop", {"active": False, "safeguard": "automatic mode"}),
             ("safeguard_stop", {"active": False}),
             ("reset_safeguard", {}),
             ("press_button", {"button": "teach", "pressed": False}),
@@ -352,9 +354,19 @@ class Walker:
 
 
 def walk(made: Walk, show: Callable[[str], object] = lambda text: None) -> tuple[int, AssertionError] | None:
-    """Walk; return the step that broke a rule and what it was, or None."""
+    """Walk, then replay the journal; return the step that broke a rule and what it was, or None."""
+    with _tempdir() as folder:
+        found = _walk(made, folder, show)
+        if found is None:
+            replayed = replay(folder / JOURNAL)
+            if replayed.difference is not None or replayed.end:
+                return len(made.steps) - 1, BrokenRule(f"the journal does not explain the walk: {replayed}")
+    return found
+
+
+def _walk(made: Walk, folder: Path, show: Callable[[str], object]) -> tuple[int, AssertionError] | None:
     kind = KINDS[made.kind]
-    with _tempdir() as folder, contextlib.closing(WalkBox(kind, made.seed, folder)) as box:
+    with contextlib.closing(WalkBox(kind, made.seed, folder)) as box:
         for number, text in enumerate(made.files):
             body = text.replace("{port}", str(box.port))
             (folder / f"walk{number}.script").write_text(body)
@@ -364,7 +376,11 @@ def walk(made: Walk, show: Callable[[str], object] = lambda text: None) -> tuple
             urp(external_control("127.0.0.1", str(box.port)), name="external")
         )
         (folder / "default.installation").write_bytes(installation())
-        box.controller.state.io.digital_out |= 1 << KEPT_OUTPUT
+        kept = (
+            ("standard_digital_output_mask", 1 << KEPT_OUTPUT),
+            ("standard_digital_output", 1 << KEPT_OUTPUT),
+        )
+        box.served.submit(WriteInputs(kept))
         box.tick(3)
         walker = Walker(box)
         for index, step in enumerate(made.steps):

@@ -13,16 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ur_emulator.box import Box
-from ur_emulator.box_options import BoxOptions
-from ur_emulator.controller.controller import Controller
-from ur_emulator.controller.events import Event
-from ur_emulator.controller.snapshot import Snapshot
 from ur_emulator.errors import EmulatorError
-from ur_emulator.loop.event_loop import EventLoop
-from ur_emulator.loop.pacing import Situation
-from ur_emulator.loop.steps import Steps
+from ur_emulator.host.box import Box
+from ur_emulator.host.box_options import BoxOptions
+from ur_emulator.host.control_api.operations import make
+from ur_emulator.host.pacing import Situation
+from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.steps import Steps
+from ur_emulator.machine.controller.controller import Controller
+from ur_emulator.machine.controller.events import Event
+from ur_emulator.machine.controller.snapshot import Snapshot
 
+JOURNAL = "walk.journal"
 _HANG = 30.0  # s of real time; no walk waits for it
 
 
@@ -62,10 +64,12 @@ class WalkBox:
     def __init__(self, kind: Kind, seed: int, programs: Path, fidelity: str = "typical") -> None:
         options = BoxOptions(
             kind.robot, kind.version, port_base=None, seed=seed, programs=programs, fidelity=fidelity,
-            tool=kind.tool, services=kind.services,
+            tool=kind.tool, services=kind.services, journal=programs / JOURNAL,
         )  # fmt: skip
         self._loop = EventLoop(precise=False)
         self._box = Box(options, loop=self._loop)
+        assert self._box._journal is not None
+        self._box._journal._waits = True
         self._box.on_end = self._loop.stop
         self.served = self._box._box
         self.served._pacer, self.served._repeats = self, False
@@ -159,7 +163,7 @@ class WalkBox:
 
     def perform(self, name: str, /, **arguments: object) -> None:
         """Have an operation of the control API done, in a cycle or some; what is refused is refused."""
-        self._do(lambda done: self._box.operations.begin(name, arguments, done))
+        self._do(lambda done: self._box.operations.begin(make(name, arguments), done))
 
     def steps(self, steps: Steps[Any]) -> None:
         """Have done what the player does in steps."""

@@ -12,12 +12,12 @@ sys.path.append(str(Path(__file__).parent.parent / "ur_emulator"))
 from states_support import check_wires
 
 from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SoftwareVersion
-from ur_emulator.controller.events import ErrorReported, Event
-from ur_emulator.controller.safety.modes import MOVING_MODES, ROW
-from ur_emulator.controller.snapshot import Snapshot
-from ur_emulator.motion.generators import SpeedL, StopL
-from ur_emulator.motion.move import Move
-from ur_emulator.motion.ownership import ArmState
+from ur_emulator.machine.controller.events import ErrorReported, Event
+from ur_emulator.machine.controller.safety.modes import MOVING_MODES, ROW
+from ur_emulator.machine.controller.snapshot import Snapshot
+from ur_emulator.machine.motion.move import Move
+from ur_emulator.machine.motion.ownership import ArmState
+from ur_emulator.machine.motion.tool_streams import SpeedL, StopL
 
 # No set-point accelerates a joint more than this [rad/s²]: the hardest of the programs' commands (6 rad/s², the
 # run-up of a CB3 box adds .38 of it), a stop, and a ramp of the time scaling; and what may be added near a singularity by

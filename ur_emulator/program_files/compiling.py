@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.events import ScriptFailed
 from ur_emulator.errors import ProgramFileError
+from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import load_installation

@@ -21,6 +21,12 @@ from ur_emulator.errors import FileMissingError, ProgramFileError
 WIRE_ROOTS = (PurePosixPath("/programs"), PurePosixPath("/ursim/programs"))
 # A program is one of these files: nodes of PolyScope, a text, a program of PolyScope X.
 PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX = ".urp", ".script", ".urpx"
+# A file while it is written; every write removes what a killed process has left in the same folder.
+PART_NAME = "ur-emulator.part"
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+# A pipe without a writer is not waited for, a terminal does not become ours.
+_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
+_CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +63,7 @@ class ProgramFolder:
 
         FileMissingError if there is none, or the name leads out of the folder.
         """
-        inside = self.locate(name)
-        if not _is(Path.is_file, self._known_root() / inside):
-            raise FileMissingError(f"there is no file {name!r} in the programs folder")
-        return FoundFile(inside)
+        return FoundFile(self._locate(name, Path.is_file, "file"))
 
     def has(self, name: str) -> bool:
         """Return whether there is a file of that name."""
@@ -100,10 +103,7 @@ class ProgramFolder:
 
     def locate_folder(self, name: str) -> PurePosixPath:
         """Return the path of a folder in this folder, from there on; FileMissingError if there is none."""
-        inside = self.locate(name)
-        if not _is(Path.is_dir, self._known_root() / inside):
-            raise FileMissingError(f"there is no folder {name!r} in the programs folder")
-        return inside
+        return self._locate(name, Path.is_dir, "folder")
 
     def beside(self, file: FoundFile, name: str) -> FoundFile:
         """Return the file that `file` refers to: by a path of the box, or by a name in the same folder.
@@ -116,20 +116,33 @@ class ProgramFolder:
 
     def read(self, file: FoundFile, most: int) -> bytes:
         """Return what is in a file; ProgramFileError if it has more than `most` bytes, or cannot be read."""
-        try:
-            data = _read(self._known_root(), file.inside, most + 1)
-        except OSError as error:
-            raise ProgramFileError(f"{file.name} cannot be read: {error.strerror or error}") from None
+        with self._opened(file.inside.parent, f"{file.name} cannot be read") as folder:
+            descriptor = os.open(file.inside.name, _READ, dir_fd=folder)
+            with open(descriptor, "rb") as opened:
+                if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                    raise OSError(errno.EINVAL, "it is not a file")
+                data = opened.read(most + 1)
         if len(data) > most:
             raise ProgramFileError(f"{file.name} has more than {most} bytes")
         return data
 
     def write(self, inside: PurePosixPath, data: bytes) -> FoundFile:
-        """Write a file in one step: no part of it stays after a ProgramFileError."""
-        try:
-            _write(self._known_root(), inside, data)
-        except OSError as error:
-            raise ProgramFileError(f"{inside.name} cannot be written: {error.strerror or error}") from None
+        """Write a file in one step, in place of what has its name.
+
+        No part of it stays after a ProgramFileError.
+        """
+        with self._opened(inside.parent, f"{inside.name} cannot be written") as folder:
+            with suppress(FileNotFoundError):
+                os.unlink(PART_NAME, dir_fd=folder)
+            descriptor = os.open(PART_NAME, _CREATE, 0o666, dir_fd=folder)
+            try:
+                with open(descriptor, "wb") as file:
+                    file.write(data)
+                os.replace(PART_NAME, inside.name, src_dir_fd=folder, dst_dir_fd=folder)
+            except BaseException:
+                with suppress(OSError):
+                    os.unlink(PART_NAME, dir_fd=folder)
+                raise
         return FoundFile(inside)
 
     def make_folder(self, name: str) -> PurePosixPath:
@@ -137,18 +150,44 @@ class ProgramFolder:
 
         ProgramFileError if it cannot be made, or a link of that name leads out of this folder.
         """
-        try:
-            _make_folder(self._known_root(), name)
-        except OSError as error:
-            raise ProgramFileError(f"{name} cannot be made: {error.strerror or error}") from None
+        with self._opened(PurePosixPath(), f"{name} cannot be made") as root, suppress(FileExistsError):
+            os.mkdir(name, dir_fd=root)
         return self.locate_folder(name)
 
     def sizes(self) -> Iterator[tuple[PurePosixPath, int]]:
-        """Yield path and size [bytes] of each file, those in inner folders too; links are left out.
+        """Yield path and size [bytes] of each regular file, those in inner folders too.
 
-        ProgramFileError if the folder has too many files.
+        Links and folders that cannot be read are left out. ProgramFileError if there are too many files and
+        folders.
         """
-        return _sizes(self._known_root(), BUDGETS.folder_files)
+        root, most = self._known_root(), BUDGETS.folder_files
+        waiting = [PurePosixPath()]
+        for inside in waiting:
+            with suppress(OSError), _folder_below(root, inside) as folder, os.scandir(folder) as entries:
+                for entry in entries:
+                    most -= 1
+                    if most < 0:
+                        raise ProgramFileError("the programs folder has too many files to write another")
+                    if entry.is_dir(follow_symlinks=False):
+                        waiting.append(inside / entry.name)
+                    elif entry.is_file(follow_symlinks=False):
+                        yield inside / entry.name, entry.stat(follow_symlinks=False).st_size
+
+    def _locate(self, name: str, is_kind: Callable[[Path], bool], kind: str) -> PurePosixPath:
+        inside = self.locate(name)
+        with suppress(OSError):  # a name that is too long, a folder that may not be looked into
+            if is_kind(self._known_root() / inside):
+                return inside
+        raise FileMissingError(f"there is no {kind} {name!r} in the programs folder")
+
+    @contextmanager
+    def _opened(self, inside: PurePosixPath, problem: str) -> Iterator[int]:
+        """Open a folder below this one; an OSError becomes a ProgramFileError with the problem."""
+        try:
+            with _folder_below(self._known_root(), inside) as folder:
+                yield folder
+        except OSError as error:
+            raise ProgramFileError(f"{problem}: {error.strerror or error}") from None
 
     def _known_root(self) -> Path:
         if self._root is None:
@@ -156,79 +195,13 @@ class ProgramFolder:
         return self._root
 
 
-def _is(kind: Callable[[Path], bool], path: Path) -> bool:
-    try:
-        return kind(path)
-    except OSError:  # a name that is too long, a folder that may not be looked into
-        return False
-
-
-# --- files below a folder, read and written without following a link
-#
-# Paths are resolved before, so that links which stay in the folder work. What they resolve to is opened
-# folder by folder, each from the one before it: a link that somebody puts there in between is an error and
-# leads nowhere.
-
-# A file while it is written; every write removes what a killed process has left in the same folder.
-PART_NAME = "ur-emulator.part"
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
-# A pipe without a writer is not waited for, a terminal does not become ours.
-_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
-_CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
-
-
-def _read(root: Path, inside: PurePosixPath, most: int) -> bytes:
-    """Return the first `most` bytes of a file; OSError if it cannot be read, or is no regular file."""
-    with _opened(root, inside.parent) as folder:
-        descriptor = os.open(inside.name, _READ, dir_fd=folder)
-    with open(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, "it is not a file")
-        return file.read(most)
-
-
-def _write(root: Path, inside: PurePosixPath, data: bytes) -> None:
-    """Write a file in one step, in place of what has its name; after an OSError no part of it stays."""
-    with _opened(root, inside.parent) as folder:
-        with suppress(FileNotFoundError):
-            os.unlink(PART_NAME, dir_fd=folder)
-        descriptor = os.open(PART_NAME, _CREATE, 0o666, dir_fd=folder)
-        try:
-            with open(descriptor, "wb") as file:
-                file.write(data)
-            os.replace(PART_NAME, inside.name, src_dir_fd=folder, dst_dir_fd=folder)
-        except BaseException:
-            with suppress(OSError):
-                os.unlink(PART_NAME, dir_fd=folder)
-            raise
-
-
-def _make_folder(root: Path, name: str) -> None:
-    """Make a folder, unless something has its name."""
-    with _opened(root, PurePosixPath()) as folder, suppress(FileExistsError):
-        os.mkdir(name, dir_fd=folder)
-
-
-def _sizes(root: Path, most: int) -> Iterator[tuple[PurePosixPath, int]]:
-    """Yield path and size [bytes] of each regular file; folders that cannot be read are left out.
-
-    ProgramFileError if there are more than `most` files and folders.
-    """
-    waiting = [PurePosixPath()]
-    for inside in waiting:
-        with suppress(OSError), _opened(root, inside) as folder, os.scandir(folder) as entries:
-            for entry in entries:
-                most -= 1
-                if most < 0:
-                    raise ProgramFileError("the programs folder has too many files to write another")
-                if entry.is_dir(follow_symlinks=False):
-                    waiting.append(inside / entry.name)
-                elif entry.is_file(follow_symlinks=False):
-                    yield inside / entry.name, entry.stat(follow_symlinks=False).st_size
+# Files are read and written without following a link. Paths are resolved before, so that links which stay in
+# the folder work. What they resolve to is opened folder by folder, each from the one before it: a link that
+# somebody puts there in between is an error and leads nowhere.
 
 
 @contextmanager
-def _opened(root: Path, inside: PurePosixPath) -> Iterator[int]:
+def _folder_below(root: Path, inside: PurePosixPath) -> Iterator[int]:
     """Open a folder below the root."""
     descriptor = os.open(root, _FOLDER)
     try:

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
 
-from ur_emulator.controller.io.lines import RunState
-from ur_emulator.controller.io.modbus_signals import SignalType
-from ur_emulator.controller.safety.safety_state import NO_SETTINGS, SafetySettings
-from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6
+from ur_emulator.machine.controller.io.lines import RunState
+from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.safety.safety_state import NO_SETTINGS, SafetySettings
+from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6
 
 STANDARD_GRAVITY = 9.82
 """Acceleration of gravity that PolyScope writes [m/s^2]."""

@@ -17,14 +17,15 @@ import numpy as np
 
 from protocol.pose import T_to_pose
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.io.lines import RunState
-from ur_emulator.controller.io.modbus_signals import SignalType
 from ur_emulator.errors import FileMissingError, ProgramFileError, UndefinedError
-from ur_emulator.models.robot_model import ZERO6, Vector3, Vector6, six
+from ur_emulator.machine.controller.io.lines import RunState
+from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
 from ur_emulator.program_files import installation, variables_file
-from ur_emulator.program_files.folder import WIRE_ROOTS, FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import WIRE_ROOTS, ProgramFolder
 from ur_emulator.program_files.installation import Installation
-from ur_emulator.program_files.reader import ProgramReader, XmlTree, number, number_texts
+from ur_emulator.program_files.lines import LINE_KINDS
+from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.safety_text import safety_settings
 
 if TYPE_CHECKING:
@@ -46,21 +47,21 @@ def load_installation(folder: ProgramFolder, name: str) -> Installation:
     return _read(ProgramReader(folder), name)
 
 
-def installation_of(reader: ProgramReader, tree: XmlTree, program: FoundFile) -> Installation:
+def installation_of(reader: ProgramReader, tree: XmlTree) -> Installation:
     """Read the installation of a program: at its path from the program's folder, else by its name.
 
     ProgramFileError if there is none of that name, or the file is not an installation.
     """
     given = tree.root.get("installationRelativePath") or tree.root.get("installation") or ""
     path = given.replace("\\", "/").removesuffix(SUFFIX) + SUFFIX if given else DEFAULT_NAME
-    for place in (PurePosixPath(program.wire_path).parent, WIRE_ROOTS[0]):
+    for place in (PurePosixPath(tree.file.wire_path).parent, WIRE_ROOTS[0]):
         name = posixpath.normpath(place / path)
         if reader.folder.has(name):
             return _read(reader, name)
         path = PurePosixPath(path).name
     if path == DEFAULT_NAME:
         return _read(reader, DEFAULT_NAME)
-    raise ProgramFileError(f"{tree.name} needs the installation {path}: put it beside the program")
+    raise ProgramFileError(f"{tree.file.name} needs the installation {path}: put it beside the program")
 
 
 def _read(reader: ProgramReader, name: str) -> Installation:
@@ -72,7 +73,7 @@ def _read(reader: ProgramReader, name: str) -> Installation:
         return NEW_BOX
     if file.inside.suffix != SUFFIX:
         raise ProgramFileError(f"{file.name} is not an installation: its name must end in {SUFFIX}")
-    found = read_installation(reader.xml(file), file.wire_path)
+    found = _read_tree(reader.xml(file))
     variables = str(file.inside.with_suffix(variables_file.SUFFIX))
     if not reader.folder.has(variables):
         return found
@@ -83,41 +84,6 @@ def _read(reader: ProgramReader, name: str) -> Installation:
 _EXTERNAL_CONTROL = "com.fzi.externalcontrol"
 _ROBOTIQ = "com.robotiq.urcap.gripper"
 _CALIBRATION = [f"_{end}ValueIn{unit}" for unit in ("Percent", "Millimeters") for end in ("closed", "open")]
-# Element with the names of lines -> their own name, the index of the first.
-_LINE_NAMES = {
-    "DigitalInputNames": ("digital_in", 0),
-    "DigitalOutputNames": ("digital_out", 0),
-    "ConfigurableInputNames": ("config_in", 0),
-    "ConfigurableOutputNames": ("config_out", 0),
-    "ToolDigitalInputNames": ("tool_in", 0),
-    "ToolDigitalOutputNames": ("tool_out", 0),
-    "AnalogInputNames": ("analog_in", 0),
-    "ToolAnalogInputNames": ("analog_in", 2),
-    "AnalogOutputNames": ("analog_out", 0),
-    "GeneralPurposeBooleanRegisterInputNames": ("GP_bool_in", 0),
-    "GeneralPurposeBooleanRegisterOutputNames": ("GP_bool_out", 0),
-    "GeneralPurposeIntRegisterInputNames": ("GP_int_in", 0),
-    "GeneralPurposeIntRegisterOutputNames": ("GP_int_out", 0),
-    "GeneralPurposeFloatRegisterInputNames": ("GP_float_in", 0),
-    "GeneralPurposeFloatRegisterOutputNames": ("GP_float_out", 0),
-}
-# Element with the actions of inputs -> group in the names of builtins, number of lines.
-_INPUT_ACTIONS = {
-    "DigitalInputActions": ("standard_digital", 8),
-    "ConfigurableInputActions": ("configurable_digital", 8),
-    "ToolDigitalInputActions": ("tool_digital", 2),
-    "GeneralPurposeBooleanRegisterInputActions": ("gp_boolean", 64),
-}
-# Element with the actions of outputs -> group in the names of builtins, number of lines.
-_OUTPUT_ACTIONS = {
-    "DigitalOutputActions": ("standard_digital", 8),
-    "ConfigurableOutputActions": ("configurable_digital", 8),
-    "ToolDigitalOutputActions": ("tool_digital", 2),
-    "AnalogOutputActions": ("standard_analog", 2),
-    "GeneralPurposeBooleanRegisterOutputActions": ("gp_boolean", 64),
-    "GeneralPurposeIntRegisterOutputActions": ("gp_integer", 24),
-    "GeneralPurposeFloatRegisterOutputActions": ("gp_float", 24),
-}
 _RUN_STATES = {
     "LOW_WHEN_PROGRAM_STOPPED": RunState.LOW_WHEN_STOPPED,
     "HIGH_WHEN_PROGRAM_STOPPED": RunState.HIGH_WHEN_STOPPED,  # inferred
@@ -127,18 +93,20 @@ _VOLTAGES = {"ZERO": 0, "TWELVE": 12, "TWENTY_FOUR": 24}
 _SIGNAL_TYPES = {kind.name: kind for kind in SignalType}
 
 
-def read_installation(tree: XmlTree, wire_path: str) -> Installation:
+def _read_tree(tree: XmlTree) -> Installation:
     """Return what an installation file declares; its variables stand in another file.
 
     ProgramFileError if a value makes no sense, or there are too many.
     """
+    found = Installation(tree.file.wire_path)
     if tree.root.tag.startswith("gui."):  # of PolyScope 1.8, a dump of its objects: nothing is read
-        return Installation(wire_path)
+        return found
     reader = _Reader(tree)
     pc, pc_name = reader.external_control()
     tcps, active_tcp = reader.tcps()
+    safety = reader.first.get("SafetySettings")
     found = Installation(
-        wire_path,
+        tree.file.wire_path,
         pc,
         pc_name,
         tcps,
@@ -146,58 +114,55 @@ def read_installation(tree: XmlTree, wire_path: str) -> Installation:
         reader.payload(),
         reader.gravity(),
         reader.tool_voltage(),
-        reader.domains("analogInputRange", (1, 1, 1, 1)),
-        reader.domains("analogOutputDomain", (0, 0)),
+        reader.domains("analogInputRange", found.analog_in_domains),
+        reader.domains("analogOutputDomain", found.analog_out_domains),
         reader.input_actions(),
         reader.output_rules(),
         0 if reader.attribute("SmoothTransitionSettings", "transitionHardness") == "HARD" else 1,
         reader.line_names(),
-        dict(_features(reader)),
+        dict(_features(reader, reader.first.get("Features", reader.first.get("GeomFeatures")))),
         {},
         tuple(reader.signals()),
         reader.safe_home(),
-        safety_settings(tree.name, reader.first["SafetySettings"].itertext())
-        if "SafetySettings" in reader.first
-        else Installation(wire_path).safety,
+        found.safety if safety is None else safety_settings(tree.file.name, safety.itertext()),
         reader.start_up(),
         reader.grippers(),
     )
     entries = len(tcps) + len(found.features) + len(found.lines) + len(found.modbus)
     if entries > BUDGETS.installation_entries:
         raise ProgramFileError(
-            f"{tree.name} has more than {BUDGETS.installation_entries} TCPs, features, lines and signals"
+            f"{tree.file.name} has more than {BUDGETS.installation_entries} TCPs, features, lines and signals"
         )
     return found
 
 
-def pc_from(data: dict[str, str], file_name: str) -> installation.ExternalControlPc:
+def pc_from(data: dict[str, str], tree: XmlTree) -> installation.ExternalControlPc:
     """Return the PC in the data of a node or an installation. Keys: the source text of the URCap.
 
     ProgramFileError if the host is too long for a name, or the port is not a port number.
     """
     host = data.get("host_ip", "")
     if len(host) > BUDGETS.host_length:
-        raise ProgramFileError(
-            f"{file_name}: the host of External Control has more than {BUDGETS.host_length} characters"
-        )
+        raise tree.error(f"the host of External Control has more than {BUDGETS.host_length} characters")
     port = data.get("port_nr", "")
     if port and not (port.isascii() and port.isdigit() and 0 < int(port[:6]) < 1 << 16):
-        raise ProgramFileError(f"{file_name}: port {port[:20]!r} of External Control is none of 1 to 65535")
+        raise tree.error(f"port {port[:20]!r} of External Control is none of 1 to 65535")
     return installation.ExternalControlPc(host, int(port or 0))
 
 
-class _Values:
-    """Values of one file; `first` is the first element of each kind."""
+class _Reader:
+    """Looks up the parts of one file; `first` is the first element of each kind."""
 
     def __init__(self, tree: XmlTree) -> None:
         self.tree = tree
         self.first: dict[str, Element] = {}
         for element in tree.root.iter():
             self.first.setdefault(element.tag.rpartition(".")[2], element)
+        self._tcp_settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
 
-    def attribute(self, kind: str, name: str) -> str:
-        """Return an attribute of the first element of a kind; "" without one."""
-        return self.first[kind].get(name, "") if kind in self.first else ""
+    def attribute(self, kind: str, name: str, default: str = "") -> str:
+        """Return an attribute of the first element of a kind."""
+        return self.first[kind].get(name, default) if kind in self.first else default
 
     def value(self, element: Element, name: str) -> str:
         """Return a list of an element: of its attribute, or of the child of that name."""
@@ -211,27 +176,6 @@ class _Values:
         given = self.attribute(kind, "value")
         return [item.strip() for item in given.split(",")] if given else []
 
-    def number(self, text: str | None, what: str) -> float:
-        """Return a finite number; `what` names it in the error."""
-        return number(self.tree, text, what)
-
-    def numbers(self, text: str | None, count: int, what: str) -> list[float]:
-        """Return so many numbers, which commas separate."""
-        return list(map(float, number_texts(self.tree, text, what, count)))
-
-    def vector3(self, text: str | None, what: str) -> Vector3:
-        """Return three numbers."""
-        x, y, z = self.numbers(text, 3, what)
-        return (x, y, z)
-
-    def vector6(self, text: str | None, what: str) -> Vector6:
-        """Return six numbers."""
-        return six(self.numbers(text, 6, what))
-
-
-class _Reader(_Values):
-    """Looks up the parts of one file but its features."""
-
     def _contributed(self, owner: str) -> dict[str, str]:
         """Return what a URCap has kept, by key."""
         parts = [part for part in self.tree.root.iter("Contributed") if part.get("ownerId") == owner]
@@ -239,7 +183,7 @@ class _Reader(_Values):
 
     def external_control(self) -> tuple[installation.ExternalControlPc, str]:
         data = self._contributed(_EXTERNAL_CONTROL)
-        return pc_from(data, self.tree.name), data.get("name", "")
+        return pc_from(data, self.tree), data.get("name", "")
 
     def grippers(self) -> installation.GripperSetup:
         data = self._contributed(_ROBOTIQ)
@@ -247,46 +191,44 @@ class _Reader(_Values):
         for n in range(1, 5):
             prefix = f"_models.Gripper{n}."
             if data.get(prefix + "_isCalibrationDefined") == "true":
-                values = [self.number(data.get(prefix + key), f"{key} of a gripper") for key in _CALIBRATION]
+                values = [
+                    self.tree.number(data.get(prefix + key), f"{key} of a gripper") for key in _CALIBRATION
+                ]
                 if values[0] == values[1] or max(map(abs, values)) > 1000.0:
                     problem = f"gripper {n} is calibrated at {values}: use two positions, widths below 1 m"
-                    raise ProgramFileError(f"{self.tree.name}: {problem}")
+                    raise self.tree.error(problem)
                 calibrations[n] = installation.GripperCalibration(*values)
         is_limited = data.get("gripper_current_limit_enabled") == "true"
         return installation.GripperSetup(bool(data), is_limited, calibrations)
 
     def tcps(self) -> tuple[dict[str, Vector6], str]:
-        settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
+        settings = self._tcp_settings
         if settings is None:
             return {}, ""
         tcps = {
-            tcp.get("name", ""): self.vector6(tcp.get("offset"), "offset of a TCP")
+            tcp.get("name", ""): self.tree.vector6(tcp.get("offset"), "offset of a TCP")
             for tcp in settings.iter("tcp")
             if tcp.get("name")
         }
         return tcps, settings.get("activePose", "")
 
     def payload(self) -> installation.DeclaredPayload:
-        for payload in self.tree.root.iter("Payload"):
-            if payload.get("defaultPayload") == "true":
-                mass, cog = payload.get("mass"), payload.get("centerOfGravity")
-                break
-        else:
-            settings = self.first.get("TCPSettings", self.first.get("TCPSettingsImpl"))
-            if settings is None:
-                return installation.DeclaredPayload()
-            mass, cog = settings.get("toolPayload"), settings.get("centerOfGravity")
+        payloads = self.tree.root.iter("Payload")
+        payload = next((one for one in payloads if one.get("defaultPayload") == "true"), self._tcp_settings)
+        if payload is None:
+            return installation.DeclaredPayload()
+        mass = payload.get("toolPayload" if payload is self._tcp_settings else "mass")
+        cog = payload.get("centerOfGravity")
         return installation.DeclaredPayload(
-            self.number(mass, "mass of the payload") if mass else 0.0,
-            self.vector3(cog, "centre of gravity") if cog else None,
+            self.tree.number(mass, "mass of the payload") if mass else 0.0,
+            self.tree.vector3(cog, "centre of gravity") if cog else None,
         )
 
     def gravity(self) -> Vector3:
-        mounting = self.first.get("WorldtoMarshal")
-        if mounting is None:
+        if "WorldtoMarshal" not in self.first:
             return (0.0, 0.0, installation.STANDARD_GRAVITY)
-        base = self.number(mounting.get("baseAngle", "0"), "angle of the base")
-        tilt = self.number(mounting.get("tiltAngle", "0"), "tilt of the base")
+        base = self.tree.number(self.attribute("WorldtoMarshal", "baseAngle", "0"), "angle of the base")
+        tilt = self.tree.number(self.attribute("WorldtoMarshal", "tiltAngle", "0"), "tilt of the base")
         # The sign of y is seen; which of sine and cosine belongs to x is open: both were equal.
         g = installation.STANDARD_GRAVITY
         level = g * math.sin(tilt)
@@ -303,33 +245,32 @@ class _Reader(_Values):
         if not given:
             return usual
         if len(given) != len(usual) or not set(given) <= {"0", "1"}:
-            raise ProgramFileError(
-                f"{self.tree.name}: <{kind}> is {given[:8]}, {len(usual)} of 0 and 1 are needed"
-            )
+            raise self.tree.error(f"<{kind}> is {given[:8]}, {len(usual)} of 0 and 1 are needed")
         return tuple(map(int, given))
 
+    def _actions(self, direction: str) -> Iterator[tuple[str, int, str]]:
+        """Yield group, index and action of the lines in a direction that can have one."""
+        for kind in LINE_KINDS:
+            if kind.element.endswith(direction):
+                actions = self.items(f"{kind.element}Actions")[: kind.actions]
+                yield from ((kind.group, index, action) for index, action in enumerate(actions))
+
     def input_actions(self) -> tuple[tuple[str, int, str], ...]:
-        return tuple(
-            (group, index, action)
-            for kind, (group, count) in _INPUT_ACTIONS.items()
-            for index, action in enumerate(self.items(kind)[:count])
-            if action not in ("", "NONE")
-        )
+        return tuple(row for row in self._actions("Input") if row[2] not in ("", "NONE"))
 
     def output_rules(self) -> tuple[installation.OutputRule, ...]:
         return tuple(
             installation.OutputRule(group, index, _RUN_STATES[action])
-            for kind, (group, count) in _OUTPUT_ACTIONS.items()
-            for index, action in enumerate(self.items(kind)[:count])
+            for group, index, action in self._actions("Output")
             if action in _RUN_STATES
         )
 
     def line_names(self) -> dict[str, str]:
         names: dict[str, str] = {}
-        for kind, (own, start) in _LINE_NAMES.items():
-            for index, name in enumerate(self.items(kind), start):
+        for kind in LINE_KINDS:
+            for index, name in enumerate(self.items(f"{kind.element}Names"), kind.first):
                 if name:
-                    names.setdefault(name, f"{own}[{index}]")
+                    names.setdefault(name, f"{kind.name}[{index}]")
         return names
 
     def signals(self) -> Iterator[installation.DeclaredSignal]:
@@ -338,15 +279,15 @@ class _Reader(_Values):
                 kind = _SIGNAL_TYPES.get(signal.get("type", ""))
                 if kind is None:
                     continue
-                frequency = self.number(signal.get("updateFrequency", "-1"), "frequency of a signal")
+                frequency = self.tree.number(signal.get("updateFrequency", "-1"), "frequency of a signal")
                 rule = _RUN_STATES.get(signal.get("outputAction", ""), RunState.KEEP)
                 if signal.get("setLowAtProgramStop") == "true":
                     rule = RunState.LOW_WHEN_STOPPED
                 yield installation.DeclaredSignal(
                     signal.get("name", ""),
                     unit.get("ipAddress", ""),
-                    int(self.number(signal.get("slaveAddress", "255"), "slave of a signal")),
-                    int(self.number(signal.get("signalAddress", "0"), "address of a signal")),
+                    int(self.tree.number(signal.get("slaveAddress", "255"), "slave of a signal")),
+                    int(self.tree.number(signal.get("signalAddress", "0"), "address of a signal")),
                     kind,
                     frequency if frequency >= 0.0 else None,
                     rule,
@@ -356,31 +297,22 @@ class _Reader(_Values):
     def safe_home(self) -> Vector6:
         settings = self.first.get("SafeHomeSettings")
         position = "" if settings is None else self.value(settings, "position")
-        return self.vector6(position, "safe home") if position else installation.NEW_HOME
+        return self.tree.vector6(position, "safe home") if position else installation.NEW_HOME
 
     def start_up(self) -> installation.StartUp:
-        settings = self.first.get("DefaultProgramSettings")
-        if settings is None:
-            return installation.StartUp()
+        kind = "DefaultProgramSettings"
         return installation.StartUp(
-            settings.get("fileName", "") if settings.get("autoLoad") == "true" else "",
-            settings.get("nameOfSensorToAutoStartProgram", ""),
-            settings.get("triggerValueToStartProgram", "true") == "true",
+            self.attribute(kind, "fileName") if self.attribute(kind, "autoLoad") == "true" else "",
+            self.attribute(kind, "nameOfSensorToAutoStartProgram"),
+            self.attribute(kind, "triggerValueToStartProgram", "true") == "true",
         )
 
 
-def _features(file: _Values) -> Iterator[tuple[str, installation.Feature]]:
-    """Yield the features of an installation with their names."""
-    container = file.first.get("Features", file.first.get("GeomFeatures"))
-    if container is not None:
-        yield from _features_in(file, container, "", is_variable=False)
-
-
-def _features_in(
-    file: _Values, node: Element, name: str, *, is_variable: bool
+def _features(
+    file: _Reader, node: Element | None, name: str = "", *, is_variable: bool = False
 ) -> Iterator[tuple[str, installation.Feature]]:
-    """Yield the features in a node; a feature may stand in another node that has its name."""
-    for given in node:
+    """Yield the features in a node; one may stand in another node that has its name."""
+    for given in () if node is None else node:
         child = file.tree.resolve(given)
         inner_name = child.get("name") or name
         variable = child.get("isVariable") == "true" or (is_variable and not child.get("isVariable"))
@@ -391,10 +323,10 @@ def _features_in(
         if pose is not None and inner_name:
             yield inner_name, installation.Feature(pose, variable, is_taught)
         elif pose is None and given is child:
-            yield from _features_in(file, child, inner_name, is_variable=variable)
+            yield from _features(file, child, inner_name, is_variable=variable)
 
 
-def _pose_of(file: _Values, node: Element) -> Vector6 | None:
+def _pose_of(file: _Reader, node: Element) -> Vector6 | None:
     """Return the pose of a feature, None for another node; UndefinedError if it was never taught."""
     if node.tag.endswith("GeomPlaneNode") and node.find("firstPoint") is not None:
         return _plane(file, node)
@@ -404,30 +336,30 @@ def _pose_of(file: _Values, node: Element) -> Vector6 | None:
     return (*position, *rotation)
 
 
-def _taught(file: _Values, node: Element, *names: str) -> list[Vector3]:
+def _taught(file: _Reader, node: Element, *names: str) -> list[Vector3]:
     """Return vectors of a point; UndefinedError if it was never taught: no joint angles, and only zeros."""
-    vectors = [file.vector3(file.value(node, name), f"{name} of a feature") for name in names]
+    vectors = [file.tree.vector3(file.value(node, name), f"{name} of a feature") for name in names]
     if "NaN" in file.value(node, "jointPositionVector") and not any(map(any, vectors)):
-        raise UndefinedError(f"{file.tree.name}: a feature was never taught")
+        raise file.tree.undefined("a feature was never taught")
     return vectors
 
 
-def _plane(file: _Values, node: Element) -> Vector6:
+def _plane(file: _Reader, node: Element) -> Vector6:
     p1, p2, p3 = (_point(file, node, name) for name in ("firstPoint", "secondPoint", "thirdPoint"))
     y, normal = p2 - p1, np.cross(p2 - p1, p3 - p1)
     length, area = float(np.linalg.norm(y)), float(np.linalg.norm(normal))
     if not (length > 0.0 and area > 0.0):
-        raise UndefinedError(f"{file.tree.name}: the points of a plane lie on a line")
+        raise file.tree.undefined("the points of a plane lie on a line")
     y, z = y / length, normal / (-area if node.get("userHasPoints") == "true" else area)
     T_base_plane = np.eye(4)
     T_base_plane[:3, :4] = np.column_stack((np.cross(y, z), y, z, p1))
     return six(T_to_pose(T_base_plane))
 
 
-def _point(file: _Values, node: Element, name: str) -> np.ndarray:
+def _point(file: _Reader, node: Element, name: str) -> np.ndarray:
     point = node.find(name)
     inner = None if point is None else file.tree.resolve(point)
     for element in () if inner is None else inner.iter():
         if file.value(element, "toolPosition"):
             return np.array(_taught(file, element, "toolPosition")[0])
-    raise UndefinedError(f"{file.tree.name}: a plane has no <{name}>")
+    raise file.tree.undefined(f"a plane has no <{name}>")

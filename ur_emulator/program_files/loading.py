@@ -7,13 +7,7 @@ from pathlib import PurePosixPath
 
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
-from ur_emulator.program_files.folder import (
-    PROGRAM_SUFFIX,
-    SCRIPT_SUFFIX,
-    URPX_SUFFIX,
-    FoundFile,
-    ProgramFolder,
-)
+from ur_emulator.program_files.folder import PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX, ProgramFolder
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import NEW_BOX, installation_of
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
@@ -83,9 +77,8 @@ class LoadedProgram:
                 texts.append(part)
                 continue
             if isinstance(part, Header):
-                texts.extend(
-                    f"  {to_script_text(line)}" for line in header_lines(self.installation or NEW_BOX)
-                )
+                declared = header_lines(self.installation or NEW_BOX)
+                texts += [f"  {to_script_text(line)}" for line in declared]
                 continue
             header, lines = split_header(received(part.pc))
             if part.pc not in headed:
@@ -149,11 +142,11 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
     tree = reader.xml(file)
     if tree.root.tag not in (ROOT, OLD_ROOT):
         raise ProgramFileError(f"{file.name} is not a program: it is a <{tree.root.tag}>, not a <{ROOT}>")
-    installation = installation_of(reader, tree, file)
+    installation = installation_of(reader, tree)
     try:
-        made = make_script(file, tree, reader, installation, skip_unknown=skip_unknown)
+        made = make_script(tree, reader, installation, skip_unknown=skip_unknown)
     except UnknownNodeError as unknown:
-        return _twin_instead(reader, file, tree, installation, unknown)
+        return _twin_instead(reader, tree, installation, unknown)
     notes: list[str] = []
     for texts, what in ((made.left_out, "left out"), (made.undefined, "undefined")):
         notes += [f"{_cause(text)}: it is {what}" for text in texts[:_MOST_NOTES]]
@@ -165,35 +158,22 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
 
 
 def _twin_instead(
-    reader: ProgramReader,
-    file: FoundFile,
-    tree: XmlTree,
-    installation: Installation,
-    unknown: UnknownNodeError,
+    reader: ProgramReader, tree: XmlTree, installation: Installation, unknown: UnknownNodeError
 ) -> LoadedProgram:
     """Return the program with the script that PolyScope saved; raise `unknown` if there is none."""
-    saved = str(file.inside.with_suffix(SCRIPT_SUFFIX))
+    saved = str(tree.file.inside.with_suffix(SCRIPT_SUFFIX))
     if not reader.folder.has(saved):
         raise unknown
     twin = reader.folder.find(saved)
     text = as_one_program(reader.script(twin), identifier(twin.inside.stem))
-    if not _is_twin(text):
+    if not (_DEF.match(text) and _LABEL.search(text)):  # no program with labels, as PolyScope makes it
         raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} is not a script that PolyScope saved")
     if uses_external_control(tree):
         raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} has what a PC sent when it was saved")
-    origin = f"{twin.name}, saved by software {_software_of(text)}"
+    software = next((software for mark, software in _MARKS if mark in text), "unknown")
+    origin = f"{twin.name}, saved by software {software}"
     note = f"{_cause(unknown)}: instead of the nodes runs {origin}"
-    return LoadedProgram(file.wire_path, installation, (text,), (note,), origin)
-
-
-def _is_twin(text: str) -> bool:
-    """True for a script that PolyScope made: a program with labels."""
-    return _DEF.match(text) is not None and _LABEL.search(text) is not None
-
-
-def _software_of(text: str) -> str:
-    """Return the software that saved a twin, as far as its header shows it."""
-    return next((software for mark, software in _MARKS if mark in text), "unknown")
+    return LoadedProgram(tree.file.wire_path, installation, (text,), (note,), origin)
 
 
 def _cause(error: object) -> str:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.errors import ProgramFileError, UndefinedError
+from ur_emulator.errors import ProgramFileError, UndefinedError, UnknownNodeError
+from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
 from ur_emulator.program_files.folder import FoundFile, ProgramFolder
 from urscript.source import as_utf8, program_text
 
@@ -27,7 +28,7 @@ class ProgramReader:
 
     def xml(self, file: FoundFile) -> XmlTree:
         """Read an XML file, packed or not; ProgramFileError also if the program becomes too large."""
-        return self.parsed(file.name, self.unpacked(file))
+        return self.parsed(file, self.unpacked(file))
 
     def unpacked(self, file: FoundFile) -> bytes:
         """Read a file, packed or not; ProgramFileError also if the program becomes too large."""
@@ -35,14 +36,15 @@ class ProgramReader:
         self._bytes_left -= len(data)
         return data
 
-    def parsed(self, name: str, data: bytes) -> XmlTree:
+    def parsed(self, file: FoundFile, data: bytes) -> XmlTree:
         """Return the tree of an XML file; ProgramFileError also if the program becomes too large."""
-        self._marks_left -= count_marks(data)
+        # Tags and attributes together are not more than these marks.
+        self._marks_left -= data.count(b"<") + data.count(b"=")
         if self._marks_left < 0:
             raise ProgramFileError(
-                f"{name}: the program has more than {BUDGETS.program_marks} tags and attributes"
+                f"{file.name}: the program has more than {BUDGETS.program_marks} tags and attributes"
             )
-        return parse_xml(name, data)
+        return XmlTree(file, _parsed(file.name, data))
 
     def script(self, file: FoundFile) -> str:
         """Read a text file, UTF-8 or else Latin-1; ProgramFileError also if the program becomes too large."""
@@ -69,20 +71,82 @@ _STEP = re.compile(r"([A-Za-z_][\w.\-]*)(?:\[(\d{1,6})\])?")
 _GZIP_MAGIC = b"\x1f\x8b"
 
 
-class XmlTree:
-    """A file that was read; its name is for messages."""
+_NUMBER = re.compile(r"-?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_SHOWN = 100
 
-    def __init__(self, name: str, root: Element) -> None:
+CB3 = 3
+"""Series of the software of CB3; that of the e-Series is 5."""
+
+
+class XmlTree:
+    """A file that was read.
+
+    Attributes:
+        series: the first number of the software that saved it.
+    """
+
+    def __init__(self, file: FoundFile, root: Element) -> None:
         """Take a tree; ProgramFileError if the elements are nested too deep."""
-        self.name = name
+        self.file = file
         self.root = root
+        self.series = 5 if root.get("lastSavedIn", "").startswith("5") else CB3
         self._parents: dict[Element, Element] = {}
         level = [root]
         for _ in range(BUDGETS.program_depth):
             self._parents |= {child: parent for parent in level for child in parent}
             level = [child for parent in level for child in parent]
         if level:
-            raise ProgramFileError(f"{name}: elements are nested more than {BUDGETS.program_depth} deep")
+            raise self.error(f"elements are nested more than {BUDGETS.program_depth} deep")
+
+    def error(self, problem: str) -> ProgramFileError:
+        """Return the error that says what is wrong with this file."""
+        return ProgramFileError(f"{self.file.name}: {problem}")
+
+    def undefined(self, problem: str) -> UndefinedError:
+        """Return the error that says what is missing; the program is loaded, and not played."""
+        return UndefinedError(f"{self.file.name}: {problem}")
+
+    def unknown(self, what: str) -> UnknownNodeError:
+        """Return the error that names what is not known."""
+        return UnknownNodeError(
+            f"{self.file.name}: {what} cannot be turned into a script; "
+            "put the .script that PolyScope saved with the program beside it, "
+            "or leave it out (--skip-unknown-nodes)"
+        )
+
+    def number_text(self, text: str | None, what: str) -> str:
+        """Return a finite number as it stands in the file, which is how a script has it.
+
+        UndefinedError if it is none; `what` names it there.
+        """
+        plain = (text or "").strip()
+        if not _NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
+            shown = None if text is None else text[:_SHOWN]
+            raise self.undefined(f"{what} is {shown!r}, a number is needed")
+        return plain
+
+    def number(self, text: str | None, what: str) -> float:
+        """Return a finite number; UndefinedError if it is none."""
+        return float(self.number_text(text, what))
+
+    def number_texts(self, text: str | None, what: str, count: int = 6) -> list[str]:
+        """Return numbers that have commas between, as they stand in the file.
+
+        UndefinedError if there are more or fewer than `count`, or one is not a finite number.
+        """
+        parts = text.split(",") if text else []
+        if len(parts) != count:
+            raise self.undefined(f"{what} has {len(parts)} values, it needs {count}")
+        return [self.number_text(part, what) for part in parts]
+
+    def vector3(self, text: str | None, what: str) -> Vector3:
+        """Return three numbers; UndefinedError if they are not."""
+        x, y, z = map(float, self.number_texts(text, what, 3))
+        return x, y, z
+
+    def vector6(self, text: str | None, what: str) -> Vector6:
+        """Return six numbers; UndefinedError if they are not."""
+        return six(list(map(float, self.number_texts(text, what))))
 
     def resolve(self, element: Element) -> Element:
         """Return the element that `element` stands for, itself if it has no reference.
@@ -94,7 +158,7 @@ class XmlTree:
             if reference is None:
                 return element
             element = self._follow(element, reference)
-        raise ProgramFileError(f"{self.name}: references of <{element.tag}> lead in a circle")
+        raise self.error(f"references of <{element.tag}> lead in a circle")
 
     def _follow(self, start: Element, reference: str) -> Element:
         element: Element | None = start
@@ -110,19 +174,12 @@ class XmlTree:
             else:
                 element = None
         if element is None:
-            raise ProgramFileError(
-                f"{self.name}: the reference {reference[:100]!r} of <{start.tag}> leads nowhere"
-            )
+            raise self.error(f"the reference {reference[:100]!r} of <{start.tag}> leads nowhere")
         return element
 
 
-def count_marks(data: bytes) -> int:
-    """Return a number that the tags and attributes of a file in UTF-8 together do not exceed."""
-    return data.count(b"<") + data.count(b"=")
-
-
-def parse_xml(name: str, data: bytes) -> XmlTree:
-    """Return the tree of a file, unpacked; ProgramFileError if it is not XML as PolyScope writes it."""
+def _parsed(name: str, data: bytes) -> Element:
+    """Return the root of a file, unpacked; ProgramFileError if it is not XML as PolyScope writes it."""
     if not _is_text(data):  # in another encoding the searches for marks and document types see nothing
         raise ProgramFileError(f"{name} is not text in UTF-8, as PolyScope's files are")
     if b"<!DOCTYPE" in data:
@@ -135,7 +192,7 @@ def parse_xml(name: str, data: bytes) -> XmlTree:
         root: Element = parser.close()
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise ProgramFileError(f"{name} is not XML that PolyScope has written: {error}") from None
-    return XmlTree(name, root)
+    return root
 
 
 def unpack(name: str, data: bytes, most: int) -> bytes:
@@ -164,34 +221,3 @@ def _is_text(data: bytes) -> bool:
         return "\0" not in data.decode("utf-8")
     except UnicodeDecodeError:
         return False
-
-
-# --- numbers in the files of PolyScope
-
-_NUMBER = re.compile(r"-?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-_SHOWN = 100
-
-
-def number_text(tree: XmlTree, text: str | None, what: str) -> str:
-    """Return a finite number as it stands in the file, which is how a script has it, or UndefinedError."""
-    plain = (text or "").strip()
-    if not _NUMBER.fullmatch(plain) or not math.isfinite(float(plain)):
-        shown = None if text is None else text[:_SHOWN]
-        raise UndefinedError(f"{tree.name}: {what} is {shown!r}, a number is needed")
-    return plain
-
-
-def number(tree: XmlTree, text: str | None, what: str) -> float:
-    """Return a finite number; UndefinedError if it is none."""
-    return float(number_text(tree, text, what))
-
-
-def number_texts(tree: XmlTree, text: str | None, what: str, count: int = 6) -> list[str]:
-    """Return numbers that have commas between, as they stand in the file.
-
-    UndefinedError if there are more or fewer than `count`, or one is not a finite number.
-    """
-    parts = text.split(",") if text else []
-    if len(parts) != count:
-        raise UndefinedError(f"{tree.name}: {what} has {len(parts)} values, it needs {count}")
-    return [number_text(tree, part, what) for part in parts]

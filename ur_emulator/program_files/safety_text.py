@@ -4,12 +4,17 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 
-from ur_emulator.controller.safety.boundaries import Boundaries, BoundaryMode, SafetyPlane, ToolDirection
-from ur_emulator.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
-from ur_emulator.controller.safety.safety_state import SafetySettings
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.models.robot_model import Vector3, Vector6, six
-from ur_emulator.models.safety_limits import ArmLimits
+from ur_emulator.machine.controller.safety.boundaries import (
+    Boundaries,
+    BoundaryMode,
+    SafetyPlane,
+    ToolDirection,
+)
+from ur_emulator.machine.controller.safety.inputs import N_INPUT_PAIRS, SafetyInput
+from ur_emulator.machine.controller.safety.safety_state import SafetySettings
+from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
+from ur_emulator.machine.models.safety_limits import ArmLimits
 
 _NORMAL, _REDUCED = "SafetyLimits Normal Values", "SafetyLimits Reduced Values"
 _NORMAL_JOINTS, _REDUCED_JOINTS = "SafetyLimits Normal Joints", "SafetyLimits Reduced Joints"

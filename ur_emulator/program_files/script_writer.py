@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.controller.io.lines import RunState
-from ur_emulator.controller.io.modbus_signals import FREEDRIVE_ACTION
 from ur_emulator.errors import ProgramFileError
+from ur_emulator.machine.controller.io.lines import RunState
+from ur_emulator.machine.controller.io.modbus_signals import FREEDRIVE_ACTION
 from ur_emulator.program_files.installation import ExternalControlPc, Installation, OutputRule
 from urscript.values import to_script_text
 
@@ -98,24 +98,17 @@ def setup_script(installation: Installation, before: Installation) -> str:
 
 
 def _settings(installation: Installation) -> Iterator[str]:
-    domains = installation.analog_in_domains
-    for port in (0, 1):
-        yield f"set_standard_analog_input_domain({port}, {domains[port]})"
-    for port in (0, 1):
-        yield f"set_tool_analog_input_domain({port}, {domains[2 + port]})"
-    for port in (0, 1):
-        yield f"set_analog_outputdomain({port}, {installation.analog_out_domains[port]})"
+    domains = (*installation.analog_in_domains, *installation.analog_out_domains)
+    calls = ("set_standard_analog_input_domain", "set_tool_analog_input_domain", "set_analog_outputdomain")
+    for index, domain in enumerate(domains):
+        yield f"{calls[index // 2]}({index % 2}, {domain})"
     yield f"set_tool_voltage({installation.tool_voltage})"
     yield "set_input_actions_to_default()"
     for group, index, action in installation.input_actions:
         if action.lower() == FREEDRIVE_ACTION:
             yield f'set_{group}_input_action({index}, "{FREEDRIVE_ACTION}")'
-    low = [
-        rule.index
-        for rule in installation.output_rules
-        if (rule.group, rule.state) == ("standard_digital", RunState.LOW_WHEN_STOPPED)
-    ]
-    if low:
+    low_ones = ("standard_digital", RunState.LOW_WHEN_STOPPED)
+    if low := [rule.index for rule in installation.output_rules if (rule.group, rule.state) == low_ones]:
         yield f"set_runstate_standard_digital_outputs({low})"
     yield from map(_rule, installation.output_rules)
     yield f"set_safety_mode_transition_hardness({installation.transition_hardness})"
@@ -174,14 +167,6 @@ class Header:
 Part = str | Gap | Header
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A place in a script: how many parts are before it, and in how many open blocks it is."""
-
-    parts: int
-    depth: int
-
-
 class ScriptWriter:
     """The script so far: texts of whole lines, and places for others, in order."""
 
@@ -192,15 +177,15 @@ class ScriptWriter:
         self._gaps = 0
 
     @property
-    def place(self) -> Place:
-        """The end of the script so far."""
-        return Place(len(self.parts), self._depth)
+    def place(self) -> tuple[int, int]:
+        """The end of the script so far: how many parts are before it, in how many open blocks it is."""
+        return len(self.parts), self._depth
 
-    def take(self, place: Place) -> list[Part]:
+    def take(self, place: tuple[int, int]) -> list[Part]:
         """Remove what was written since a place, and return it; it may be put into another place."""
-        taken = self.parts[place.parts :]
-        del self.parts[place.parts :]
-        self._depth = place.depth
+        length, self._depth = place
+        taken = self.parts[length:]
+        del self.parts[length:]
         return taken
 
     def add(self, *texts: str) -> None:

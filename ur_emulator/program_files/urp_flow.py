@@ -4,58 +4,54 @@ Source: program files and the scripts that PolyScope saved beside them.
 """
 
 from collections.abc import Sequence
-from functools import partial
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.program_files.reader import number_text
 from ur_emulator.program_files.urp_expressions import expression_of, variable_name
-from ur_emulator.program_files.urp_maker import Around, UrpMaker
+from ur_emulator.program_files.urp_maker import Around, NodeKinds, UrpMaker
 from ur_emulator.program_files.urp_nodes import Node
 
+KINDS = NodeKinds()
 # Value of the case of a `<Switch>` that is taken when no other one is.
 _DEFAULT_CASE = "2147483647"
 
 
-def write_folder(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<Folder>`: its nodes stand at the same level."""
-    maker.writer.label(node.number, node.get("name") or "Folder", around.mark)
+@KINDS.writes("Folder", "its nodes")
+def _write_folder(maker: UrpMaker, node: Node, around: Around) -> None:
+    maker.put(node, around, node.get("name") or "Folder")
     maker.write_children(node, around)
 
 
-def write_loop(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<Loop>`: without end, a number of times, or while a condition holds."""
+@KINDS.writes("Loop", "`while`: Forever, Counting with its variable, While; checked continuously as If")
+def _write_loop(maker: UrpMaker, node: Node, around: Around) -> None:
     writer = maker.writer
     match node.get("type"):
         case "Forever":
-            writer.label(node.number, "Loop", around.mark)
-            with writer.block("while (True):"):
-                maker.write_children(node, around)
+            maker.put(node, around, "Loop")
+            maker.write_block("while (True):", node, around)
         case "Counting":
-            count = number_text(node.source.tree, node.get("count"), "count of a <Loop>")
+            count = node.tree.number_text(node.get("count"), "count of a <Loop>")
             variable = node.element.find("loopVariable")
             counter = maker.program.names.new("Loop") if variable is None else variable_name(node, variable)
-            writer.label(node.number, f"Loop {count} times", around.mark)
-            writer.add(f"{counter} = 0")
+            maker.put(node, around, f"Loop {count} times", f"{counter} = 0")
             with writer.block(f"while ({counter} < {count}):"):
                 maker.write_children(node, around)
                 writer.add(f"{counter} = {counter} + 1")
         case "While" | "Expression":
             condition = expression_of(maker, node)
-            writer.label(node.number, f"Loop {condition.label}", around.mark)
+            maker.put(node, around, f"Loop {condition.label}")
             if node.get("checkContinuously") == "true":
                 _write_watched_loop(maker, node, around, condition.script)
                 return
-            with writer.block(f"while ({condition.script}):"):
-                maker.write_children(node, around)
+            maker.write_block(f"while ({condition.script}):", node, around)
         case other:
-            raise node.source.unknown(f"a loop of type {other!r}")
+            raise node.tree.unknown(f"a loop of type {other!r}")
 
 
 def _write_watched_loop(maker: UrpMaker, node: Node, around: Around, condition: str) -> None:
     """Write a loop in a thread that ends as soon as the condition does not hold."""
     writer, n = maker.writer, node.number
-    with writer.block(f"thread Thread_while_{n}():"), writer.block("while (True):"):
-        maker.write_children(node, around)
+    with writer.block(f"thread Thread_while_{n}():"):
+        maker.write_block("while (True):", node, around)
     with writer.block(f"if ({condition}):"):
         writer.add(f"global thread_handler_{n}=run Thread_while_{n}()")
         with writer.block(f"while ({condition}):"):
@@ -63,14 +59,19 @@ def _write_watched_loop(maker: UrpMaker, node: Node, around: Around, condition: 
         writer.add(f"kill thread_handler_{n}")
 
 
-def write_if(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write an `<If>` with its branches: each stands in the `else` of the one before."""
-    if node.get("type") not in ("", "If"):
-        if node.get("type") in ("ElseIf", "Else"):
-            raise node.source.error(f"an {node.get('type')} node stands behind no If")
-        raise node.source.unknown(f"an <If> node of type {node.get('type')!r}")
+@KINDS.writes(
+    "If",
+    "`if`, with ElseIf and Else; a condition that is checked continuously ends the thread of its nodes",
+)
+def _write_if(maker: UrpMaker, node: Node, around: Around) -> None:
+    """Each branch stands in the `else` of the one before."""
+    kind = node.get("type")
+    if kind in ("ElseIf", "Else"):
+        raise node.tree.error(f"an {kind} node stands behind no If")
+    if kind not in ("", "If"):
+        raise node.tree.unknown(f"an <If> node of type {kind!r}")
     if len(node.branches) > BUDGETS.node_depth:
-        raise node.source.error(f"an <If> node has more than {BUDGETS.node_depth} branches")
+        raise node.tree.error(f"an <If> node has more than {BUDGETS.node_depth} branches")
     _write_branches(maker, (node, *node.branches), around)
 
 
@@ -83,7 +84,7 @@ def _write_branches(maker: UrpMaker, branches: Sequence[Node], around: Around) -
         maker.write_children(node, around)
         return
     condition = expression_of(maker, node)
-    writer.label(n, f"{node.get('type') or 'If'} {condition.label}", around.mark)
+    maker.put(node, around, f"{node.get('type') or 'If'} {condition.label}")
     if node.get("checkContinuously") == "true":
         _write_watched_branch(maker, node, around, condition.script)
         if others:
@@ -116,21 +117,20 @@ def _write_watched_branch(maker: UrpMaker, node: Node, around: Around, condition
         writer.add(f"thread_flag_{n} = 2")
 
 
-def write_switch(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<Switch>` with its cases; the default case stands behind the others."""
+@KINDS.writes("Switch", "`if`, `elif` and `else` for the default case")
+def _write_switch(maker: UrpMaker, node: Node, around: Around) -> None:
     writer = maker.writer
     for case in node.children:
         if case.kind != "Case":
-            raise case.source.unknown(f"<{case.kind}> in a <Switch>")
+            raise case.tree.unknown(f"<{case.kind}> in a <Switch>")
     value = expression_of(maker, node)
     maker.switches += 1
     variable = f"switch_{maker.switches}"
-    writer.label(node.number, f"Switch {value.label}", around.mark)
-    writer.add(f"{variable} = {value.script}")
-    cases = [case for case in node.children if case.get("caseValue") != _DEFAULT_CASE]
+    maker.put(node, around, f"Switch {value.label}", f"{variable} = {value.script}")
     defaults = [case for case in node.children if case.get("caseValue") == _DEFAULT_CASE]
+    cases = [case for case in node.children if case.get("caseValue") != _DEFAULT_CASE]
     for index, case in enumerate(cases):
-        chosen = number_text(case.source.tree, case.get("caseValue"), "value of a <Case>")
+        chosen = case.tree.number_text(case.get("caseValue"), "value of a <Case>")
         if index == 0:  # PolyScope writes the label of the first case before its block
             writer.label(case.number, f"Case {chosen}", around.mark)
         with writer.branch(f"{'elif' if index else 'if'} ({chosen} == {variable}):"):
@@ -145,14 +145,13 @@ def write_switch(maker: UrpMaker, node: Node, around: Around) -> None:
         writer.add("end")
 
 
-def write_call(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<CallSubProgram>`."""
+@KINDS.writes("CallSubProgram", "the call of a function, perhaps from another .urp")
+def _write_call(maker: UrpMaker, node: Node, around: Around) -> None:
     called = node.find("subprogram")
     if called is None:
-        raise node.source.undefined("a <CallSubProgram> node names no sub-program")
+        raise node.tree.undefined("a <CallSubProgram> node names no sub-program")
     name = maker.program.functions[called]
-    maker.writer.label(node.number, f"Call {name}", around.mark)
-    maker.writer.add(f"{name}()")
+    maker.put(node, around, f"Call {name}", f"{name}()")
 
 
 def write_thread(maker: UrpMaker, node: Node, around: Around) -> None:
@@ -161,12 +160,8 @@ def write_thread(maker: UrpMaker, node: Node, around: Around) -> None:
     given = node.get("name") or "Thread"
     name = maker.program.names.new(given)
     writer.label(node.number, given)
-    with writer.block(f"thread {name}():"):
-        if node.get("runOnlyOnce") == "true":
-            maker.write_children(node, around)
-        else:
-            with writer.block("while (True):"):
-                maker.write_children(node, around)
+    with writer.block(f"thread {name}():"), maker.repeated(node):
+        maker.write_children(node, around)
     writer.add(f"threadId_{name} = run {name}()")
 
 
@@ -175,7 +170,8 @@ def write_events(maker: UrpMaker, events: Sequence[Node], around: Around) -> Non
     writer = maker.writer
     known: list[tuple[Node, str]] = []
     for event in events:
-        maker.try_to(event, partial(_note_condition, maker, event, known))
+        with maker.leaving_out(event):
+            known.append((event, expression_of(maker, event).script))
     if not known:
         return
     with writer.block("thread EventThread():"), writer.block("while (True):"):
@@ -184,7 +180,3 @@ def write_events(maker: UrpMaker, events: Sequence[Node], around: Around) -> Non
                 maker.write_children(node, around)
         writer.add("end", "sync()")
     writer.add("eventThread = run EventThread()")
-
-
-def _note_condition(maker: UrpMaker, event: Node, known: list[tuple[Node, str]]) -> None:
-    known.append((event, expression_of(maker, event).script))

@@ -1,8 +1,8 @@
 """UrpMaker: what the writers of nodes share while a program file becomes a script."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
-from functools import partial
 
 from ur_emulator.errors import UndefinedError, UnknownNodeError
 from ur_emulator.program_files.installation import Installation
@@ -15,19 +15,36 @@ from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 class Around:
     """What is around a node: the `<Move>` that waypoints belong to, if there is one.
 
-    `is_quiet`: labels say that the program does not stop at them.
+    `mark`: of the labels of nodes; "noBreak" says that the program does not stop at them.
     """
 
     move: Node | None = None
-    is_quiet: bool = False
-
-    @property
-    def mark(self) -> str:
-        """Mark of the label of a node."""
-        return "noBreak" if self.is_quiet else ""
+    mark: str = ""
 
 
 NodeWriter = Callable[["UrpMaker", Node, Around], None]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeKind:
+    """A kind of nodes that stand in programs, and what writes one; `becomes` is what it is in the script."""
+
+    tag: str
+    write: NodeWriter
+    becomes: str
+
+
+class NodeKinds(dict[str, NodeKind]):
+    """Kinds of nodes by tag."""
+
+    def writes(self, tag: str, becomes: str) -> Callable[[NodeWriter], NodeWriter]:
+        """Add the kind of nodes that the decorated function writes."""
+
+        def add(write: NodeWriter) -> NodeWriter:
+            self[tag] = NodeKind(tag, write, becomes)
+            return write
+
+        return add
 
 
 @dataclass(slots=True)
@@ -35,7 +52,7 @@ class UrpMaker:
     """Writes the nodes of a program.
 
     Attributes:
-        writers: what writes each kind of node.
+        kinds: of the nodes that can be written, by tag.
         skip_unknown: leaves out what is not known, instead of an error.
         declarations: lines that stand before all nodes, by what they declare, in the order of first use.
         timers: names, in the order of first use.
@@ -48,7 +65,7 @@ class UrpMaker:
     program: ProgramNodes
     installation: Installation
     reader: ProgramReader
-    writers: Mapping[str, NodeWriter]
+    kinds: Mapping[str, NodeKind]
     skip_unknown: bool = False
     writer: ScriptWriter = field(default_factory=ScriptWriter)
     declarations: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -60,22 +77,22 @@ class UrpMaker:
 
     def write(self, node: Node, around: Around) -> None:
         """Write one node; UnknownNodeError if it, or something in it, is not known."""
-        self.try_to(node, partial(self._write, node, around))
+        with self.leaving_out(node):
+            kind = self.kinds.get(node.kind)
+            if kind is None:
+                raise node.tree.unknown(f"a <{node.kind}> node")
+            kind.write(self, node, around)
 
-    def _write(self, node: Node, around: Around) -> None:
-        write = self.writers.get(node.kind)
-        if write is None:
-            raise node.source.unknown(f"a <{node.kind}> node")
-        write(self, node, around)
+    @contextmanager
+    def leaving_out(self, node: Node) -> Iterator[None]:
+        """Do something for a node; what is written for it is removed if the node is undefined.
 
-    def try_to(self, node: Node, action: Callable[[], None]) -> None:
-        """Do something for a node; what it has written is removed if the node is undefined.
-
-        So it is if it meets what is not known and may be left out; UnknownNodeError if that must not be.
+        So it is if there is something that is not known and may be left out; UnknownNodeError if that must
+        not be.
         """
         place = self.writer.place
         try:
-            action()
+            yield
         except UndefinedError as error:
             self.writer.take(place)
             self.undefined.append(f"{error} (label {node.number})")
@@ -85,10 +102,24 @@ class UrpMaker:
             self.writer.take(place)
             self.left_out.append(str(error))
 
+    def put(self, node: Node, around: Around, label: str, *lines: str) -> None:
+        """Write the label of a node, and the lines behind it."""
+        self.writer.label(node.number, label, around.mark)
+        self.writer.add(*lines)
+
     def write_children(self, node: Node, around: Around) -> None:
         """Write the nodes inside a node."""
         for child in node.children:
             self.write(child, around)
+
+    def write_block(self, head: str, node: Node, around: Around) -> None:
+        """Write a block with the nodes inside a node."""
+        with self.writer.block(head):
+            self.write_children(node, around)
+
+    def repeated(self, node: Node) -> AbstractContextManager[None]:
+        """Write a loop without end around what follows, unless the node says that it runs once."""
+        return nullcontext() if node.get("runOnlyOnce") == "true" else self.writer.block("while (True):")
 
     def declare(self, what: str, *lines: str) -> None:
         """Declare something before all nodes, unless it is declared already."""

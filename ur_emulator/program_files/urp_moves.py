@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from protocol.pose import pose_inv
-from ur_emulator.program_files.reader import number_text, number_texts
+from ur_emulator.program_files.reader import CB3
 from ur_emulator.program_files.script_writer import identifier
 from ur_emulator.program_files.urp_expressions import (
     ZERO_POSE,
     expression_of,
+    only_angles,
     pose_of,
     pose_text,
     position_of,
@@ -21,51 +22,65 @@ from ur_emulator.program_files.urp_expressions import (
     taught_waypoint,
     variable_name,
 )
-from ur_emulator.program_files.urp_maker import Around, UrpMaker
-from ur_emulator.program_files.urp_nodes import CB3, Node
+from ur_emulator.program_files.urp_maker import Around, NodeKinds, UrpMaker
+from ur_emulator.program_files.urp_nodes import Node
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 
+KINDS = NodeKinds()
+
 # --- motions that end at an event: Direction with Until, and the Force node
 
-_AXES = {"X": 0, "Y": 1, "Z": 2}
+_AXES = ("X", "Y", "Z")
 _SIGNS = {"Plus": ("+", "1.0"), "Minus": ("-", "-1.0")}
 # Goal of a direction that no distance ends [m]; it is beyond the reach of every arm.
 _FAR = "1000.0"
-# Speed of the way back from a contact [m/s].
-_RETRACTION_SPEED = "0.1"
-_POINT = (
-    "def calculate_point_to_move_towards(feature, direction, position_distance):",
-    "  local goal=get_target_waypoint()",
-    "  local axis=[direction[0], direction[1], direction[2]]",
-    "  if (norm(axis) < 1e-6):",
-    "    return goal",
-    "  end",
-    "  local unit=normalize(axis)",
-    "  local d=position_distance",
-    "  local step=p[unit[0]*d, unit[1]*d, unit[2]*d, 0, 0, 0]",
-    "  local turned=pose_trans(p[0, 0, 0, feature[3], feature[4], feature[5]], step)",
-    "  return p[goal[0]+turned[0], goal[1]+turned[1], goal[2]+turned[2], goal[3], goal[4], goal[5]]",
-    "end",
+# The way back from a contact: its speed is 0.1 m/s.
+_RETRACTION = """\
+kill move_thread_han_{n}
+stopl({a})
+local contactPose=get_forward_kin(get_actual_joint_positions_history(stepsToRetract))
+local axis=[targetTcpDirection[0], targetTcpDirection[1], targetTcpDirection[2]]
+local retractTo=contactPose
+if (norm(axis) > 1e-6):
+  local unit=normalize(axis)
+  retractTo = pose_sub(contactPose, p[unit[0]*{d}, unit[1]*{d}, unit[2]*{d}, 0, 0, 0])
+end
+movel(retractTo, a={a}, v=0.1)"""
+_POINT = """\
+def calculate_point_to_move_towards(feature, direction, position_distance):
+  local goal=get_target_waypoint()
+  local axis=[direction[0], direction[1], direction[2]]
+  if (norm(axis) < 1e-6):
+    return goal
+  end
+  local unit=normalize(axis)
+  local d=position_distance
+  local step=p[unit[0]*d, unit[1]*d, unit[2]*d, 0, 0, 0]
+  local turned=pose_trans(p[0, 0, 0, feature[3], feature[4], feature[5]], step)
+  return p[goal[0]+turned[0], goal[1]+turned[1], goal[2]+turned[2], goal[3], goal[4], goal[5]]
+end"""
+
+
+@KINDS.writes(
+    "gui.program.direction.MoveDirectionNode",
+    "a motion in a thread that its `Until` nodes end: a distance, or a contact and a way back",
 )
-
-
-def write_direction(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `MoveDirectionNode`: a motion in a thread, which its `<Until>` nodes end."""
+def _write_direction(maker: UrpMaker, node: Node, around: Around) -> None:
     writer, n = maker.writer, node.number
     untils = [child for child in node.children if child.kind == "Until"]
     if not untils or len(untils) != len(node.children):
-        raise node.source.undefined("a direction needs <Until> nodes, and no others")
+        raise node.tree.undefined("a direction needs <Until> nodes, and no others")
     feature = feature_name(node)
     name, vector = _direction(maker, node)
-    writer.label(n, f"Direction: {feature_label(feature)}{name}", around.mark)
-    maker.declare("point of a direction", *_POINT)
+    maker.put(node, around, f"Direction: {_LABELS.get(feature, feature)}{name}")
+    maker.declare("point of a direction", _POINT)
     distance = _FAR
     for until in untils:
         if until.get("type") == "DISTANCE":
-            distance = number_text(node.source.tree, until.text("Distance"), "distance of an <Until>")
+            distance = node.tree.number_text(until.text("Distance"), "distance of an <Until>")
     speed, acceleration = _tool_parameters(node, around)
     frame = frame_of(maker, node, feature, "get_forward_kin()")
     writer.add(f"global move_thread_flag_{n}=0")
@@ -92,24 +107,19 @@ def _direction(maker: UrpMaker, node: Node) -> tuple[str, str]:
         return "", expression_of(maker, node).script
     axis, sign = selected[:1], selected[1:]
     if axis not in _AXES or sign not in _SIGNS:
-        raise node.source.unknown(f"a direction {selected!r}")
+        raise node.tree.unknown(f"a direction {selected!r}")
     mark, length = _SIGNS[sign]
-    vector = ["0.0"] * 3
-    vector[_AXES[axis]] = length
-    return f" {axis}{mark}", f"[{', '.join(vector)}]"
+    return f" {axis}{mark}", f"[{', '.join(length if one == axis else '0.0' for one in _AXES)}]"
 
 
 def _tool_parameters(node: Node, around: Around) -> list[str]:
     """Return speed and acceleration: those of the node, else those of the move around it."""
-    tree = node.source.tree
     if own := node.get("toolParams"):
-        return number_texts(tree, own, "toolParams of a direction", 2)
+        return node.tree.number_texts(own, "toolParams of a direction", 2)
     if around.move is None:
-        raise node.source.undefined("a direction stands outside of a <Move> and has no toolParams")
-    return [
-        number_text(tree, around.move.get(name), f"{name} of a direction")
-        for name in ("speed", "acceleration")
-    ]
+        raise node.tree.undefined("a direction stands outside of a <Move> and has no toolParams")
+    names = ("speed", "acceleration")
+    return [node.tree.number_text(around.move.get(name), f"{name} of a direction") for name in names]
 
 
 def _write_until(maker: UrpMaker, node: Node, n: int, acceleration: str, around: Around) -> None:
@@ -121,64 +131,44 @@ def _write_until(maker: UrpMaker, node: Node, n: int, acceleration: str, around:
             writer.add("sleep(1.0E-10)")
             with writer.block(f"if (move_thread_flag_{n} > 1):"):
                 writer.add(f"join move_thread_han_{n}")
-                writer.label(node.number, label, around.mark)
+                maker.put(node, around, label)
                 maker.write_children(node, around)
                 writer.add("break")
         case "TOOL_CONTACT_DETECTION":
-            tree = node.source.tree
-            deceleration = number_text(
-                tree, node.get("decelerationAcceleration") or acceleration, "deceleration of an <Until>"
+            deceleration = node.tree.number_text(
+                node.get("decelerationAcceleration") or acceleration, "deceleration of an <Until>"
             )
-            retraction = number_text(tree, node.get("retraction") or "0.0", "retraction of an <Until>")
+            retraction = node.tree.number_text(node.get("retraction") or "0.0", "retraction of an <Until>")
             writer.add(
                 "local targetTcpDirection=get_target_tcp_speed()",
                 "local stepsToRetract=tool_contact(direction=targetTcpDirection)",
             )
             with writer.block("if (stepsToRetract > 0):"):
-                writer.add(f"kill move_thread_han_{n}", f"stopl({deceleration})")
-                writer.add(
-                    "local contactPose=get_forward_kin(get_actual_joint_positions_history(stepsToRetract))",
-                    "local axis=[targetTcpDirection[0], targetTcpDirection[1], targetTcpDirection[2]]",
-                    "local retractTo=contactPose",
-                )
-                with writer.block("if (norm(axis) > 1e-6):"):
-                    step = ", ".join(f"unit[{i}]*{retraction}" for i in range(3))
-                    writer.add(
-                        "local unit=normalize(axis)", f"retractTo = pose_sub(contactPose, p[{step}, 0, 0, 0])"
-                    )
-                writer.add(f"movel(retractTo, a={deceleration}, v={_RETRACTION_SPEED})")
-                writer.label(node.number, label, around.mark)
+                writer.add(_RETRACTION.format(n=n, a=deceleration, d=retraction))
+                maker.put(node, around, label)
                 maker.write_children(node, around)
                 writer.add("break")
         case _:
             how = f"{kind} {node.get('distanceNodeType')}".strip()
-            raise node.source.unknown(f"an <Until> of type {how!r}")
+            raise node.tree.unknown(f"an <Until> of type {how!r}")
 
 
-def write_force(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<Force>`: its nodes run while the tool gives way."""
+@KINDS.writes("Force", "`force_mode` around its nodes; only the type Frame")
+def _write_force(maker: UrpMaker, node: Node, around: Around) -> None:
     if node.get("type") != "Frame":
-        raise node.source.unknown(f"a <Force> of type {node.get('type')!r}")
-    values = {}
+        raise node.tree.unknown(f"a <Force> of type {node.get('type')!r}")
+    values = []
     for tag in ("selection", "wrench", "limitsForce", "limitsMotion"):
         element = node.find(tag)
         given = None if element is None else element.get("value")
-        values[tag] = number_texts(node.source.tree, given, f"{tag} of a <Force>")
-    limits = [
-        compliant if float(selected) else stiff
-        for selected, compliant, stiff in zip(
-            values["selection"], values["limitsForce"], values["limitsMotion"], strict=True
-        )
-    ]
+        values.append(node.tree.number_texts(given, f"{tag} of a <Force>"))
+    selection, wrench, compliant, stiff = values
+    limits = [c if float(selected) else s for selected, c, s in zip(selection, compliant, stiff, strict=True)]
+    lists = [f"[{', '.join(one)}]" for one in (selection, wrench, limits)]
     frame = frame_of(maker, node, feature_name(node), "tool_pose()")
-    maker.writer.label(node.number, "Force", around.mark)
-    lists = [f"[{', '.join(one)}]" for one in (values["selection"], values["wrench"])]
-    maker.writer.add(
-        "sleep(0.02)",
-        "zero_ftsensor()",
-        f"force_mode({frame}, {lists[0]}, {lists[1]}, 2, [{', '.join(limits)}])",
-    )
-    maker.write_children(node, Around(around.move, is_quiet=True))
+    force_mode = f"force_mode({frame}, {lists[0]}, {lists[1]}, 2, {lists[2]})"
+    maker.put(node, around, "Force", "sleep(0.02)", "zero_ftsensor()", force_mode)
+    maker.write_children(node, Around(around.move, "noBreak"))
     maker.writer.add("end_force_mode()", "stopl(5.0)")
 
 
@@ -190,22 +180,24 @@ _TYPES = {
 }
 _PARAMETERS = frozenset(
     {"jointSpeed", "jointAcceleration", "cartesianSpeed", "cartesianAcceleration"}
-    | {"blendRadius", "nextMotionTime"}
+    | {"blendRadius", "nextMotionTime", "reference"}
 )
 _BASE = "Joint_0_name"
 _TOOL = "Joint_6_name"
+# How labels call features, other than by their names.
+_LABELS = {"": "Base", _BASE: "Base", _TOOL: "Tool"}
 _AFTER = "breakAfter"
 
 
-def write_move(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<Move>`: its nodes stand at the same level."""
-    motion = _motion(maker, node)
+@KINDS.writes("Move", "a label and its nodes (MoveJ, MoveL, MoveP); `set_tcp` if it names a TCP")
+def _write_move(maker: UrpMaker, node: Node, around: Around) -> None:
+    motion = _motion(node)
     if node.get("optimoveEnabled") == "true":
-        raise node.source.unknown("a <Move> with OptiMove")
-    maker.writer.label(node.number, motion, around.mark)
+        raise node.tree.unknown("a <Move> with OptiMove")
+    maker.put(node, around, motion)
     if node.get("useActiveTCP") == "false" and (tcp := node.find("tcp")) is not None:
         maker.writer.add(set_tcp(maker, node, tcp))
-    maker.write_children(node, Around(node, around.is_quiet))
+    maker.write_children(node, Around(node, around.mark))
 
 
 def set_tcp(maker: UrpMaker, node: Node, tcp: Element) -> str:
@@ -214,28 +206,34 @@ def set_tcp(maker: UrpMaker, node: Node, tcp: Element) -> str:
     offset = maker.installation.tcps.get(name)
     if offset is None:
         known = ", ".join(maker.installation.tcps) or "none"
-        raise node.source.undefined(f"the installation has no TCP {name[:100]!r}: it has {known}")
+        raise node.tree.undefined(f"the installation has no TCP {name[:100]!r}: it has {known}")
     return f"set_tcp(p[{', '.join(map(repr, offset))}])"
 
 
-def write_waypoint(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<Waypoint>` of the move around it."""
+@KINDS.writes(
+    "Waypoint",
+    "`movej`, `movel` or `movep`: Fixed, Variable (also a feature), Relative; own speeds, blend or time",
+)
+def _write_waypoint(maker: UrpMaker, node: Node, around: Around) -> None:
     move = _move_around(node, around)
-    builtin = _TYPES[_motion(maker, move)][0]
+    builtin = _TYPES[_motion(move)][0]
     if node.children:
-        raise node.source.unknown("what is inside of a waypoint")
+        raise node.tree.unknown("what is inside of a waypoint")
     maker.writer.label(node.number, _waypoint_name(node), around.mark or _AFTER)
     target = _target(maker, node, move, builtin)
     maker.writer.add(f"{builtin}({target}, {_motion_parameters(maker, node, node, move)})")
 
 
-def write_circle(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<CircleMove>`: a motion through its first waypoint to its second."""
+@KINDS.writes(
+    "CircleMove",
+    "`movec` through the first to the second waypoint, `mode=1` for a fixed orientation",
+)
+def _write_circle(maker: UrpMaker, node: Node, around: Around) -> None:
     move = _move_around(node, around)
     if [child.kind for child in node.children] != ["Waypoint", "Waypoint"]:
-        raise node.source.undefined("a <CircleMove> needs two waypoints: one on the way, and its end")
+        raise node.tree.undefined("a <CircleMove> needs two waypoints: one on the way, and its end")
     via, end = node.children
-    maker.writer.label(node.number, "CircleMove", around.mark)
+    maker.put(node, around, "CircleMove")
     maker.writer.label(via.number, _waypoint_name(via), "noBreak")
     maker.writer.label(end.number, _waypoint_name(end), around.mark or _AFTER)
     targets = ", ".join(_target(maker, one, move, "movep") for one in (via, end))
@@ -243,18 +241,19 @@ def write_circle(maker: UrpMaker, node: Node, around: Around) -> None:
     maker.writer.add(f"movec({targets}, {_motion_parameters(maker, node, end, move)}{mode})")
 
 
-def write_safe_home(maker: UrpMaker, node: Node, around: Around) -> None:
-    """Write a `<SafeHome>`: a motion to the position of the installation."""
-    tree = node.source.tree
+@KINDS.writes(
+    "SafeHome",
+    "`movej` to the home position of the installation, or else to that of a new box: arm upright",
+)
+def _write_safe_home(maker: UrpMaker, node: Node, around: Around) -> None:
+    given = [("t", "nextMotionTime", "time")]
     if node.get("positionOptionType") == "SPEED_AND_ACCELERATION":
-        how = ", ".join(
-            f"{letter}={number_text(tree, node.get(name), f'{name} of a <SafeHome>')}"
-            for letter, name in (("a", "acceleration"), ("v", "speed"))
-        )
-    else:
-        how = f"t={number_text(tree, node.get('nextMotionTime'), 'time of a <SafeHome>')}"
-    maker.writer.label(node.number, "Home", around.mark)
-    maker.writer.add(f"movej([{', '.join(map(repr, maker.installation.safe_home))}], {how})")
+        given = [("a", "acceleration", "acceleration"), ("v", "speed", "speed")]
+    how = ", ".join(
+        f"{letter}={node.tree.number_text(node.get(name), f'{what} of a <SafeHome>')}"
+        for letter, name, what in given
+    )
+    maker.put(node, around, "Home", f"movej([{', '.join(map(repr, maker.installation.safe_home))}], {how})")
 
 
 # --- targets
@@ -264,7 +263,7 @@ def _target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
     """Return where a waypoint is, as the builtin takes it."""
     match node.get("type") or "Fixed":
         case "Variable":
-            name = variable_name(node, node.element.find("variable"))
+            name = variable_name(node)
             taught_feature(maker, node, name)
             feature = _variable_feature(maker, move)
             return f"pose_trans({feature}, {name})" if feature else name
@@ -273,7 +272,7 @@ def _target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
         case "Relative":
             return _relative_target(maker, node)
         case other:
-            raise node.source.unknown(f"a waypoint of type {other!r}")
+            raise node.tree.unknown(f"a waypoint of type {other!r}")
 
 
 def _fixed_target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
@@ -287,16 +286,15 @@ def _fixed_target(maker: UrpMaker, node: Node, move: Node, builtin: str) -> str:
 
 def _in_feature(node: Node, pose: str, feature: str) -> str:
     """Return a pose that moves with a feature."""
-    tree = node.source.tree
     given = node.find("BaseToFeature")
     if given is not None:
-        base = pose_text(pose_inv(pose_of(tree, given.get("pose"), "<BaseToFeature>")))
+        base = pose_text(pose_inv(pose_of(node.tree, given.get("pose"), "<BaseToFeature>")))
         return f"pose_trans({feature}, pose_trans({base}, {pose}))"
     inside = node.find("position/poseInFeatureCoordinates")
     if inside is None:
         name = _waypoint_name(node)[:100]
-        raise node.source.undefined(f"the pose of waypoint {name!r} in feature {feature!r} is not known")
-    taught = pose_of(tree, inside.get("pose"), "<poseInFeatureCoordinates>")
+        raise node.tree.undefined(f"the pose of waypoint {name!r} in feature {feature!r} is not known")
+    taught = pose_of(node.tree, inside.get("pose"), "<poseInFeatureCoordinates>")
     return f"pose_trans({feature}, {pose_text(taught)})"
 
 
@@ -305,11 +303,11 @@ def _relative_target(maker: UrpMaker, node: Node) -> str:
     name = _waypoint_name(node)
     poses = []
     for part, tag in (("from", "relativeFromPosition"), ("to", "position")):
-        position = position_of(node.source.tree, node.find(tag), f"waypoint {name[:100]!r}")
-        if position.pose is None:
-            raise node.source.undefined(f"the file has only the joint angles of waypoint {name[:100]!r}")
-        text = pose_text(position.pose)
-        if node.source.series != CB3:
+        _, pose = position_of(node.tree, node.find(tag), f"waypoint {name[:100]!r}")
+        if pose is None:
+            raise only_angles(node, name)
+        text = pose_text(pose)
+        if node.tree.series != CB3:
             variable = f"{identifier(name)}_{part}_p"
             maker.declare(f"pose {variable}", f"global {variable}={text}")
             text = variable
@@ -319,7 +317,7 @@ def _relative_target(maker: UrpMaker, node: Node) -> str:
 
 def _is_joint_move(move: Node) -> bool:
     """True for a MoveJ whose waypoints are joint angles, whatever the tool is."""
-    if move.source.series != CB3:
+    if move.tree.series != CB3:
         return move.get("positionType") == "JointAngles"
     return move.get("useActiveTCP") == "false" and move.find("feature") is None
 
@@ -350,56 +348,47 @@ def frame_of(maker: UrpMaker, node: Node, name: str, tool: str) -> str:
         return tool
     feature = taught_feature(maker, node, name)
     if feature is None:
-        raise node.source.undefined(f"the installation has no feature {name[:100]!r}")
+        raise node.tree.undefined(f"the installation has no feature {name[:100]!r}")
     return name if feature.is_variable else pose_text(feature.pose)
-
-
-def feature_label(name: str) -> str:
-    """Return how labels call a feature."""
-    return {"": "Base", _BASE: "Base", _TOOL: "Tool"}.get(name, name)
 
 
 # --- parameters
 
 
-def _motion(maker: UrpMaker, move: Node) -> str:
+def _motion(move: Node) -> str:
     motion = move.get("motionType")
     if motion not in _TYPES:
-        raise move.source.unknown(f"a move of type {motion!r}")
+        raise move.tree.unknown(f"a move of type {motion!r}")
     return motion
 
 
 def _move_around(node: Node, around: Around) -> Node:
     if around.move is None:
-        raise node.source.undefined(f"a <{node.kind}> stands outside of a <Move>")
+        raise node.tree.undefined(f"a <{node.kind}> stands outside of a <Move>")
     return around.move
 
 
 def _waypoint_name(node: Node) -> str:
     if node.get("type") == "Variable":
-        return variable_name(node, node.element.find("variable"))
+        return variable_name(node)
     return node.get("name") or "Waypoint"
 
 
 def _motion_parameters(maker: UrpMaker, motion: Node, waypoint: Node, move: Node) -> str:
     """Return acceleration, speed and blend, or the time, of a waypoint or of the circle up to it."""
-    tree = waypoint.source.tree
-    kind = _motion(maker, move)
+    kind = _motion(move)
     _, acceleration, speed = _TYPES[kind]
     parameters = waypoint.find("motionParameters")
     own = {} if parameters is None else dict(parameters.attrib)
-    unknown = set(own) - _PARAMETERS - {"reference"}
-    if unknown:
-        raise waypoint.source.unknown(f"motion parameter {min(unknown)!r} of a waypoint")
-    given = [
-        ("a", own.get(acceleration) or move.get("acceleration")),
-        ("v", own.get(speed) or move.get("speed")),
-    ]
+    if unknown := own.keys() - _PARAMETERS:
+        raise waypoint.tree.unknown(f"motion parameter {min(unknown)!r} of a waypoint")
     if "nextMotionTime" in own:
         given = [("t", own["nextMotionTime"])]
+    else:
+        values = own.get(acceleration) or move.get("acceleration"), own.get(speed) or move.get("speed")
+        given = list(zip("av", values, strict=True))
     radius = own.get("blendRadius") or (move.get("blendRadius") or "0.0" if kind == "MoveP" else "")
     if radius:
         given.append(("r", "0.0" if motion.number in maker.last_motions else radius))
-    return ", ".join(
-        f"{letter}={number_text(tree, text, f'{letter} of a waypoint')}" for letter, text in given
-    )
+    texts = [(letter, waypoint.tree.number_text(text, f"{letter} of a waypoint")) for letter, text in given]
+    return ", ".join(f"{letter}={text}" for letter, text in texts)

@@ -11,71 +11,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from itertools import groupby, pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from ur_emulator.program_files import urp_flow, urp_moves, urp_statements
-from ur_emulator.program_files.folder import FoundFile
 from ur_emulator.program_files.installation import Installation
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
 from ur_emulator.program_files.script_writer import Header, Part, ScriptWriter, identifier
 from ur_emulator.program_files.urp_expressions import expression_of, variable_name
-from ur_emulator.program_files.urp_maker import Around, NodeWriter, UrpMaker
-from ur_emulator.program_files.urp_nodes import Node, read_nodes
+from ur_emulator.program_files.urp_maker import Around, NodeKind, UrpMaker
+from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 from ur_emulator.program_files.urp_robotiq import declare_functions
 
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
-
-
-@dataclass(frozen=True, slots=True)
-class NodeKind:
-    """A kind of nodes that stand in programs, and what writes one; `becomes` is what it is in the script."""
-
-    tag: str
-    write: NodeWriter
-    becomes: str
-
-
-_ROWS = (
-    NodeKind("Assignment", urp_statements.write_assignment,
-        "`global v=...`: an expression, or what the operator answers (Boolean, Integer, Float, String)"),
-    NodeKind("CallSubProgram", urp_flow.write_call, "the call of a function, perhaps from another .urp"),
-    NodeKind("CircleMove", urp_moves.write_circle,
-        "`movec` through the first to the second waypoint, `mode=1` for a fixed orientation"),
-    NodeKind("Comment", urp_statements.write_comment, "a comment"),
-    NodeKind("Contributed", urp_statements.write_contributed,
-        "External Control: what a PC sends, see below; the nodes of Robotiq_Grippers"),
-    NodeKind("Folder", urp_flow.write_folder, "its nodes"),
-    NodeKind("Force", urp_moves.write_force, "`force_mode` around its nodes; only the type Frame"),
-    NodeKind("Halt", urp_statements.write_halt, "`halt`"),
-    NodeKind("If", urp_flow.write_if,
-        "`if`, with ElseIf and Else; a condition that is checked continuously ends the thread of its nodes"),
-    NodeKind("Loop", urp_flow.write_loop,
-        "`while`: Forever, Counting with its variable, While; checked continuously as If"),
-    NodeKind("Move", urp_moves.write_move,
-        "a label and its nodes (MoveJ, MoveL, MoveP); `set_tcp` if it names a TCP"),
-    NodeKind("Placeholder", urp_statements.write_nothing, "nothing"),
-    NodeKind("Popup", urp_statements.write_popup,
-        "`popup` of a text, a variable or an expression; one that halts the program does not wait"),
-    NodeKind("SafeHome", urp_moves.write_safe_home,
-        "`movej` to the home position of the installation, or else to that of a new box: arm upright"),
-    NodeKind("Script", urp_statements.write_script,
-        "a line, or the text of a file, read from its path or else from the copy in the node"),
-    NodeKind("Set", urp_statements.write_set, "a digital output, or the active TCP"),
-    NodeKind("Switch", urp_flow.write_switch, "`if`, `elif` and `else` for the default case"),
-    NodeKind("Timer", urp_statements.write_timer, "a variable that a thread counts up while it is started"),
-    NodeKind("Wait", urp_statements.write_wait,
-        "`sleep`, or a loop until a line has a level or a condition holds"),
-    NodeKind("Waypoint", urp_moves.write_waypoint,
-        "`movej`, `movel` or `movep`: Fixed, Variable (also a feature), Relative; own speeds, blend or time"),
-    NodeKind("gui.program.direction.MoveDirectionNode", urp_moves.write_direction,
-        "a motion in a thread that its `Until` nodes end: a distance, or a contact and a way back"),
-)  # fmt: skip
-
-KINDS: Mapping[str, NodeKind] = MappingProxyType({row.tag: row for row in _ROWS})
+KINDS: Mapping[str, NodeKind] = MappingProxyType(
+    dict(sorted((urp_flow.KINDS | urp_moves.KINDS | urp_statements.KINDS).items()))
+)
 """By tag."""
 
 TOP_KINDS: Mapping[str, str] = MappingProxyType(
@@ -122,12 +72,7 @@ def uses_external_control(tree: XmlTree) -> bool:
 
 
 def make_script(
-    file: FoundFile,
-    tree: XmlTree,
-    reader: ProgramReader,
-    installation: Installation,
-    *,
-    skip_unknown: bool = False,
+    tree: XmlTree, reader: ProgramReader, installation: Installation, *, skip_unknown: bool = False
 ) -> MadeScript:
     """Return the script of a program; the reader reads files that it refers to.
 
@@ -135,11 +80,10 @@ def make_script(
         UnknownNodeError: a node is not known, and must not be skipped.
         ProgramFileError: something in the file is damaged, or a limit is exceeded.
     """
-    program = read_nodes(file, tree, reader)
-    writers = {tag: kind.write for tag, kind in KINDS.items()}
-    maker = UrpMaker(program, installation, reader, writers, skip_unknown)
+    program = ProgramNodes(tree, reader)
+    maker = UrpMaker(program, installation, reader, KINDS, skip_unknown)
     writer, main = maker.writer, program.main
-    name = identifier(tree.root.get("name") or file.inside.stem)
+    name = identifier(tree.root.get("name") or tree.file.inside.stem)
     # Parts are written in the order of their numbers, so that declarations come in the order of first use.
     with writer.block(f"def {name}():"):
         writer.parts.append(Header())
@@ -147,18 +91,14 @@ def make_script(
         with _part(writer) as before:
             if program.before_start is not None:
                 _write_section(maker, program.before_start, "BeforeStart")
-        with _part(writer) as body:
-            if main.get("runOnlyOnce") == "true":
-                _write_section(maker, main, "Robot Program")
-            else:
-                with writer.block("while (True):"):
-                    _write_section(maker, main, "Robot Program", is_loop=True)
+        with _part(writer) as body, maker.repeated(main):
+            _write_section(maker, main, "Robot Program", is_loop=main.get("runOnlyOnce") != "true")
         with _part(writer) as others:
             _write_threads(maker, program.others)
         with _part(writer) as functions:
-            for sub_program in program.sub_programs:
-                with writer.block(f"def {sub_program.name}():"):
-                    _write_section(maker, sub_program.node, sub_program.name, mark="noBreak")
+            for function, node in program.sub_programs:
+                with writer.block(f"def {function}():"):
+                    _write_section(maker, node, function, mark="noBreak")
         written = (*writer.parts, *functions, *before, *others, *body)
         if installation.grippers.is_there and any("rq_" in part for part in written if isinstance(part, str)):
             declare_functions(maker)
@@ -201,35 +141,28 @@ def _write_section(maker: UrpMaker, node: Node, name: str, *, is_loop: bool = Fa
 
 def _write_threads(maker: UrpMaker, nodes: Sequence[Node]) -> None:
     events = [node for node in nodes if node.kind == "Event"]
+    for event in events:
+        maker.last_motions |= _last_motions(event, is_loop=False)
     for node in nodes:
         if node.kind == "Thread":
             maker.last_motions |= _last_motions(node, is_loop=node.get("runOnlyOnce") != "true")
             urp_flow.write_thread(maker, node, Around())
         elif node.kind != "Event":
             maker.write(node, Around())
-    for event in events:
-        maker.last_motions |= _last_motions(event, is_loop=False)
-    if events:
-        urp_flow.write_events(maker, events, Around())
+    urp_flow.write_events(maker, events, Around())
 
 
 def _write_first_values(maker: UrpMaker) -> None:
     """Write the values that variables have before anything else; they stand with the names."""
     program = maker.program
-    for element in program.source.tree.root.iter():
-        first = element.find("initializeExpression")
-        if first is not None and len(first):
-            maker.try_to(program.main, partial(_declare_first_value, maker, element, first))
-    for variable in () if program.variables is None else program.variables:
-        given = variable.find("expression")
-        if given is not None and len(given):
-            maker.try_to(program.main, partial(_declare_first_value, maker, variable, given))
-
-
-def _declare_first_value(maker: UrpMaker, variable: Element, value: Element) -> None:
-    name = variable_name(maker.program.main, variable)
-    expression = expression_of(maker, maker.program.main, value)
-    maker.declare(f"first value of {name}", f"global {name}={expression.script}")
+    values = [(one, one.find("initializeExpression")) for one in program.tree.root.iter()]
+    values += [(one, one.find("expression")) for one in program.variables]
+    for variable, value in values:
+        if value is not None and len(value):
+            with maker.leaving_out(program.main):
+                name = variable_name(program.main, variable)
+                expression = expression_of(maker, program.main, value)
+                maker.declare(f"first value of {name}", f"global {name}={expression.script}")
 
 
 def _write_timers(maker: UrpMaker) -> None:

@@ -8,7 +8,6 @@ import math
 from importlib import resources
 
 from ur_emulator.program_files.installation import GripperCalibration
-from ur_emulator.program_files.reader import number
 from ur_emulator.program_files.urp_maker import Around, UrpMaker
 from ur_emulator.program_files.urp_nodes import Node
 
@@ -44,12 +43,11 @@ def write_gripper_node(maker: UrpMaker, node: Node, around: Around) -> None:
         case "Gripper Activate":
             reset = node.data.get("ResetAndActivateKey") == "true"
             label = f"Gripper {'Reset and ' if reset else ''}Activate"
-            maker.writer.label(node.number, label, around.mark)
-            maker.writer.add("rq_init()", f"rq_activate_all_grippers({reset})")
+            maker.put(node, around, label, "rq_init()", f"rq_activate_all_grippers({reset})")
         case "Grip Check":
             _write_check(maker, node, around)
         case kind:
-            raise node.source.unknown(f"a node {kind!r} of the URCap {ROBOTIQ!r}")
+            raise node.tree.unknown(f"a node {kind!r} of the URCap {ROBOTIQ!r}")
 
 
 def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
@@ -64,7 +62,7 @@ def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
         motion = f"Move{_rounded(percents[0])}%"
     else:
         motion = f"Move{_rounded(calibration.width(percents[0]))}mm"
-    writer.label(node.number, f"Gripper {motion} ({', '.join(map(str, grippers))})", around.mark)
+    maker.put(node, around, f"Gripper {motion} ({', '.join(map(str, grippers))})")
     for n in grippers:
         with writer.block(f"if not(gripper_connected[{n - 1}]):"):
             writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, True)')
@@ -81,7 +79,7 @@ def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
     writer, data, (n, *others) = maker.writer, node.data, _grippers(node, "GripperIdKey")
     branches = {child.get("strategyProgramNodeType"): child for child in node.children}
     if branches.keys() != {"If", "Else"} or others:
-        raise node.source.undefined("a Grip Check node needs one gripper, an If and an Else")
+        raise node.tree.undefined("a Grip Check node needs one gripper, an If and an Else")
     detects = data.get("ObjectDetectedKey", "true") == "true"
     label = "If object detected" if detects else "If object not detected"
     condition = f'{"" if detects else "not "}rq_is_object_detected("{n}")'
@@ -90,7 +88,7 @@ def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
         middle, more, less = (_percent(node, key) * 2.55 for key in keys)
         label, position = "If grip validated", f'rq_current_pos("{n}")'
         condition += f" and {position} >= {middle - less:.2f} and {position} <= {middle + more:.2f}"
-    writer.label(node.number, "Grip Check", around.mark)
+    maker.put(node, around, "Grip Check")
     writer.label(branches["If"].number, label + " " * 10, "noBreak")
     with writer.branch(f"if ({condition}):"):
         maker.write_children(branches["If"], around)
@@ -104,16 +102,16 @@ def _grippers(node: Node, key: str) -> list[int]:
     names = (node.data.get(key, "").strip("[] ") or "9").split(",")
     numbers = [_NUMBERS.get(name.strip()) for name in names]
     if None in numbers or len({*numbers}) < len(numbers):
-        raise node.source.unknown(f"a node of the grippers {','.join(names)[:100]!r}")
+        raise node.tree.unknown(f"a node of the grippers {','.join(names)[:100]!r}")
     return [number for number in numbers if number is not None]
 
 
 def _percent(node: Node, *keys: str) -> float:
     """Return the value under the first of the keys that is there [%]; UndefinedError without one."""
     text = next((node.data[key] for key in keys if key in node.data), None)
-    value = number(node.source.tree, text, f"{keys[-1]} of a {node.get('strategyProgramNodeType')} node")
+    value = node.tree.number(text, f"{keys[-1]} of a {node.get('strategyProgramNodeType')} node")
     if not 0.0 <= value <= 100.0:
-        raise node.source.undefined(f"{keys[-1]} is {value:g} %: use 0 to 100")
+        raise node.tree.undefined(f"{keys[-1]} is {value:g} %: use 0 to 100")
     return value
 
 

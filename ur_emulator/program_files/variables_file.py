@@ -21,8 +21,8 @@ SUFFIX = ".variables"
 _DECIMALS = 5
 _MOST_ITEMS, _DEEPEST = 64, 1
 _ROOT = "InstallationVariables"
-# A key, then the first `=` or `:` that is not escaped. Source: java.util.Properties.
-_PROPERTY = re.compile(r"\s*((?:\\.|[^\\=:\s])+)\s*[=:]\s*(.*)")
+# A key, then the first `=` or `:` that is not escaped; no comment. Source: java.util.Properties.
+_PROPERTY = re.compile(r"\s*(?![\s#!])((?:\\.|[^\\=:\s])+)\s*[=:]\s*(.*)")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|(.))")
 _CONTROLS = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
 
@@ -56,7 +56,7 @@ def write_variables(folder: ProgramFolder, installation: str, values: Mapping[st
     raw = folder.read(file, BUDGETS.program_bytes)
     data = unpack(file.name, raw, BUDGETS.program_bytes)
     if data.lstrip().startswith(b"<"):
-        new = _new_xml(ProgramReader(folder).parsed(file.name, data), values)
+        new = _new_xml(ProgramReader(folder).parsed(file, data), values)
     else:
         new = _new_properties(data, values)
     folder.write(file.inside, new if data is raw else gzip.compress(new, mtime=0))
@@ -82,7 +82,7 @@ def literal(value: Any, depth: int = 0) -> str:
 
 
 def _xml_items(reader: ProgramReader, file: FoundFile, data: bytes) -> Iterator[tuple[str, str]]:
-    root = reader.parsed(file.name, data).root
+    root = reader.parsed(file, data).root
     if root.tag != _ROOT:
         raise ProgramFileError(f"{file.name} is a <{root.tag}>, not <{_ROOT}>")
     for variable in root.iter("variable"):
@@ -91,8 +91,7 @@ def _xml_items(reader: ProgramReader, file: FoundFile, data: bytes) -> Iterator[
 
 def _properties(data: bytes) -> Iterator[tuple[str, str]]:
     for line in data.decode("latin-1").splitlines():
-        match = _PROPERTY.fullmatch(line)
-        if match and not line.lstrip().startswith(("#", "!")):
+        if match := _PROPERTY.fullmatch(line):
             yield _unescaped(match[1]), _unescaped(match[2]).strip()
 
 
@@ -113,19 +112,13 @@ def _new_xml(tree: XmlTree, values: Mapping[str, str]) -> bytes:
 def _new_properties(data: bytes, values: Mapping[str, str]) -> bytes:
     lines: list[str] = []
     for line in data.decode("latin-1").splitlines():
-        match = None if line.lstrip().startswith(("#", "!")) else _PROPERTY.fullmatch(line)
+        match = _PROPERTY.fullmatch(line)
         name = _unescaped(match[1]) if match else ""
         lines.append(f"{name}={_escaped(values[name])}" if name in values else line)
     return "".join(f"{line}\n" for line in lines).encode("latin-1")
 
 
 def _escaped(text: str) -> str:
-    return "".join(
-        char if char.isascii() and char != "\\" else "".join(f"\\u{unit:04x}" for unit in _utf_16(char))
-        for char in text
-    )
-
-
-def _utf_16(char: str) -> Iterator[int]:
-    data = char.encode("utf-16-be", "replace")
-    return (int.from_bytes(data[i : i + 2]) for i in range(0, len(data), 2))
+    data = text.encode("utf-16-be", "replace")
+    units = (int.from_bytes(data[i : i + 2]) for i in range(0, len(data), 2))
+    return "".join(chr(unit) if unit < 128 and unit != ord("\\") else f"\\u{unit:04x}" for unit in units)

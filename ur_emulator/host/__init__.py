@@ -1,0 +1,1 @@
+"""What feeds the machine: sockets, clocks, threads and files; boxes and racks."""

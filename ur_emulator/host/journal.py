@@ -1,0 +1,151 @@
+"""The journal of a box: the inputs of each cycle, and check sums of what the cycle gave.
+
+A journal is a file of lines in JSON. The first says which box it is; each other one is a cycle: its number
+`t`, its inputs `i` if there were any, and `d`, the check sums that have changed (`machine.records.Digest`).
+It is only appended to, and can be read after its process was killed (`host.replay`).
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from platform import python_version
+from typing import IO, Any, Final
+
+from ur_emulator.budgets import BUDGETS
+from ur_emulator.errors import EmulatorError
+from ur_emulator.host.box_options import BoxOptions
+from ur_emulator.host.pacing import Pace
+from ur_emulator.machine.machine import Answer, Input
+from ur_emulator.machine.records import Digest, RecordError, to_plain
+
+FORMAT: Final = 1
+# What a box computes with: other versions may give other figures.
+_COMPUTES: Final = ("ur-hil", "mujoco", "numpy", "lark")
+# Options that say where a box is served, not what it is.
+_OUTSIDE: Final = frozenset(
+    {"host", "port_base", "programs", "control_port", "control_token", "generation", "journal"}
+)
+# Options that may name files, whose text goes into the journal.
+FILES: Final = ("robot", "fidelity", "tool", "scene")
+
+
+class JournalError(EmulatorError):
+    """A journal cannot be written, or read."""
+
+
+class Journal:
+    """Writes the journal of one box, in a thread of its own: a slow disk delays no cycle."""
+
+    def __init__(
+        self, path: Path, options: BoxOptions, report: Callable[[str], None], *, waits: bool
+    ) -> None:
+        """Open the file and write the first line.
+
+        Args:
+            report: writes into the log of the box that cycles were lost.
+            waits: a cycle waits when too many others are not written yet (lockstep); otherwise it is lost.
+
+        Raises:
+            JournalError: the file cannot be written.
+        """
+        try:
+            self._file: IO[str] = path.open("w", encoding="utf-8")
+            self._file.write(json.dumps(_header(options)) + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise JournalError(f"journal {path} given: {error.strerror}") from None
+        self._path = path
+        self._report = report
+        self._waits = waits
+        self._cycles: deque[tuple[int, Sequence[Input], Answer | None]] = deque()
+        self._lost = 0
+        self._has_work = threading.Event()
+        self._is_closed = False
+        self._digest = Digest()
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
+
+    def write(self, inputs: Sequence[Input], answer: Answer) -> None:
+        """Take a cycle; in the thread of the loop."""
+        while self._waits and len(self._cycles) >= BUDGETS.journal_cycles and self._thread.is_alive():
+            time.sleep(0.001)
+        if len(self._cycles) >= BUDGETS.journal_cycles:
+            if not self._lost:
+                self._report(f"the journal {self._path} has a gap: cycles come faster than they are written")
+            self._lost += 1
+            return
+        if self._lost:
+            self._cycles.append((self._lost, (), None))
+            self._lost = 0
+        self._cycles.append((answer.snapshot.tick, inputs, answer))
+        if len(self._cycles) == 1:
+            self._has_work.set()
+
+    def close(self) -> None:
+        """Write what waits, and close the file; harmless if that was done."""
+        self._is_closed = True
+        self._has_work.set()
+        self._thread.join()
+        self._file.close()
+
+    def _run(self) -> None:
+        while not (self._is_closed and not self._cycles):
+            self._has_work.wait()
+            self._has_work.clear()
+            try:
+                while self._cycles:
+                    self._file.write(self._line(*self._cycles[0]) + "\n")
+                    self._cycles.popleft()
+                self._file.flush()
+            except OSError as error:
+                self._report(f"the journal {self._path} ends here: {error.strerror}")
+                return
+
+    def _line(self, number: int, inputs: Sequence[Input], answer: Answer | None) -> str:
+        if answer is None:
+            return json.dumps({"lost": number})
+        line: dict[str, Any] = {"t": number}
+        if inputs:
+            try:
+                line["i"] = [to_plain(one) for one in inputs]
+            except RecordError as error:
+                line["unknown"] = str(error)
+        if changes := self._digest.changes(answer):
+            line["d"] = changes.hex()
+        return json.dumps(line, separators=(",", ":"))
+
+
+def _header(options: BoxOptions) -> dict[str, Any]:
+    """Return what says which box this is; JournalError if that cannot be written down."""
+    if options.generation is not None:
+        raise JournalError("a box of a generation of one's own keeps no journal")
+    given = {field.name: getattr(options, field.name) for field in fields(options)}
+    box = {name: value for name, value in given.items() if name not in _OUTSIDE}
+    box = {name: list(value) if name == "services" else value for name, value in box.items()}
+    box = {name: str(value) if isinstance(value, Path) else value for name, value in box.items()}
+    box["pace"] = Pace(box["pace"]).value
+    files = {
+        word: Path(word).read_text(encoding="utf-8")
+        for name in FILES
+        for word in str(box[name]).split(",")
+        if word.endswith((".toml", ".xml"))
+    }
+    return {"journal": FORMAT, "box": box, "files": files, "made_with": versions()}
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what a box computes with."""
+    found = {"python": python_version()}
+    for name in _COMPUTES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

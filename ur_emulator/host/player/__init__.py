@@ -1,0 +1,1 @@
+"""What the screen of a box does with programs: the one that is loaded, External Control."""

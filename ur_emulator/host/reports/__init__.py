@@ -1,0 +1,1 @@
+"""Reports that the screen of a box writes into files."""

@@ -1,0 +1,1 @@
+"""Event loop, connections, worker processes, memory: nothing of robots."""

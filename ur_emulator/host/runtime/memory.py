@@ -1,0 +1,196 @@
+"""Memory of a process with boxes: how much it holds, who pays for it, and when garbage is collected.
+
+A process that only serves boxes is watched: what it holds beyond what it had when it began, with its worker
+processes, is one total (`memory` of the budgets), measured where the system tells it (Linux). When there is
+too much, the programs of the box, or the task, that made it grow most end. The system's own limit stands
+behind that. Such a process also decides when the garbage collector runs: between cycles, and never over more
+than what is new, unless no program runs.
+
+A process of the user keeps its collector and its limits.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import resource
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Protocol
+
+from ur_emulator.budgets import BUDGETS, MIB
+from ur_emulator.machine.commands.programs import EndPrograms
+
+if TYPE_CHECKING:
+    from ur_emulator.machine.controller.command import Command
+    from ur_emulator.machine.controller.program_runner import ProgramRunner
+    from ur_emulator.machine.machine import Machine
+
+# In a process of the user: collect rarely, a full collection over a large heap costs more than a cycle has to
+# spare; and let threads take short turns, one with long work shares the interpreter with the loop.
+_RARELY = (50_000, 20, 100)
+_SWITCH_INTERVAL = 1e-4  # s
+# Objects that are new when the collector looks at them [1]: so many take a fifth of a millisecond.
+_NEW = 2_000
+# The same where few objects are long [bytes]: the collector looks at all elements of new lists, half a
+# millisecond for a MiB.
+_GROWN = 2 * MIB
+# Generation of the collector with all objects.
+_ALL = 2
+# How often the memory is measured [s]: a program makes 5 MiB in that time.
+_PERIOD = 0.01
+# What is given back when no program runs [bytes]: less is not worth the time.
+_WORTH_IT = 8 * MIB
+# Between the limit of the watch and that of the system [bytes]: a single statement makes less.
+_MARGIN = 64 * MIB
+# `M_MMAP_THRESHOLD` of mallopt(3): longer blocks go back to the system when they are freed [bytes].
+_MMAP_THRESHOLD, _LONG_BLOCK = -3, 64 * 1024
+_PAGE = resource.getpagesize()
+
+_lock = threading.Lock()
+_running_loops = 0
+_before = (gc.get_threshold(), sys.getswitchinterval())
+
+
+@contextmanager
+def loop_settings() -> Iterator[None]:
+    """Collect rarely and switch threads often in this block, in a process of the user.
+
+    Blocks of several loops may overlap. When the last one ends, the settings are again what they were before
+    the first.
+    """
+    global _running_loops, _before
+    with _lock:
+        if not _running_loops:
+            _before = (gc.get_threshold(), sys.getswitchinterval())
+        _running_loops += 1
+        gc.set_threshold(*_RARELY)
+        sys.setswitchinterval(_SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        with _lock:
+            _running_loops -= 1
+            if not _running_loops:
+                thresholds, interval = _before
+                gc.set_threshold(*thresholds)
+                sys.setswitchinterval(interval)
+
+
+def own_process() -> None:
+    """Take over the collector and the limits of a process that only serves boxes; all of them exist."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    with suppress(OSError, AttributeError):  # long blocks go back when they are freed, where that can be set
+        ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _LONG_BLOCK)
+    with suppress(OSError, ValueError), open("/proc/self/statm", "rb") as file:
+        limit = int(file.read().split()[5]) * _PAGE + BUDGETS.memory + _MARGIN
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, resource.getrlimit(resource.RLIMIT_DATA)[1]))
+
+
+def resident(process: int | str = "self") -> int:
+    """Return what a process has in memory [bytes]; 0 where the system does not tell."""
+    try:
+        with open(f"/proc/{process}/statm", "rb") as file:
+            return int(file.read().split()[1]) * _PAGE
+    except OSError:
+        return 0
+
+
+def is_stopped(process: int) -> bool:
+    """Return whether a process is stopped, as by SIGSTOP; False where the system does not tell."""
+    try:
+        with open(f"/proc/{process}/stat", "rb") as file:
+            return file.read().rpartition(b") ")[2][:1] == b"T"
+    except OSError:
+        return False
+
+
+class Tasks(Protocol):
+    """What worker processes do, for the watch."""
+
+    def memory(self) -> int:
+        """Return what they hold beyond what they began with [bytes]."""
+        ...
+
+    def end_for_memory(self) -> None:
+        """End the task that holds most."""
+        ...
+
+
+class Box(Protocol):
+    """A box whose programs hold memory."""
+
+    machine: Machine
+
+    def submit_quietly(self, command: Command) -> None:
+        """Take a command for the next cycle."""
+        ...
+
+
+class MemoryWatch:
+    """Watches the memory of a process that only serves boxes."""
+
+    def __init__(self, tasks: Tasks) -> None:
+        self._tasks = tasks
+        self._at_rest = self._now = self._collected = resident()
+        # What it holds when nothing can be given back.
+        self._floor = 0
+        # How much each box has made it grow since it held half of what is allowed.
+        self._grown: dict[Box, int] = {}
+        # The box whose programs had to end last, until what they held is given back.
+        self._ended: Box | None = None
+        self._next_look = 0.0
+
+    def look(self, box: Box, now: float) -> None:
+        """Measure, after a cycle of a box; let pay who must."""
+        if gc.get_count()[0] > _NEW or self._now - self._collected > _GROWN:
+            gc.collect(1)
+            self._collected = self._now
+        if now < self._next_look or any(_programs(one).is_releasing for one in (box, *self._grown)):
+            return
+        if self._ended is not None:
+            if self._ended is not box:
+                return  # its next cycle ends them
+            self._give_back(box)
+            self._ended = None
+        before, self._now = self._now, resident()
+        self._collected = min(self._collected, self._now)
+        held = self._now - self._at_rest
+        if 2 * held < BUDGETS.memory:
+            self._next_look = now + _PERIOD
+            self._grown.clear()
+            if held - self._floor > _WORTH_IT and not _programs(box).is_any_running:
+                self._give_back(box)
+            held = max(0, held)
+        else:
+            self._grown[box] = self._grown.get(box, 0) + self._now - before
+        tasks = self._tasks.memory()
+        if held + tasks > BUDGETS.memory:
+            self._end_somebody(held, tasks)
+
+    def _end_somebody(self, held: int, tasks: int) -> None:
+        if tasks > held:
+            self._tasks.end_for_memory()
+            return
+        box = max(self._grown, key=lambda one: (_programs(one).is_any_running, self._grown[one]))
+        text = f"the program was ended: box and programs hold more than {BUDGETS.memory // MIB} MiB of memory"
+        box.submit_quietly(EndPrograms(text))
+        self._ended = box
+
+    def _give_back(self, box: Box) -> None:
+        """Give back what programs held that have ended."""
+        box.machine.forget_ended()
+        gc.collect(_ALL)
+        with suppress(OSError, AttributeError):  # only some systems can
+            ctypes.CDLL(None).malloc_trim(0)
+        self._grown.clear()
+        self._now = resident()
+        self._floor = self._now - self._at_rest
+
+
+def _programs(box: Box) -> ProgramRunner:
+    return box.machine.controller.programs

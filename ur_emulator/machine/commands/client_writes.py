@@ -1,0 +1,32 @@
+"""Commands of clients that write: input variables of RTDE, the robot's Modbus map."""
+
+from dataclasses import dataclass
+
+from protocol.rtde.types import RtdeValue
+from ur_emulator.machine.controller.command import BoxParts
+from ur_emulator.machine.controller.modbus_map import write_range
+
+
+@dataclass(frozen=True, slots=True)
+class WriteInputs:
+    """Write input variables of RTDE: pairs of name and value, in order; see `protocol.rtde.fields.INPUTS`."""
+
+    values: tuple[tuple[str, RtdeValue], ...]
+
+    def apply(self, box: BoxParts) -> None:
+        box.state.client_inputs.write(self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class WriteModbus:
+    """Write neighbouring addresses of the robot's Modbus map; what cannot be written is left out.
+
+    The values are 0 or 1 for coils, 0 to 65535 for registers; `first` is the lowest address.
+    """
+
+    is_coils: bool
+    first: int
+    values: tuple[int, ...]
+
+    def apply(self, box: BoxParts) -> None:
+        write_range(box.state, self.is_coils, self.first, self.values)

@@ -1,0 +1,80 @@
+"""Things around an arm that can be moved, as people put them there and as they are now; shapes; contacts."""
+
+from dataclasses import dataclass
+
+from ur_emulator.machine.models.robot_model import Vector3, Vector6
+
+# What the sizes of each shape mean, in order [m]. A plane has no end; its z points away from it.
+SIZES: dict[str, tuple[str, ...]] = {
+    "box": ("edge along x", "edge along y", "edge along z"),
+    "sphere": ("radius",),
+    "capsule": ("radius", "length along z without the ends"),
+    "plane": (),
+    "cylinder": ("radius", "length along z"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """A body that can be moved.
+
+    Attributes:
+        shape: "box", "cylinder" (along z) or "sphere".
+        size: three edges; radius and length; radius [m].
+        mass: evenly distributed [kg].
+        friction: coefficient of its surface; of two surfaces the greater counts, of a tool's pads their own.
+        pose: of its middle in the base frame [m, rad].
+    """
+
+    name: str
+    shape: str
+    size: tuple[float, ...]
+    mass: float
+    friction: float
+    pose: Vector6
+
+
+@dataclass(frozen=True, slots=True)
+class ThingState:
+    """Where a thing is now: pose in the base frame [m, rad], linear and angular velocity [m/s, rad/s]."""
+
+    pose: Vector6
+    twist: Vector6
+    touches_tool: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BodyShape:
+    """A shape around the arm, or on its flange, for those who draw it; the links of the arm are none.
+
+    Attributes:
+        name: of the body that it is a part of: a tool, an obstacle, a thing, "table" or "scene"; of a plane.
+        is_carried: it hangs on the flange.
+        shape: "box" (also around a mesh), "cylinder" or "capsule" (along z), "sphere", "plane" (z points away
+            from it) or "safety plane" (z points to the allowed side).
+        size: three edges; radius and length, of a capsule without its ends; radius [m].
+        pose: of its middle in the base frame, of one that is carried in the flange frame [m, rad].
+    """
+
+    name: str
+    is_carried: bool
+    shape: str
+    size: tuple[float, ...]
+    pose: Vector6
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A point in which two bodies press on each other.
+
+    Attributes:
+        first: name of a body: of a link, a tool, an obstacle, a thing, "table", "base" or "scene".
+        second: likewise.
+        position: in the base frame [m].
+        force: on the second body, in the base frame [N].
+    """
+
+    first: str
+    second: str
+    position: Vector3
+    force: Vector3

@@ -1,1 +1,0 @@
-"""What the screen of a box does: the loaded program, start-up, reports for people."""
