@@ -21,6 +21,7 @@ from ur_emulator.machine.commands import client_writes, grippers, power, program
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.generations import CB3
 from ur_emulator.machine.models.robots import robot_by_name
+from ur_emulator.machine.plant.arm_plant import FlangePush
 from ur_emulator.machine.records import RECORDS, RecordError, to_input, to_plain
 from ur_emulator.machine.scripting import network
 from urscript import compile_program
@@ -225,6 +226,26 @@ def test_a_journal_is_read_after_its_process_was_killed(file):
     assert_identical(file, 18)
     file.write_text(file.read_text()[:-7])  # a line that was cut off
     assert_identical(file, 17)
+
+
+def test_an_error_that_has_ended_a_box_is_met_again(file, monkeypatch):
+    def broken(push):
+        raise ZeroDivisionError("broken")
+
+    def session():
+        with kept(file, in_process=True) as box:
+            box.push((1, 0, 0), duration=0.1)
+            while box.failure is None:
+                pass
+
+    monkeypatch.setattr(FlangePush, "step", broken)
+    with pytest.raises(ZeroDivisionError):
+        session()
+    found = replay(file)
+    assert found.difference is None
+    assert "ends with an error, as it did then: ZeroDivisionError('broken')" in found.notes[-1]
+    monkeypatch.undo()
+    assert replay(file).difference.fields == ("the error that has ended it",)
 
 
 def test_a_gap_ends_the_replay(session):

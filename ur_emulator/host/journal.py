@@ -64,16 +64,18 @@ class Journal:
         self._path = path
         self._report = report
         self._waits = waits
-        self._cycles: deque[tuple[int, Sequence[Input], Answer | None]] = deque()
-        self._lost = 0
+        # Number, inputs and answer of each cycle; without inputs: so many cycles are lost.
+        self._cycles: deque[tuple[int, Sequence[Input] | None, Answer | None]] = deque()
+        self._tick = self._lost = 0
         self._has_work = threading.Event()
         self._is_closed = False
         self._digest = Digest()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
-    def write(self, inputs: Sequence[Input], answer: Answer) -> None:
-        """Take a cycle; in the thread of the loop."""
+    def write(self, inputs: Sequence[Input], answer: Answer | None) -> None:
+        """Take a cycle, in the thread of the loop; one that an error has ended has no answer."""
+        self._tick = self._tick + 1 if answer is None else answer.snapshot.tick
         while self._waits and len(self._cycles) >= BUDGETS.journal_cycles and self._thread.is_alive():
             time.sleep(0.001)
         if len(self._cycles) >= BUDGETS.journal_cycles:
@@ -82,9 +84,9 @@ class Journal:
             self._lost += 1
             return
         if self._lost:
-            self._cycles.append((self._lost, (), None))
+            self._cycles.append((self._lost, None, None))
             self._lost = 0
-        self._cycles.append((answer.snapshot.tick, inputs, answer))
+        self._cycles.append((self._tick, inputs, answer))
         if len(self._cycles) == 1:
             self._has_work.set()
 
@@ -104,12 +106,12 @@ class Journal:
                     self._file.write(self._line(*self._cycles[0]) + "\n")
                     self._cycles.popleft()
                 self._file.flush()
-            except OSError as error:
-                self._report(f"the journal {self._path} ends here: {error.strerror}")
+            except Exception as error:  # of the disk, or ours
+                self._report(f"the journal {self._path} ends here: {error}")
                 return
 
-    def _line(self, number: int, inputs: Sequence[Input], answer: Answer | None) -> str:
-        if answer is None:
+    def _line(self, number: int, inputs: Sequence[Input] | None, answer: Answer | None) -> str:
+        if inputs is None:
             return json.dumps({"lost": number})
         line: dict[str, Any] = {"t": number}
         if inputs:
@@ -117,7 +119,9 @@ class Journal:
                 line["i"] = [to_plain(one) for one in inputs]
             except RecordError as error:
                 line["unknown"] = str(error)
-        if changes := self._digest.changes(answer):
+        if answer is None:
+            line["error"] = True
+        elif changes := self._digest.changes(answer):
             line["d"] = changes.hex()
         return json.dumps(line, separators=(",", ":"))
 

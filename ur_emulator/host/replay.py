@@ -16,6 +16,7 @@ from typing import Any
 from ur_emulator.host.box import Choice
 from ur_emulator.host.box_options import BoxOptions
 from ur_emulator.host.journal import FILES, FORMAT, JournalError, versions
+from ur_emulator.host.runtime.barrier import describe_error
 from ur_emulator.machine.machine import Answer, Machine
 from ur_emulator.machine.records import FIELDS, Digest, RecordError, to_input
 from urscript.catalogue import Catalogue
@@ -39,7 +40,7 @@ class Replay:
         real_time: that it took [s].
         difference: the first one; None if there is none.
         end: why it ended before the end of the journal, "" if it did not.
-        notes: other versions than those that the journal was made with.
+        notes: other versions than those that the journal was made with, and an error that was met again.
     """
 
     cycles: int
@@ -75,6 +76,11 @@ def replay(path: Path, until: float | None = None) -> Replay:
     digest = Digest()
     first = machine.controller.snapshot.timestamp
     begin, cycles, difference, end = time.perf_counter(), 0, None, ""
+    notes = [
+        f"made with {name} {was}, replayed with {now}"
+        for name, was in header.get("made_with", {}).items()
+        if (now := versions().get(name, "none")) != was
+    ]
     for line in lines:
         if "t" not in line or "unknown" in line:
             end = line.get("unknown") or f"the journal has a gap of {line.get('lost')} cycles"
@@ -84,9 +90,16 @@ def replay(path: Path, until: float | None = None) -> Replay:
         except RecordError as error:
             end = str(error)
             break
-        answer = machine.tick(inputs)
+        try:
+            answer = machine.tick(inputs)
+        except Exception as error:
+            if "error" not in line:
+                raise
+            notes.append(f"cycle {line['t']} ends with an error, as it did then: {describe_error(error)}")
+            cycles += 1
+            break
         changes = digest.changes(answer)
-        if answer.snapshot.tick != line["t"] or changes.hex() != line.get("d", ""):
+        if "error" in line or answer.snapshot.tick != line["t"] or changes.hex() != line.get("d", ""):
             difference = Difference(line["t"], _differing(answer, changes, line))
             break
         cycles += 1
@@ -98,11 +111,7 @@ def replay(path: Path, until: float | None = None) -> Replay:
         time.perf_counter() - begin,
         difference,
         end,
-        tuple(
-            f"made with {name} {was}, replayed with {now}"
-            for name, was in header.get("made_with", {}).items()
-            if (now := versions().get(name, "none")) != was
-        ),
+        tuple(notes),
     )
 
 
@@ -147,6 +156,8 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
 
 def _differing(answer: Answer, changes: bytes, line: dict[str, Any]) -> tuple[str, ...]:
     """Return the names of the fields that are not as in a line."""
+    if "error" in line:
+        return ("the error that has ended it",)
     if answer.snapshot.tick != line["t"]:
         return ("tick",)
     now, then = (

@@ -81,7 +81,8 @@ class ServedBox:
         machine: the box without its ports.
         controller: its parts; ports read them and never change them.
         network: carries out what scripts want of the outside; set before the box runs.
-        keep: called with inputs and answer of each cycle, for a journal; None without one.
+        keep: called with inputs and answer of each cycle, for a journal; None without one. A cycle that an
+            error has ended has no answer.
         identity: names and numbers by which clients know the box.
         steps: advances what takes several cycles; the last of the publishers.
         log: programs, errors, modes, text messages, clients.
@@ -107,7 +108,7 @@ class ServedBox:
         self._loop = loop
         self.log = BoxLog(self.controller.generation)
         self.network: LoopNetwork | None = None
-        self.keep: Callable[[Sequence[Input], Answer], None] | None = None
+        self.keep: Callable[[Sequence[Input], Answer | None], None] | None = None
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._has_noted_input = False
@@ -402,10 +403,13 @@ class ServedBox:
         inputs: list[Input] = [command for command, _ in commands]
         if commands:
             self._quiet, self._commands, self._is_urged = [], {}, False
-        answer = self.machine.tick(inputs)
-        if self.keep is not None:
-            self.keep((*self._arrived, *inputs), answer)
-            self._arrived = []
+        answer = None
+        try:
+            answer = self.machine.tick(inputs)
+        finally:
+            if self.keep is not None:
+                self.keep((*self._arrived, *inputs), answer)
+                self._arrived = []
         for (_, done), (result, error) in zip(commands, answer.outcomes, strict=True):
             done(result, error)
         if answer.requests and self.network is not None:
