@@ -1,6 +1,6 @@
 """From the text of a program, or from its file, to a program that can be started.
 
-It takes longer than a cycle: these functions run in the worker process (`loop.worker`), and all
+It takes longer than a cycle: these functions run in the worker process (`host.runtime.worker`), and all
 that goes in and comes out can be pickled.
 """
 

@@ -1,4 +1,4 @@
-"""Operations that take no cycle or several, done in steps (see `loop.steps`).
+"""Operations that take no cycle or several, done in steps (see `host.steps`).
 
 They read the box, wait for it, do something at a time, run a program. The command line loads this module for
 their parameters: nothing heavy at its top.

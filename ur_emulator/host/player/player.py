@@ -1,6 +1,6 @@
 """The program that is loaded, and what the buttons of PolyScope do with it: load, play, pause, stop.
 
-Every action is done in steps (see `loop.steps`). What cannot be done is refused, and the log says why. When
+Every action is done in steps (see `host.steps`). What cannot be done is refused, and the log says why. When
 the box is switched on, the default installation of its folder says what is loaded and started.
 """
 

@@ -61,7 +61,7 @@ def word_command(item: ControlLine) -> Command | str | None:
 _PROGRAM_COST = 2 * KIB
 
 
-# Without a text of their own: each holds all others.
+# No `repr`: a sender and its programs refer to each other.
 @dataclass(eq=False, repr=False, slots=True)
 class Sender:
     """A client that sends scripts.
