@@ -160,7 +160,9 @@ def test_a_long_way_is_gone_to_its_end(followed, monkeypatch):
     until(lambda: hands.goal is None, "the end")
     assert at(box, goal)
     # The follower has seen it on its own stream; that of the robot and the list of clients come later.
-    until(lambda: (robot.values["runtime_state"], rtde_clients(box)) == (1, 1), "the end of program and client")
+    until(
+        lambda: (robot.values["runtime_state"], rtde_clients(box)) == (1, 1), "the end of program and client"
+    )
 
 
 def test_no_goal_is_lost_while_a_follower_ends(followed, monkeypatch):
