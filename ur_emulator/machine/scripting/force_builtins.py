@@ -40,6 +40,7 @@ class ForceBuiltins(BuiltinGroup):
         self._force_sense = force_sense
         self._past = past
         self._stiffness = ServoGains.of(arm.robot).kp.tolist()
+        self._servo_frequency = arm.robot.servo_frequency
         self._sensing = arm.robot.generation.force_sensing
 
     def functions(self) -> dict[str, HostFunction]:
@@ -150,7 +151,9 @@ class ForceBuiltins(BuiltinGroup):
         offset = ZERO6 if force_sense.sensor is not None else force_sense.offset(self._past.steady_cycles)
         measure = partial(self._measure, offset)
         compliance.begin_force(
-            force_mode.ForceMode(tool, frame, settings, self._sensing, self._stiffness, measure)
+            force_mode.ForceMode(
+                tool, frame, settings, self._sensing, self._stiffness, self._servo_frequency, measure
+            )
         )
 
     def _measure(self, offset: Vector6) -> force_mode.ArmMeasurement:
