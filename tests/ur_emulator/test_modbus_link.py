@@ -17,7 +17,7 @@ from ur_emulator.host.script_network.modbus_units import (
     TOLERANCE,
     ModbusLink,
 )
-from ur_emulator.machine.controller.io.modbus_signals import (
+from ur_emulator.machine.controller.io.network import (
     DISCONNECTED,
     NO_ANSWER,
     ModbusSignal,

@@ -31,11 +31,11 @@ from ur_emulator.machine.commands.programs import StartProgram, StopProgram
 from ur_emulator.machine.commands.safety import PressEmergencyStop, UnlockProtectiveStop
 from ur_emulator.machine.controller.command import Command, Done, Result
 from ur_emulator.machine.controller.events import Event, LogAdded
+from ur_emulator.machine.controller.io.network import Arrival
 from ur_emulator.machine.controller.safety.modes import MOVING_MODES
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.machine import Answer, Input, Machine
 from ur_emulator.machine.models.robot_generation import Software
-from ur_emulator.machine.scripting.network import Arrival
 from urscript import CompiledProgram
 from urscript.run.waits import Outside
 

@@ -11,17 +11,16 @@ a journal holds and `ur-emulator replay` proves.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from ur_emulator.machine.controller.command import Command, Result, Submitted
 from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.controller.events import Event
+from ur_emulator.machine.controller.io.network import Arrival, Request
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import RobotModel
-from ur_emulator.machine.scripting.network import Arrival, Network, Request
 from ur_emulator.machine.scripting.robot_host import robot_hosts
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
@@ -66,9 +65,8 @@ class Machine:
             scene: what stands around the arm.
             remote_control: clients may command the box (e-Series).
         """
-        self.network = Network()
-        hosts = partial(robot_hosts, network=self.network)
-        self.controller = Controller(robot, fidelity, seed, hosts, version=version, tools=tools)
+        self.controller = Controller(robot, fidelity, seed, robot_hosts, version=version, tools=tools)
+        self.network = self.controller.state.network
         self.controller.state.pendant.set_remote_control(remote_control)
         if scene is not None:
             self.controller.plant.furnish(scene)

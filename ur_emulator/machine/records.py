@@ -16,10 +16,10 @@ from zlib import crc32
 from ur_emulator.errors import EmulatorError
 from ur_emulator.machine.commands import client_writes, grippers, power, programs, safety, surroundings
 from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.controller.io import network
 from ur_emulator.machine.controller.safety import boundaries, inputs, safety_state
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.machine import Answer, Input, Machine
-from ur_emulator.machine.scripting import network
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
 from urscript.compile.interpreter_mode import CompiledStatements, compile_statements

@@ -20,21 +20,19 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.sockets import OutgoingConnection
-from ur_emulator.machine.controller.io.modbus_signals import (
+from ur_emulator.machine.controller.io.network import (
     DISCONNECTED,
     NO_ANSWER,
-    ModbusSignal,
-    SignalType,
-    UnitAddress,
-)
-from ur_emulator.machine.scripting.network import (
     Arrival,
     ForgetSignal,
+    ModbusSignal,
     ReleaseUnit,
     ResetUnit,
     SendToUnit,
     ServeSignal,
     SignalServed,
+    SignalType,
+    UnitAddress,
 )
 
 _READ = {

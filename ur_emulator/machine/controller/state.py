@@ -19,6 +19,7 @@ from ur_emulator.machine.controller.io.configuration import IoConfiguration
 from ur_emulator.machine.controller.io.encoders import Encoders
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.controller.io.modbus_signals import ModbusSignals
+from ur_emulator.machine.controller.io.network import Network
 from ur_emulator.machine.controller.io.registers import MapMemory, Registers
 from ur_emulator.machine.controller.io.watchdogs import Watchdogs
 from ur_emulator.machine.controller.past_cycles import PastCycles
@@ -58,6 +59,7 @@ class ControllerState:
         io_configuration: which inputs act, which outputs follow the program.
         client_inputs: last values of the RTDE inputs that are no registers.
         watchdogs: of the running program over RTDE inputs.
+        network: what programs have outside of the box.
         modbus: signals of other units that programs have added.
         modbus_map: words of the robot's own Modbus map.
         force_sense: zero and history of the wrench.
@@ -92,6 +94,7 @@ class ControllerState:
     client_inputs: ClientInputs
     watchdogs: Watchdogs
     encoders: Encoders
+    network: Network
     modbus: ModbusSignals
     modbus_map: MapMemory
     compliance: Compliance
@@ -121,7 +124,8 @@ def make_state(
     rules = robot.generation.limits
     safety = SafetyState(limits_of(robot), has_programs_in_recovery=rules.has_programs_in_recovery)
     past, tool = PastCycles(clock.generation), ToolSettings()
-    modbus, watchdogs = ModbusSignals(clock.period_s), Watchdogs(clock.period_s)
+    network, watchdogs = Network(), Watchdogs(clock.period_s)
+    modbus = ModbusSignals(clock.period_s, network)
     io_configuration = IoConfiguration(io, registers, modbus)
     has_tool_line = bool(tools) and robot.generation.software(SoftwareVersion(*version)).has_tool_line
     grippers = make_grippers(tools, clock.period_s, has_tool_line)
@@ -152,6 +156,7 @@ def make_state(
         client_inputs=ClientInputs(io, registers, speed, watchdogs, clock),
         watchdogs=watchdogs,
         encoders=Encoders(),
+        network=network,
         modbus=modbus,
         modbus_map=MapMemory(version),
         compliance=Compliance(motion, mode, safety, operational, io_configuration, past, robot),

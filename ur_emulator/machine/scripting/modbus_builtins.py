@@ -16,18 +16,16 @@ from ur_emulator.machine.controller import modbus_map
 from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.io.configuration import IoConfiguration
 from ur_emulator.machine.controller.io.lines import RunState
-from ur_emulator.machine.controller.io.modbus_signals import (
+from ur_emulator.machine.controller.io.modbus_signals import MAX_SIGNALS, ModbusSignals
+from ur_emulator.machine.controller.io.network import (
     DEFAULT_ACTION,
     DEFAULT_PORT,
-    MAX_SIGNALS,
     ModbusSignal,
-    ModbusSignals,
     SignalType,
     UnitAddress,
 )
 from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin
-from ur_emulator.machine.scripting.network import Network
 from urscript import Blocked, Outside, ScriptRuntimeError
 from urscript.values import log_form, wrap_int
 
@@ -48,14 +46,11 @@ _T = TypeVar("_T")
 class ModbusBuiltins(BuiltinGroup):
     """Signals of other units."""
 
-    def __init__(
-        self, modbus: ModbusSignals, configuration: IoConfiguration, clock: Clock, network: Network
-    ) -> None:
+    def __init__(self, modbus: ModbusSignals, configuration: IoConfiguration, clock: Clock) -> None:
         """Bind the builtins; the configuration says whether a program runs."""
         self._modbus = modbus
         self._configuration = configuration
         self._clock = clock
-        self._network = network
 
     # --- definitions
 
@@ -120,7 +115,7 @@ class ModbusBuiltins(BuiltinGroup):
                 raise ScriptRuntimeError(
                     f"{function}: address {at} with {count} registers; allowed: addresses below {ADDRESSES}"
                 )
-        self._modbus.add(signal, self._network.modbus_unit)
+        self._modbus.add(signal)
 
     @builtin("modbus_delete_signal")
     def _delete_signal(self, thread: object, name: str) -> None:
@@ -133,8 +128,7 @@ class ModbusBuiltins(BuiltinGroup):
             raise ScriptRuntimeError(
                 f"{function}: data must be a list of up to {MAX_DATA} integers from 0 to {BYTE_MAX}"
             )
-        unit = _unit_address(function, ip)
-        self._modbus.send(unit, self._network.modbus_unit, slave, code, bytes(data))
+        self._modbus.send(_unit_address(function, ip), slave, code, bytes(data))
 
     # --- values
 

@@ -13,7 +13,6 @@ from ur_emulator.machine.scripting.line_builtins import LineBuiltins, LineSetupB
 from ur_emulator.machine.scripting.modbus_builtins import MapBuiltins, ModbusBuiltins
 from ur_emulator.machine.scripting.move_builtins import MoveBuiltins, PlanningBuiltins
 from ur_emulator.machine.scripting.move_planner import MovePlanner
-from ur_emulator.machine.scripting.network import Network
 from ur_emulator.machine.scripting.overlay_builtins import (
     ConveyorBuiltins,
     EncoderBuiltins,
@@ -29,7 +28,7 @@ from urscript.builtins import pure_builtins
 from urscript.run.host import HostFunction
 
 
-def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotHost]:
+def robot_hosts(state: ControllerState) -> Callable[[], RobotHost]:
     """Bind the builtins of a box, each group to its parts; return what makes the host of a program."""
     arm = ScriptArm(state.robot, state.arm, state.motion, state.tool, state.safety)
     step_time, past = state.clock.period_s, state.past
@@ -49,7 +48,7 @@ def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotH
         LineSetupBuiltins(state.io, state.io_configuration),
         RegisterBuiltins(state.registers),
         MapBuiltins(state),
-        ModbusBuiltins(state.modbus, state.io_configuration, state.clock, network),
+        ModbusBuiltins(state.modbus, state.io_configuration, state.clock),
         RtdeBuiltins(past, outputs, state.watchdogs, state.force_sense, state.clock),
         EncoderBuiltins(state.encoders, state.io),
         PendantBuiltins(state.pendant, state.events),
@@ -57,7 +56,7 @@ def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotH
         ErrorBuiltins(state.error_settings, past, state.requests),
     )
     shared = _functions(groups)
-    return lambda: RobotHost(state, network, arm, shared)
+    return lambda: RobotHost(state, arm, shared)
 
 
 def _functions(groups: Iterable[BuiltinGroup]) -> dict[str, HostFunction]:
@@ -67,17 +66,15 @@ def _functions(groups: Iterable[BuiltinGroup]) -> dict[str, HostFunction]:
 class RobotHost:
     """The host of one running program (see urscript.run.host.Host)."""
 
-    def __init__(
-        self, state: ControllerState, network: Network, arm: ScriptArm, shared: Mapping[str, HostFunction]
-    ) -> None:
+    def __init__(self, state: ControllerState, arm: ScriptArm, shared: Mapping[str, HostFunction]) -> None:
         """Bind the builtins that keep something for one program; those of all programs are `shared`."""
         random = pure_builtins(state.seed)["random"]
         self.step_time = state.clock.period_s
         self._state = state
         # What a program opens or displaces the arm by ends with it.
         self._ending = (
-            SocketBuiltins(state.clock, state.events, network),
-            RpcBuiltins(network, state.clock),
+            SocketBuiltins(state.clock, state.events, state.network),
+            RpcBuiltins(state.network, state.clock),
             ConveyorBuiltins(arm, state.encoders, state.clock),
             PathOffsetBuiltins(arm),
         )

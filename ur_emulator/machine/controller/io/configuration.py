@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, InputOutput, RunState, level
-from ur_emulator.machine.controller.io.modbus_signals import DEFAULT_ACTION, FREEDRIVE_ACTION, ModbusSignals
+from ur_emulator.machine.controller.io.modbus_signals import ModbusSignals
+from ur_emulator.machine.controller.io.network import DEFAULT_ACTION, FREEDRIVE_ACTION
 from ur_emulator.machine.controller.io.registers import Registers
 
 
