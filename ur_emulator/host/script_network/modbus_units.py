@@ -106,7 +106,11 @@ class _Waiting:
 
 
 class ModbusLink:
-    """One unit's connection; its signals are the host's own records of those of the machine."""
+    """One unit's connection; its signals are the host's own records of those of the machine.
+
+    Attributes:
+        is_released: it is to be closed once what was sent is answered.
+    """
 
     def __init__(self, name: str, connect: Callable[[], OutgoingConnection], period_s: float) -> None:
         """Prepare; nothing is connected before something is wanted.
@@ -135,7 +139,6 @@ class ModbusLink:
 
     def want(self, signal: ModbusSignal) -> None:
         """Write or read a signal as soon as possible."""
-        self.is_released = False
         self._signals.add(signal)
         self._wanted[signal] = None
 
@@ -150,7 +153,6 @@ class ModbusLink:
 
     def send(self, slave: int, function_code: int, data: bytes) -> None:
         """Send a request whose answer is not used."""
-        self.is_released = False
         if len(self._own_requests) < BUDGETS.modbus_requests:
             self._own_requests.append((slave, bytes((function_code,)) + data))
 
@@ -159,10 +161,6 @@ class ModbusLink:
         self._drop(DISCONNECTED)
         self._retry_at = -math.inf
         self._pause = FIRST_RETRY
-
-    def release(self) -> None:
-        """Close once what was sent is answered."""
-        self.is_released = True
 
     @property
     def is_idle(self) -> bool:
@@ -389,7 +387,7 @@ class ModbusClient:
                 self._unit(unit).reset()
             case ReleaseUnit(unit):
                 if unit in self._links:
-                    self._links[unit].release()
+                    self._links[unit].is_released = True
         self._tell()
 
     def advance(self, now: float) -> float:

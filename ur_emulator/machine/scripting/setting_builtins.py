@@ -1,7 +1,6 @@
 """Builtins for TCP, payload and mounting, and the world model."""
 
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Sequence
 from itertools import combinations
 from math import hypot, pi
 from typing import Any
@@ -14,7 +13,7 @@ from ur_emulator.machine.controller.force_sense import ForceSense
 from ur_emulator.machine.controller.settings import Payload, ToolSettings
 from ur_emulator.machine.controller.world_model import WorldModel, WorldModelError
 from ur_emulator.machine.models.robot_model import RobotModel, Vector3, six
-from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin, floats, vector
+from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin, floats, refusing, vector
 from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
 
@@ -179,7 +178,7 @@ class WorldBuiltins(BuiltinGroup):
             "get_frame_parent": lambda thread, name: world.parent(name),
             "get_children": lambda thread, name: world.children(name),
         }
-        return {name: _refusing(name, function) for name, function in functions.items()}
+        return refusing(functions, WorldModelError)
 
     @builtin("get_pose")
     def _get_pose(self, thread: object, name: str, rel_name: str, ref_name: str | None) -> Pose:
@@ -194,14 +193,3 @@ class WorldBuiltins(BuiltinGroup):
     def _declare_attached(self, thread: object) -> None:
         payload = self._world.attached_payload()
         self._declare(thread, payload.mass, payload.cog, payload.inertia)
-
-
-def _refusing(name: str, function: Callable[..., Any]) -> HostFunction:
-    @wraps(function)
-    def call(*arguments: Any) -> Any:
-        try:
-            return function(*arguments)
-        except WorldModelError as error:
-            raise ScriptRuntimeError(f"{name}: {error}") from None
-
-    return call

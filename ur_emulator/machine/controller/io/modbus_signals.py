@@ -2,11 +2,13 @@
 
 A signal lives until it is deleted, replaced by one of the same name, or the controller ends. It is refreshed
 at its frequency in robot time; the connection to its unit belongs to the host, works in real time and never
-delays a cycle. An output is read until a program sets it and is written from then on: at
-once when its value changes, and at its frequency.
+delays a cycle. An output is read until a program sets it and is written from then on: at once when its value
+changes, and at its frequency.
 Source: URScript manual CB3 3.15, module interfaces; UR3 user manual CB3, section "MODBUS client I/O setup".
 That a changed output goes out at once: chosen.
 """
+
+from operator import attrgetter
 
 from ur_emulator.machine.controller.io.lines import RunState, level
 from ur_emulator.machine.controller.io.network import (
@@ -23,6 +25,9 @@ from ur_emulator.machine.controller.io.network import (
 MAX_SIGNALS = 256
 """Chosen: a program that adds signals in an endless loop must end at some point."""
 
+# What a signal stands for.
+_PLACE = attrgetter("unit", "slave", "address", "type", "count", "write_address", "write_count")
+
 
 class ModbusSignals:
     """All signals of one controller, by name."""
@@ -36,7 +41,7 @@ class ModbusSignals:
         """Add a signal; one of the same name is replaced, its value stays if it stands for the same thing."""
         # The new signal first: a unit that both share stays connected.
         old = self.signals.pop(signal.name, None)
-        if old is not None and old.is_same_place(signal):
+        if old is not None and _PLACE(old) == _PLACE(signal):
             signal.values = old.values
         self.signals[signal.name] = signal
         if old is not None:

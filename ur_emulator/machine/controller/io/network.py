@@ -71,8 +71,7 @@ class UnitAddress(NamedTuple):
 # --- Requests: what the host is to do
 
 
-@dataclass(frozen=True, slots=True)
-class OpenSocket:
+class OpenSocket(NamedTuple):
     """Connect to a host; the socket has a number of its own."""
 
     socket: int
@@ -80,23 +79,20 @@ class OpenSocket:
     port: int
 
 
-@dataclass(frozen=True, slots=True)
-class SendBytes:
+class SendBytes(NamedTuple):
     """Send bytes on a socket."""
 
     socket: int
     data: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class CloseSocket:
+class CloseSocket(NamedTuple):
     """Close a socket; nothing of it arrives any more."""
 
     socket: int
 
 
-@dataclass(frozen=True, slots=True)
-class CallProcedure:
+class CallProcedure(NamedTuple):
     """Call a remote procedure by XML-RPC; `body` is the encoded call."""
 
     server: int
@@ -105,8 +101,7 @@ class CallProcedure:
     body: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class CloseServer:
+class CloseServer(NamedTuple):
     """Close the connection to a server of remote procedures, and forget its calls."""
 
     server: int
@@ -132,16 +127,14 @@ class ServeSignal:
     output: tuple[int, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
-class ForgetSignal:
+class ForgetSignal(NamedTuple):
     """Do nothing more for a signal."""
 
     unit: UnitAddress
     signal: int
 
 
-@dataclass(frozen=True, slots=True)
-class SendToUnit:
+class SendToUnit(NamedTuple):
     """Send a request whose answer is not used."""
 
     unit: UnitAddress
@@ -150,15 +143,13 @@ class SendToUnit:
     data: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class ResetUnit:
+class ResetUnit(NamedTuple):
     """Close the connection to a unit and make a new one."""
 
     unit: UnitAddress
 
 
-@dataclass(frozen=True, slots=True)
-class ReleaseUnit:
+class ReleaseUnit(NamedTuple):
     """Close the connection to a unit once what was sent is answered."""
 
     unit: UnitAddress
@@ -180,40 +171,35 @@ Request = (
 # --- Arrivals: what comes from outside
 
 
-@dataclass(frozen=True, slots=True)
-class SocketOpened:
+class SocketOpened(NamedTuple):
     """A socket is connected; `is_own`: to a port of the box itself."""
 
     socket: int
     is_own: bool
 
 
-@dataclass(frozen=True, slots=True)
-class SocketClosed:
+class SocketClosed(NamedTuple):
     """The peer has closed, or there is no connection: `problem` says why, "" if the peer refused."""
 
     socket: int
     problem: str
 
 
-@dataclass(frozen=True, slots=True)
-class BytesArrived:
+class BytesArrived(NamedTuple):
     """Bytes have come on a socket."""
 
     socket: int
     data: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class BytesUnsent:
+class BytesUnsent(NamedTuple):
     """So many bytes of a socket wait for a peer that does not read; it is told when the number changes."""
 
     socket: int
     n_bytes: int
 
 
-@dataclass(frozen=True, slots=True)
-class CallEnded:
+class CallEnded(NamedTuple):
     """A remote procedure has returned a value, or the call has failed with a text."""
 
     call: int
@@ -221,8 +207,7 @@ class CallEnded:
     error: str
 
 
-@dataclass(frozen=True, slots=True)
-class SignalServed:
+class SignalServed(NamedTuple):
     """What is known of a signal now; see `ModbusSignal` for the fields. No values: none were read."""
 
     signal: int
@@ -379,15 +364,6 @@ class ModbusSignal:
         self.trouble, self.device_error, self.connection_error = trouble, device_error, connection_error
         if values and (self.output is None or self.reads_back):
             self.values = values
-
-    def is_same_place(self, other: ModbusSignal) -> bool:
-        """Whether both stand for the same thing."""
-        return self._place == other._place
-
-    @property
-    def _place(self) -> tuple[object, ...]:
-        write = self.write_address, self.write_count
-        return self.unit, self.slave, self.address, self.type, self.count, *write
 
 
 class Network:
