@@ -130,7 +130,7 @@ class ProgramRunner:
         self._state.motion.begin_program()
         self._state.io_configuration.program_started()
         self._state.interpreter.program_started()
-        self._state.force_sense.program_started(self._state.past.steady_cycles)
+        self._state.force_sense.zero_built_in(self._state.past.steady_cycles)
         self._state.events.append(events.ProgramStarted(program.name, self._primary))
 
     def stop(self, *, unscheduled: bool = False) -> None:

@@ -21,13 +21,6 @@ from urscript.run.threads import ProgramHalted
 from urscript.run.waits import NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
-_KINDS = {
-    "boolean": RequestedType.BOOLEAN,
-    "integer": RequestedType.INTEGER,
-    "float": RequestedType.FLOAT,
-    "string": RequestedType.STRING,
-}
-
 
 class PendantBuiltins(BuiltinGroup):
     """Popups and requests for values."""
@@ -38,10 +31,10 @@ class PendantBuiltins(BuiltinGroup):
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
-        requests = {
-            f"request_{name}_from_primary_client": self._requester(kind) for name, kind in _KINDS.items()
+        kinds = (RequestedType.BOOLEAN, RequestedType.INTEGER, RequestedType.FLOAT, RequestedType.STRING)
+        return super().functions() | {
+            f"request_{kind.name.lower()}_from_primary_client": self._requester(kind) for kind in kinds
         }
-        return super().functions() | requests
 
     @builtin("popup")
     def _popup(

@@ -9,7 +9,7 @@ from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, ScriptArm
 from ur_emulator.machine.scripting.flow_builtins import ErrorBuiltins, InterpreterBuiltins, PendantBuiltins
 from ur_emulator.machine.scripting.force_builtins import ForceBuiltins
-from ur_emulator.machine.scripting.line_builtins import LineBuiltins, LineSetupBuiltins, RegisterBuiltins
+from ur_emulator.machine.scripting.line_builtins import LineBuiltins, RegisterBuiltins
 from ur_emulator.machine.scripting.modbus_builtins import MapBuiltins, ModbusBuiltins
 from ur_emulator.machine.scripting.move_builtins import MoveBuiltins, PlanningBuiltins
 from ur_emulator.machine.scripting.move_planner import MovePlanner
@@ -22,7 +22,7 @@ from ur_emulator.machine.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.machine.scripting.rtde_builtins import RtdeBuiltins
 from ur_emulator.machine.scripting.setting_builtins import SettingBuiltins, WorldBuiltins
 from ur_emulator.machine.scripting.socket_builtins import SocketBuiltins
-from ur_emulator.machine.scripting.state_builtins import DynamicsBuiltins, StateBuiltins
+from ur_emulator.machine.scripting.state_builtins import StateBuiltins
 from ur_emulator.machine.scripting.stream_builtins import StreamBuiltins, TorqueBuiltins
 from urscript.builtins import pure_builtins
 from urscript.run.host import HostFunction
@@ -39,13 +39,11 @@ def robot_hosts(state: ControllerState) -> Callable[[], RobotHost]:
         MoveBuiltins(arm, state.place_arm, state.events, planner, state.world),
         PlanningBuiltins(state.planning),
         StreamBuiltins(arm, step_time),
-        StateBuiltins(arm, past, state.clock),
-        DynamicsBuiltins(arm, state.dynamics, past),
+        StateBuiltins(arm, state.dynamics, past, state.clock),
         ForceBuiltins(arm, state.compliance, state.force_sense, past),
         settings,
         WorldBuiltins(state.world, settings.set_target_payload),
-        LineBuiltins(state.io),
-        LineSetupBuiltins(state.io, state.io_configuration),
+        LineBuiltins(state.io, state.io_configuration),
         RegisterBuiltins(state.registers),
         MapBuiltins(state),
         ModbusBuiltins(state.modbus, state.io_configuration, state.clock),

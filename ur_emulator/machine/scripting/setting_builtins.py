@@ -53,7 +53,7 @@ class SettingBuiltins(BuiltinGroup):
     def _set_payload(self, thread: object, m: float, cog: Any) -> None:
         mass, place = self._mass(m), _cog(self._tool.tcp_offset[:3] if cog is None else cog)
         self._tool.set_payload(mass, None if cog is None else place)
-        self._force_sense.payload_declared()
+        self._force_sense.zero_built_in(0)
 
     @builtin("set_payload_mass")
     def _set_payload_mass(self, thread: object, m: float) -> None:

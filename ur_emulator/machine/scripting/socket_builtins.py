@@ -7,7 +7,6 @@ socket_read_binary_integer and related builtins ([0, -1, -1, ...], [0, nan, nan,
 import math
 import struct
 from collections.abc import Callable, Generator
-from typing import Any
 
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.machine.controller.clock import Clock
@@ -16,6 +15,7 @@ from ur_emulator.machine.controller.io.network import Network, ScriptSocket
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
+from urscript.run.host import HostFunction
 from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
@@ -84,6 +84,21 @@ class SocketBuiltins(BuiltinGroup):
         self._searched = 0
         self._searched_in = -1
 
+    def functions(self) -> dict[str, HostFunction]:
+        """Return the builtins."""
+        send, read = self._send, self._read_numbers
+        return super().functions() | {
+            "socket_send_byte": lambda thread, value, name: send(name, bytes([int(value) & 0xFF])),
+            "socket_send_string": lambda thread, text, name: send(name, _latin(log_form(text))),
+            "socket_send_line": lambda thread, text, name: send(name, _latin(log_form(text)) + b"\n"),
+            "socket_read_binary_integer": lambda thread, number, name, timeout: read(
+                name, timeout, number, "i", 4
+            ),
+            "socket_read_byte_list": lambda thread, number, name, timeout: read(
+                name, timeout, number, "B", 1
+            ),
+        }
+
     def end(self) -> None:
         """Close every socket; the program has ended."""
         for socket in self._sockets.values():
@@ -134,27 +149,15 @@ class SocketBuiltins(BuiltinGroup):
         socket = self._socket(name)
         return socket is not None and self._network.send(socket, data)
 
-    @builtin("socket_send_byte")
-    def _send_byte(self, thread: object, value: int, name: _Name) -> bool:
-        return self._send(name, bytes([int(value) & 0xFF]))
-
     @builtin("socket_send_int")
     def _send_int(self, thread: object, value: float, name: _Name) -> bool:
         if not (math.isfinite(value) and -(2**31) <= value < 2**31):
             raise ScriptRuntimeError(f"socket_send_int: {value:g} does not fit into 32 bits")
         return self._send(name, struct.pack(">i", int(value)))
 
-    @builtin("socket_send_string")
-    def _send_string(self, thread: object, text: Any, name: _Name) -> bool:
-        return self._send(name, log_form(text).encode("latin-1", "replace"))
-
-    @builtin("socket_send_line")
-    def _send_line(self, thread: object, text: Any, name: _Name) -> bool:
-        return self._send(name, log_form(text).encode("latin-1", "replace") + b"\n")
-
     @builtin("socket_set_var")
     def _set_var(self, thread: object, variable: str, value: float, name: _Name) -> None:
-        self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
+        self._send(name, _latin(f"SET {variable} {log_form(value)}\n"))
 
     # --- reading
 
@@ -247,18 +250,6 @@ class SocketBuiltins(BuiltinGroup):
             return failed
         return [number, *struct.unpack(f">{number}{code}", socket.take(size))]
 
-    @builtin("socket_read_binary_integer")
-    def _read_binary_integer(
-        self, thread: object, number: int, name: _Name, timeout: float
-    ) -> Generator[Blocked, None, list[int]]:
-        return self._read_numbers(name, timeout, number, "i", 4)
-
-    @builtin("socket_read_byte_list")
-    def _read_byte_list(
-        self, thread: object, number: int, name: _Name, timeout: float
-    ) -> Generator[Blocked, None, list[int]]:
-        return self._read_numbers(name, timeout, number, "B", 1)
-
     @builtin("socket_read_ascii_float")
     def _read_ascii_float(
         self, thread: object, number: int, name: _Name, timeout: float
@@ -293,7 +284,7 @@ class SocketBuiltins(BuiltinGroup):
 
     @builtin("socket_get_var")
     def _get_var(self, thread: object, variable: str, name: _Name) -> Generator[Wait, None, int]:
-        self._send(name, f"GET {variable}\n".encode("latin-1", "replace"))
+        self._send(name, _latin(f"GET {variable}\n"))
         data = yield from self._take(name, OPEN_TIMEOUT, TextSearch(b"", b"\n"))
         words = b"" if data is None or len(data) > MAX_STRING else data
         try:
@@ -308,4 +299,8 @@ def _delimiter(text: str, interpret_escape: bool) -> bytes:
     text = text.lstrip(" ")
     if interpret_escape:
         text = text.replace("\\n", "\n").replace("\\r", "\r").replace("\\t", "\t")
+    return _latin(text)
+
+
+def _latin(text: str) -> bytes:
     return text.encode("latin-1", "replace")
