@@ -47,12 +47,11 @@ def box_word(word: int) -> int:
 
 def write_bits(bits: Sequence[int], forced: bool | None = None) -> Writer:
     """Write outputs from a word; with `forced`, only those whose bit is set, to that value."""
+    write_one = write_bit(bits, forced)
 
     def write(state: ControllerState, offset: int, value: int) -> None:
-        for i, bit in enumerate(bits):
-            is_set = bool(value >> i & 1)
-            if forced is None or is_set:
-                state.io.write_digital_out(bit, is_set if forced is None else forced)
+        for i in range(len(bits)):
+            write_one(state, i, value >> i & 1)
 
     return write
 

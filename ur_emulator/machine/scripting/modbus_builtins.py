@@ -57,7 +57,18 @@ class ModbusBuiltins(BuiltinGroup):
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins; what a signal refuses is an error of the program."""
-        return refusing(super().functions(), SignalError)
+        modbus, signal, period_s = self._modbus, self._signal, self._clock.period_s
+        functions = super().functions() | {
+            "modbus_delete_signal": lambda thread, name: modbus.delete(name),
+            "modbus_request_update_signal_value": lambda thread, name: modbus.refresh(signal(name)),
+            "modbus_get_time_since_signal_invalid": lambda thread, name: (
+                period_s * signal(name).invalid_cycles
+            ),
+            "modbus_set_signal_watchdog": lambda thread, name, timeout: modbus.set_tolerance(
+                signal(name), float(timeout)
+            ),
+        }
+        return refusing(functions, SignalError)
 
     # --- definitions
 
@@ -117,10 +128,6 @@ class ModbusBuiltins(BuiltinGroup):
                 )
         self._modbus.add(signal)
 
-    @builtin("modbus_delete_signal")
-    def _delete_signal(self, thread: object, name: str) -> None:
-        self._modbus.delete(name)
-
     @builtin("modbus_send_custom_command")
     def _send_custom_command(self, thread: object, ip: str, slave: int, code: int, data: list[Any]) -> None:
         if len(data) > MAX_DATA or not all(type(item) is int and 0 <= item <= BYTE_MAX for item in data):
@@ -174,10 +181,6 @@ class ModbusBuiltins(BuiltinGroup):
             raise SignalError(f'signal "{name}" is a {signal.type.title}, not an output')
         self._modbus.set_rule(signal, RunState(code), self._configuration.program_runs)
 
-    @builtin("modbus_set_signal_watchdog")
-    def _set_watchdog(self, thread: object, name: str, timeout: float) -> None:
-        self._modbus.set_tolerance(self._signal(name), float(timeout))
-
     # --- connections
 
     @builtin("modbus_get_error")
@@ -186,14 +189,6 @@ class ModbusBuiltins(BuiltinGroup):
         device, connection = signal.device_error, signal.connection_error
         # Both: the connection error in the upper two bytes.
         return (wrap_int((connection & WORD_MAX) << 16 | device), device, connection)[source]
-
-    @builtin("modbus_get_time_since_signal_invalid")
-    def _get_time_invalid(self, thread: object, name: str) -> float:
-        return self._clock.period_s * self._signal(name).invalid_cycles
-
-    @builtin("modbus_request_update_signal_value")
-    def _request_update(self, thread: object, name: str) -> None:
-        self._modbus.refresh(self._signal(name))
 
     @builtin("modbus_reset_connection")
     def _reset_connection(self, thread: object, connection_id: str, is_blocking: bool) -> Sequence[Blocked]:

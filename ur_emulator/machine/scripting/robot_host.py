@@ -11,7 +11,7 @@ from ur_emulator.machine.scripting.flow_builtins import ErrorBuiltins, Interpret
 from ur_emulator.machine.scripting.force_builtins import ForceBuiltins
 from ur_emulator.machine.scripting.line_builtins import LineBuiltins, RegisterBuiltins
 from ur_emulator.machine.scripting.modbus_builtins import MapBuiltins, ModbusBuiltins
-from ur_emulator.machine.scripting.move_builtins import MoveBuiltins, PlanningBuiltins
+from ur_emulator.machine.scripting.move_builtins import MoveBuiltins
 from ur_emulator.machine.scripting.move_planner import MovePlanner
 from ur_emulator.machine.scripting.overlay_builtins import (
     ConveyorBuiltins,
@@ -34,10 +34,8 @@ def robot_hosts(state: ControllerState) -> Callable[[], RobotHost]:
     step_time, past = state.clock.period_s, state.past
     settings = SettingBuiltins(state.robot, state.tool, state.force_sense, step_time)
     planner = MovePlanner(state.dynamics, state.planning, state.tool)
-    outputs = state.robot.generation.rtde_outputs
     groups = (
-        MoveBuiltins(arm, state.place_arm, state.events, planner, state.world),
-        PlanningBuiltins(state.planning),
+        MoveBuiltins(arm, state.place_arm, state.events, planner, state.planning, state.world),
         StreamBuiltins(arm, step_time),
         StateBuiltins(arm, state.dynamics, past, state.clock),
         ForceBuiltins(arm, state.compliance, state.force_sense, past),
@@ -47,7 +45,7 @@ def robot_hosts(state: ControllerState) -> Callable[[], RobotHost]:
         RegisterBuiltins(state.registers),
         MapBuiltins(state),
         ModbusBuiltins(state.modbus, state.io_configuration, state.clock),
-        RtdeBuiltins(past, outputs, state.watchdogs, state.force_sense, state.clock),
+        RtdeBuiltins(past, state.clock, state.watchdogs, state.force_sense),
         EncoderBuiltins(state.encoders, state.io),
         PendantBuiltins(state.pendant, state.events),
         InterpreterBuiltins(state.interpreter),

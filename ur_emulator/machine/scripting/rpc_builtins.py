@@ -96,7 +96,9 @@ class RemoteHandle:
         call = self._program.network.call(self._server, self._url, method, values)
         yield Blocked(lambda: call.is_done, Outside.PEER)
         try:
-            return _from_wire(call.result(), self._program.has_structs)
+            if call.error:
+                raise RemoteCallError(call.error)
+            return _from_wire(call.value, self._program.has_structs)
         except RemoteCallError as error:
             text = to_script_text(" ".join(str(error).split())[:LONGEST_MESSAGE])
             raise ScriptRuntimeError(f"{method}: remote procedure call failed: {text}") from None

@@ -1,6 +1,7 @@
 """Builtins for TCP, payload and mounting, and the world model."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from math import hypot, pi
 from typing import Any
@@ -26,17 +27,14 @@ MAX_COG = 1.0
 MAX_INERTIA = 133.0
 
 
+@dataclass(frozen=True)
 class SettingBuiltins(BuiltinGroup):
-    """TCP, payload and mounting."""
+    """TCP, payload and mounting; a payload zeroes a force sensor. A cycle takes `_step_time` [s]."""
 
-    def __init__(
-        self, robot: RobotModel, tool: ToolSettings, force_sense: ForceSense, step_time: float
-    ) -> None:
-        """Bind the builtins; a force sensor is zeroed with the payload. A cycle takes `step_time` [s]."""
-        self._robot = robot
-        self._tool = tool
-        self._force_sense = force_sense
-        self._step_time = step_time
+    _robot: RobotModel
+    _tool: ToolSettings
+    _force_sense: ForceSense
+    _step_time: float
 
     @builtin("set_tcp")
     def _set_tcp(self, thread: object, pose: Any, name: str = "") -> None:

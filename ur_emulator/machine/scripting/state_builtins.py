@@ -141,9 +141,10 @@ class StateBuiltins(BuiltinGroup):
             low <= x <= high for x, low, high in zip(q, limits.q_min, limits.q_max, strict=True)
         ):
             return False
-        if not boundaries:
-            return True
-        return boundaries.find_crossed(self._arm.model.state(q, ZERO6, self._arm.settings.tcp_offset)) is None
+        return (
+            not boundaries
+            or boundaries.find_crossed(self._arm.model.state(q, ZERO6, self._arm.settings.tcp_offset)) is None
+        )
 
     def _inverse(self, thread: ScriptThread, pose: Pose, q_near: Any, tcp: Any) -> tuple[float, ...] | None:
         model = self._arm.model

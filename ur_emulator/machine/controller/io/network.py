@@ -268,23 +268,21 @@ class RemoteCallError(Exception):
 
 
 class RemoteCall:
-    """One call of a remote procedure of a server; it `is_done` once the result, or the failure, is known."""
+    """One call of a remote procedure of a server.
+
+    Attributes:
+        is_done: the value that it has returned is known, or the error with which it has failed.
+    """
 
     def __init__(self, server: int) -> None:
         self.server = server
         self.is_done = False
-        self._value: Any = None
-        self._error = ""
+        self.value: Any = None
+        self.error = ""
 
-    def result(self) -> Any:
-        """Return what the procedure returned; RemoteCallError if the call failed."""
-        if self._error:
-            raise RemoteCallError(self._error)
-        return self._value
-
-    def finish(self, value: Any, error: str) -> None:
+    def end(self, value: Any, error: str) -> None:
         """Take the end of the call."""
-        self._value, self._error, self.is_done = value, error, True
+        self.value, self.error, self.is_done = value, error, True
 
 
 DEFAULT_FREQUENCY = 10.0
@@ -438,10 +436,10 @@ class Network:
         try:
             body = encode_call(method, arguments)
         except LocalProtocolError as error:
-            call.finish(None, str(error))
+            call.end(None, str(error))
             return call
         if len(busy - {server}) >= most:
-            call.finish(
+            call.end(
                 None, f"{most} remote procedures of other handles are being called, wait for one of them"
             )
             return call
@@ -517,7 +515,7 @@ class Network:
                     self._set_unsent(socket, n_bytes)
             case CallEnded(number, value, error):
                 if (call := self._calls.pop(number, None)) is not None:
-                    call.finish(value, error)
+                    call.end(value, error)
             case SignalServed(number, values, trouble, device_error, connection_error):
                 if (signal := self._signals.get(number)) is not None:
                     signal.served(values, trouble, device_error, connection_error)
