@@ -33,6 +33,7 @@ from ur_emulator.machine.controller.io.network import (
     SignalServed,
     SignalType,
     UnitAddress,
+    UnitRequest,
 )
 
 _READ = {
@@ -340,7 +341,6 @@ class ModbusLink:
         return min(times)
 
 
-UnitRequest = ServeSignal | ForgetSignal | SendToUnit | ResetUnit | ReleaseUnit
 # What the machine takes for known of a signal before anything has arrived: see `SignalServed`.
 _AT_FIRST = ((), "", 0, 0)
 
@@ -449,15 +449,7 @@ class ModbusClient:
 
 def _signal_of(request: ServeSignal) -> ModbusSignal:
     """Return the host's record of a signal; no values have been read."""
-    signal = ModbusSignal(
-        str(request.signal),
-        request.unit,
-        request.slave,
-        request.address,
-        request.type,
-        request.sequential,
-        count=request.count,
-        write_address=request.write_address,
-    )
-    signal.values = ()
+    r = request
+    signal = ModbusSignal("", r.unit, r.slave, r.address, r.type, r.sequential, count=r.count)
+    signal.number, signal.write_address, signal.values = r.signal, r.write_address, ()
     return signal

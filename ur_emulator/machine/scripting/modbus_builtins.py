@@ -102,17 +102,9 @@ class ModbusBuiltins(BuiltinGroup):
         name: str,
         sequential: bool,
     ) -> None:
-        signal = ModbusSignal(
-            name,
-            _unit_address(ip),
-            slave,
-            read_address,
-            SignalType.READ_WRITE_REGISTERS,
-            sequential,
-            count=read_count,
-            write_address=write_address,
-            write_count=write_count,
-        )
+        unit, type_ = _unit_address(ip), SignalType.READ_WRITE_REGISTERS
+        signal = ModbusSignal(name, unit, slave, read_address, type_, sequential, count=read_count)
+        signal.write_address, signal.write_count = write_address, write_count
         self._add(signal)
 
     def _add(self, signal: ModbusSignal) -> None:

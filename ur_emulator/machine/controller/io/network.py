@@ -155,18 +155,8 @@ class ReleaseUnit(NamedTuple):
     unit: UnitAddress
 
 
-Request = (
-    OpenSocket
-    | SendBytes
-    | CloseSocket
-    | CallProcedure
-    | CloseServer
-    | ServeSignal
-    | ForgetSignal
-    | SendToUnit
-    | ResetUnit
-    | ReleaseUnit
-)
+UnitRequest = ServeSignal | ForgetSignal | SendToUnit | ResetUnit | ReleaseUnit
+Request = OpenSocket | SendBytes | CloseSocket | CallProcedure | CloseServer | UnitRequest
 
 # --- Arrivals: what comes from outside
 
