@@ -216,8 +216,9 @@ class XmlRpcClient:
     def failed(self, error: Exception) -> None:
         """End all calls after an error of ours."""
         self._report("the remote procedure calls of scripts are ended", error)
-        for server in tuple(self._busy):
-            server.give_up(repr(error))
+        for server in self._busy:
+            for request in server.calls:
+                self.arrive(CallEnded(request.call, None, repr(error)))
         self.close()
 
     def close(self) -> None:
@@ -249,12 +250,6 @@ class XmlRpcServer:
         self.calls.clear()
         self._end_exchange()
         self._disconnect()
-
-    def give_up(self, why: str) -> None:
-        """Fail the running calls."""
-        for request in self.calls:
-            self._client.arrive(CallEnded(request.call, None, why))
-        self.close()
 
     def advance(self) -> bool:
         """Go on with the call that is the first; return whether a piece of an answer was read."""

@@ -3,7 +3,7 @@
 A client of the control API answers instead of an operator.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from functools import partial
 from typing import Any, NoReturn
 
@@ -33,7 +33,8 @@ class PendantBuiltins(BuiltinGroup):
         """Return the builtins."""
         kinds = (RequestedType.BOOLEAN, RequestedType.INTEGER, RequestedType.FLOAT, RequestedType.STRING)
         return super().functions() | {
-            f"request_{kind.name.lower()}_from_primary_client": self._requester(kind) for kind in kinds
+            f"request_{kind.name.lower()}_from_primary_client": partial(self._request_value, kind)
+            for kind in kinds
         }
 
     @builtin("popup")
@@ -49,13 +50,12 @@ class PendantBuiltins(BuiltinGroup):
         self._events.append(PopupShown(title, text, warning, error, blocking, request.request_id))
         yield from self._wait_for(request)
 
-    def _requester(self, kind: RequestedType) -> Callable[..., Generator[Blocked, None, Answer | None]]:
-        def request_value(thread: object, text: str) -> Generator[Blocked, None, Answer | None]:
-            request = self._pendant.ask(kind, text)
-            self._events.append(ValueRequested(request.request_id, kind, text))
-            return (yield from self._wait_for(request))
-
-        return request_value
+    def _request_value(
+        self, kind: RequestedType, thread: object, text: str
+    ) -> Generator[Blocked, None, Answer | None]:
+        request = self._pendant.ask(kind, text)
+        self._events.append(ValueRequested(request.request_id, kind, text))
+        return (yield from self._wait_for(request))
 
     def _wait_for(self, request: PendantRequest) -> Generator[Blocked, None, Answer | None]:
         try:

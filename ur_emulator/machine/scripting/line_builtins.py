@@ -4,6 +4,7 @@ The catalogue has checked that a line or register exists.
 """
 
 from collections.abc import MutableSequence, Sequence
+from functools import partial
 from typing import Any, Final
 
 from ur_emulator.machine.controller.io import lines
@@ -82,9 +83,9 @@ class LineBuiltins(BuiltinGroup):
             functions[f"set_{group}_input_action"] = self._action_setter(group)
         for kind, output in _RUNSTATE_NAMES.items():
             name = f"set_runstate_{output}_to_value"
-            functions[name] = self._runstate_setter(kind, name)
+            functions[name] = partial(self._set_runstate, kind, name)
         for name, listed in _LISTED_OUTPUTS.items():
-            functions[name] = self._list_setter(listed, name)
+            functions[name] = partial(self._set_runstates, listed, name)
         return functions
 
     def _digital(self, group: str, bits: Sequence[int]) -> dict[str, HostFunction]:
@@ -142,26 +143,20 @@ class LineBuiltins(BuiltinGroup):
     def _action_setter(self, group: str) -> HostFunction:
         return lambda thread, port, action: self._configuration.set_input_action(group, port, action)
 
-    def _runstate_setter(self, kind: OutputKind, name: str) -> HostFunction:
+    def _set_runstate(self, kind: OutputKind, function: str, thread: object, output: int, code: int) -> None:
         # The catalogue checks the codes of the others, which the e-Series has more of.
-        is_number = kind in (OutputKind.GP_INTEGER, OutputKind.GP_FLOAT)
+        if kind in (OutputKind.GP_INTEGER, OutputKind.GP_FLOAT) and code not in range(4):
+            raise ScriptRuntimeError(f"{function}: state {code} does not exist; allowed: 0 to 3")
+        self._configuration.set_rule(kind, output, lines.RunState(code))
 
-        def set_runstate(thread: object, output: int, code: int) -> None:
-            if is_number and code not in range(4):
-                raise ScriptRuntimeError(f"{name}: state {code} does not exist; allowed: 0 to 3")
-            self._configuration.set_rule(kind, output, lines.RunState(code))
-
-        return set_runstate
-
-    def _list_setter(self, names: Sequence[tuple[OutputKind, int]], function: str) -> HostFunction:
-        def set_list(thread: object, outputs: list[Any]) -> None:
-            if not all(i in range(len(names)) for i in outputs):
-                raise ScriptRuntimeError(f"{function}: outputs are numbers from 0 to {len(names) - 1}")
-            for i, (kind, index) in enumerate(names):
-                state = lines.RunState.LOW_WHEN_STOPPED if i in outputs else lines.RunState.KEEP
-                self._configuration.set_rule(kind, index, state)
-
-        return set_list
+    def _set_runstates(
+        self, known: Sequence[tuple[OutputKind, int]], function: str, thread: object, outputs: list[Any]
+    ) -> None:
+        if not all(i in range(len(known)) for i in outputs):
+            raise ScriptRuntimeError(f"{function}: outputs are numbers from 0 to {len(known) - 1}")
+        for i, (kind, index) in enumerate(known):
+            state = lines.RunState.LOW_WHEN_STOPPED if i in outputs else lines.RunState.KEEP
+            self._configuration.set_rule(kind, index, state)
 
 
 def _euromap_port(number: int) -> int:
@@ -189,7 +184,7 @@ class RegisterBuiltins(BuiltinGroup):
         ):
             functions[f"read_input_{kind}_register"] = _register_reader(read)
             functions[f"read_output_{kind}_register"] = _register_reader(written)
-            functions[f"write_output_{kind}_register"] = _register_writer(written)
+            functions[f"write_output_{kind}_register"] = partial(_write_register, written, type(written[0]))
         return functions
 
 
@@ -197,10 +192,7 @@ def _register_reader(memory: MutableSequence[Any]) -> HostFunction:
     return lambda thread, address: memory[address]
 
 
-def _register_writer(memory: MutableSequence[Any]) -> HostFunction:
-    kind = type(memory[0])
-
-    def write(thread: object, address: int, value: Any) -> None:
-        memory[address] = kind(value)
-
-    return write
+def _write_register(
+    memory: MutableSequence[Any], kind: type[Any], thread: object, address: int, value: Any
+) -> None:
+    memory[address] = kind(value)
