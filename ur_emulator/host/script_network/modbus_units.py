@@ -186,8 +186,7 @@ class ModbusLink:
     def advance(self, now: float) -> float:
         """Do what can be done at monotonic time `now` [s]; return when to be called next at the latest."""
         for signal in self._wanted:
-            if signal not in self._waiting:
-                self._waiting[signal] = _Waiting(now)
+            self._waiting.setdefault(signal, _Waiting(now))
         if self._socket is not None:
             self._receive(self._socket.inbox, now)
         if self._is_connected(now):

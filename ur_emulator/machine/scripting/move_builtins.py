@@ -102,35 +102,29 @@ class MoveBuiltins(BuiltinGroup):
 
     @builtin("movep")
     def _movep(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
-        return self._process("movep", thread, PoseLine, pose, a=a, v=v, r=r)
+        make = self._process_leg("movep", PoseLine, pose, a=a, v=v, r=r)
+        return self._travel(thread, make, self._planner.limited)
 
     @builtin("servoc")
     def _servoc(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
+        make = self._process_leg("servoc", PoseLine, pose, a=a, v=v, r=r)
         # Drivers call it with the same pose again and again: nothing to warn of.
-        return self._process("servoc", thread, PoseLine, pose, a=a, v=v, r=r, may_overlap=True)
+        return self._travel(thread, make, self._planner.limited, may_overlap=True)
 
     @builtin("movec")
     def _movec(
         self, thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
     ) -> Cycles:
         arc = partial(arc_through, fixed=mode == 1)
-        return self._process("movec", thread, arc, pose_via, pose_to, a=a, v=v, r=r)
+        make = self._process_leg("movec", arc, pose_via, pose_to, a=a, v=v, r=r)
+        return self._travel(thread, make, self._planner.limited)
 
-    def _process(
-        self,
-        function: str,
-        thread: object,
-        path: Callable[..., PosePath],
-        *goals: Any,
-        a: float,
-        v: float,
-        r: float,
-        may_overlap: bool = False,
-    ) -> Cycles:
-        """Follow a path at constant speed of the tool."""
+    def _process_leg(
+        self, function: str, path: Callable[..., PosePath], *goals: Any, a: float, v: float, r: float
+    ) -> MakeLeg:
+        """Return what makes a move along a path at constant speed of the tool."""
         _limits(function, a, v, 0.0, r)
-        make = self._tool_leg(path, *goals, a=a, v=v, r=r, process=True)
-        return self._travel(thread, make, self._planner.limited, may_overlap=may_overlap)
+        return self._tool_leg(path, *goals, a=a, v=v, r=r, process=True)
 
     def _tool_leg(self, path: Callable[..., PosePath], *goals: Any, **limits: Any) -> MakeLeg:
         """Return what makes a move of the tool along a path from where it is through the goals."""
