@@ -118,11 +118,8 @@ class SocketBuiltins(BuiltinGroup):
         # Stored before it is open: a program that is killed meanwhile closes it.
         socket = self._sockets[name] = self._network.open(address, port)
         expired = self._timer(OPEN_TIMEOUT)
-        if socket.is_connecting:
-            yield Blocked(lambda: not socket.is_connecting or expired(), Outside.PEER)
-        elif not socket.is_open:
-            yield NEXT_CYCLE  # a loop of opens that fail at once must not fill the log
-        if not socket.is_open or socket.is_connecting:
+        yield Blocked(lambda: not socket.is_connecting or expired(), Outside.PEER)
+        if not socket.is_open:
             # Source: log of a real controller; all others are ours.
             reason = (
                 "Connection timed out" if socket.is_connecting else socket.problem or "Connection refused"
