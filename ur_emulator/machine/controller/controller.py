@@ -12,25 +12,21 @@ from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
-from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.command import Command
 from ur_emulator.machine.controller.events import RobotModeChanged
 from ur_emulator.machine.controller.force_sense import VARIABLE
 from ur_emulator.machine.controller.io.watchdogs import WatchdogAction
 from ur_emulator.machine.controller.program_runner import ProgramRunner
-from ur_emulator.machine.controller.robot_mode import JOINT_VECTORS, ModeCommand, RobotModeMachine
+from ur_emulator.machine.controller.robot_mode import JOINT_VECTORS, ModeCommand
 from ur_emulator.machine.controller.safety.inputs import ACTIVE
 from ur_emulator.machine.controller.safety.limit_checks import UNREACHABLE_PATH, Violation
 from ur_emulator.machine.controller.safety.modes import SafetyEvent
 from ur_emulator.machine.controller.safety.safety_state import UNLOCK_DELAY
 from ur_emulator.machine.controller.safety_system import SafetySystem
 from ur_emulator.machine.controller.snapshot import Snapshot
-from ur_emulator.machine.controller.state import ControllerState, make_state
-from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import draw_calibration
-from ur_emulator.machine.models.fidelity import Fidelity, dead_cycles
+from ur_emulator.machine.controller.state import ControllerState
+from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
-from ur_emulator.machine.motion.arm_motion import ArmMotion
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.motion.tool import UnreachableError
 from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
@@ -119,8 +115,6 @@ def make_snapshot(
     )
 
 
-# Controller time at start [s]: a public client library does not trust a controller clock below 40 s.
-BOOT_TIME = 60.0
 # Time after the last activity until the simulation may pause in lockstep, so that the arm comes to rest [s].
 # Joints of a CB3 creep for up to .9 s, below 1 mrad/s: more time would let clients begin in cycles that
 # depend on the speed of the machine.
@@ -165,31 +159,21 @@ class Controller:
         # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
         # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
-        motion = ArmMotion(
-            q,
-            robot.stop_deceleration,
-            generation.run_up_time,
-            dead_cycles(fidelity, seed, self.period_s),
-        )
-        self.state = make_state(
+        self.state = state = ControllerState(
             robot,
-            ArmModel(robot, draw_calibration(robot, fidelity, seed)),
+            fidelity,
             seed,
-            Clock(generation, generation.cycles(BOOT_TIME)),
-            motion,
-            RobotModeMachine(mode, self.period_s),
-            self._place_arm,
+            mode,
             version or generation.parse_version(generation.default_version)[:2],
             tools,
+            self._place_arm,
         )
-        if generation.limits.brakes_within_torque:
-            motion.braking = self.state.dynamics.greatest_deceleration
-        self._payload = self.state.tool.payload
-        self.state.past.place(motion.target, self.plant.sense())
-        self.programs = ProgramRunner(self.state, make_robot(self.state))
-        self.safety = SafetySystem(self.state, self.programs, self.plant)
+        self._payload = state.tool.payload
+        state.past.place(state.motion.target, self.plant.sense())
+        self.programs = ProgramRunner(state, make_robot(state))
+        self.safety = SafetySystem(state, self.programs, self.plant)
         self.push = FlangePush(self.plant)
-        self.state.mode.command(ModeCommand.BOOT)
+        state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
 
