@@ -159,7 +159,7 @@ class Bench:
         self.start(text)
         for _ in range(limit):
             moves = box.programs.has_work or box.state.motion.is_moving or box.state.mode.is_changing
-            rested = 0 if moves or box.safety.is_stopping else rested + 1
+            rested = 0 if moves or box.safety.is_braking else rested + 1
             if not box.is_active or rested > box.generation.cycles(2 * SETTLE_TIME):
                 break
             self.tick()

@@ -404,7 +404,7 @@ def test_a_requested_stop_is_one_whatever_the_robot_mode(mode):
     """A program may ask for it in the cycle in which the arm loses its power."""
     bench = Bench(mode=mode)
     bench.tick(20)
-    bench.controller.state.requests.protective_stop()
+    bench.controller.state.requests.protective_stop = True
     bench.tick(5)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     assert [e.code for e in bench.events if isinstance(e, ErrorReported)] == [209]

@@ -75,7 +75,7 @@ class TriggerProtectiveStop(CommandOperation):
         safety = box.state.safety
         if not (safety.is_watched or safety.has(SafetyMode.PROTECTIVE_STOP)):
             raise RefusedError(f"no protective stop: the arm is stopped already, by {safety.mode.name}")
-        box.state.requests.protective_stop()
+        box.state.requests.protective_stop = True
 
 
 class UnlockProtectiveStop(CommandOperation):

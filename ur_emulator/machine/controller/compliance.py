@@ -96,9 +96,14 @@ class Compliance:
         return ControlMode.POSITION if self.force_mode is None else ControlMode.FORCE
 
     @property
-    def is_on(self) -> bool:
+    def is_active(self) -> bool:
         """True while `step` must be called in every cycle."""
-        return self._motion.is_compliant or self.is_teach_pressed or self.force_mode is not None
+        return (
+            self._motion.is_compliant
+            or self.is_teach_pressed
+            or self.force_mode is not None
+            or self._inputs.has_actions
+        )
 
     # --- requests
 

@@ -38,9 +38,6 @@ from ur_hil.tools import ToolModel
 from urscript.run.host import Host
 from urscript.run.waits import Outside
 
-# --- The snapshot of a cycle: the records of target, sensors and box one after the other
-
-
 # Run time of a unit of work [ms]. Source: urscript.catalogue.costs.
 _UNIT_TIME = 50e-6
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
@@ -203,7 +200,7 @@ class Controller:
         return (
             self.state.motion.is_moving
             or self.state.mode.is_changing
-            or self.safety.is_stopping
+            or self.safety.is_braking
             or self.push.will_end
             or any(gripper.is_busy for gripper in self.state.grippers)
         )
@@ -214,11 +211,10 @@ class Controller:
         The commands are those since the last cycle, in order of arrival.
         """
         state = self.state
-        state.clock.advance()
+        state.clock.tick += 1
         n_events = len(state.events)
         was_pushing = self.push.will_end
-        if was_pushing:
-            self.push.step()
+        self.push.step()
         for command in commands:
             with suppress(RefusedError):  # `Submitted` has reported it
                 command.apply(self)
@@ -236,7 +232,7 @@ class Controller:
         settings = state.error_settings
         if settings.pause_codes and settings.must_pause(state.events[n_events:]):
             self.programs.pause()
-        was_active = was_active or (control is _BY_HAND and any(target.qd))
+        was_active = was_active or (control is ControlMode.TEACH and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
         snapshot = make_snapshot(state, self.programs, self.plant.report(state.past.sensed), control)
         # What has stopped the arm may have dropped its target.
@@ -255,23 +251,25 @@ class Controller:
             state.events.append(RobotModeChanged(int(self._mode)))
             if self._mode is RobotMode.RUNNING:
                 self.safety.check_range()
-        if self.safety.is_busy:
-            self.safety.step()
-        if state.watchdogs and not self.programs.is_paused:
-            self._check_watchdogs()
-        if state.encoders.decoding:
-            state.encoders.step(state.io.digital_in)
-        if state.modbus.signals:
-            state.modbus.step(state.clock.tick)
+        self.safety.step()
+        if not self.programs.is_paused and (late := state.watchdogs.late(state.clock.tick)):
+            state.events.append(late.report)
+            if late.action is WatchdogAction.PAUSE:
+                self.programs.pause()
+            else:
+                self.programs.stop()
+        state.encoders.step(state.io.digital_in)
+        state.modbus.step(state.clock.tick)
 
     def _step_scripts(self) -> None:
         """All threads of all programs, and the effects of their requests."""
         state = self.state
         self.programs.step()
-        if state.requests.take_pause():
+        if state.requests.pause:
             self.programs.pause()
-        if state.requests.take_power_off():
+        if state.requests.power_off:
             self.safety.cut_power()
+        state.requests.pause = state.requests.power_off = False
         state.tool.step()
         payload = state.tool.payload
         if payload is not self._payload:
@@ -282,7 +280,7 @@ class Controller:
     def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget, TorqueCommand | None]:
         """How the arm is driven in this cycle, to where, and by which torque."""
         state, compliance = self.state, self.state.compliance
-        if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
+        if compliance.is_active:
             compliance.step()
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed.slider)
         return compliance.mode, target, compliance.torque()
@@ -307,16 +305,6 @@ class Controller:
         may_warn = is_watched and settings.warns_of_deviation
         if may_warn and (warning := settings.deviation_warning(sensed.position_error)):
             state.events.append(warning)
-
-    def _check_watchdogs(self) -> None:
-        late = self.state.watchdogs.late(self.state.clock.tick)
-        if late is None:
-            return
-        self.state.events.append(late.report)
-        if late.action is WatchdogAction.PAUSE:
-            self.programs.pause()
-        else:
-            self.programs.stop()
 
     # --- stops
 
@@ -357,6 +345,3 @@ class Controller:
         state.motion.place(q)
         state.past.place(state.motion.target, plant.sense())
         return True
-
-
-_BY_HAND = ControlMode.TEACH

@@ -220,7 +220,7 @@ class ProgramRunner:
             else:
                 program.kill()  # a secondary program has one cycle
         if self._primary is not None and (self._phase is _PLAYING or self._may_run()):
-            self._state.clock.advance_program()
+            self._state.clock.program_tick += 1
             status = self._primary.step()
             if status is not ProgramStatus.RUNNING:
                 has_failed = status is ProgramStatus.FAILED

@@ -130,14 +130,14 @@ class ErrorBuiltins(BuiltinGroup):
 
     @builtin("protective_stop")
     def _protective_stop(self, thread: object) -> None:
-        self._requests.protective_stop()
+        self._requests.protective_stop = True
 
     @builtin("powerdown")
     def _powerdown(self, thread: object) -> NoReturn:
-        self._requests.power_off()
+        self._requests.power_off = True
         raise ProgramHalted
 
     @builtin("pause")
     def _pause(self, thread: object) -> Generator[Wait, None, None]:
-        self._requests.pause()
+        self._requests.pause = True
         yield NEXT_CYCLE

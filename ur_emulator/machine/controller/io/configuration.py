@@ -46,6 +46,11 @@ class IoConfiguration:
     program_runs: bool = False
     _rules: dict[tuple[OutputKind, int], RunState] = field(default_factory=dict)
 
+    @property
+    def has_actions(self) -> bool:
+        """True while an input may have an action: of the box, or of another unit."""
+        return bool(self.input_actions or self.modbus.signals)
+
     def set_input_action(self, group: str, index: int, action: str) -> None:
         """Set the action of an input."""
         if action == DEFAULT_ACTION:
