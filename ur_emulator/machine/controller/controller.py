@@ -40,6 +40,8 @@ from urscript.run.waits import Outside
 
 # Run time of a unit of work [ms]. Source: urscript.catalogue.costs.
 _UNIT_TIME = 50e-6
+# Looked up once.
+_BY_HAND = ControlMode.TEACH
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
@@ -214,7 +216,8 @@ class Controller:
         state.clock.tick += 1
         n_events = len(state.events)
         was_pushing = self.push.will_end
-        self.push.step()
+        if was_pushing:
+            self.push.step()
         for command in commands:
             with suppress(RefusedError):  # `Submitted` has reported it
                 command.apply(self)
@@ -232,7 +235,7 @@ class Controller:
         settings = state.error_settings
         if settings.pause_codes and settings.must_pause(state.events[n_events:]):
             self.programs.pause()
-        was_active = was_active or (control is ControlMode.TEACH and any(target.qd))
+        was_active = was_active or (control is _BY_HAND and any(target.qd))
         self._settle = max(self._settle - 1, self._settle_cycles if was_active else 0)
         snapshot = make_snapshot(state, self.programs, self.plant.report(state.past.sensed), control)
         # What has stopped the arm may have dropped its target.
@@ -252,14 +255,12 @@ class Controller:
             if self._mode is RobotMode.RUNNING:
                 self.safety.check_range()
         self.safety.step()
-        if not self.programs.is_paused and (late := state.watchdogs.late(state.clock.tick)):
-            state.events.append(late.report)
-            if late.action is WatchdogAction.PAUSE:
-                self.programs.pause()
-            else:
-                self.programs.stop()
-        state.encoders.step(state.io.digital_in)
-        state.modbus.step(state.clock.tick)
+        if state.watchdogs and not self.programs.is_paused:
+            self._check_watchdogs()
+        if state.encoders.decoding:
+            state.encoders.step(state.io.digital_in)
+        if state.modbus.signals:
+            state.modbus.step(state.clock.tick)
 
     def _step_scripts(self) -> None:
         """All threads of all programs, and the effects of their requests."""
@@ -305,6 +306,14 @@ class Controller:
         may_warn = is_watched and settings.warns_of_deviation
         if may_warn and (warning := settings.deviation_warning(sensed.position_error)):
             state.events.append(warning)
+
+    def _check_watchdogs(self) -> None:
+        if late := self.state.watchdogs.late(self.state.clock.tick):
+            self.state.events.append(late.report)
+            if late.action is WatchdogAction.PAUSE:
+                self.programs.pause()
+            else:
+                self.programs.stop()
 
     # --- stops
 

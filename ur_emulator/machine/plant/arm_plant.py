@@ -270,7 +270,6 @@ class FlangePush:
 
     def step(self) -> None:
         """Count a cycle of a push with a duration; end it after the last."""
-        if self._cycles_left:
-            self._cycles_left -= 1
-            if not self._cycles_left:
-                self._plant.push(_NOTHING)
+        self._cycles_left -= 1
+        if not self._cycles_left:
+            self._plant.push(_NOTHING)
