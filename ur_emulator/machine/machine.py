@@ -25,7 +25,6 @@ from ur_emulator.machine.scripting.network import Arrival, Network, Request
 from ur_emulator.machine.scripting.robot_host import robot_hosts
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
-from urscript.run.waits import Outside
 
 Input = Command | Arrival
 # The result of a command, or the error that has ended it: a `RefusedError` if it was refused.
@@ -74,7 +73,7 @@ class Machine:
             self.controller.plant.furnish(scene)
 
     def take(self, arrival: Arrival) -> None:
-        """Take an arrival before its cycle begins: `waits_outside` counts with it."""
+        """Take an arrival before its cycle begins: `Controller.waits_outside` counts with it."""
         self.network.take(arrival)
 
     def tick(self, inputs: Iterable[Input] = ()) -> Answer:
@@ -96,15 +95,3 @@ class Machine:
     def forget_ended(self) -> None:
         """Drop the variables of the last program if it has ended; that changes no answer."""
         self.controller.programs.forget()
-
-    # --- what paces it
-
-    @property
-    def is_active(self) -> bool:
-        """True while the box is busy or the arm settles: in lockstep time passes only then."""
-        return self.controller.is_active
-
-    @property
-    def waits_outside(self) -> Outside | None:
-        """Who outside the box a script waits for; None while the arm or its surroundings need time."""
-        return self.controller.waits_outside

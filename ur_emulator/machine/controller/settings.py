@@ -1,4 +1,8 @@
-"""What programs declare: tool and payload, how moves are planned, errors and limits."""
+"""What programs declare: tool and payload, how moves are planned, errors and limits.
+
+Sources: URScript manual CB3 3.15, module motion; e-Series 5.22, motion versions, 5.24,
+jerk_gain_scaling_set, and 5.19, tool_wrench_limit_set.
+"""
 
 from __future__ import annotations
 
@@ -101,11 +105,6 @@ class ToolSettings:
             self.change_payload(after)
 
 
-# --- PlanningSettings: how programs want their moves to be planned
-#
-# Source: URScript manual e-Series 5.22, motion versions, 5.24, jerk_gain_scaling_set, and 5.19,
-# tool_wrench_limit_set.
-
 # Accelerations of jerk-limited moves change within this time at a gain of 1 [s]. Chosen.
 JERK_TIME = 0.1
 
@@ -140,17 +139,13 @@ class PlanningSettings:
         return JERK_TIME / self.jerk_gain
 
 
-# --- what programs have set up about errors and limits. Some settings are only kept: they have no effect here
-#
-# Source: URScript manual CB3 3.15, module motion.
-
 # Code of the log entry; the real one is not known.
 DEVIATION_CODE = 174
 
 
 @dataclass(slots=True)
 class ErrorSettings:
-    """Settings of `pause_on_error_code` and related builtins.
+    """Settings of `pause_on_error_code` and related builtins. Some have no effect here: they are only kept.
 
     Attributes:
         pause_codes: (code, argument or None for any) at which the program pauses.
@@ -187,12 +182,9 @@ class ErrorSettings:
         `position_error` (6,) is the delayed target minus the true position [rad].
         """
         error, joint = max((abs(error), joint) for joint, error in enumerate(position_error))
-        was_warned, self._has_warned = (
-            self._has_warned,
-            error > self.deviation_threshold * MAX_POSITION_DEVIATION,
-        )
+        was_warned = self._has_warned
+        self._has_warned = error > self.deviation_threshold * MAX_POSITION_DEVIATION
         if was_warned or not self._has_warned:
             return None
-        return ErrorReported(
-            DEVIATION_CODE, joint, ReportLevel.INFO, f"Large position deviation: {JOINT_NAMES[joint]}"
-        )
+        text = f"Large position deviation: {JOINT_NAMES[joint]}"
+        return ErrorReported(DEVIATION_CODE, joint, ReportLevel.INFO, text)

@@ -1,7 +1,9 @@
 """Digital, analogue and Euromap67 lines of the box and the tool, and outputs that follow the program.
 
 Digital words carry bits 0-7 standard, 8-15 configurable, 16-17 tool (UR realtime sheet; RTDE guide).
-Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V).
+Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V). No injection moulding
+machine is connected to the Euromap67 interface. Outputs that follow the program: URScript manuals CB3 3.15 and
+e-Series 5.11, module ioconfiguration.
 """
 
 from dataclasses import dataclass, field
@@ -38,6 +40,12 @@ TOOL = DigitalGroup("tool", 16, 2)
 DIGITAL_GROUPS = {group.name: group for group in (STANDARD, CONFIGURABLE, TOOL)}
 # Bits of the lines that old builtins and the Modbus map number from 0: 0-7 standard, 8-9 tool.
 STANDARD_AND_TOOL = (*STANDARD.bits, *TOOL.bits)
+
+
+def with_bit(word: int, bit: int, value: bool) -> int:
+    """Return a word with one of its bits set or cleared."""
+    return word | 1 << bit if value else word & ~(1 << bit)
+
 
 CURRENT, VOLTAGE = 0, 1
 # Full range of an analogue line by domain: (lowest, highest) value.
@@ -121,9 +129,7 @@ class ToolLine(NamedTuple):
     tx_idle_chars: float = 3.5
 
 
-# --- the Euromap67 interface to an injection moulding machine, as state: no machine is connected
-
-# Signals in each direction: two words of the Modbus map (docs/protocol/modbus.md).
+# Signals of Euromap67 in each direction: two words of the Modbus map (docs/protocol/modbus.md).
 N_EUROMAP = 32
 
 
@@ -144,18 +150,15 @@ class Euromap:
 
     def write_output(self, port: int, value: bool) -> None:
         """Switch a signal of the robot."""
-        mask = 1 << port
-        self.outputs = self.outputs | mask if value else self.outputs & ~mask
-
-
-# --- outputs that follow the program: the codes of set_runstate_*, and the level of each
-#
-# Source: URScript manuals CB3 3.15 and e-Series 5.11, module ioconfiguration. An unscheduled stop is one by a
-# protective stop, a fault, a violation or an error of the program; that an emergency stop is one: chosen.
+        self.outputs = with_bit(self.outputs, port, value)
 
 
 class RunState(IntEnum):
-    """What an output does when programs start and stop."""
+    """What an output does when programs start and stop: the codes of set_runstate_*.
+
+    An unscheduled stop is one by a protective stop, a fault, a violation or an error of the program; that an
+    emergency stop is one: chosen.
+    """
 
     KEEP = 0
     LOW_WHEN_STOPPED = 1
@@ -186,9 +189,6 @@ def level(rule: RunState, program_runs: bool, *, unscheduled: bool = False) -> b
     if program_runs:
         return _WHEN_RUNNING.get(rule)
     return (_WHEN_UNSCHEDULED if unscheduled else _WHEN_STOPPED).get(rule)
-
-
-# --- all lines of one box
 
 
 @dataclass(slots=True)
@@ -231,13 +231,11 @@ class InputOutput:
 
     def write_digital_in(self, bit: int, value: bool) -> None:
         """Set input `bit` of the digital word."""
-        mask = 1 << bit
-        self.digital_in = self.digital_in | mask if value else self.digital_in & ~mask
+        self.digital_in = with_bit(self.digital_in, bit, value)
 
     def write_digital_out(self, bit: int, value: bool) -> None:
         """Set output `bit` of the digital word."""
-        mask = 1 << bit
-        self.digital_out = self.digital_out | mask if value else self.digital_out & ~mask
+        self.digital_out = with_bit(self.digital_out, bit, value)
 
     def write_digital_outputs(self, word: int, mask: int) -> None:
         """Set the outputs in `mask` to the bits of `word`."""
