@@ -87,7 +87,7 @@ def make_snapshot(
         program_name=programs.name,
         script_control_line=programs.line if programs.reports_line else 0,
         control_mode=int(control),
-        is_guided_by_input=state.compliance.by_input,
+        is_guided_by_input="input" in state.compliance.askers,
         buttons=state.pendant.buttons,
         payload=payload.mass,
         payload_cog=payload.cog,
@@ -309,8 +309,9 @@ class Controller:
 
     def _check_watchdogs(self) -> None:
         if late := self.state.watchdogs.late(self.state.clock.tick):
-            self.state.events.append(late.report)
-            if late.action is WatchdogAction.PAUSE:
+            report, action = late
+            self.state.events.append(report)
+            if action is WatchdogAction.PAUSE:
                 self.programs.pause()
             else:
                 self.programs.stop()

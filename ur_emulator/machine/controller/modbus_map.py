@@ -114,7 +114,7 @@ def flag(state: ControllerState, offset: int) -> int:
 
 def latch_clock(state: ControllerState, offset: int, value: int) -> None:
     """Remember the present time."""
-    state.modbus_map.latch_clock(state.clock.tick)
+    state.modbus_map.latched_tick = state.clock.tick
 
 
 def clock(state: ControllerState, offset: int) -> int:

@@ -128,7 +128,7 @@ class ProgramRunner:
         if loaded:
             self._state.planning.motion_version = 1
         self._state.motion.begin_program()
-        self._state.io_configuration.program_started()
+        self._state.io_configuration.follow(True)
         self._state.interpreter.program_started()
         self._state.force_sense.program_started(self._state.past.steady_cycles)
         self._state.events.append(events.ProgramStarted(program.name, self._primary))
@@ -173,7 +173,7 @@ class ProgramRunner:
             state = self._state
             state.motion.resume()
             state.watchdogs.restart(state.clock.tick)
-            state.io_configuration.program_started()
+            state.io_configuration.follow(True)
             state.events.append(events.ProgramResumed(self.name))
             self._enter(ProgramState.RESUMING)
 
@@ -234,7 +234,7 @@ class ProgramRunner:
         is_new = self._phase_since == state.clock.tick
         if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:
             self._enter(ProgramState.PAUSED)
-            state.io_configuration.program_stopped(unscheduled=self._is_unscheduled)
+            state.io_configuration.follow(False, unscheduled=self._is_unscheduled)
             state.events.append(events.ProgramPaused(self.name))
         if self._phase in _STANDS_STILL or state.motion.is_returning:
             return False
@@ -257,7 +257,7 @@ class ProgramRunner:
         self._primary = None
         self._state.compliance.program_ended()
         self._state.interpreter.program_ended()
-        self._state.io_configuration.program_stopped(unscheduled=unscheduled)
+        self._state.io_configuration.follow(False, unscheduled=unscheduled)
         self._state.watchdogs.clear()
         self._state.error_settings.program_ended()
         self._state.events.append(events.ProgramStopped(self.name))

@@ -87,15 +87,8 @@ class IoConfiguration:
             self._rules[kind, index] = rule
             self._set(kind, index, level(rule, self.program_runs))
 
-    def program_started(self) -> None:
-        """Set the outputs that follow the program."""
-        self._follow(program_runs=True)
-
-    def program_stopped(self, *, unscheduled: bool = False) -> None:
-        """Set the outputs that follow the program; `unscheduled` as in `lines.level`."""
-        self._follow(program_runs=False, unscheduled=unscheduled)
-
-    def _follow(self, *, program_runs: bool, unscheduled: bool = False) -> None:
+    def follow(self, program_runs: bool, *, unscheduled: bool = False) -> None:
+        """Set the outputs that follow the program, which has started or ended; see `lines.level`."""
         self.program_runs = program_runs
         self.modbus.follow(program_runs, unscheduled=unscheduled)
         for (kind, index), rule in self._rules.items():

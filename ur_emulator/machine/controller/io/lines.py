@@ -1,9 +1,9 @@
 """Digital, analogue and Euromap67 lines of the box and the tool, and outputs that follow the program.
 
 Digital words carry bits 0-7 standard, 8-15 configurable, 16-17 tool (UR realtime sheet; RTDE guide).
-Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V). No injection moulding
-machine is connected to the Euromap67 interface. Outputs that follow the program: URScript manuals CB3 3.15 and
-e-Series 5.11, module ioconfiguration.
+Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V). No injection
+moulding machine is connected to the Euromap67 interface. Source of outputs that follow the program: URScript
+manuals CB3 3.15 and e-Series 5.11, module ioconfiguration.
 """
 
 from dataclasses import dataclass, field

@@ -143,7 +143,3 @@ class MapMemory:
     def write(self, offset: int, word: int) -> None:
         """Write a general purpose word."""
         self.words[offset] = word
-
-    def latch_clock(self, tick: int) -> None:
-        """Store a time, in cycles."""
-        self.latched_tick = tick
