@@ -3,8 +3,9 @@
 import socket
 import struct
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -12,10 +13,10 @@ from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.errors import RefusedError
 from ur_emulator.host.pacing import RealtimePacer
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
 from ur_emulator.machine.commands.programs import StartProgram
-from ur_emulator.machine.controller.command import Submitted
 from ur_emulator.machine.controller.controller import SETTLE_TIME, Controller
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.generations import CB3
@@ -143,6 +144,9 @@ class Bench:
     def tick(self, n=1, *commands):
         for _ in range(n):
             self.snapshots.append(self.controller.tick(commands))
+            for _, error in self.controller.outcomes:
+                if error is not None and not isinstance(error, RefusedError):
+                    raise error
             commands = ()
             self.events += self.controller.state.events.take()
         return self.now
@@ -178,6 +182,23 @@ def machine_of(controller):
     machine = Machine.__new__(Machine)
     machine.controller, machine.network = controller, Network()
     return machine
+
+
+@dataclass(frozen=True)
+class Submitted:
+    """A command whose sender gets the result, or the error, which ends only the command."""
+
+    command: Any
+    done: Any
+
+    def apply(self, box):
+        try:
+            result = self.command.apply(box)
+        except Exception as error:
+            self.done(None, error)
+            return None
+        self.done(result, None)
+        return result
 
 
 class BareBox(ServedBox):

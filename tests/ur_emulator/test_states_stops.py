@@ -29,7 +29,6 @@ from ur_emulator.machine.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.machine.controller.command import Submitted
 from ur_emulator.machine.controller.events import ErrorReported, ProgramPaused, ProgramResumed
 from ur_emulator.machine.controller.safety.speed_scaling import TOLERANCE
 from ur_emulator.machine.models.generations import CB3
@@ -482,9 +481,8 @@ def test_what_a_box_does_not_do_it_refuses(state):
         bench = Bench(mode=RobotMode.NO_CONTROLLER) if state == "boots" else moving(loaded=True)
         for step in way:
             bench.tick(BRAKING, step)
-        outcome = []
-        bench.tick(1, Submitted(command, lambda result, error, outcome=outcome: outcome.append(error)))
-        (error,) = outcome
+        bench.tick(1, command)
+        ((_, error),) = bench.controller.outcomes
         assert isinstance(error, RefusedError) is (type(command) in refused), f"{command}: {error}"
         if error is None:
             bench.tick(60)

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from ur_emulator.machine.controller.command import Command, Result, Submitted
+from ur_emulator.machine.controller.command import Command, Outcome
 from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.controller.events import Event
 from ur_emulator.machine.controller.snapshot import Snapshot
@@ -27,8 +27,6 @@ from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
 
 Input = Command | Arrival
-# The result of a command, or the error that has ended it: a `RefusedError` if it was refused.
-Outcome = tuple[Result, Exception | None]
 
 
 class Answer(NamedTuple):
@@ -78,15 +76,16 @@ class Machine:
 
     def tick(self, inputs: Iterable[Input] = ()) -> Answer:
         """Advance one control cycle. Commands act in their order; arrivals come before them."""
-        outcomes: list[Outcome] = []
         commands: list[Command] = []
         for one in inputs:
             if isinstance(one, Command):
-                commands.append(Submitted(one, lambda *outcome: outcomes.append(outcome)))
+                commands.append(one)
             else:
                 self.network.take(one)
-        snapshot = self.controller.tick(commands)
-        return Answer(snapshot, self.controller.state.events.take(), self.network.take_requests(), outcomes)
+        controller = self.controller
+        snapshot = controller.tick(commands)
+        events, requests = controller.state.events.take(), self.network.take_requests()
+        return Answer(snapshot, events, requests, controller.outcomes)
 
     def use_idle_time(self) -> None:
         """Compute now what the last cycle has left for later; that changes no answer."""

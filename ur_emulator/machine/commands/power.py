@@ -69,9 +69,6 @@ def change_mode(state: ControllerState, command: ModeCommand) -> None:
         refuse(state, f"{command.value} refused: the robot is in {state.mode.mode.name}, not in {possible}")
 
 
-# --- An e-Series box: operational mode, enabling device, remote control
-
-
 class SetOperationalMode(CommandOperation):
     """Choose the operational mode at the pendant; a wired selector and the dashboard override it."""
 

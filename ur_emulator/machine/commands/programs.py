@@ -137,9 +137,6 @@ def _program_state(box: BoxParts) -> str:
     return ProgramState(box.state.past.snapshot.runtime_state).name
 
 
-# --- Interpreter mode
-
-
 @dataclass(frozen=True, slots=True)
 class AppendStatements:
     """Add a compiled line to interpreter mode; `epoch` is that of the queue when its names were taken."""
@@ -166,9 +163,6 @@ class AbortMove:
 
     def apply(self, box: BoxParts) -> None:
         box.state.motion.abort()
-
-
-# --- The operator: questions and popups
 
 
 class AnswerRequest(CommandOperation):

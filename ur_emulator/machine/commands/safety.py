@@ -189,9 +189,6 @@ class PressButton(CommandOperation):
             box.state.compliance.is_teach_pressed = self.pressed
 
 
-# --- Safety planes and the limit of the tool's direction, as the pendant sets them up
-
-
 _LEAST_LENGTH = 1e-6
 
 

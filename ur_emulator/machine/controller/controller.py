@@ -6,13 +6,12 @@ time is the tick.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ControlMode, RobotMode
-from ur_emulator.errors import ModelError, RefusedError
+from ur_emulator.errors import ModelError
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
-from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.controller.command import Command, Outcome, outcome_of
 from ur_emulator.machine.controller.events import RobotModeChanged
 from ur_emulator.machine.controller.force_sense import VARIABLE
 from ur_emulator.machine.controller.io.watchdogs import WatchdogAction
@@ -121,7 +120,13 @@ SETTLE_TIME = 0.2
 
 
 class Controller:
-    """One control box without its ports; commands act on its public parts (`command.Box`)."""
+    """One control box without its ports; commands act on its public parts (`command.BoxParts`).
+
+    Attributes:
+        outcomes: of the commands of the last cycle, in their order.
+    """
+
+    outcomes: Sequence[Outcome]
 
     def __init__(
         self,
@@ -218,9 +223,7 @@ class Controller:
         was_pushing = self.push.will_end
         if was_pushing:
             self.push.step()
-        for command in commands:
-            with suppress(RefusedError):  # `Submitted` has reported it
-                command.apply(self)
+        self.outcomes = [outcome_of(command, self) for command in commands]
         self._step_modes()
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing

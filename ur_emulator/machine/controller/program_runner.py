@@ -136,7 +136,7 @@ class ProgramRunner:
     def stop(self, *, unscheduled: bool = False) -> None:
         """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint.
 
-        `unscheduled`: nobody wanted it, which the outputs that follow the program show.
+        `unscheduled`: an error or the safety system did, which the outputs that follow the program show.
         """
         if self._primary is not None:
             self._primary.kill()

@@ -109,13 +109,7 @@ class ControllerState:
         self.pendant: Final = Pendant()
         self.interpreter: Final = InterpreterQueue()
         self.compliance: Final = Compliance(
-            self.motion,
-            self.mode,
-            self.safety,
-            self.operational,
-            self.io_configuration,
-            self.past,
-            robot,
+            self.motion, self.mode, self.safety, self.operational, self.io_configuration, self.past, robot
         )
         has_tool_line = bool(tools) and generation.software(SoftwareVersion(*version)).has_tool_line
         self.grippers: Final = make_grippers(tools, period_s, has_tool_line)

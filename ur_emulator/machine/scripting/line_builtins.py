@@ -200,7 +200,7 @@ class LineSetupBuiltins(BuiltinGroup):
 
     @builtin("set_input_actions_to_default")
     def _clear_actions(self, thread: object) -> None:
-        self._configuration.clear_input_actions()
+        self._configuration.input_actions.clear()
 
     @builtin("get_euromap_input")
     def _get_euromap_input(self, thread: object, n: int) -> bool:

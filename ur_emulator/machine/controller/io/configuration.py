@@ -24,12 +24,8 @@ class OutputKind(IntEnum):
     EUROMAP = 7
 
 
-_OUTPUTS = {
-    OutputKind.STANDARD: STANDARD,
-    OutputKind.CONFIGURABLE: CONFIGURABLE,
-    OutputKind.TOOL: TOOL,
-}
-_INPUTS = {f"{group.name}_digital": group for group in (STANDARD, CONFIGURABLE, TOOL)}
+_OUTPUTS = (STANDARD, CONFIGURABLE, TOOL)  # as the first three kinds
+_INPUTS = {f"{group.name}_digital": group for group in _OUTPUTS}
 
 
 @dataclass(slots=True)
@@ -57,10 +53,6 @@ class IoConfiguration:
             self.input_actions.pop((group, index), None)
         else:
             self.input_actions[group, index] = action
-
-    def clear_input_actions(self) -> None:
-        """Remove the actions of all inputs."""
-        self.input_actions.clear()
 
     def requests_freedrive(self) -> bool:
         """True while a line that is set up for it, or a signal of another unit, is high."""
