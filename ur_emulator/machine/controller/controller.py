@@ -126,7 +126,7 @@ class Controller:
         outcomes: of the commands of the last cycle, in their order.
     """
 
-    outcomes: Sequence[Outcome]
+    outcomes: list[Outcome]
 
     def __init__(
         self,
@@ -223,7 +223,9 @@ class Controller:
         was_pushing = self.push.will_end
         if was_pushing:
             self.push.step()
-        self.outcomes = [outcome_of(command, self) for command in commands]
+        self.outcomes = []
+        for command in commands:
+            self.outcomes.append(outcome_of(command, self))
         self._step_modes()
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
@@ -269,11 +271,13 @@ class Controller:
         """All threads of all programs, and the effects of their requests."""
         state = self.state
         self.programs.step()
-        if state.requests.pause:
+        requests = state.requests
+        if requests.pause:
+            requests.pause = False
             self.programs.pause()
-        if state.requests.power_off:
+        if requests.power_off:
+            requests.power_off = False
             self.safety.cut_power()
-        state.requests.pause = state.requests.power_off = False
         state.tool.step()
         payload = state.tool.payload
         if payload is not self._payload:
