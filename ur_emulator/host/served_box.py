@@ -125,7 +125,7 @@ class ServedBox:
         self._awake_until = 0
         self.stops = 0
         # When the newest of the programs that were started was asked for, in monotonic time [s].
-        self._newest = 0.0
+        self.newest = 0.0
         self.watch: MemoryWatch | None = None
         self.listeners: tuple[Listener, ...] = ()
         self.backlog: set[Connection] = set()
@@ -288,9 +288,9 @@ class ServedBox:
 
     def why_too_old(self, program: CompiledProgram, asked: float) -> str:
         """Return why a program does not begin that was asked for then; "": it is the newest from now on."""
-        if asked < self._newest:
+        if asked < self.newest:
             return f"program {program.name} does not begin: a newer one was compiled before it"
-        self._newest = asked
+        self.newest = asked
         return ""
 
     def in_worker(self, function: Callable[..., T], *arguments: Any) -> Steps[T]:
