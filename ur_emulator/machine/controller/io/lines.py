@@ -6,7 +6,7 @@ moulding machine is connected to the Euromap67 interface. Source of outputs that
 manuals CB3 3.15 and e-Series 5.11, module ioconfiguration.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -169,15 +169,14 @@ class RunState(IntEnum):
     HIGH_UNTIL_UNSCHEDULED = 5  # and high from the start on
 
 
-_WHEN_RUNNING = {RunState.HIGH_WHEN_RUNNING: True, RunState.HIGH_UNTIL_UNSCHEDULED: True}
-_WHEN_STOPPED = {
-    RunState.LOW_WHEN_STOPPED: False,
-    RunState.HIGH_WHEN_STOPPED: True,
-    RunState.HIGH_WHEN_RUNNING: False,
-}
-_WHEN_UNSCHEDULED = _WHEN_STOPPED | {
-    RunState.LOW_WHEN_UNSCHEDULED: False,
-    RunState.HIGH_UNTIL_UNSCHEDULED: False,
+# Level of an output when a program runs, has stopped, was stopped unscheduled; None does not change it.
+_LEVELS: dict[RunState, tuple[bool | None, bool | None, bool | None]] = {
+    RunState.KEEP: (None, None, None),
+    RunState.LOW_WHEN_STOPPED: (None, False, False),
+    RunState.HIGH_WHEN_STOPPED: (None, True, True),
+    RunState.HIGH_WHEN_RUNNING: (True, False, False),
+    RunState.LOW_WHEN_UNSCHEDULED: (None, None, False),
+    RunState.HIGH_UNTIL_UNSCHEDULED: (True, None, False),
 }
 
 
@@ -186,12 +185,12 @@ def level(rule: RunState, program_runs: bool, *, unscheduled: bool = False) -> b
 
     `unscheduled`: the program has just been stopped, and not by itself or by a user.
     """
+    running, stopped, stopped_unscheduled = _LEVELS[rule]
     if program_runs:
-        return _WHEN_RUNNING.get(rule)
-    return (_WHEN_UNSCHEDULED if unscheduled else _WHEN_STOPPED).get(rule)
+        return running
+    return stopped_unscheduled if unscheduled else stopped
 
 
-@dataclass(slots=True)
 class InputOutput:
     """The lines of one box.
 
@@ -204,19 +203,13 @@ class InputOutput:
         euromap: signals to and from a moulding machine.
     """
 
-    digital_in: int = 0
-    digital_out: int = 0
-    analog: AnalogLines = field(default_factory=AnalogLines)
-    analog_in: list[AnalogLine] = field(init=False)
-    analog_out: list[AnalogLine] = field(init=False)
-    tool_analog_in: list[AnalogLine] = field(init=False)
-    tool_voltage: int = 0
-    tool_output_modes: tuple[int, int, int] = (0, 1, 1)
-    tool_line: ToolLine = field(default_factory=ToolLine)
-    flags: list[bool] = field(default_factory=lambda: [False] * 32)
-    euromap: Euromap = field(default_factory=Euromap)
-
-    def __post_init__(self) -> None:
+    def __init__(self) -> None:
+        self.digital_in = self.digital_out = self.tool_voltage = 0
+        self.tool_output_modes = (0, 1, 1)
+        self.tool_line = ToolLine()
+        self.flags = [False] * 32
+        self.euromap = Euromap()
+        self.analog = AnalogLines()
         self.analog_in = [AnalogLine(self.analog, i) for i in (0, 1)]
         self.analog_out = [AnalogLine(self.analog, i) for i in (2, 3)]
         self.tool_analog_in = [AnalogLine(self.analog, i) for i in (4, 5)]
