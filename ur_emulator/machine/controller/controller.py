@@ -260,6 +260,7 @@ class Controller:
             if self._mode is RobotMode.RUNNING:
                 self.safety.check_range()
         self.safety.step()
+        # Rare parts are asked whether they hold anything: a step that does nothing takes longer.
         if state.watchdogs and not self.programs.is_paused:
             self._check_watchdogs()
         if state.encoders.decoding:

@@ -64,7 +64,7 @@ class InterpreterQueue:
         last_executed: id of the last line that began to run; 0 for none, here and below.
         last_interpreted: id of the last line that was compiled.
         last_cleared: id of the last line that was cleared.
-        is_ending: the mode ends when the present line has ended.
+        is_ending: the mode ends when the present line has ended; programs set it, and the next.
         is_clearing: all is cleared when the present line has ended.
         clears_on_end: all is cleared when the mode ends.
     """
@@ -134,16 +134,6 @@ class InterpreterQueue:
         if any(number == self._held_by for number, _ in self._ready):
             self._held_by = 0
         self._ready.clear()
-
-    # --- what programs do
-
-    def end(self) -> None:
-        """Leave the mode when the present line has ended; no effect while it is off."""
-        self.is_ending = self.is_on
-
-    def clear(self) -> None:
-        """Clear all when the present line has ended."""
-        self.is_clearing = True
 
     # --- what the main thread does
 

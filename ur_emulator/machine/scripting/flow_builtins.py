@@ -84,13 +84,13 @@ class InterpreterBuiltins(BuiltinGroup):
 
     @builtin("end_interpreter")
     def _end(self, thread: object) -> None:
-        self._queue.end()
+        self._queue.is_ending = self._queue.is_on
 
     @builtin("clear_interpreter")
     def _clear(self, thread: object) -> None:
         if not self._queue.is_on:
             raise ScriptRuntimeError("clear_interpreter can only be called in interpreter mode")
-        self._queue.clear()
+        self._queue.is_clearing = True
 
 
 class ErrorBuiltins(BuiltinGroup):
