@@ -259,5 +259,5 @@ class ProgramRunner:
         self._state.interpreter.program_ended()
         self._state.io_configuration.follow(False, unscheduled=unscheduled)
         self._state.watchdogs.clear()
-        self._state.error_settings.program_ended()
+        self._state.error_settings.pause_codes.clear()
         self._state.events.append(events.ProgramStopped(self.name))

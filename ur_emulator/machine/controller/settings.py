@@ -148,7 +148,7 @@ class ErrorSettings:
     """Settings of `pause_on_error_code` and related builtins. Some have no effect here: they are only kept.
 
     Attributes:
-        pause_codes: (code, argument or None for any) at which the program pauses.
+        pause_codes: (code, argument or None for any) at which the present program pauses.
         warns_of_deviation: whether joints that deviate from the path are reported.
         deviation_threshold: part of the deviation limit at which to warn.
         transition_hardness: of safeguard stops and reduced mode: 0 hard, 1 soft.
@@ -163,10 +163,6 @@ class ErrorSettings:
     revolution_reference: Vector6 | None = None
     holds_high: bool = True
     _has_warned: bool = False
-
-    def program_ended(self) -> None:
-        """Forget the errors at which the program was to be paused."""
-        self.pause_codes.clear()
 
     def must_pause(self, events: Iterable[Event]) -> bool:
         """True when one of the events is an error code at which the program is to be paused."""

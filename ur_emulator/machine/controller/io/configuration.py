@@ -67,10 +67,6 @@ class IoConfiguration:
             return self.registers.inputs.booleans[index]
         return self.io.read_digital_in(_INPUTS[group].bits[index])
 
-    def rule(self, kind: OutputKind, index: int) -> RunState:
-        """What an output does when programs start and stop."""
-        return self._rules.get((kind, index), RunState.KEEP)
-
     def set_rule(self, kind: OutputKind, index: int, rule: RunState) -> None:
         """Let an output follow the program; it takes its value for the present state at once."""
         if rule is RunState.KEEP:
