@@ -320,7 +320,7 @@ def test_log_files_are_those_of_the_manual():
     assert queue.log.files == {"interpreter.0.log": lines}
     queue = in_mode(clear_on_end=False)
     queue.append(LINE, queue.epoch)
-    queue.end()
+    queue.is_ending = True
     queue.leave()
     assert queue.log.files == {"interpreter.saved.log": "interpreter log\ne: 0 c: 1 : x = 1\n"}
 
