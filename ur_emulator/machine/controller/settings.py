@@ -7,7 +7,7 @@ jerk_gain_scaling_set, and 5.19, tool_wrench_limit_set.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
@@ -20,8 +20,9 @@ from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
 class Payload:
     """What the controller assumes at the flange: mass [kg], centre of gravity [m] in the flange frame.
 
-    `at_tcp`: no centre of gravity was given; it is the TCP, also after a later change of the TCP.
-    `inertia`: as declared, Ixx Iyy Izz Ixy Ixz Iyz about the centre of gravity [kg m^2].
+    `at_tcp`: no centre of gravity was given; it is the TCP, also after a later change of the TCP. Source:
+    URScript manual, set_payload.
+    `inertia`: as declared, Ixx Iyy Izz Ixy Ixz Iyz about the centre of gravity [kg m^2]; zero: not known.
     """
 
     mass: float = 0.0
@@ -64,22 +65,6 @@ class ToolSettings:
         if self.payload.at_tcp:
             self.change_payload(Payload(self.payload.mass, offset[:3], at_tcp=True))
         self.tcp_offset = offset
-
-    def set_payload(self, mass: float, cog: Vector3 | None) -> None:
-        """Set mass [kg] and centre of gravity [m]; None: the TCP, also that of a later `set_tcp`.
-
-        Source: URScript manual, set_payload.
-        """
-        at_tcp = cog is None
-        self.change_payload(Payload(mass, self.tcp_offset[:3] if cog is None else cog, at_tcp))
-
-    def set_payload_mass(self, mass: float) -> None:
-        """Set the mass [kg]; the centre of gravity stays, the inertia is no longer known."""
-        self.change_payload(replace(self.payload, mass=mass, inertia=ZERO6))
-
-    def set_payload_cog(self, cog: Vector3) -> None:
-        """Set the centre of gravity [m]; the mass stays, the inertia is no longer known."""
-        self.change_payload(Payload(self.payload.mass, cog))
 
     def change_payload(self, payload: Payload, cycles: int = 0) -> None:
         """Change the payload, at once or on a straight line over so many cycles."""
