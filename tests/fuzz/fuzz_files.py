@@ -312,7 +312,7 @@ class _Answers:
                 yield
 
     def _turn(self):
-        self._clock.advance()
+        self._clock.tick += 1
         self._outside.carry_out(self._network.take_requests())
         for service in tuple(self._loop._services):
             service.advance(time.monotonic())

@@ -4,7 +4,8 @@ import socket
 import struct
 import xmlrpc.client
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -12,10 +13,10 @@ from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.errors import RefusedError
 from ur_emulator.host.pacing import RealtimePacer
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
 from ur_emulator.machine.commands.programs import StartProgram
-from ur_emulator.machine.controller.command import Submitted
 from ur_emulator.machine.controller.controller import SETTLE_TIME, Controller
 from ur_emulator.machine.controller.io.network import (
     BytesArrived,
@@ -225,6 +226,9 @@ class Bench:
                 outside.take(arrival)
             self.snapshots.append(self.controller.tick(commands))
             self.network.carry_out(outside.take_requests())
+            for _, error in self.controller.outcomes:
+                if error is not None and not isinstance(error, RefusedError):
+                    raise error
             commands = ()
             self.events += self.controller.state.events.take()
         return self.now
@@ -241,7 +245,7 @@ class Bench:
         self.start(text)
         for _ in range(limit):
             moves = box.programs.has_work or box.state.motion.is_moving or box.state.mode.is_changing
-            rested = 0 if moves or box.safety.is_stopping else rested + 1
+            rested = 0 if moves or box.safety.is_braking else rested + 1
             if not box.is_active or rested > box.generation.cycles(2 * SETTLE_TIME):
                 break
             self.tick()
@@ -260,6 +264,23 @@ def machine_of(controller):
     machine = Machine.__new__(Machine)
     machine.controller, machine.network = controller, controller.state.network
     return machine
+
+
+@dataclass(frozen=True)
+class Submitted:
+    """A command whose sender gets the result, or the error, which ends only the command."""
+
+    command: Any
+    done: Any
+
+    def apply(self, box):
+        try:
+            result = self.command.apply(box)
+        except Exception as error:
+            self.done(None, error)
+            return None
+        self.done(result, None)
+        return result
 
 
 class BareBox(ServedBox):

@@ -77,13 +77,13 @@ class InterpreterBuiltins(BuiltinGroup):
 
     @builtin("end_interpreter")
     def _end(self, thread: object) -> None:
-        self._queue.end()
+        self._queue.is_ending = self._queue.is_on
 
     @builtin("clear_interpreter")
     def _clear(self, thread: object) -> None:
         if not self._queue.is_on:
             raise ScriptRuntimeError("clear_interpreter can only be called in interpreter mode")
-        self._queue.clear()
+        self._queue.is_clearing = True
 
 
 class ErrorBuiltins(BuiltinGroup):
@@ -123,14 +123,14 @@ class ErrorBuiltins(BuiltinGroup):
 
     @builtin("protective_stop")
     def _protective_stop(self, thread: object) -> None:
-        self._requests.protective_stop()
+        self._requests.protective_stop = True
 
     @builtin("powerdown")
     def _powerdown(self, thread: object) -> NoReturn:
-        self._requests.power_off()
+        self._requests.power_off = True
         raise ProgramHalted
 
     @builtin("pause")
     def _pause(self, thread: object) -> Generator[Wait, None, None]:
-        self._requests.pause()
+        self._requests.pause = True
         yield NEXT_CYCLE

@@ -71,7 +71,7 @@ class LineBuiltins(BuiltinGroup):
             "get_flag": lambda thread, n: n < len(io.flags) and io.flags[n],
             "set_tool_output_mode": lambda thread, mode: io.set_tool_output_mode(0, mode),
             "set_tool_digital_output_mode": lambda thread, n, mode: io.set_tool_output_mode(1 + n, mode),
-            "set_input_actions_to_default": lambda thread: self._configuration.clear_input_actions(),
+            "set_input_actions_to_default": lambda thread: self._configuration.input_actions.clear(),
             "get_euromap_input": lambda thread, n: euromap.read_input(_euromap_port(n)),
             "get_euromap_output": lambda thread, n: euromap.read_output(_euromap_port(n)),
             "set_euromap_output": lambda thread, n, value: euromap.write_output(_euromap_port(n), value),

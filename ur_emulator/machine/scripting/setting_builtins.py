@@ -1,7 +1,7 @@
 """Builtins for TCP, payload and mounting, and the world model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import hypot, pi
 from typing import Any
@@ -13,7 +13,7 @@ from protocol.pose import pose_inv, pose_sub, pose_trans, rotvec_to_matrix
 from ur_emulator.machine.controller.force_sense import ForceSense
 from ur_emulator.machine.controller.settings import Payload, ToolSettings
 from ur_emulator.machine.controller.world_model import WorldModel, WorldModelError
-from ur_emulator.machine.models.robot_model import RobotModel, Vector3, six
+from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, six
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin, floats, refusing, vector
 from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
@@ -50,16 +50,16 @@ class SettingBuiltins(BuiltinGroup):
     @builtin("set_payload")
     def _set_payload(self, thread: object, m: float, cog: Any) -> None:
         mass, place = self._mass(m), _cog(self._tool.tcp_offset[:3] if cog is None else cog)
-        self._tool.set_payload(mass, None if cog is None else place)
+        self._tool.change_payload(Payload(mass, place, at_tcp=cog is None))
         self._force_sense.zero_built_in(0)
 
     @builtin("set_payload_mass")
     def _set_payload_mass(self, thread: object, m: float) -> None:
-        self._tool.set_payload_mass(self._mass(m))
+        self._tool.change_payload(replace(self._tool.payload, mass=self._mass(m), inertia=ZERO6))
 
     @builtin("set_payload_cog")
     def _set_payload_cog(self, thread: object, cog: Any) -> None:
-        self._tool.set_payload_cog(_cog(cog))
+        self._tool.change_payload(Payload(self._tool.payload.mass, _cog(cog)))
 
     @builtin("set_target_payload")
     def set_target_payload(
