@@ -7,7 +7,6 @@ motion. `docs/fidelity.md` has the greatest differences and their reasons.
 from __future__ import annotations
 
 from dataclasses import fields
-from functools import partial
 from itertools import product
 from math import pi, radians
 
@@ -15,7 +14,6 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from box_support import FakeNetwork
 from dashboard_support import Dashboard
 from public_arms import ROS, Body, ros_model
 
@@ -190,9 +188,7 @@ def test_drives_can_carry_the_stretched_arm_with_its_payload(robot):
 )
 def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(name, fidelity):
     robot = ROBOTS[name]
-    controller = Controller(
-        robot, robot.generation.fidelity(fidelity), 7, partial(robot_hosts, network=FakeNetwork())
-    )
+    controller = Controller(robot, robot.generation.fidelity(fidelity), 7, robot_hosts)
     program = compile_program(f"""def prog():
       set_payload({robot.payload_max}, [0, 0, 0.03])
       q = get_target_joint_positions()

@@ -76,15 +76,15 @@ class ForceBuiltins(BuiltinGroup):
         blocked = [x == 0 for x in free_axes]
         hold = AxisHold(self._arm.tool, turn, blocked, q) if any(blocked) else None
         wrench = self._force_sense.residual(self._past.steady_cycles)
-        self._compliance.start_freedrive(by_program=True, hold=hold, wrench=wrench)
+        self._compliance.start_freedrive("program", hold=hold, wrench=wrench)
 
     @builtin("freedrive_mode_no_incorrect_payload_check")
     def _begin_freedrive_unchecked(self, thread: object) -> None:
-        self._compliance.start_freedrive(by_program=True)
+        self._compliance.start_freedrive("program")
 
     @builtin("end_freedrive_mode", "end_teach_mode")
     def _end_freedrive(self, thread: object) -> None:
-        self._compliance.end_freedrive(by_program=True)
+        self._compliance.end_freedrive("program")
 
     # --- force mode
 
