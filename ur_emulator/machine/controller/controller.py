@@ -27,7 +27,6 @@ from ur_emulator.machine.controller.safety_system import SafetySystem
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.controller.state import ControllerState, make_state
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import draw_calibration
 from ur_emulator.machine.models.fidelity import Fidelity, dead_cycles
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
@@ -173,7 +172,7 @@ class Controller:
         )
         self.state = make_state(
             robot,
-            ArmModel(robot, draw_calibration(robot, fidelity, seed)),
+            ArmModel(robot, self.plant.dh),
             seed,
             Clock(generation, generation.cycles(BOOT_TIME)),
             motion,

@@ -142,7 +142,7 @@ def make_state(
         enabling_device=EnablingDevice(),
         speed=speed,
         tool=tool,
-        dynamics=ArmDynamics(robot, arm.calibration, tool),
+        dynamics=ArmDynamics(robot, arm.dh, tool),
         planning=PlanningSettings(),
         world=WorldModel(lambda: arm.fk(motion.target.q), tool),
         energy=EnergyMeter(clock.generation),

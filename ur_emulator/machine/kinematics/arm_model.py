@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_to_flat
 from ur_emulator.errors import KinematicsError
 from ur_emulator.machine.kinematics.closed_form import closed_form_inverse
-from ur_emulator.machine.models.calibration import NOMINAL, Calibration, calibrated_dh
 from ur_emulator.machine.models.joint_range import JointRange
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
-from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3, Vector6, six
 from ur_hil.arithmetic import add_up
 
 # --- wrenches at other points
@@ -79,7 +78,7 @@ class ArmModel:
     Not to be shared between threads: evaluation uses one scratch state.
 
     Args:
-        calibration: differences of this arm from the nominal one.
+        dh: its six rows; None: the nominal ones.
 
     Attributes:
         range: the joint ranges that `inverse` keeps; at first those of the robot.
@@ -89,10 +88,10 @@ class ArmModel:
     `tcp` in all methods: pose of the tool centre point in the flange frame; None for the flange itself.
     """
 
-    def __init__(self, robot: RobotModel, calibration: Calibration = NOMINAL) -> None:
+    def __init__(self, robot: RobotModel, dh: tuple[DhRow, ...] | None = None) -> None:
         self.robot = robot
-        self.calibration = calibration
-        self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
+        self.dh = robot.dh if dh is None else dh
+        self._model = arm_spec(robot, self.dh, (1.0,) * 6).compile()
         self._data = mujoco.MjData(self._model)
         data = self._data
         self._flange_link: int = self._model.body(LINKS[5]).id

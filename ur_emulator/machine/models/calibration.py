@@ -1,4 +1,4 @@
-"""Calibration: how one built arm differs from the nominal table of its type.
+"""The factory calibration: how the DH table of one built arm differs from the nominal one of its type.
 
 The factory measures every arm and stores the differences in the control box, so the controller's own
 kinematics know them; a client that trusts the nominal table is off by one or two millimetres.
@@ -9,20 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ur_emulator.machine.models.fidelity import Fidelity, random_stream
-from ur_emulator.machine.models.robot_model import ZERO6, DhRow, RobotModel, Vector6, six
-
-
-@dataclass(frozen=True, slots=True)
-class Calibration:
-    """Differences to add to a nominal DH table [rad, m], in the controller's own naming."""
-
-    delta_theta: Vector6 = ZERO6
-    delta_a: Vector6 = ZERO6
-    delta_d: Vector6 = ZERO6
-    delta_alpha: Vector6 = ZERO6
-
-
-NOMINAL = Calibration()
+from ur_emulator.machine.models.robot_model import ZERO6, DhRow, RobotModel, Vector6
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,27 +94,16 @@ _SPREADS = {
 }
 
 
-def draw_calibration(robot: RobotModel, fidelity: Fidelity, seed: int) -> Calibration:
-    """Draw the calibration of the box with this seed: normal, independent entries."""
+def draw_dh(robot: RobotModel, fidelity: Fidelity, seed: int) -> tuple[DhRow, ...]:
+    """Return the DH table of the box with this seed: the nominal one plus normal, independent differences."""
     spread = _SPREADS.get(robot.name, _OTHERS)
     rng = random_stream(seed, "calibration")
     lengths = np.add(spread.mean, spread.sd * rng.standard_normal(6))
     angles = np.multiply([spread.tilt, [spread.zero] * 6], rng.standard_normal((2, 6)))
     d1, a2, a3, d4, d5, d6 = (1e-3 * fidelity.calibration * lengths).tolist()
     alpha, theta = (1e-3 * fidelity.calibration * angles).tolist()
-    return Calibration(six(theta), (0.0, a2, a3, 0.0, 0.0, 0.0), (d1, 0.0, 0.0, d4, d5, d6), six(alpha))
-
-
-def calibrated_dh(robot: RobotModel, calibration: Calibration) -> tuple[DhRow, ...]:
-    """Return the six rows of one arm: nominal plus calibration."""
+    a, d = (0.0, a2, a3, 0.0, 0.0, 0.0), (d1, 0.0, 0.0, d4, d5, d6)
     return tuple(
         DhRow(row.a + da, row.d + dd, row.alpha + dalpha, row.theta + dtheta)
-        for row, da, dd, dalpha, dtheta in zip(
-            robot.dh,
-            calibration.delta_a,
-            calibration.delta_d,
-            calibration.delta_alpha,
-            calibration.delta_theta,
-            strict=True,
-        )
+        for row, da, dd, dalpha, dtheta in zip(robot.dh, a, d, alpha, theta, strict=True)
     )
