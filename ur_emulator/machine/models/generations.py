@@ -11,14 +11,9 @@ Sources of the electrics and fidelities of the e-Series, cited by letter below:
 from dataclasses import replace
 from datetime import datetime
 from math import radians
-from types import MappingProxyType
 from typing import Any
 
-from protocol.dashboard.commands import COMMANDS
-from protocol.primary.layout import SUB_PACKAGES
-from protocol.realtime.layout import COLUMNS, VERSIONS
 from protocol.robot_api import CALLS
-from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.machine.models.fidelity import (
     EXACT,
@@ -31,7 +26,7 @@ from ur_emulator.machine.models.fidelity import (
 )
 from ur_emulator.machine.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
 from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
-from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
+from urscript.catalogue import STEP_TIME, Generation
 
 _CB3_BUILDS: Builds = (
     (SoftwareVersion(3, 0), 15547, datetime(2014, 6, 1)),  # build: public issues name 3.0.15547; date chosen
@@ -83,19 +78,8 @@ CB3 = RobotGeneration(
     execution_time=0.0,  # chosen: the unit is not known
     run_up_time=0.16,  # recordings of a real UR3 and of the maker's simulator: .05 in each of 20 cycles
     gravity=9.82,  # recordings of a real UR3: `target_moment` at rest
-    reports_control_as_target=False,
-    has_operational_modes=False,
-    has_remote_control=False,
     fidelities=FIDELITIES,
     robot_subtype=2,
-    dashboard=COMMANDS,
-    realtime=COLUMNS,
-    frame_sizes=VERSIONS,
-    sub_packages=SUB_PACKAGES,
-    rtde_outputs=OUTPUTS,
-    rtde_inputs=INPUTS,
-    builtins=ALL_ROWS,
-    interpreter_since=None,
 )
 
 
@@ -205,13 +189,6 @@ E_SERIES = RobotGeneration(
     has_remote_control=True,
     fidelities=(_EXACT, _IDEAL, _TYPICAL, _POOR),
     robot_subtype=3,
-    dashboard=COMMANDS,
-    realtime=COLUMNS,
-    frame_sizes=VERSIONS,
-    sub_packages=SUB_PACKAGES,
-    rtde_outputs=OUTPUTS,
-    rtde_inputs=INPUTS,
-    builtins=ALL_ROWS,
     interpreter_since=SoftwareVersion(5, 10),  # UR support page of interpreter mode: "SW 5.10 above"
 )
 
@@ -228,10 +205,8 @@ POLYSCOPE_X = replace(
     robot_api=CALLS,
     # Switched off until somebody enables them under Security, Services. To which 30002 and 30003 belong is
     # chosen.
-    services=MappingProxyType(
-        {
-            "primary": ("primary", "secondary", "realtime", "primary_ro", "secondary_ro", "realtime_ro"),
-            "rtde": ("rtde",),
-        }
-    ),
+    services={
+        "primary": ("primary", "secondary", "realtime", "primary_ro", "secondary_ro", "realtime_ro"),
+        "rtde": ("rtde",),
+    },
 )

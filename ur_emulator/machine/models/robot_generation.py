@@ -12,24 +12,20 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from protocol.dashboard.commands import DashboardCommand, commands_of
+from protocol.dashboard.commands import COMMANDS, DashboardCommand, commands_of
 from protocol.errors import LocalProtocolError
 from protocol.primary.framing import SubPackage
-from protocol.realtime.layout import RealtimeColumn, RealtimeLayout, frame_size
+from protocol.primary.layout import SUB_PACKAGES
+from protocol.realtime.layout import COLUMNS, VERSIONS, RealtimeColumn, RealtimeLayout, frame_size
 from protocol.robot_api import ApiCall, calls_of
-from protocol.rtde.fields import RtdeField, input_fields, output_fields
+from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.machine.models.fidelity import Fidelity, read_fidelity
 from ur_emulator.machine.models.safety_limits import SafetyLimits
-from urscript.catalogue import Builtin, catalogue_for
+from urscript.catalogue import ALL_ROWS, Builtin, Catalogue, catalogue_for
 from urscript.catalogue.types import Version
-
-if TYPE_CHECKING:
-    from urscript.catalogue import Catalogue
-
 
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
@@ -85,22 +81,22 @@ class RobotGeneration:
     execution_time: float
     run_up_time: float
     gravity: float
-    reports_control_as_target: bool
-    has_operational_modes: bool
-    has_remote_control: bool
+    reports_control_as_target: bool = False
+    has_operational_modes: bool = False
+    has_remote_control: bool = False
     has_remote_in_manual: bool = True
     fidelities: tuple[Fidelity, ...]
     robot_subtype: int
-    dashboard: tuple[DashboardCommand, ...]
+    dashboard: tuple[DashboardCommand, ...] = COMMANDS
     robot_api: tuple[ApiCall, ...] = ()
     services: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    realtime: tuple[RealtimeColumn, ...]
-    frame_sizes: tuple[tuple[SoftwareVersion, int], ...]
-    sub_packages: tuple[type[SubPackage], ...]
-    rtde_outputs: tuple[RtdeField, ...]
-    rtde_inputs: tuple[RtdeField, ...]
-    builtins: tuple[Builtin, ...]
-    interpreter_since: SoftwareVersion | None
+    realtime: tuple[RealtimeColumn, ...] = COLUMNS
+    frame_sizes: tuple[tuple[SoftwareVersion, int], ...] = VERSIONS
+    sub_packages: tuple[type[SubPackage], ...] = SUB_PACKAGES
+    rtde_outputs: tuple[RtdeField, ...] = OUTPUTS
+    rtde_inputs: tuple[RtdeField, ...] = INPUTS
+    builtins: tuple[Builtin, ...] = ALL_ROWS
+    interpreter_since: SoftwareVersion | None = None
 
     def __post_init__(self) -> None:
         if self.substep_us <= 0 or self.period_us <= 0 or self.period_us % self.substep_us:
