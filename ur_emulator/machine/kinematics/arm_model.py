@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_to_flat
 from ur_emulator.errors import KinematicsError
 from ur_emulator.machine.kinematics.closed_form import closed_form_inverse
-from ur_emulator.machine.models.joint_range import JointRange
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
-from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3, Vector6, six
+from ur_emulator.machine.models.robot_model import DhRow, JointRange, RobotModel, Vector3, Vector6, six
 from ur_hil.arithmetic import add_up
 
 # --- wrenches at other points

@@ -328,8 +328,8 @@ UR20 = RobotModel(
 
 
 # The UR30. Its masses and centres are those of B, turned back into the DH frames. The tensors there are a
-# copy of another arm's and not used. Assumed: those of the UR20; of the arm's tubes scaled by mass and length,
-# of wrist 3 by mass.
+# copy of another arm's and not used. Assumed: those of the UR20; of the arm's tubes scaled by mass and
+# length, of wrist 3 by mass.
 UR30 = replace(
     UR20,
     name="ur30",

@@ -155,6 +155,14 @@ RANGE_END = 2.0 * pi + radians(3.0)
 FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
 
 
+@dataclass(slots=True)
+class JointRange:
+    """Ends of the joint ranges in force [rad], for all who keep them: at first of the arm, then as installed."""
+
+    q_min: Vector6
+    q_max: Vector6
+
+
 @dataclass(frozen=True, slots=True)
 class RobotModel:
     """One type of arm.
@@ -176,10 +184,8 @@ class RobotModel:
         torque_constant: joint torque per motor current, gear included [Nm/A].
         stop_deceleration: of the leading axis when the safety system or the end of a program stops the arm
             [rad/s²].
-        servo_frequency: natural frequency of the joint position loop [Hz].
-        servo_damping: damping ratio of that loop.
-        servo_inertia: inertia at the joint that the loop gains are laid out for: the diagonal of the arm's at
-            `home_q` with the armature [kg m²].
+        servo_inertia: inertia at the joint that the gains of its servo are laid out for: the diagonal of the
+            arm's at `home_q` with the armature [kg m²].
         payload_max: rated payload [kg].
         reach: rated reach [m].
         robot_type: code in the primary interface's configuration data.
@@ -211,8 +217,6 @@ class RobotModel:
     home_q: Vector6
     q_min: Vector6 = (-RANGE_END,) * 6
     q_max: Vector6 = (RANGE_END,) * 6
-    servo_frequency: float = 25.0  # chosen: at 12 Hz an arm is further from its target than a real one
-    servo_damping: float = 0.9
     first_version: str | None = None
     has_point_masses: bool = False
 

@@ -18,8 +18,7 @@ from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
 from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.fidelity import Fidelity
-from ur_emulator.machine.models.joint_range import JointRange
-from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
+from ur_emulator.machine.models.robot_model import ZERO6, JointRange, RobotModel, Vector3, Vector6
 from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
