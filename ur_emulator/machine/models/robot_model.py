@@ -157,7 +157,7 @@ FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
 
 @dataclass(slots=True)
 class JointRange:
-    """Ends of the joint ranges in force [rad], for all who keep them: at first of the arm, then as installed."""
+    """Ends of the joint ranges in force [rad], for all who keep them: first of the arm, then as installed."""
 
     q_min: Vector6
     q_max: Vector6

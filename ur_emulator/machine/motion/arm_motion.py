@@ -97,8 +97,6 @@ class ArmMotion:
         self._begins_program = False
         self._chain = OverlayChain()
         self._overlays = self._chain.overlays
-        # Overlays, or time that is not normal: a single test in the hot path.
-        self._is_special = False
 
     # --- what others ask
 
@@ -190,7 +188,6 @@ class ArmMotion:
             self._begins_program = False
             if kind is Kind.MOVE:
                 self._time.begin(1.0 / self._run_up_time, runs_up=True)
-                self._is_special = True
         return command
 
     def release(self, owner: object) -> None:
@@ -219,7 +216,7 @@ class ArmMotion:
         time, generator = self._time, None if self._command is None else self._command.generator
         if time.paused:
             return
-        time.paused = self._is_special = True
+        time.paused = True
         self._delay.clear()
         speed = max(map(abs, self.target.qd))
         time.slowing = max(PAUSE_RATE, deceleration * time.factor / speed if speed > 0.0 else 0.0)
@@ -251,7 +248,7 @@ class ArmMotion:
                 self._brake(Event.TAKEN)
             self._drop_overlays()
         self._brake(Event.INTERRUPT)
-        self._time.paused = self._is_special = True
+        self._time.paused = True
         self._time.factor = 0.0
 
     def abort(self) -> None:
@@ -330,7 +327,6 @@ class ArmMotion:
     def add_overlay(self, overlay: Overlay) -> None:
         """Add an overlay from the next cycle on, after those that are active already."""
         self._chain.add(overlay, self.target)
-        self._is_special = True
 
     def has_overlay(self, overlay: Overlay) -> bool:
         """True while an overlay is active."""
@@ -379,7 +375,6 @@ class ArmMotion:
         if was is ArmState.RETURNING:
             self._ramp = StopJ(self.stop_deceleration)
             self._time.begin(PAUSE_RATE)
-            self._is_special = True
         self._turn_back()
         if is_paused:
             self._go(Event.PAUSE)
@@ -403,10 +398,10 @@ class ArmMotion:
         `scale` is the commanded speed scaling, 0..1; during a motion it is reached gradually.
         UnreachableError if the arm cannot reach the path there.
         """
+        path, before, time = self.path, self.target, self._time
         advance = rate = 1.0
-        if self._is_special:
-            advance, rate = self._time.step(dt), self._time.factor
-        path, before = self.path, self.target
+        if time.paused or time.factor < 1.0:
+            advance, rate = time.step(dt), time.factor
         if self.state in _AT_REST:
             self.scale = scale
             if any(path.qd) or any(path.qdd):
@@ -419,10 +414,11 @@ class ArmMotion:
                 self._follow_hand(dt, advance) if self.state is _BY_HAND else self._advance(dt, advance, rate)
             )
         self.path = path
-        if self._is_special:
-            self._displace(before, dt, advance, rate)
-        elif self.state is not _BY_HAND:
-            self.target = path
+        if self.state is not _BY_HAND:
+            if self._overlays:
+                self._displace(before, dt, advance, rate)
+            else:
+                self.target = path
         return self.target
 
     def _advance(self, dt: float, advance: float, rate: float) -> JointTarget:
@@ -474,17 +470,13 @@ class ArmMotion:
         return path
 
     def _displace(self, before: JointTarget, dt: float, advance: float, rate: float) -> None:
-        """Compute the target beside overlays, or in time that is not normal."""
+        """Compute the target beside overlays; they stand still while the path's time does."""
         path = self.path
-        if self.state is not _BY_HAND:
-            if not self._overlays:
-                self.target = path
-            elif advance > 0.0 or rate > 0.0 or any(path.qd):
-                self.target = self._chain.displace(path, before, dt, rate)
-                # The move that ended overlays displaced has ended at rest.
-                has_settled = self.move is None and (self.state not in _AT_REST or not any(self.target.qd))
-                if has_settled and self._chain.all_ended:
-                    self._drop_overlays()
-            elif any(before.qd) or any(before.qdd):
-                self.target = JointTarget(before.q)
-        self._is_special = bool(self._overlays) or not self._time.is_normal
+        if advance > 0.0 or rate > 0.0 or any(path.qd):
+            self.target = self._chain.displace(path, before, dt, rate)
+            # The move that ended overlays displaced has ended at rest.
+            has_settled = self.move is None and (self.state not in _AT_REST or not any(self.target.qd))
+            if has_settled and self._chain.all_ended:
+                self._drop_overlays()
+        elif any(before.qd) or any(before.qdd):
+            self.target = JointTarget(before.q)

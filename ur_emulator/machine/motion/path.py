@@ -58,7 +58,10 @@ def times(k: float, values: Sequence[float]) -> Vector6:
 
 
 class PoseLine:
-    """Straight line from one pose to another."""
+    """Straight line from one pose to another.
+
+    `length_rate` is the path length of the tool per unit of s; below 1 where the line is mainly a rotation.
+    """
 
     rate = 1.0
     bend = 0.0
@@ -70,11 +73,7 @@ class PoseLine:
         length = measure(self._change)
         self.length = length if length > LEAST_LENGTH else 0.0
         self._twist = times(1.0 / self.length if self.length > 0.0 else 0.0, self._change)
-
-    @property
-    def length_rate(self) -> float:
-        """Path length of the tool per unit of s; below 1 where the line is mainly a rotation."""
-        return _norm(self._twist)
+        self.length_rate = _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """Return the pose and the twist at s; the end is exactly the goal."""
