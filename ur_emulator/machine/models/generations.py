@@ -124,15 +124,12 @@ _TYPICAL = replace(
     voltage_offset=0.15,  # A: 47.5-47.8
     **_SIGNALS,
 )
-_IDEAL = replace(
-    IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01, speed_least=_SMALLEST_SPEED
-)
-_EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
+_IDEAL = replace(IDEAL, feedback_age=0.002, force_sigma=0.01, speed_least=_SMALLEST_SPEED)
+_EXACT = replace(EXACT, feedback_age=0.002)
 _POOR = replace(  # C
     POOR,
     dead_time=0.004,
     ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
-    drive_lag=0.002,
     feedback_age=0.004,
     force_offset=10.0,
     force_drift=0.012,

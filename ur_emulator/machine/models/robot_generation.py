@@ -42,9 +42,6 @@ class RobotGeneration:
         substep_us: physics step [us].
         major: first number of its software versions.
         default_version: what a box runs if the user names none.
-        builds: which version has which build.
-        electrics: of the box and its arms.
-        force_sensing: how its arms know the wrench at the flange.
         execution_time: run time of a control cycle without programs, as the box reports it [ms]; 0: it is
             always reported as 0.
         run_up_time: in which the time on the path of a program's first move runs up to its full rate [s].
@@ -53,7 +50,6 @@ class RobotGeneration:
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
         has_remote_control: local control, in which clients may not command the box, and remote control.
         has_remote_in_manual: remote control is possible in manual mode.
-        fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
         dashboard: commands of the dashboard server; none: there is no such server.
         robot_api: calls of the Robot API; none: there is no such server.
@@ -61,8 +57,7 @@ class RobotGeneration:
         realtime: columns of the frames on port 30003.
         frame_sizes: first version of each size of these frames.
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
-        rtde_outputs: variables that a client can subscribe to.
-        rtde_inputs: variables that a client can write.
+        rtde_outputs, rtde_inputs: variables that a client can subscribe to, and write.
         interpreter_since: first version with the port for interpreter mode; None if there is none.
 
     Raises:
@@ -231,8 +226,7 @@ class ForceSensing:
         bandwidth: pole of the measurement [Hz]; None: none shows.
         precision: force and moment that may be an error of a measurement that was not zeroed [N], [Nm].
         contact_force: a contact is a force that has risen by this [N].
-        least_averaging: time that is averaged at least to separate a zero from noise [s].
-        most_averaging: and at most [s].
+        least_averaging, most_averaging: time that is averaged to separate a zero from noise [s].
         filter_time: of force mode: time constant of its filter of the wrench [s].
         control_rate: of force mode: rate at which the force approaches the one asked for at gain scaling 1
             [1/s]. What the delay of the whole loop allows.

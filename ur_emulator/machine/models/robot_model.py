@@ -175,8 +175,7 @@ class RobotModel:
         links: six moving links.
         tau_max: largest joint torque [Nm].
         qd_max: rated joint speed, which moves are planned with [rad/s].
-        q_min: lower end of the joint range of the safety system [rad].
-        q_max: upper end of the joint range of the safety system [rad].
+        q_min, q_max: ends of the joint range of the safety system [rad].
         armature: rotor and gear inertia as felt at the joint [kg m²].
         viscous: viscous friction up to the kink [Nm s/rad].
         viscous_fast: its slope beyond the kink [Nm s/rad].
@@ -188,8 +187,7 @@ class RobotModel:
             arm's at `home_q` with the armature [kg m²].
         payload_max: rated payload [kg].
         reach: rated reach [m].
-        robot_type: code in the primary interface's configuration data.
-        box_type: code of the control box, as above.
+        robot_type, box_type: codes of arm and control box in the primary interface's configuration data.
         home_q: a pose clear of the table, away from singularities [rad].
         first_version: oldest software that the maker has released for it; None: the generation's first.
         has_point_masses: the controller's model takes the links for points, without inertia tensors.

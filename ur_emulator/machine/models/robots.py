@@ -19,9 +19,6 @@ from ur_hil.records import checked, number, record, text, word
 
 ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (*cb3_arms.ARMS, *e_series_arms.ARMS)}
 
-# Software of another generation that the same arms run.
-_ALSO = {E_SERIES: POLYSCOPE_X}
-
 
 def robot_by_name(name: str, version: str | None = None) -> RobotModel:
     """Look an arm up by its name, in any letter case; a name that ends in .toml is a file.
@@ -32,9 +29,9 @@ def robot_by_name(name: str, version: str | None = None) -> RobotModel:
     robot = read_robot(Path(name)) if name.endswith(".toml") else ROBOTS.get(name.lower())
     if robot is None:
         raise ModelError(f"unknown robot {name!r}: choose one of {', '.join(ROBOTS)}, or give FILE.toml")
-    also = _ALSO.get(robot.generation)
-    if also is not None and version is not None and version.strip().startswith(f"{also.major}."):
-        return replace(robot, generation=also, first_version=None)
+    is_polyscope_x = version is not None and version.strip().startswith(f"{POLYSCOPE_X.major}.")
+    if is_polyscope_x and robot.generation is E_SERIES:
+        return replace(robot, generation=POLYSCOPE_X, first_version=None)
     return robot
 
 

@@ -1,15 +1,8 @@
 """The motion of the arm: along the path of the program, displaced by overlays; its pauses and its stops.
 
-`ownership.TABLE` says who has the arm and what takes it from whom: here is what computes the set-point. The
-rules are the controller's behaviour as users report it:
-
-* only one script thread moves the arm at a time; a second one gets "Another thread is already controlling
-  the robot";
-* ownership ends when the motion has brought the arm to rest, or when the owner ends or is killed;
-* a velocity command must be renewed in every cycle: when the next `speedj` is late the arm begins to stop
-  (drivers that stream too slowly see a stutter), and when the program ends it stops.
-
-Must not know scripts or physics: an owner is any object, compared by identity.
+`ownership.TABLE` says who has the arm and what takes it from whom: here is what computes the set-point. Only
+one script thread moves the arm at a time. Must not know scripts or physics: an owner is any object, compared
+by identity.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -64,7 +57,7 @@ class ArmMotion:
         scale: speed scaling of the last cycle, 0..1.
         scaling_rate: rate of change of the speed scaling [1/s].
         braking: gives the greatest deceleration of the leading axis [rad/s^2] that the drives can give in a
-            stop, in the direction of the path's velocity; None: a stop brakes as it was asked to.
+            stop, in the direction of the path's velocity; at first infinite.
     """
 
     def __init__(
@@ -82,7 +75,7 @@ class ArmMotion:
         """
         self.stop_deceleration = stop_deceleration
         self.path = self.target = JointTarget(q)
-        self.braking: Callable[[JointTarget], float] | None = None
+        self.braking: Callable[[JointTarget], float] = lambda target: inf
         self.scaling_rate = SCALING_RATE
         self.scale = 1.0
         self.state = ArmState.HOLDING
@@ -152,8 +145,8 @@ class ArmMotion:
 
     def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
         """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
-        allowed = inf if self.braking is None else self.braking(target)
-        braking_time = max(map(abs, target.qd)) / (2.0 * min(self.stop_deceleration, allowed))
+        deceleration = min(self.stop_deceleration, self.braking(target))
+        braking_time = max(map(abs, target.qd)) / (2.0 * deceleration)
         for share in (0.5, 1.0):
             time = share * max(braking_time, _LEAST_LOOK_AHEAD)
             yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
@@ -238,10 +231,7 @@ class ArmMotion:
         self._turn_back()
 
     def interrupt(self) -> None:
-        """Pause by a stop that leaves the path.
-
-        Overlays end, and with them a move that they displace.
-        """
+        """Pause by a stop that leaves the path. Overlays end, and with them a move that they displace."""
         self.let_go()
         if self._overlays:
             if self.move is not None:
@@ -443,7 +433,7 @@ class ArmMotion:
                 return self._delay.pass_on(stream, self._ramp).step(self.path, dt, scale)
             self._go(Event.LOST, stream.when_lost())
         ramp = self._delay.pass_on(self._ramp, self._ramp)
-        if self.braking is not None and isinstance(ramp, StopJ):
+        if isinstance(ramp, StopJ):
             ramp.allowed = self.braking(self.path)
         self.path = ramp.step(self.path, dt, scale)
         ramp = self._ramp
