@@ -19,7 +19,12 @@ from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
 from ur_emulator.machine.models.robot_model import DhRow, JointRange, RobotModel, Vector3, Vector6, six
 from ur_hil.arithmetic import add_up
 
-# --- wrenches at other points
+# Of the inverse of a Jacobian. Chosen: changes joint speeds away from singularities by 1e-9 relative at most.
+_DAMPING = 1e-12 * np.eye(6)
+_POSITION_TOLERANCE = 1e-11  # m and rad; a tenth of what `inverse` promises
+_MAX_ITERATIONS = 20
+_NEAR = 0.3  # rad; a result of Newton's method this close to its start is on the same branch
+_LONGEST_STEP = 0.5  # rad; greatest step of Newton's method, for convergence near singularities
 
 
 def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> Vector6:
@@ -32,25 +37,14 @@ def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> V
     return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)
 
 
-# --- the damped inverse of a Jacobian: joint speeds for a twist, finite at singularities too
-
-# Chosen: changes joint speeds away from singularities by 1e-9 relative at most.
-_DAMPING = 1e-12 * np.eye(6)
-
-
 def joint_speeds(jacobian: NDArray[np.float64], twist: NDArray[np.float64]) -> NDArray[np.floating]:
     """Return the joint speeds (6,) [rad/s] whose twist, `jacobian @ qd`, is closest to the one given.
 
-    The twist (6,) is linear first [m/s, rad/s]; a small displacement [m, rad] gives joint steps [rad].
+    Finite at singularities, too. The twist (6,) is linear first [m/s, rad/s]; a small displacement [m, rad]
+    gives joint steps [rad].
     """
     transposed = jacobian.T
     return np.linalg.solve(transposed @ jacobian + _DAMPING, transposed @ twist)
-
-
-_POSITION_TOLERANCE = 1e-11  # m and rad; a tenth of what `inverse` promises
-_MAX_ITERATIONS = 20
-_NEAR = 0.3  # rad; a result of Newton's method this close to its start is on the same branch
-_LONGEST_STEP = 0.5  # rad; greatest step of Newton's method, for convergence near singularities
 
 
 class CartesianState(NamedTuple):

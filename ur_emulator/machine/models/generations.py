@@ -25,7 +25,7 @@ from ur_emulator.machine.models.fidelity import (
     Ripple,
 )
 from ur_emulator.machine.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
-from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
+from ur_emulator.machine.models.safety_limits import ArmLimits, SafetyLimits
 from urscript.catalogue import STEP_TIME, Generation
 
 _CB3_BUILDS: Builds = (
@@ -49,11 +49,8 @@ CB3 = RobotGeneration(
         recovery_speed=radians(30.0),  # UR3 and UR5/CB3 user manuals
         speed_margin=0.2,  # safety blocks of real installations: 191.5 and 371.5 deg/s
         acceleration=40.0,  # not known; that of a UR5e capture
-        reduced=UNLIMITED,  # chosen: only joint speeds are limited
-        recovery=UNLIMITED,  # likewise
-        manual=UNLIMITED,
+        # Chosen: in reduced and recovery mode only joint speeds are limited.
         has_programs_in_recovery=True,  # chosen
-        brakes_within_torque=False,
     ),
     electrics=Electrics(
         main_voltage=48.13,  # recordings of a resting arm
