@@ -22,16 +22,7 @@ from typing import Any
 
 from ur_emulator.machine.models.cb3_arms import UR3, UR5, UR10
 from ur_emulator.machine.models.generations import E_SERIES
-from ur_emulator.machine.models.robot_model import (
-    FIRST_TURN,
-    LAST_TURN,
-    RANGE_END,
-    Link,
-    Outline,
-    RobotModel,
-    dh_table,
-    six,
-)
+from ur_emulator.machine.models.robot_model import Link, Outline, RobotModel, dh_table, six
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +107,8 @@ UR3E = RobotModel(
     ),
     outline=UR3.outline,
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # B: 180 and 360 deg/s
-    q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # wrist 3 is endless
-    q_max=(*(RANGE_END,) * 5, LAST_TURN),
+    q_min=UR3.q_min,  # wrist 3 is endless
+    q_max=UR3.q_max,
     **drives(_SIZE_2, _SIZE_2, SIZE_1, SIZE_0, SIZE_0, SIZE_0),
     stop_deceleration=20.0,  # as for the UR3
     servo_inertia=(0.852, 0.917, 0.377, 0.0817, 0.0733, 0.0713),  # A, B
@@ -162,8 +153,7 @@ UR10E = RobotModel(
 )
 
 
-# The UR12e: a UR10e for a greater payload, which says on the wire that it is a UR10e.
-# Sources: UR client library (type, first version), data sheet (payload).
+# The UR12e: likewise a UR10e, with the same sources.
 UR12E = replace(UR10E, name="ur12e", title="UR12e", payload_max=12.5, first_version="5.22.0")
 
 
