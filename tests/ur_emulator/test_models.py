@@ -30,7 +30,7 @@ from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
-from ur_emulator.machine.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL, random_stream
+from ur_emulator.machine.models.fidelity import IDEAL, POOR, TYPICAL, random_stream
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.models.mjcf import GRAVITY, arm_spec
 from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
@@ -65,7 +65,7 @@ def test_a_table_without_six_rows_makes_no_arm():
 
 
 def test_fidelities_are_ordered():
-    assert {it.name for it in FIDELITIES} == {"exact", "ideal", "typical", "poor"}
+    assert {it.name for it in CB3.fidelities} == {"exact", "ideal", "typical", "poor"}
     for better, worse in ((IDEAL, TYPICAL), (TYPICAL, POOR)):
         for field in fields(TYPICAL):
             if field.name in (
@@ -85,7 +85,7 @@ def test_fidelities_are_ordered():
 def test_calibration_comes_from_the_seed():
     assert draw_dh(UR3, TYPICAL, 7) == draw_dh(UR3, TYPICAL, 7)
     assert draw_dh(UR3, TYPICAL, 7) != draw_dh(UR3, TYPICAL, 8)
-    for fidelity in (it for it in FIDELITIES if it.name in ("exact", "ideal")):
+    for fidelity in (it for it in CB3.fidelities if it.name in ("exact", "ideal")):
         assert draw_dh(UR3, fidelity, 7) == UR3.dh
 
 

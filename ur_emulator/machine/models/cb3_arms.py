@@ -17,15 +17,11 @@ Sources of all three, cited by letter:
 from math import pi
 
 from ur_emulator.machine.models.generations import CB3
-from ur_emulator.machine.models.robot_model import (
-    FIRST_TURN,
-    LAST_TURN,
-    RANGE_END,
-    Link,
-    Outline,
-    RobotModel,
-    dh_table,
-)
+from ur_emulator.machine.models.robot_model import RANGE_END, Link, Outline, RobotModel, dh_table
+
+# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
+_FIRST_TURN, _LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
+
 
 # The UR3 of the CB3 generation. Its own sources:
 # B  physical_parameters.yaml beside C: cylinder estimates, because the vendor publishes no inertia tensors
@@ -60,8 +56,8 @@ UR3 = RobotModel(
     ),
     tau_max=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),  # C
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # C: 180 and 360 deg/s
-    q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # H: wrist 3 has no position limit
-    q_max=(*(RANGE_END,) * 5, LAST_TURN),
+    q_min=(*(-RANGE_END,) * 5, _FIRST_TURN),  # H: wrist 3 has no position limit
+    q_max=(*(RANGE_END,) * 5, _LAST_TURN),
     armature=(0.6121, 0.6121, 0.2118, 0.0714, 0.0714, 0.0714),  # D
     viscous=(4.5, 5.1, 3.3, 0.5, 1.3, 0.8),  # D
     viscous_fast=(2.4, 2.7, 1.9, 0.3, 0.7, 0.4),  # D

@@ -15,15 +15,7 @@ from typing import Any
 
 from protocol.robot_api import CALLS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.machine.models.fidelity import (
-    EXACT,
-    FIDELITIES,
-    IDEAL,
-    POOR,
-    REVERSAL_SPEED,
-    TYPICAL,
-    Ripple,
-)
+from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, REVERSAL_SPEED, TYPICAL, Ripple
 from ur_emulator.machine.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
 from ur_emulator.machine.models.safety_limits import ArmLimits, SafetyLimits
 from urscript.catalogue import STEP_TIME, Generation
@@ -75,7 +67,7 @@ CB3 = RobotGeneration(
     execution_time=0.0,  # chosen: the unit is not known
     run_up_time=0.16,  # recordings of a real UR3 and of the maker's simulator: .05 in each of 20 cycles
     gravity=9.82,  # recordings of a real UR3: `target_moment` at rest
-    fidelities=FIDELITIES,
+    fidelities=(EXACT, IDEAL, TYPICAL, POOR),
     robot_subtype=2,
 )
 

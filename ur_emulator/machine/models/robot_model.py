@@ -151,9 +151,6 @@ VISCOUS_KINK = 0.5
 RANGE_END = 2.0 * pi + radians(3.0)
 """[rad]"""
 
-# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
-FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
-
 
 @dataclass(slots=True)
 class JointRange:
