@@ -54,6 +54,7 @@ class ArmMotion:
         state: what the arm does along the path.
         path: target along the path of the program, which generators work on.
         target: of the joints; the same object as `path` unless overlays displace it or a hand guides the arm.
+        overlays: those that are active, to be asked only.
         scale: speed scaling of the last cycle, 0..1.
         scaling_rate: rate of change of the speed scaling [1/s].
         braking: gives the greatest deceleration of the leading axis [rad/s^2] that the drives can give in a
@@ -89,7 +90,7 @@ class ArmMotion:
         self._run_up_time = run_up_time
         self._begins_program = False
         self._chain = OverlayChain()
-        self._overlays = self._chain.overlays
+        self.overlays = self._chain.overlays
 
     # --- what others ask
 
@@ -115,7 +116,7 @@ class ArmMotion:
         """True while a command, a ramp or an overlay moves the arm, unless a pause has stopped it."""
         if self.state is _BY_HAND:
             return self._command is not None and not self._time.paused
-        return (self.state not in _AT_REST or bool(self._overlays)) and not self.is_paused
+        return (self.state not in _AT_REST or bool(self.overlays)) and not self.is_paused
 
     @property
     def is_paused(self) -> bool:
@@ -217,7 +218,7 @@ class ArmMotion:
             self._go(Event.PAUSE, StopJ(deceleration) if deceleration else generator.when_paused())
         else:
             self._go(Event.PAUSE)
-        if self.state not in _IN_TIME and not self._overlays:
+        if self.state not in _IN_TIME and not self.overlays:
             time.factor = 0.0
 
     def resume(self) -> None:
@@ -233,7 +234,7 @@ class ArmMotion:
     def interrupt(self) -> None:
         """Pause by a stop that leaves the path. Overlays end, and with them a move that they displace."""
         self.let_go()
-        if self._overlays:
+        if self.overlays:
             if self.move is not None:
                 self._brake(Event.TAKEN)
             self._drop_overlays()
@@ -318,16 +319,12 @@ class ArmMotion:
         """Add an overlay from the next cycle on, after those that are active already."""
         self._chain.add(overlay, self.target)
 
-    def has_overlay(self, overlay: Overlay) -> bool:
-        """True while an overlay is active."""
-        return overlay in self._overlays
-
     def remove_overlay(self, overlay: Overlay) -> None:
         """End an overlay, if it is active; the arm keeps its last displacement.
 
         A move or another overlay continues with that displacement.
         """
-        if overlay in self._overlays:
+        if overlay in self.overlays:
             self._chain.keep_last(overlay)
             if self._chain.all_ended and self.move is None:
                 self._drop_overlays()
@@ -335,7 +332,7 @@ class ArmMotion:
 
     def _drop_overlays(self) -> None:
         """End all overlays; the path continues from the displaced target."""
-        if self._overlays:
+        if self.overlays:
             self._chain.clear()
             self.path = self.target
 
@@ -405,7 +402,7 @@ class ArmMotion:
             )
         self.path = path
         if self.state is not _BY_HAND:
-            if self._overlays:
+            if self.overlays:
                 self._displace(before, dt, advance, rate)
             else:
                 self.target = path
