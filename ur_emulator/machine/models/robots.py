@@ -13,7 +13,7 @@ import numpy as np
 from ur_emulator.errors import ModelError
 from ur_emulator.machine.models import cb3_arms, e_series_arms
 from ur_emulator.machine.models.generations import E_SERIES, POLYSCOPE_X
-from ur_emulator.machine.models.robot_model import RANGE_END, Link, RobotModel, Vector6, dh_table, six
+from ur_emulator.machine.models.robot_model import RANGE_END, RobotModel, Vector6, dh_table, six
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import checked, number, record, text, word
 
@@ -138,18 +138,13 @@ def _problem(robot: RobotModel) -> str:
         if not low <= home <= high:
             return f"home_q: {home:g} of joint {joint} is not within {low:g} to {high:g}; give one that is"
     for field, link in zip(fields(LinkTables), robot.links, strict=True):
-        if not _is_body(link):
+        least, middle, greatest = np.linalg.eigvalsh(link.tensor)
+        if not (least > 0.0 and greatest <= (least + middle) * (1.0 + 1e-9)):
             return (
                 f"links.{field.name}.inertia: no body has these moments and products; each principal moment "
                 "is above 0 and at most the sum of the other two"
             )
     return ""
-
-
-def _is_body(link: Link) -> bool:
-    """Return whether a distribution of mass can have the inertia of a link."""
-    least, middle, greatest = np.linalg.eigvalsh(link.tensor)
-    return bool(least > 0.0 and greatest <= (least + middle) * (1.0 + 1e-9))
 
 
 def _servo_inertia(robot: RobotModel) -> Vector6:
