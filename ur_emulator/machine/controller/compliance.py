@@ -87,7 +87,7 @@ class Compliance:
     def force_mode(self) -> ForceMode | None:
         """The overlay of force mode; None without it. Stops of the arm end it."""
         force = self._force
-        return force if force is not None and self._motion.has_overlay(force) else None
+        return force if force is not None and force in self._motion.overlays else None
 
     @property
     def mode(self) -> ControlMode:

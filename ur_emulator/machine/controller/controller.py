@@ -24,6 +24,7 @@ from ur_emulator.machine.controller.safety.safety_state import UNLOCK_DELAY
 from ur_emulator.machine.controller.safety_system import SafetySystem
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.controller.state import ControllerState
+from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
@@ -164,7 +165,7 @@ class Controller:
         # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
         self.state = state = ControllerState(
-            robot,
+            ArmModel(robot, self.plant.dh),
             fidelity,
             seed,
             mode,

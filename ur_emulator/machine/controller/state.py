@@ -31,9 +31,8 @@ from ur_emulator.machine.controller.safety.speed_scaling import SpeedScaling
 from ur_emulator.machine.controller.settings import ErrorSettings, PlanningSettings, ToolSettings
 from ur_emulator.machine.controller.world_model import WorldModel
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import draw_calibration
 from ur_emulator.machine.models.fidelity import Fidelity, dead_cycles
-from ur_emulator.machine.models.robot_model import RobotModel, Vector6
+from ur_emulator.machine.models.robot_model import Vector6
 from ur_emulator.machine.motion.arm_motion import ArmMotion
 from ur_emulator.machine.tools import SUPPLY, make_grippers
 from ur_hil.tools import ToolModel
@@ -47,7 +46,7 @@ class ControllerState:
 
     def __init__(
         self,
-        robot: RobotModel,
+        arm: ArmModel,
         fidelity: Fidelity,
         seed: int,
         mode: RobotMode,
@@ -58,9 +57,10 @@ class ControllerState:
         """Make the parts; arguments as of `Controller`.
 
         Args:
+            arm: its kinematics with the calibration that the controller knows.
             place_arm: puts the resting arm at joint angles [rad]; False where it would touch something.
         """
-        generation = robot.generation
+        robot, generation = arm.robot, arm.robot.generation
         period_s, limits = generation.period_s, generation.limits
         self.robot: Final = robot
         self.seed: Final = seed
@@ -70,11 +70,10 @@ class ControllerState:
         self.events: Final = EventQueue()
         self.requests: Final = ProgramRequests()
         self.past: Final = PastCycles(generation)
-        # The arm: its kinematics with the calibration that the controller knows, what programs have declared
-        # about its tool, its dynamics with that, the targets of its joints.
-        self.arm: Final = ArmModel(robot, draw_calibration(robot, fidelity, seed))
+        # The arm, what programs have declared of its tool, its dynamics with that, the targets of its joints.
+        self.arm: Final = arm
         self.tool: Final = ToolSettings()
-        self.dynamics: Final = ArmDynamics(robot, self.arm.calibration, self.tool)
+        self.dynamics: Final = ArmDynamics(robot, arm.dh, self.tool)
         self.motion: Final = ArmMotion(
             robot.home_q,
             robot.stop_deceleration,
@@ -85,7 +84,7 @@ class ControllerState:
             self.motion.braking = self.dynamics.greatest_deceleration
         self.speed: Final = SpeedScaling()
         self.planning: Final = PlanningSettings()
-        self.world: Final = WorldModel(lambda: self.arm.fk(self.motion.target.q), self.tool)
+        self.world: Final = WorldModel(lambda: arm.fk(self.motion.target.q), self.tool)
         self.force_sense: Final = ForceSense(generation, self.tool)
         self.energy: Final = EnergyMeter(generation)
         self.error_settings: Final = ErrorSettings()

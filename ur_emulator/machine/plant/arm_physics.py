@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.machine.models.calibration import Calibration, calibrated_dh
 from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3
@@ -67,13 +66,13 @@ class ArmPhysics:
     def __init__(
         self,
         robot: RobotModel,
-        calibration: Calibration,
+        dh: Sequence[DhRow],
         fidelity: Fidelity,
         seed: int,
         tools: Sequence[ToolModel] = (),
     ) -> None:
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
-        dh, substep = calibrated_dh(robot, calibration), robot.generation.substep_us * 1e-6
+        substep = robot.generation.substep_us * 1e-6
         self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), substep, tools)
         model = compile_physics(spec, fidelity.friction_rise)
         presliding = fidelity.friction_presliding

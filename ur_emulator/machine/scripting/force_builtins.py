@@ -10,7 +10,7 @@ from ur_emulator.machine.kinematics.arm_model import moved_wrench
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion import force_mode
 from ur_emulator.machine.motion.axis_hold import AxisHold, singularity_status
-from ur_emulator.machine.plant.drives import ServoGains
+from ur_emulator.machine.plant.drives import SERVO_FREQUENCY, ServoGains
 from ur_emulator.machine.scripting.builtin_group import (
     BuiltinGroup,
     ScriptArm,
@@ -40,7 +40,6 @@ class ForceBuiltins(BuiltinGroup):
         self._force_sense = force_sense
         self._past = past
         self._stiffness = ServoGains.of(arm.robot).kp.tolist()
-        self._servo_frequency = arm.robot.servo_frequency
         self._sensing = arm.robot.generation.force_sensing
 
     def functions(self) -> dict[str, HostFunction]:
@@ -152,7 +151,7 @@ class ForceBuiltins(BuiltinGroup):
         measure = partial(self._measure, offset)
         compliance.begin_force(
             force_mode.ForceMode(
-                tool, frame, settings, self._sensing, self._stiffness, self._servo_frequency, measure
+                tool, frame, settings, self._sensing, self._stiffness, SERVO_FREQUENCY, measure
             )
         )
 

@@ -44,7 +44,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     @builtin("path_offset_enable")
     def _enable(self, thread: object) -> None:
-        if not self._motion.has_overlay(self._offset):
+        if self._offset not in self._motion.overlays:
             self._offset.begin(self._arm.tool)
             self._motion.add_overlay(self._offset)
 
@@ -61,7 +61,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     @builtin("path_offset_get")
     def _get(self, thread: object, kind: float) -> Pose:
-        is_on = self._motion.has_overlay(self._offset)
+        is_on = self._offset in self._motion.overlays
         return Pose.of(self._offset.applied(OffsetType(int(kind))) if is_on else ZERO6)
 
     @builtin("path_offset_set_alpha_filter")
