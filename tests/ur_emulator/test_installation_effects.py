@@ -25,6 +25,7 @@ from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.models.robots import robot_by_name
 from ur_emulator.machine.models.safety_limits import ArmLimits
+from ur_emulator.program_files.header import header_lines, setup_script
 from ur_emulator.program_files.installation import (
     DeclaredPayload,
     DeclaredSignal,
@@ -32,7 +33,6 @@ from ur_emulator.program_files.installation import (
     Installation,
     OutputRule,
 )
-from ur_emulator.program_files.script_writer import header_lines, setup_script
 from urscript import compile_program
 
 LAMP = DeclaredSignal("LAMP", "10.0.0.9", 255, 7, SignalType.DIGITAL_OUTPUT, 5.0, RunState.LOW_WHEN_STOPPED)

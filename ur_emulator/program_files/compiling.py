@@ -11,10 +11,10 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.header import setup_script
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import load_installation
 from ur_emulator.program_files.loading import LoadedProgram, load_program
-from ur_emulator.program_files.script_writer import setup_script
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
 from urscript.compile.interpreter_mode import CompiledStatements, compile_statements

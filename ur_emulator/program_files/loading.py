@@ -8,10 +8,12 @@ from pathlib import PurePosixPath
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
 from ur_emulator.program_files.folder import PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX, ProgramFolder
+from ur_emulator.program_files.header import header_lines
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import NEW_BOX, installation_of
+from ur_emulator.program_files.names import identifier
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
-from ur_emulator.program_files.script_writer import Gap, Header, Part, header_lines, identifier
+from ur_emulator.program_files.script_writer import Gap, Header, Part
 from ur_emulator.program_files.urp_nodes import OLD_ROOT, ROOT
 from ur_emulator.program_files.urp_program import make_script, uses_external_control
 from ur_emulator.program_files.urpx import read_urpx
@@ -154,7 +156,7 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
             notes.append(f"{file.name}: {len(texts)} things are {what} in all")
     others = f", and {len(made.undefined) - 1} more" if len(made.undefined) > 1 else ""
     undefined = made.undefined[0] + others if made.undefined else ""
-    return LoadedProgram(file.wire_path, installation, made.parts, tuple(notes), undefined=undefined)
+    return LoadedProgram(file.wire_path, installation, tuple(made.parts), tuple(notes), undefined=undefined)
 
 
 def _twin_instead(

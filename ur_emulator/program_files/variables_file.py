@@ -12,8 +12,8 @@ from typing import Any
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.names import is_identifier
 from ur_emulator.program_files.reader import ProgramReader, XmlTree, unpack
-from ur_emulator.program_files.script_writer import is_identifier
 from urscript.values import Pose
 
 SUFFIX = ".variables"
