@@ -86,15 +86,17 @@ class _SafetyText:
 
     def speeds(self, section: str) -> Vector6 | None:
         """Return the joint speeds of a section [rad/s]."""
-        given = self._six(section, "maxJointSpeed")
-        if given is not None and min(given) <= 0.0:
+        given = self._numbers(section, "maxJointSpeed", 6)
+        if given is None:
+            return None
+        if min(given) <= 0.0:
             raise self._error("maxJointSpeed", f"is {min(given):g}, it must be above 0")
-        return given
+        return six(given)
 
     def ends(self, which: str, unlimited: float) -> Vector6 | None:
         """Return the ends of the joint ranges [rad]."""
-        angle = self._six(_NORMAL_JOINTS, f"{which}JointPosition")
-        turns = self._six(_NORMAL_JOINTS, f"{which}JointRevolutions")
+        angle = self._numbers(_NORMAL_JOINTS, f"{which}JointPosition", 6)
+        turns = self._numbers(_NORMAL_JOINTS, f"{which}JointRevolutions", 6)
         if angle is None or turns is None:
             return None
         flags = self._values.get((_SETUP, "withPositionLimits"), "").strip("[]").split(",")
@@ -170,10 +172,6 @@ class _SafetyText:
             raise self._error(key, f"of {section} is missing or has no length")
         x, y, z = (part / length for part in given)
         return x, y, z
-
-    def _six(self, section: str, key: str) -> Vector6 | None:
-        given = self._numbers(section, key, 6)
-        return None if given is None else six(given)
 
     def _numbers(self, section: str, key: str, count: int) -> list[float] | None:
         text = self._values.get((section, key))

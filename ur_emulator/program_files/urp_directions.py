@@ -133,16 +133,14 @@ def _write_until(writer: ScriptWriter, node: Node, n: int, acceleration: str) ->
 def _write_force(writer: ScriptWriter, node: Node) -> None:
     if node.get("type") != "Frame":
         raise node.tree.unknown(f"a <Force> of type {node.get('type')!r}")
-    values = []
-    for tag in ("selection", "wrench", "limitsForce", "limitsMotion"):
-        element = node.find(tag)
-        given = None if element is None else element.get("value")
-        values.append(node.tree.number_texts(given, f"{tag} of a <Force>"))
-    selection, wrench, compliant, stiff = values
+    selection, wrench, compliant, stiff = (
+        node.tree.number_texts(node.value(tag, "value"), f"{tag} of a <Force>")
+        for tag in ("selection", "wrench", "limitsForce", "limitsMotion")
+    )
     limits = [c if float(selected) else s for selected, c, s in zip(selection, compliant, stiff, strict=True)]
-    lists = [f"[{', '.join(one)}]" for one in (selection, wrench, limits)]
+    axes, wanted, most = (f"[{', '.join(one)}]" for one in (selection, wrench, limits))
     frame = frame_of(writer, node, "tool_pose()")
-    force_mode = f"force_mode({frame}, {lists[0]}, {lists[1]}, 2, {lists[2]})"
+    force_mode = f"force_mode({frame}, {axes}, {wanted}, 2, {most})"
     writer.put(node, "Force", "sleep(0.02)", "zero_ftsensor()", force_mode)
     writer.write_children(node)
     writer.add("end_force_mode()", "stopl(5.0)")

@@ -6,7 +6,6 @@ joint space is joint angles. Source: program files and the scripts that PolyScop
 
 from protocol.pose import pose_inv
 from ur_emulator.program_files.names import identifier
-from ur_emulator.program_files.reader import CB3
 from ur_emulator.program_files.script_writer import ScriptWriter, writes
 from ur_emulator.program_files.urp_expressions import variable_name
 from ur_emulator.program_files.urp_nodes import Node
@@ -144,7 +143,7 @@ def _relative_target(writer: ScriptWriter, node: Node) -> str:
         if pose is None:
             raise only_angles(node, name)
         text = pose_text(pose)
-        if node.tree.series != CB3:
+        if not node.tree.is_cb3:
             variable = f"{identifier(name)}_{part}_p"
             writer.declare(f"pose {variable}", f"global {variable}={text}")
             text = variable
@@ -154,7 +153,7 @@ def _relative_target(writer: ScriptWriter, node: Node) -> str:
 
 def _is_joint_move(move: Node) -> bool:
     """True for a MoveJ whose waypoints are joint angles, whatever the tool is."""
-    if move.tree.series != CB3:
+    if not move.tree.is_cb3:
         return move.get("positionType") == "JointAngles"
     return move.get("useActiveTCP") == "false" and move.find("feature") is None
 

@@ -75,6 +75,11 @@ class Node:
         found = self.element.find(tag)
         return None if found is None else self.tree.resolve(found)
 
+    def value(self, tag: str, attribute: str) -> str:
+        """Return an attribute of the first element inside of that tag, "" if one of them is missing."""
+        found = self.find(tag)
+        return "" if found is None else found.get(attribute, "")
+
 
 _SUPPRESSED = frozenset({"SuppressedNode", "suppressedNode"})
 # Elements that give a variable its name.

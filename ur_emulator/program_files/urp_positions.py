@@ -15,7 +15,7 @@ from protocol.pose import Pose, T_to_pose, pose_trans
 from ur_emulator.errors import UndefinedError
 from ur_emulator.program_files.installation import Feature
 from ur_emulator.program_files.names import identifier
-from ur_emulator.program_files.reader import CB3, XmlTree
+from ur_emulator.program_files.reader import XmlTree
 from ur_emulator.program_files.script_writer import ScriptWriter
 from ur_emulator.program_files.urp_nodes import Node
 
@@ -28,10 +28,7 @@ _ZERO_BEFORE_POINT = re.compile(r"\b0\.")
 
 def feature_name(node: Node) -> str:
     """Return the name of the feature that a node names; "" for none."""
-    feature = node.find("feature")
-    if feature is None:
-        return ""
-    return feature.get("referencedName") or feature.get("featureName") or ""
+    return node.value("feature", "referencedName") or node.value("feature", "featureName")
 
 
 def taught_feature(writer: ScriptWriter, node: Node, name: str) -> Feature | None:
@@ -73,7 +70,7 @@ def taught_waypoint(writer: ScriptWriter, node: Node, element: Element | None, n
     joint angles, or numbers are damaged.
     """
     q, pose = position_of(node.tree, element, f"waypoint {name[:100]!r}")
-    if pose is None or node.tree.series == CB3:
+    if pose is None or node.tree.is_cb3:
         return "" if pose is None else pose_text(pose), q
     plain = identifier(name)
     writer.declare(f"waypoint {plain}", f"global {plain}_p={pose_text(pose)}", f"global {plain}_q={q}")

@@ -69,7 +69,7 @@ def make_script(
     for node in (*program.before_start, program.main, *program.others, *program.events, *sub_programs):
         writer.last_motions |= _last_motions(node)
     # Parts are written in the order of their numbers, so that declarations come in the order of first use.
-    with writer.block(f"def {identifier(tree.root.get('name') or tree.file.inside.stem)}():"):
+    with writer.block(f"def {identifier(tree.root.get('name') or tree.file.stem)}():"):
         writer.parts.append(Header())
         _write_first_values(writer)
         with writer.aside() as before:

@@ -91,10 +91,10 @@ def _write_set(writer: ScriptWriter, node: Node) -> None:
         if not line.writes:
             raise node.tree.undefined(f"line {line.label!r} is an input: it cannot be set")
         writer.put(node, f"Set {line.label}={'On' if is_high else 'Off'}", line.writes[is_high])
-    elif kind != "NoAction":
-        raise node.tree.unknown(f"a <Set> of type {kind!r}")
-    else:
+    elif kind == "NoAction":
         writer.put(node, "Set")
+    else:
+        raise node.tree.unknown(f"a <Set> of type {kind!r}")
     write_tcp(writer, node)
 
 
@@ -126,15 +126,10 @@ def _write_wait(writer: ScriptWriter, node: Node) -> None:
             label, condition = awaited.label, f"not({awaited.script})"
         case other:
             raise node.tree.unknown(f"a <Wait> of type {other!r}")
-    writer.put(node, f"Wait {label}")
-    with writer.block(f"while ({condition}):"):
-        writer.add("sync()")
+    writer.put(node, f"Wait {label}", f"while ({condition}):", "  sync()", "end")
 
 
-@writes(
-    "Popup",
-    "`popup` of a text, a variable or an expression; one that halts the program does not wait",
-)
+@writes("Popup", "`popup` of a text, a variable or an expression; one that halts the program does not wait")
 def _write_popup(writer: ScriptWriter, node: Node) -> None:
     kind = node.get("type") or "Message"
     if kind not in _POPUPS:
@@ -195,9 +190,7 @@ def contributor(element: Element) -> str:
 
 
 def _line(writer: ScriptWriter, node: Node) -> Line:
-    pin = node.find("pin")
-    name = "" if pin is None else pin.get("referencedName", "")
-    return line_of(writer.installation, name, node.tree)
+    return line_of(writer.installation, node.value("pin", "referencedName"), node.tree)
 
 
 def _is_high(node: Node) -> bool:
