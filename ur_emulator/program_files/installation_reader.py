@@ -233,7 +233,7 @@ class _Reader:
     def tool_voltage(self) -> int:
         if self.contributed(_ROBOTIQ):
             return 24  # its software controls the connector
-        given = self.part("ToolCommSettings").get("toolOutputVoltage")
+        given = self.part("ToolCommSettings").get("toolOutputVoltage", "")
         return _VOLTAGES.get(given or self.tree.root.get("toolOutputVoltage", ""), 0)
 
     def domains(self, kind: str, usual: tuple[int, ...]) -> tuple[int, ...]:

@@ -6,6 +6,7 @@ Source: names of programs and the names of the functions in the scripts that Pol
 import re
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_OTHER = re.compile(r"[^A-Za-z0-9_]")
 
 
 def is_identifier(name: str) -> bool:
@@ -19,14 +20,8 @@ def identifier(name: str) -> str:
     A full stop is left out, a letter that is not ASCII becomes `u` and its decimal code, what else is neither
     letter nor digit becomes `_`, and a `P` stands before a digit at the start.
     """
-    plain = "".join(_character(one) for one in name.replace(".", ""))
+    plain = _OTHER.sub(lambda one: "_" if one[0].isascii() else f"u{ord(one[0])}", name.replace(".", ""))
     return plain if is_identifier(plain) else f"P{plain}"
-
-
-def _character(one: str) -> str:
-    if one.isascii():
-        return one if one.isalnum() else "_"
-    return f"u{ord(one)}"
 
 
 class Names:

@@ -83,6 +83,7 @@ class _SafetyText:
     def __init__(self, file_name: str, values: dict[tuple[str, str], str]) -> None:
         self._file_name = file_name
         self._values = values
+        self._planes = sorted({section for section, _ in values if section.startswith(_PLANE)})
 
     def speeds(self, section: str) -> Vector6 | None:
         """Return the joint speeds of a section [rad/s]."""
@@ -125,13 +126,13 @@ class _SafetyText:
 
     def unwatched(self) -> Iterator[str]:
         """Yield what is set up and not watched."""
-        for section in (*self._plane_sections(), _TOOL):
+        for section in (*self._planes, _TOOL):
             if self._mode(section) is None:
                 yield f"{section} with the unknown mode {self._values[section, 'mode'][:40]} is"
 
     def planes(self) -> Iterator[SafetyPlane]:
         """Yield the safety planes that are set up."""
-        for section in self._plane_sections():
+        for section in self._planes:
             mode = self._mode(section)
             if mode is None or mode is BoundaryMode.DISABLED:
                 continue
@@ -155,9 +156,6 @@ class _SafetyText:
         if angle >= math.pi:
             return None
         return ToolDirection(self._direction(_TOOL, "tcpOrientationVector"), angle, mode)
-
-    def _plane_sections(self) -> list[str]:
-        return sorted({section for section, _ in self._values if section.startswith(_PLANE)})
 
     def _mode(self, section: str) -> BoundaryMode | None:
         """Return the mode of a boundary; None for one that is not known."""

@@ -93,11 +93,6 @@ class ScriptWriter:
         for child in node.children:
             self.write(child)
 
-    def write_block(self, head: str, node: Node) -> None:
-        """Write a block with the nodes inside a node."""
-        with self.block(head):
-            self.write_children(node)
-
     @contextmanager
     def leaving_out(self, node: Node) -> Iterator[None]:
         """Do something for a node; what is written for it is removed if the node is undefined.

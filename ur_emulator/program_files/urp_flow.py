@@ -25,7 +25,8 @@ def _write_loop(writer: ScriptWriter, node: Node) -> None:
     match node.get("type"):
         case "Forever":
             writer.put(node, "Loop")
-            writer.write_block("while (True):", node)
+            with writer.block("while (True):"):
+                writer.write_children(node)
         case "Counting":
             count = node.tree.number_text(node.get("count"), "count of a <Loop>")
             variable = node.element.find("loopVariable")
@@ -40,7 +41,8 @@ def _write_loop(writer: ScriptWriter, node: Node) -> None:
             if node.get("checkContinuously") == "true":
                 _write_watched_loop(writer, node, condition.script)
                 return
-            writer.write_block(f"while ({condition.script}):", node)
+            with writer.block(f"while ({condition.script}):"):
+                writer.write_children(node)
         case other:
             raise node.tree.unknown(f"a loop of type {other!r}")
 
@@ -48,8 +50,8 @@ def _write_loop(writer: ScriptWriter, node: Node) -> None:
 def _write_watched_loop(writer: ScriptWriter, node: Node, condition: str) -> None:
     """Write a loop in a thread that ends as soon as the condition does not hold."""
     n = node.number
-    with writer.block(f"thread Thread_while_{n}():"):
-        writer.write_block("while (True):", node)
+    with writer.block(f"thread Thread_while_{n}():"), writer.block("while (True):"):
+        writer.write_children(node)
     with writer.block(f"if ({condition}):"):
         writer.add(f"global thread_handler_{n}=run Thread_while_{n}()")
         with writer.block(f"while ({condition}):"):

@@ -117,10 +117,9 @@ class ProgramNodes:
         self._waiting: list[tuple[XmlTree, Element]] = []
         self._reserve_names(tree)
         top = tree.root.findall("children/*")
-        first_values = tree.root.find("children/InitVariablesNode")
-        variables = None if first_values is None else first_values.find("variables")
-        self.variables = () if variables is None else tuple(variables)
-        self._last = 0 if first_values is None else 1  # its number, also when it is empty
+        self.variables = tree.root.findall("children/InitVariablesNode/variables/*")
+        has_values = any(one.tag == "InitVariablesNode" for one in top)
+        self._last = int(has_values)  # its number, also when it is empty
         before = [self._node(tree, one) for one in top if one.tag == "SpecialSequence"]
         for node in before:
             if node.get("type") != "BeforeStart":
@@ -154,8 +153,9 @@ class ProgramNodes:
         depth, move, mark = 1, None, ""
         if around is not None:
             # Software up to 3.6 has waypoints outside of moves: the program has their parameters.
+            depth = around.depth + 1
             move = around if around.get("motionType") else around.move
-            depth, mark = around.depth + 1, "noBreak" if around.kind == "Force" else around.mark
+            mark = "noBreak" if around.kind == "Force" else around.mark
         if depth > BUDGETS.node_depth:
             raise tree.error(f"nodes are nested more than {BUDGETS.node_depth} deep")
         content = tree.resolve(element) if content is None else content

@@ -100,10 +100,10 @@ def _write_check(writer: ScriptWriter, node: Node) -> None:
 def _grippers(node: Node, key: str) -> list[int]:
     """Return the numbers of the grippers that a node names, in its order; gripper 1 if it names none."""
     names = (node.data.get(key, "").strip("[] ") or "9").split(",")
-    numbers = [_NUMBERS.get(name.strip()) for name in names]
-    if None in numbers or len({*numbers}) < len(numbers):
+    numbers = [_NUMBERS.get(name.strip(), 0) for name in names]
+    if 0 in numbers or len({*numbers}) < len(numbers):
         raise node.tree.unknown(f"a node of the grippers {','.join(names)[:100]!r}")
-    return [number for number in numbers if number is not None]
+    return numbers
 
 
 def _percent(node: Node, *keys: str) -> float:
