@@ -38,14 +38,11 @@ def compile_text(
         log_text = f"{error.log_text} (line {error.line}, column {error.column}{hint})"
         return ScriptFailed(error.line, error.column, error.wire_text, secondary, log_text)
     compiled = program.compiled
+    values = len(program.globals) + len(compiled.constants)
     for count, limit, what in (
         (len(compiled.code), BUDGETS.program_code, "bytes when compiled"),
         (len(compiled.function_names), BUDGETS.program_functions, "functions"),
-        (
-            len(program.globals) + len(compiled.constants),
-            BUDGETS.program_values,
-            "global variables and poses",
-        ),
+        (values, BUDGETS.program_values, "global variables and poses"),
     ):
         if count > limit:
             return ScriptFailed(1, 1, f"the program has {count} {what}: at most {limit} are allowed")

@@ -69,8 +69,8 @@ def _settings(installation: Installation) -> Iterator[str]:
     yield from map(_rule, installation.output_rules)
     yield f"set_safety_mode_transition_hardness({installation.transition_hardness})"
     yield f"set_tcp(p{list(installation.tcp_offset)})"
-    payload = installation.payload
-    yield f"set_payload({payload.mass!r}{'' if payload.cog is None else f', {list(payload.cog)}'})"
+    cog = installation.payload_cog
+    yield f"set_payload({installation.payload!r}{'' if cog is None else f', {list(cog)}'})"
     yield f"set_gravity({list(installation.gravity)})"
 
 

@@ -23,7 +23,6 @@ from ur_emulator.program_files import variables_file
 from ur_emulator.program_files.folder import WIRE_ROOTS, ProgramFolder
 from ur_emulator.program_files.installation import (
     STANDARD_GRAVITY,
-    DeclaredPayload,
     DeclaredSignal,
     ExternalControlPc,
     Feature,
@@ -105,13 +104,18 @@ def _read_tree(tree: XmlTree) -> Installation:
     remote = reader.contributed(_EXTERNAL_CONTROL)
     hardness = reader.part("SmoothTransitionSettings").get("transitionHardness")
     home = reader.value(reader.part("SafeHomeSettings"), "position")
+    tcps, payloads = reader.tcps(), tree.root.iter("Payload")
+    payload = next((one for one in payloads if one.get("defaultPayload") == "true"), reader.tcp_settings)
+    mass = payload.get("toolPayload" if payload is reader.tcp_settings else "mass")
+    cog = payload.get("centerOfGravity")
     found = Installation(
         ProgramFolder.wire_path(tree.file),
         pc=pc_from(remote, tree),
         pc_name=remote.get("name", ""),
-        tcps=reader.tcps(),
-        active_tcp=reader.tcp_settings.get("activePose", ""),
-        payload=reader.payload(),
+        tcps=tcps,
+        tcp_offset=tcps.get(reader.tcp_settings.get("activePose", ""), ZERO6),
+        payload=tree.number(mass, "mass of the payload") if mass else 0.0,
+        payload_cog=tree.vector3(cog, "centre of gravity") if cog else None,
         gravity=reader.gravity(),
         tool_voltage=reader.tool_voltage(),
         analog_in_domains=reader.domains("analogInputRange", NEW_BOX.analog_in_domains),
@@ -209,16 +213,6 @@ class _Reader:
             for tcp in self.tcp_settings.iter("tcp")
             if tcp.get("name")
         }
-
-    def payload(self) -> DeclaredPayload:
-        payloads = self.tree.root.iter("Payload")
-        payload = next((one for one in payloads if one.get("defaultPayload") == "true"), self.tcp_settings)
-        mass = payload.get("toolPayload" if payload is self.tcp_settings else "mass")
-        cog = payload.get("centerOfGravity")
-        return DeclaredPayload(
-            self.tree.number(mass, "mass of the payload") if mass else 0.0,
-            self.tree.vector3(cog, "centre of gravity") if cog else None,
-        )
 
     def gravity(self) -> Vector3:
         mounting = self.part("WorldtoMarshal")

@@ -77,19 +77,18 @@ class LoadedProgram:
         for part in self.parts:
             if isinstance(part, str):
                 texts.append(part)
-                continue
-            if isinstance(part, Header):
+            elif isinstance(part, Header):
                 declared = header_lines(self.installation or NEW_BOX)
                 texts += [f"  {to_script_text(line)}" for line in declared]
-                continue
-            header, lines = split_header(received(part.pc))
-            if part.pc not in headed:
-                headed.add(part.pc)
-                lines = header + lines
-            size += sum(map(len, lines)) + len(lines) * (len(part.indent) + 1)
-            if size > MAX_PROGRAM:
-                raise ProgramFileError(f"the parts of PCs together have more than {MAX_PROGRAM} bytes")
-            texts.append(part.indent + f"\n{part.indent}".join(lines))
+            else:
+                header, lines = split_header(received(part.pc))
+                if part.pc not in headed:
+                    headed.add(part.pc)
+                    lines = header + lines
+                size += sum(map(len, lines)) + len(lines) * (len(part.indent) + 1)
+                if size > MAX_PROGRAM:
+                    raise ProgramFileError(f"the parts of PCs together have more than {MAX_PROGRAM} bytes")
+                texts.append(part.indent + f"\n{part.indent}".join(lines))
         return "\n".join(texts) + "\n"
 
 

@@ -4,6 +4,9 @@ A waypoint in Cartesian space is a pose, to which the tool goes that is active w
 joint space is joint angles. Source: program files and the scripts that PolyScope saved beside them.
 """
 
+from collections.abc import Iterator
+from itertools import pairwise
+
 from protocol.pose import pose_inv
 from ur_emulator.program_files.names import identifier
 from ur_emulator.program_files.script_writer import ScriptWriter, writes
@@ -25,10 +28,7 @@ _TYPES = {
     "MoveL": ("movel", "cartesianAcceleration", "cartesianSpeed"),
     "MoveP": ("movep", "cartesianAcceleration", "cartesianSpeed"),
 }
-_PARAMETERS = frozenset(
-    {"jointSpeed", "jointAcceleration", "cartesianSpeed", "cartesianAcceleration"}
-    | {"blendRadius", "nextMotionTime", "reference"}
-)
+_PARAMETERS = {"blendRadius", "nextMotionTime", "reference"}.union(*(own for _, *own in _TYPES.values()))
 
 
 @writes("Move", "a label and its nodes (MoveJ, MoveL, MoveP); `set_tcp` if it names a TCP")
@@ -195,3 +195,32 @@ def _motion_parameters(writer: ScriptWriter, motion: Node, waypoint: Node) -> st
     return ", ".join(
         f"{letter}={tree.number_text(text, f'{letter} of a waypoint')}" for letter, text in given.items()
     )
+
+
+def last_motions(section: Node) -> set[int]:
+    """Return the numbers of the motions of MoveP behind which no other motion of MoveP comes.
+
+    They have no blend radius. Ends of other loops than counting ones are inferred.
+    """
+    motions = list(_motions(section))
+    behind = motions[0] if motions and section.repeats else (0, "")
+    return {
+        number
+        for (number, kind), (_, following) in pairwise([*motions, behind])
+        if kind == "MoveP" and following != "MoveP"
+    }
+
+
+def _motions(node: Node) -> Iterator[tuple[int, str]]:
+    """Yield number and type of each motion in the order of the nodes; the end of a loop has no type."""
+    for child in node.children:
+        match child.kind:
+            case "Waypoint" | "CircleMove":
+                yield child.number, child.move.get("motionType") if child.move else ""
+                continue
+            case "SafeHome" | "gui.program.direction.MoveDirectionNode":
+                yield child.number, ""
+        for branch in (child, *child.branches):
+            yield from _motions(branch)
+        if child.kind == "Loop":
+            yield 0, ""

@@ -6,14 +6,13 @@ BeforeStart, threads and events, main program. Source: program files and the scr
 beside them. docs/programs.md shows the tables of nodes.
 """
 
-from collections.abc import Iterator, Mapping
-from itertools import groupby, pairwise
-from types import MappingProxyType
+from collections.abc import Iterator
+from itertools import groupby
 
 from ur_emulator.program_files import (
-    urp_directions,  # noqa: F401 - its nodes are in KINDS then, those of the others too
+    urp_directions,  # noqa: F401 - its nodes are in KINDS then, as those of the others
     urp_flow,
-    urp_moves,  # noqa: F401
+    urp_moves,
     urp_statements,
 )
 from ur_emulator.program_files.installation import Installation
@@ -24,20 +23,18 @@ from ur_emulator.program_files.urp_expressions import expression_of, variable_na
 from ur_emulator.program_files.urp_nodes import Node, ProgramNodes
 from ur_emulator.program_files.urp_robotiq import declare_functions
 
-TOP_KINDS: Mapping[str, str] = MappingProxyType(
-    {
-        "InitVariablesNode": "first values of variables",
-        "SpecialSequence": "BeforeStart: statements before threads and main program",
-        "MainProgram": "the body, in a loop unless `runOnlyOnce`",
-        "Thread": "a thread that loops unless `runOnlyOnce`; it starts after BeforeStart",
-        "Event": "a condition with nodes; one thread looks for all events",
-        "SubProgram": "a function before BeforeStart",
-        "SuppressedNode": "nothing, but its nodes count in the numbers of labels; also inside of programs",
-    }
-)
+TOP_KINDS = {
+    "InitVariablesNode": "first values of variables",
+    "SpecialSequence": "BeforeStart: statements before threads and main program",
+    "MainProgram": "the body, in a loop unless `runOnlyOnce`",
+    "Thread": "a thread that loops unless `runOnlyOnce`; it starts after BeforeStart",
+    "Event": "a condition with nodes; one thread looks for all events",
+    "SubProgram": "a function before BeforeStart",
+    "SuppressedNode": "nothing, but its nodes count in the numbers of labels; also inside of programs",
+}
 """Nodes around those of `KINDS` -> what they become."""
 
-NOT_KNOWN: tuple[str, ...] = (
+NOT_KNOWN = (
     "pallets and conveyor tracking",
     "wizards and nodes of URCaps other than External Control and Robotiq_Grippers",
     "`Set` of analogue outputs, expressions and payloads",
@@ -67,7 +64,7 @@ def make_script(
     writer = ScriptWriter(program, installation, skip_unknown=skip_unknown)
     sub_programs = [node for _, node in program.sub_programs]
     for node in (*program.before_start, program.main, *program.others, *program.events, *sub_programs):
-        writer.last_motions |= _last_motions(node)
+        writer.last_motions |= urp_moves.last_motions(node)
     # Parts are written in the order of their numbers, so that declarations come in the order of first use.
     with writer.block(f"def {identifier(tree.root.get('name') or tree.file.stem)}():"):
         writer.parts.append(Header())
@@ -141,32 +138,3 @@ def _write_timers(writer: ScriptWriter) -> None:
             writer.add(f"if ({timer}_is_counting):", f"  {timer} = {timer} + get_steptime()", "end")
         writer.add("sync()")
     writer.add("run Timer_Thread()")
-
-
-def _last_motions(section: Node) -> set[int]:
-    """Return the numbers of the motions of MoveP behind which no other motion of MoveP comes.
-
-    They have no blend radius. Ends of other loops than counting ones are inferred.
-    """
-    motions = list(_motions(section))
-    behind = motions[0] if motions and section.repeats else (0, "")
-    return {
-        number
-        for (number, kind), (_, following) in pairwise([*motions, behind])
-        if kind == "MoveP" and following != "MoveP"
-    }
-
-
-def _motions(node: Node) -> Iterator[tuple[int, str]]:
-    """Yield number and type of each motion in the order of the nodes; the end of a loop has no type."""
-    for child in node.children:
-        match child.kind:
-            case "Waypoint" | "CircleMove":
-                yield child.number, child.move.get("motionType") if child.move else ""
-                continue
-            case "SafeHome" | "gui.program.direction.MoveDirectionNode":
-                yield child.number, ""
-        for branch in (child, *child.branches):
-            yield from _motions(branch)
-        if child.kind == "Loop":
-            yield 0, ""
