@@ -40,7 +40,7 @@ class Node:
     move: Node | None
     mark: str
     children: list[Node] = field(default_factory=list)
-    branches: list[Node] = field(default_factory=list)
+    branches: tuple[Node, ...] = ()
 
     @property
     def repeats(self) -> bool:
@@ -53,7 +53,7 @@ class Node:
             before = self.children[-1]
             has_else = before.branches and before.branches[-1].get("type") == "Else"
             if before.kind == "If" and not has_else:
-                before.branches.append(node)
+                before.branches += (node,)
                 return
         self.children.append(node)
 
