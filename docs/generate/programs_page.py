@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from docs.generate.page_parts import table
-from ur_emulator.program_files.urp_program import KINDS, NOT_KNOWN, TOP_KINDS
+from ur_emulator.program_files.script_writer import KINDS
+from ur_emulator.program_files.urp_program import NOT_KNOWN, TOP_KINDS
 
 _BEGIN = "<!-- made from ur_emulator/program_files/urp_program.py by `make docs` -->\n"
 _END = "<!-- end of what is made -->\n"
@@ -24,7 +25,7 @@ def render() -> str:
 def _tables() -> Iterator[str]:
     yield from table(("outer node", "becomes"), ((f"`{tag}`", text) for tag, text in TOP_KINDS.items()))
     yield ""
-    yield from table(("node", "becomes"), ((f"`{row.tag}`", row.becomes) for row in KINDS.values()))
+    yield from table(("node", "becomes"), ((f"`{tag}`", kind.becomes) for tag, kind in sorted(KINDS.items())))
     yield ""
     yield "No script is known for:"
     yield ""

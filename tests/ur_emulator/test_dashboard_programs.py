@@ -61,7 +61,7 @@ def dashboard(box):
 )
 def test_names_of_programs(folder, name, path):
     found = ProgramFolder(folder).find(name)
-    assert (str(found.inside), found.wire_path) == (path, f"/programs/{path}")
+    assert (str(found), ProgramFolder.wire_path(found)) == (path, f"/programs/{path}")
 
 
 @pytest.mark.parametrize(

@@ -25,22 +25,22 @@ from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.models.robots import robot_by_name
 from ur_emulator.machine.models.safety_limits import ArmLimits
+from ur_emulator.program_files.header import header_lines, setup_script
 from ur_emulator.program_files.installation import (
-    DeclaredPayload,
     DeclaredSignal,
     Feature,
     Installation,
     OutputRule,
 )
-from ur_emulator.program_files.script_writer import header_lines, setup_script
 from urscript import compile_program
 
 LAMP = DeclaredSignal("LAMP", "10.0.0.9", 255, 7, SignalType.DIGITAL_OUTPUT, 5.0, RunState.LOW_WHEN_STOPPED)
 CELL = Installation(
     "/programs/cell.installation",
     tcps={"Gripper": (0.0, 0.0, 0.12, 0.0, 0.0, 0.5)},
-    active_tcp="Gripper",
-    payload=DeclaredPayload(1.25, (0.0, 0.01, 0.05)),
+    tcp_offset=(0.0, 0.0, 0.12, 0.0, 0.0, 0.5),
+    payload=1.25,
+    payload_cog=(0.0, 0.01, 0.05),
     tool_voltage=24,
     input_actions=(("tool_digital", 1, "FREEDRIVE"), ("standard_digital", 0, "START")),
     output_rules=(

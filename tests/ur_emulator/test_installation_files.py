@@ -24,7 +24,6 @@ from ur_emulator.machine.controller.safety.boundaries import NO_BOUNDARIES, Boun
 from ur_emulator.machine.models.safety_limits import ArmLimits
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import (
-    DeclaredPayload,
     DeclaredSignal,
     Feature,
     OutputRule,
@@ -51,13 +50,14 @@ def test_tcps_and_payload(tmp_path):
     cell = read(tmp_path, TCP)
     assert list(cell.tcps) == ["TCP", "Gripper"]
     assert cell.tcp_offset == (0.0, 0.0, 0.12, 0.0, 0.0, 0.5)
-    assert cell.payload == DeclaredPayload(1.25, (0.0, 0.01, 0.05))
-    assert read(tmp_path, TCP, NEW_PAYLOAD).payload == DeclaredPayload(0.75, (0.0, 0.0, 0.04))
+    assert (cell.payload, cell.payload_cog) == (1.25, (0.0, 0.01, 0.05))
+    new = read(tmp_path, TCP, NEW_PAYLOAD)
+    assert (new.payload, new.payload_cog) == (0.75, (0.0, 0.0, 0.04))
     old = TCP.replace("TCPSettings", "com.ur.view.tcp.domain.TCPSettingsImpl").replace(
         ' centerOfGravity="0.0, 0.01, 0.05"', ""
     )
     assert read(tmp_path, old).tcp_offset == cell.tcp_offset
-    assert read(tmp_path, old).payload == DeclaredPayload(1.25)
+    assert (read(tmp_path, old).payload, read(tmp_path, old).payload_cog) == (1.25, None)
 
 
 def test_mounting(tmp_path):

@@ -28,7 +28,7 @@ from ur_emulator.host.reports.report_files import (
     save_log,
     support_file,
 )
-from ur_emulator.program_files.folder import PART_NAME, FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import PART_NAME, ProgramFolder
 from ur_emulator.program_files.loading import load_program
 
 SECRET = 'def secret():\n  textmsg("secret of another user")\nend\n'
@@ -158,7 +158,7 @@ def test_pipes_devices_and_folders_are_no_programs(folder):
 def test_a_pipe_that_is_put_there_after_the_check_does_not_block(folder):
     os.mkfifo(folder / "pipe.script")
     with pytest.raises(ProgramFileError, match=r"pipe\.script cannot be read: it is not a file"):
-        ProgramFolder(folder).read(FoundFile(PurePosixPath("pipe.script")), 1000)
+        ProgramFolder(folder).read(PurePosixPath("pipe.script"), 1000)
 
 
 # --- budgets and disks
@@ -169,7 +169,7 @@ def test_a_pipe_that_is_put_there_after_the_check_does_not_block(folder):
 )
 def test_a_long_path_is_no_file_and_is_not_looked_up(folder, below, beyond):
     place = ProgramFolder(folder)
-    assert place.find(f"{below}hello.urp").wire_path == "/programs/hello.urp"
+    assert place.find(f"{below}hello.urp") == PurePosixPath("hello.urp")
     with pytest.raises(FileMissingError, match=r"more than 4096 and 64"):
         place.find(f"{beyond}hello.urp")
 

@@ -40,9 +40,9 @@ from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import NEW_HOME, DeclaredSignal, Feature, Installation
 from ur_emulator.program_files.installation_reader import load_installation
 from ur_emulator.program_files.loading import load_program
-from ur_emulator.program_files.script_writer import identifier, is_identifier
-from ur_emulator.program_files.urp_expressions import pose_text
-from ur_emulator.program_files.urp_program import KINDS
+from ur_emulator.program_files.names import identifier, is_identifier
+from ur_emulator.program_files.script_writer import KINDS
+from ur_emulator.program_files.urp_positions import pose_text
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -11,10 +11,10 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.header import setup_script
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import load_installation
 from ur_emulator.program_files.loading import LoadedProgram, load_program
-from ur_emulator.program_files.script_writer import setup_script
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
 from urscript.compile.interpreter_mode import CompiledStatements, compile_statements
@@ -38,14 +38,11 @@ def compile_text(
         log_text = f"{error.log_text} (line {error.line}, column {error.column}{hint})"
         return ScriptFailed(error.line, error.column, error.wire_text, secondary, log_text)
     compiled = program.compiled
+    values = len(program.globals) + len(compiled.constants)
     for count, limit, what in (
         (len(compiled.code), BUDGETS.program_code, "bytes when compiled"),
         (len(compiled.function_names), BUDGETS.program_functions, "functions"),
-        (
-            len(program.globals) + len(compiled.constants),
-            BUDGETS.program_values,
-            "global variables and poses",
-        ),
+        (values, BUDGETS.program_values, "global variables and poses"),
     ):
         if count > limit:
             return ScriptFailed(1, 1, f"the program has {count} {what}: at most {limit} are allowed")

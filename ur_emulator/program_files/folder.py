@@ -10,7 +10,6 @@ import os
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ur_emulator.budgets import BUDGETS
@@ -29,25 +28,8 @@ _READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY
 _CREATE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
 
 
-@dataclass(frozen=True, slots=True)
-class FoundFile:
-    """A file of the folder; `inside` is its path from the folder on, without links."""
-
-    inside: PurePosixPath
-
-    @property
-    def name(self) -> str:
-        """Its name without folder."""
-        return self.inside.name
-
-    @property
-    def wire_path(self) -> str:
-        """Its name on the wire, `/programs/sub/x.urp`."""
-        return str(WIRE_ROOTS[0] / self.inside)
-
-
 class ProgramFolder:
-    """The folder of `--programs`; a box may have none."""
+    """The folder of `--programs`; a box may have none. Its files are paths from it on, without links."""
 
     def __init__(self, root: Path | None) -> None:
         """Take a folder; `None` is a box without programs."""
@@ -58,12 +40,17 @@ class ProgramFolder:
         """Whether the box has a folder."""
         return self._root is not None
 
-    def find(self, name: str) -> FoundFile:
+    @staticmethod
+    def wire_path(file: PurePosixPath) -> str:
+        """Return the name of a file on the wire, `/programs/sub/x.urp`."""
+        return str(WIRE_ROOTS[0] / file)
+
+    def find(self, name: str) -> PurePosixPath:
         """Return the file of that name, as a client gives it: with or without folder, with or without quotes.
 
         FileMissingError if there is none, or the name leads out of the folder.
         """
-        return FoundFile(self._locate(name, Path.is_file, "file"))
+        return self._locate(name, Path.is_file, "file")
 
     def has(self, name: str) -> bool:
         """Return whether there is a file of that name."""
@@ -105,19 +92,19 @@ class ProgramFolder:
         """Return the path of a folder in this folder, from there on; FileMissingError if there is none."""
         return self._locate(name, Path.is_dir, "folder")
 
-    def beside(self, file: FoundFile, name: str) -> FoundFile:
+    def beside(self, file: PurePosixPath, name: str) -> PurePosixPath:
         """Return the file that `file` refers to: by a path of the box, or by a name in the same folder.
 
         FileMissingError if there is none.
         """
         if self.has(name):
             return self.find(name)
-        return self.find(str(file.inside.parent / PurePosixPath(name.replace("\\", "/")).name))
+        return self.find(str(file.parent / PurePosixPath(name.replace("\\", "/")).name))
 
-    def read(self, file: FoundFile, most: int) -> bytes:
+    def read(self, file: PurePosixPath, most: int) -> bytes:
         """Return what is in a file; ProgramFileError if it has more than `most` bytes, or cannot be read."""
-        with self._opened(file.inside.parent, f"{file.name} cannot be read") as folder:
-            descriptor = os.open(file.inside.name, _READ, dir_fd=folder)
+        with self._opened(file.parent, f"{file.name} cannot be read") as folder:
+            descriptor = os.open(file.name, _READ, dir_fd=folder)
             with open(descriptor, "rb") as opened:
                 if not stat.S_ISREG(os.fstat(descriptor).st_mode):
                     raise OSError(errno.EINVAL, "it is not a file")
@@ -126,7 +113,7 @@ class ProgramFolder:
             raise ProgramFileError(f"{file.name} has more than {most} bytes")
         return data
 
-    def write(self, inside: PurePosixPath, data: bytes) -> FoundFile:
+    def write(self, inside: PurePosixPath, data: bytes) -> None:
         """Write a file in one step, in place of what has its name.
 
         No part of it stays after a ProgramFileError.
@@ -143,7 +130,6 @@ class ProgramFolder:
                 with suppress(OSError):
                     os.unlink(PART_NAME, dir_fd=folder)
                 raise
-        return FoundFile(inside)
 
     def make_folder(self, name: str) -> PurePosixPath:
         """Make a folder directly in this folder, if there is none of that name; return its path.

@@ -34,17 +34,6 @@ class ExternalControlPc:
 
 
 @dataclass(frozen=True, slots=True)
-class DeclaredPayload:
-    """The payload that is active when a program starts: mass [kg], centre of gravity in the flange frame [m].
-
-    Without a centre of gravity the controller takes the TCP.
-    """
-
-    mass: float = 0.0
-    cog: Vector3 | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Feature:
     """A pose or a plane in the base frame [m, rotation vector in rad].
 
@@ -142,7 +131,9 @@ class Installation:
         pc: for External Control nodes that do not name one themselves.
         pc_name: name of that PC, as the labels of its nodes show it.
         tcps: name of each TCP -> its pose in the flange frame [m, rotation vector in rad].
-        active_tcp: name of the TCP that is active when a program starts.
+        tcp_offset: the TCP that is active when a program starts; the flange if none is.
+        payload: the mass that is active then [kg].
+        payload_cog: its centre of gravity in the flange frame [m]; without one the controller takes the TCP.
         gravity: direction that is up, times the acceleration of gravity, in the base frame [m/s^2].
         tool_voltage: supply of the tool [V].
         analog_in_domains: of the standard inputs 0 and 1 and the tool's 0 and 1: 0 current, 1 voltage.
@@ -161,8 +152,9 @@ class Installation:
     pc: ExternalControlPc = ExternalControlPc()
     pc_name: str = ""
     tcps: Mapping[str, Vector6] = field(default_factory=dict)
-    active_tcp: str = ""
-    payload: DeclaredPayload = DeclaredPayload()
+    tcp_offset: Vector6 = ZERO6
+    payload: float = 0.0
+    payload_cog: Vector3 | None = None
     gravity: Vector3 = (0.0, 0.0, STANDARD_GRAVITY)
     tool_voltage: int = 0
     analog_in_domains: tuple[int, ...] = (1, 1, 1, 1)
@@ -178,8 +170,3 @@ class Installation:
     safety: SafetySettings = NO_SETTINGS
     start_up: StartUp = StartUp()
     grippers: GripperSetup = GripperSetup()
-
-    @property
-    def tcp_offset(self) -> Vector6:
-        """Pose of the active TCP in the flange frame; the flange if there is none of that name."""
-        return self.tcps.get(self.active_tcp, ZERO6)

@@ -8,10 +8,12 @@ from pathlib import PurePosixPath
 from protocol.script_channel import MAX_PROGRAM, ProgramText, ScriptChannel
 from ur_emulator.errors import ProgramFileError, UnknownNodeError
 from ur_emulator.program_files.folder import PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX, ProgramFolder
+from ur_emulator.program_files.header import header_lines
 from ur_emulator.program_files.installation import ExternalControlPc, Installation
 from ur_emulator.program_files.installation_reader import NEW_BOX, installation_of
+from ur_emulator.program_files.names import identifier
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
-from ur_emulator.program_files.script_writer import Gap, Header, Part, header_lines, identifier
+from ur_emulator.program_files.script_writer import Gap, Header, Part
 from ur_emulator.program_files.urp_nodes import OLD_ROOT, ROOT
 from ur_emulator.program_files.urp_program import make_script, uses_external_control
 from ur_emulator.program_files.urpx import read_urpx
@@ -75,19 +77,18 @@ class LoadedProgram:
         for part in self.parts:
             if isinstance(part, str):
                 texts.append(part)
-                continue
-            if isinstance(part, Header):
+            elif isinstance(part, Header):
                 declared = header_lines(self.installation or NEW_BOX)
                 texts += [f"  {to_script_text(line)}" for line in declared]
-                continue
-            header, lines = split_header(received(part.pc))
-            if part.pc not in headed:
-                headed.add(part.pc)
-                lines = header + lines
-            size += sum(map(len, lines)) + len(lines) * (len(part.indent) + 1)
-            if size > MAX_PROGRAM:
-                raise ProgramFileError(f"the parts of PCs together have more than {MAX_PROGRAM} bytes")
-            texts.append(part.indent + f"\n{part.indent}".join(lines))
+            else:
+                header, lines = split_header(received(part.pc))
+                if part.pc not in headed:
+                    headed.add(part.pc)
+                    lines = header + lines
+                size += sum(map(len, lines)) + len(lines) * (len(part.indent) + 1)
+                if size > MAX_PROGRAM:
+                    raise ProgramFileError(f"the parts of PCs together have more than {MAX_PROGRAM} bytes")
+                texts.append(part.indent + f"\n{part.indent}".join(lines))
         return "\n".join(texts) + "\n"
 
 
@@ -129,12 +130,12 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
     """
     file = folder.find(name)
     reader = ProgramReader(folder)
-    suffix = file.inside.suffix
-    if suffix in (SCRIPT_SUFFIX, URPX_SUFFIX):
-        is_script = suffix == SCRIPT_SUFFIX
+    path = folder.wire_path(file)
+    if file.suffix in (SCRIPT_SUFFIX, URPX_SUFFIX):
+        is_script = file.suffix == SCRIPT_SUFFIX
         text = reader.script(file) if is_script else read_urpx(file.name, reader.unpacked(file)).script
-        return LoadedProgram(file.wire_path, None, (as_one_program(text, identifier(file.inside.stem)),))
-    if suffix != PROGRAM_SUFFIX:
+        return LoadedProgram(path, None, (as_one_program(text, identifier(file.stem)),))
+    if file.suffix != PROGRAM_SUFFIX:
         raise ProgramFileError(
             f"{file.name} is not a program: its name must end in {PROGRAM_SUFFIX}, {SCRIPT_SUFFIX} or "
             f"{URPX_SUFFIX}"
@@ -154,18 +155,18 @@ def load_program(folder: ProgramFolder, name: str, *, skip_unknown: bool = False
             notes.append(f"{file.name}: {len(texts)} things are {what} in all")
     others = f", and {len(made.undefined) - 1} more" if len(made.undefined) > 1 else ""
     undefined = made.undefined[0] + others if made.undefined else ""
-    return LoadedProgram(file.wire_path, installation, made.parts, tuple(notes), undefined=undefined)
+    return LoadedProgram(path, installation, tuple(made.parts), tuple(notes), undefined=undefined)
 
 
 def _twin_instead(
     reader: ProgramReader, tree: XmlTree, installation: Installation, unknown: UnknownNodeError
 ) -> LoadedProgram:
     """Return the program with the script that PolyScope saved; raise `unknown` if there is none."""
-    saved = str(tree.file.inside.with_suffix(SCRIPT_SUFFIX))
+    saved = str(tree.file.with_suffix(SCRIPT_SUFFIX))
     if not reader.folder.has(saved):
         raise unknown
     twin = reader.folder.find(saved)
-    text = as_one_program(reader.script(twin), identifier(twin.inside.stem))
+    text = as_one_program(reader.script(twin), identifier(twin.stem))
     if not (_DEF.match(text) and _LABEL.search(text)):  # no program with labels, as PolyScope makes it
         raise ProgramFileError(f"{_cause(unknown)}, and {twin.name} is not a script that PolyScope saved")
     if uses_external_control(tree):
@@ -173,7 +174,7 @@ def _twin_instead(
     software = next((software for mark, software in _MARKS if mark in text), "unknown")
     origin = f"{twin.name}, saved by software {software}"
     note = f"{_cause(unknown)}: instead of the nodes runs {origin}"
-    return LoadedProgram(tree.file.wire_path, installation, (text,), (note,), origin)
+    return LoadedProgram(reader.folder.wire_path(tree.file), installation, (text,), (note,), origin)
 
 
 def _cause(error: object) -> str:

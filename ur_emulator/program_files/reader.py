@@ -5,17 +5,23 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from typing import TYPE_CHECKING
+from pathlib import PurePosixPath
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError, UndefinedError, UnknownNodeError
 from ur_emulator.machine.models.robot_model import Vector3, Vector6, six
-from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import ProgramFolder
 from urscript.source import as_utf8, program_text
 
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
+# References that lead to references; PolyScope writes one step.
+_MAX_STEPS = 16
+_STEP = re.compile(r"([A-Za-z_][\w.\-]*)(?:\[(\d{1,6})\])?")
+_GZIP_MAGIC = b"\x1f\x8b"
+_NUMBER = re.compile(r"-?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_SHOWN = 100
 
 
 class ProgramReader:
@@ -26,17 +32,17 @@ class ProgramReader:
         self._bytes_left = BUDGETS.program_bytes
         self._marks_left = BUDGETS.program_marks
 
-    def xml(self, file: FoundFile) -> XmlTree:
+    def xml(self, file: PurePosixPath) -> XmlTree:
         """Read an XML file, packed or not; ProgramFileError also if the program becomes too large."""
         return self.parsed(file, self.unpacked(file))
 
-    def unpacked(self, file: FoundFile) -> bytes:
+    def unpacked(self, file: PurePosixPath) -> bytes:
         """Read a file, packed or not; ProgramFileError also if the program becomes too large."""
         data = unpack(file.name, self.folder.read(file, self._bytes_left), self._bytes_left)
         self._bytes_left -= len(data)
         return data
 
-    def parsed(self, file: FoundFile, data: bytes) -> XmlTree:
+    def parsed(self, file: PurePosixPath, data: bytes) -> XmlTree:
         """Return the tree of an XML file; ProgramFileError also if the program becomes too large."""
         # Tags and attributes together are not more than these marks.
         self._marks_left -= data.count(b"<") + data.count(b"=")
@@ -44,9 +50,21 @@ class ProgramReader:
             raise ProgramFileError(
                 f"{file.name}: the program has more than {BUDGETS.program_marks} tags and attributes"
             )
-        return XmlTree(file, _parsed(file.name, data))
+        try:
+            is_text = "\0" not in data.decode("utf-8")
+        except UnicodeDecodeError:
+            is_text = False
+        if not is_text:  # in another encoding the searches for marks and document types see nothing
+            raise ProgramFileError(f"{file.name} is not text in UTF-8, as PolyScope's files are")
+        if b"<!DOCTYPE" in data:
+            raise ProgramFileError(f"{file.name}: a document type is declared, PolyScope's files have none")
+        try:
+            root = ElementTree.fromstring(data, ElementTree.XMLParser(encoding="utf-8"))
+        except (ElementTree.ParseError, ValueError, LookupError) as error:
+            raise ProgramFileError(f"{file.name} is not XML that PolyScope has written: {error}") from None
+        return XmlTree(file, root)
 
-    def script(self, file: FoundFile) -> str:
+    def script(self, file: PurePosixPath) -> str:
         """Read a text file, UTF-8 or else Latin-1; ProgramFileError also if the program becomes too large."""
         data = self.folder.read(file, min(MAX_PROGRAM, self._bytes_left))
         self._bytes_left -= len(data)
@@ -59,37 +77,22 @@ class ProgramReader:
         return as_utf8(text).replace("\r\n", "\n")
 
 
-# --- PolyScope's files: XML, mostly compressed with gzip, in which one element may stand for another
-#
-# An element with a `reference` attribute, such as `<variable reference="../../Assignment[2]/variable"/>`, is
-# another occurrence of the element at that path; paths start at the element itself and use `..`, names, and
-# counts from 1. Source: files as public generators write them and public readers take them.
-
-# References that lead to references; PolyScope writes one step.
-_MAX_STEPS = 16
-_STEP = re.compile(r"([A-Za-z_][\w.\-]*)(?:\[(\d{1,6})\])?")
-_GZIP_MAGIC = b"\x1f\x8b"
-
-
-_NUMBER = re.compile(r"-?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-_SHOWN = 100
-
-CB3 = 3
-"""Series of the software of CB3; that of the e-Series is 5."""
-
-
 class XmlTree:
-    """A file that was read.
+    """A file that was read: XML, in which one element may stand for another.
+
+    An element with a `reference` attribute, such as `<variable reference="../../Assignment[2]/variable"/>`,
+    is another occurrence of the element at that path; paths start at the element itself and use `..`, names,
+    and counts from 1. Source: files as public generators write them and public readers take them.
 
     Attributes:
-        series: the first number of the software that saved it.
+        is_cb3: software of CB3 has saved it, not that of the e-Series.
     """
 
-    def __init__(self, file: FoundFile, root: Element) -> None:
+    def __init__(self, file: PurePosixPath, root: Element) -> None:
         """Take a tree; ProgramFileError if the elements are nested too deep."""
         self.file = file
         self.root = root
-        self.series = 5 if root.get("lastSavedIn", "").startswith("5") else CB3
+        self.is_cb3 = not root.get("lastSavedIn", "").startswith("5")
         self._parents: dict[Element, Element] = {}
         level = [root]
         for _ in range(BUDGETS.program_depth):
@@ -178,23 +181,6 @@ class XmlTree:
         return element
 
 
-def _parsed(name: str, data: bytes) -> Element:
-    """Return the root of a file, unpacked; ProgramFileError if it is not XML as PolyScope writes it."""
-    if not _is_text(data):  # in another encoding the searches for marks and document types see nothing
-        raise ProgramFileError(f"{name} is not text in UTF-8, as PolyScope's files are")
-    if b"<!DOCTYPE" in data:
-        raise ProgramFileError(f"{name}: a document type is declared, PolyScope's files have none")
-    from xml.etree import ElementTree  # a slow import, which few boxes need
-
-    parser = ElementTree.XMLParser(encoding="utf-8")
-    try:
-        parser.feed(data)
-        root: Element = parser.close()
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise ProgramFileError(f"{name} is not XML that PolyScope has written: {error}") from None
-    return root
-
-
 def unpack(name: str, data: bytes, most: int) -> bytes:
     """Return what is in a file that may be packed with gzip.
 
@@ -214,10 +200,3 @@ def unpack(name: str, data: bytes, most: int) -> bytes:
     if unpacker.unused_data.strip(b"\0"):
         raise ProgramFileError(f"{name} is damaged: something stands behind its end")
     return plain
-
-
-def _is_text(data: bytes) -> bool:
-    try:
-        return "\0" not in data.decode("utf-8")
-    except UnicodeDecodeError:
-        return False

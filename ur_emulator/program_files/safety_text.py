@@ -83,18 +83,21 @@ class _SafetyText:
     def __init__(self, file_name: str, values: dict[tuple[str, str], str]) -> None:
         self._file_name = file_name
         self._values = values
+        self._planes = sorted({section for section, _ in values if section.startswith(_PLANE)})
 
     def speeds(self, section: str) -> Vector6 | None:
         """Return the joint speeds of a section [rad/s]."""
-        given = self._six(section, "maxJointSpeed")
-        if given is not None and min(given) <= 0.0:
+        given = self._numbers(section, "maxJointSpeed", 6)
+        if given is None:
+            return None
+        if min(given) <= 0.0:
             raise self._error("maxJointSpeed", f"is {min(given):g}, it must be above 0")
-        return given
+        return six(given)
 
     def ends(self, which: str, unlimited: float) -> Vector6 | None:
         """Return the ends of the joint ranges [rad]."""
-        angle = self._six(_NORMAL_JOINTS, f"{which}JointPosition")
-        turns = self._six(_NORMAL_JOINTS, f"{which}JointRevolutions")
+        angle = self._numbers(_NORMAL_JOINTS, f"{which}JointPosition", 6)
+        turns = self._numbers(_NORMAL_JOINTS, f"{which}JointRevolutions", 6)
         if angle is None or turns is None:
             return None
         flags = self._values.get((_SETUP, "withPositionLimits"), "").strip("[]").split(",")
@@ -123,13 +126,13 @@ class _SafetyText:
 
     def unwatched(self) -> Iterator[str]:
         """Yield what is set up and not watched."""
-        for section in (*self._plane_sections(), _TOOL):
+        for section in (*self._planes, _TOOL):
             if self._mode(section) is None:
                 yield f"{section} with the unknown mode {self._values[section, 'mode'][:40]} is"
 
     def planes(self) -> Iterator[SafetyPlane]:
         """Yield the safety planes that are set up."""
-        for section in self._plane_sections():
+        for section in self._planes:
             mode = self._mode(section)
             if mode is None or mode is BoundaryMode.DISABLED:
                 continue
@@ -154,9 +157,6 @@ class _SafetyText:
             return None
         return ToolDirection(self._direction(_TOOL, "tcpOrientationVector"), angle, mode)
 
-    def _plane_sections(self) -> list[str]:
-        return sorted({section for section, _ in self._values if section.startswith(_PLANE)})
-
     def _mode(self, section: str) -> BoundaryMode | None:
         """Return the mode of a boundary; None for one that is not known."""
         word = self._values.get((section, "mode"), "disabled").strip("\"'").lower().replace(" ", "_")
@@ -170,10 +170,6 @@ class _SafetyText:
             raise self._error(key, f"of {section} is missing or has no length")
         x, y, z = (part / length for part in given)
         return x, y, z
-
-    def _six(self, section: str, key: str) -> Vector6 | None:
-        given = self._numbers(section, key, 6)
-        return None if given is None else six(given)
 
     def _numbers(self, section: str, key: str, count: int) -> list[float] | None:
         text = self._values.get((section, key))

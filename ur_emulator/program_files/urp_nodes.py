@@ -1,34 +1,33 @@
-"""The nodes of a program file as frozen records, numbered as PolyScope numbers its labels.
+"""The nodes of a program file, numbered as PolyScope numbers its labels.
 
 References are followed: a node has the content of the element that it stands for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError
+from ur_emulator.program_files.names import Names
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
-from ur_emulator.program_files.script_writer import Names
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
-
 
 ROOT = "URProgram"
 OLD_ROOT = "gui.program.ProgramRootNode"
 """Of programs of PolyScope 1.8: a dump of its objects."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Node:
     """A node of a program.
 
     Attributes:
         tree: the file that it is in.
+        depth: how many nodes are around it, with itself.
+        move: the node around it that has the parameters of its motions, a `<Move>` as a rule.
+        mark: of its label; "noBreak" says that the program does not stop there.
         children: the nodes inside it, without suppressed ones; branches stand with their `<If>`.
         branches: of an `<If>`: the `ElseIf` and `Else` behind it.
     """
@@ -37,8 +36,26 @@ class Node:
     number: int
     element: Element
     tree: XmlTree
-    children: tuple[Node, ...]
+    depth: int
+    move: Node | None
+    mark: str
+    children: list[Node] = field(default_factory=list)
     branches: tuple[Node, ...] = ()
+
+    @property
+    def repeats(self) -> bool:
+        """True for a part of a program that begins again at its end."""
+        return self.kind in ("MainProgram", "Thread") and self.get("runOnlyOnce") != "true"
+
+    def add(self, node: Node) -> None:
+        """Add a node behind those inside it; an `ElseIf` or `Else` belongs to the `<If>` before it."""
+        if node.kind == "If" and node.get("type") in ("ElseIf", "Else") and self.children:
+            before = self.children[-1]
+            has_else = before.branches and before.branches[-1].get("type") == "Else"
+            if before.kind == "If" and not has_else:
+                before.branches += (node,)
+                return
+        self.children.append(node)
 
     def get(self, attribute: str) -> str:
         """Return an attribute, "" if it is missing."""
@@ -58,6 +75,11 @@ class Node:
         found = self.element.find(tag)
         return None if found is None else self.tree.resolve(found)
 
+    def value(self, tag: str, attribute: str) -> str:
+        """Return an attribute of the first element inside of that tag, "" if one of them is missing."""
+        found = self.find(tag)
+        return "" if found is None else found.get(attribute, "")
+
 
 _SUPPRESSED = frozenset({"SuppressedNode", "suppressedNode"})
 # Elements that give a variable its name.
@@ -73,8 +95,8 @@ class ProgramNodes:
 
     Attributes:
         variables: the elements with the first values of variables.
-        before_start: the sequence before the start, if there is one.
-        others: threads, events, and what has no name here.
+        before_start: the sequence before the start; none or one.
+        others: threads, and what has no name here.
         sub_programs: names of their functions, and their nodes; in the order of the numbers of their labels.
         functions: names of the functions of sub-programs by the element that defines each.
         undefined: sub-programs whose files are missing; one line each.
@@ -91,28 +113,26 @@ class ProgramNodes:
         self.names = Names()
         self.functions: dict[Element, str] = {}
         self.undefined: list[str] = []
-        self._reader = reader
-        self._depth = 0
+        self.reader = reader
         self._waiting: list[tuple[XmlTree, Element]] = []
         self._reserve_names(tree)
         top = tree.root.findall("children/*")
-        first_values = tree.root.find("children/InitVariablesNode")
-        variables = None if first_values is None else first_values.find("variables")
-        self.variables = () if variables is None else tuple(variables)
-        self._last = 0 if first_values is None else 1  # its number, also when it is empty
+        self.variables = tree.root.findall("children/InitVariablesNode/variables/*")
+        has_values = any(one.tag == "InitVariablesNode" for one in top)
+        self._last = int(has_values)  # its number, also when it is empty
         before = [self._node(tree, one) for one in top if one.tag == "SpecialSequence"]
         for node in before:
             if node.get("type") != "BeforeStart":
                 raise tree.unknown(f"a sequence of type {node.get('type')!r}")
-        self.before_start = before[0] if before else None
+        self.before_start = before[:1]
         main = [self._node(tree, one) for one in top if one.tag == "MainProgram"]
         if not main:
             raise tree.error("there is no <MainProgram> in it")
         self.main = main[0]
         known = ("InitVariablesNode", "SpecialSequence", "MainProgram", "Event", "SubProgram")
         others = [self._node(tree, one) for one in top if one.tag not in known]
-        others += [self._node(tree, one) for one in top if one.tag == "Event"]
         self.others = [node for node in others if node.kind not in _SUPPRESSED]
+        self.events = [self._node(tree, one) for one in top if one.tag == "Event"]
         for one in top:
             if one.tag == "SubProgram":
                 self._call(tree, one)
@@ -123,23 +143,32 @@ class ProgramNodes:
             if element.tag in _VARIABLES and (name := element.get("name")):
                 self.names.reserve(name)
 
-    def _node(self, tree: XmlTree, element: Element, content: Element | None = None) -> Node:
+    def _node(
+        self, tree: XmlTree, element: Element, around: Node | None = None, content: Element | None = None
+    ) -> Node:
         """Return the node that an element is; `content` is the element that has its nodes, if not itself."""
         self._last += 1
         if self._last > BUDGETS.program_marks:
             raise tree.error(f"the program has more than {BUDGETS.program_marks} nodes")
-        self._depth += 1
-        if self._depth > BUDGETS.node_depth:
+        depth, move, mark = 1, None, ""
+        if around is not None:
+            # Software up to 3.6 has waypoints outside of moves: the program has their parameters.
+            depth = around.depth + 1
+            move = around if around.get("motionType") else around.move
+            mark = "noBreak" if around.kind == "Force" else around.mark
+        if depth > BUDGETS.node_depth:
             raise tree.error(f"nodes are nested more than {BUDGETS.node_depth} deep")
-        number = self._last
         content = tree.resolve(element) if content is None else content
+        node = Node(element.tag, self._last, content, tree, depth, move, mark)
         path = "suppressedNode/children/*" if element.tag in _SUPPRESSED else "children/*"
-        children = [self._node(tree, child) for child in content.findall(path)]
+        for child in content.findall(path):
+            inner = self._node(tree, child, node)
+            if inner.kind not in _SUPPRESSED:
+                node.add(inner)
         called = content.find("subprogram")
         if element.tag == "CallSubProgram" and called is not None:
             self._call(tree, called)
-        self._depth -= 1
-        return Node(element.tag, number, content, tree, tuple(_with_branches(children)))
+        return node
 
     def _call(self, tree: XmlTree, element: Element) -> None:
         """Note that a sub-program has to be written; `element` defines it, or refers to what does."""
@@ -154,7 +183,7 @@ class ProgramNodes:
     def _sub_programs(self) -> Iterator[tuple[str, Node]]:
         for tree, definition in self._waiting:  # it becomes longer with the calls in sub-programs
             own, body = self._body(tree, definition)
-            yield self.functions[definition], self._node(own, definition, body)
+            yield self.functions[definition], self._node(own, definition, content=body)
 
     def _body(self, tree: XmlTree, definition: Element) -> tuple[XmlTree, Element]:
         """Return the element that has the nodes of a sub-program, and the file that it is in."""
@@ -163,34 +192,15 @@ class ProgramNodes:
         if not file_name or not (is_empty or definition.get("keepSynchronizedWithDisk") == "true"):
             return tree, definition
         try:
-            file = self._reader.folder.beside(tree.file, file_name)
+            file = self.reader.folder.beside(tree.file, file_name)
         except FileMissingError as error:
             if is_empty:
                 name = self.functions[definition]
                 self.undefined.append(f"{tree.file.name}: sub-program {name!r} is missing: {error}")
             return tree, definition
-        other = self._reader.xml(file)
+        other = self.reader.xml(file)
         self._reserve_names(other)
         main = other.root.find("children/MainProgram")
         if main is None:
             raise other.error("there is no <MainProgram> in it")
         return other, main
-
-
-def _with_branches(nodes: Iterable[Node]) -> list[Node]:
-    """Return the nodes without suppressed ones, each `ElseIf` and `Else` in the `<If>` before it."""
-    kept: list[Node] = []
-    for node in nodes:
-        if node.kind in _SUPPRESSED:
-            continue
-        before = kept[-1] if kept else None
-        is_branch = node.kind == "If" and node.get("type") in ("ElseIf", "Else")
-        if is_branch and before is not None and before.kind == "If" and not _has_else(before):
-            kept[-1] = replace(before, branches=(*before.branches, node))
-        else:
-            kept.append(node)
-    return kept
-
-
-def _has_else(node: Node) -> bool:
-    return any(branch.get("type") == "Else" for branch in node.branches)

@@ -8,7 +8,7 @@ import math
 from importlib import resources
 
 from ur_emulator.program_files.installation import GripperCalibration
-from ur_emulator.program_files.urp_maker import Around, UrpMaker
+from ur_emulator.program_files.script_writer import ScriptWriter
 from ur_emulator.program_files.urp_nodes import Node
 
 ROBOTIQ = "Robotiq_Grippers"
@@ -18,11 +18,11 @@ ROBOTIQ = "Robotiq_Grippers"
 _NUMBERS = {"9": 1, "1": 1, "2": 2, "3": 3, "4": 4}
 
 
-def declare_functions(maker: UrpMaker) -> None:
+def declare_functions(writer: ScriptWriter) -> None:
     """Put the functions before all nodes, and what the installation gives for them."""
-    setup = maker.installation.grippers
+    setup = writer.installation.grippers
     rows = [setup.calibrations.get(n, GripperCalibration()) for n in range(1, 5)]
-    maker.declare(
+    writer.declare(
         ROBOTIQ,
         f"rq_current_limit_enabled = {setup.is_current_limited}",
         *(
@@ -34,35 +34,35 @@ def declare_functions(maker: UrpMaker) -> None:
     )
 
 
-def write_gripper_node(maker: UrpMaker, node: Node, around: Around) -> None:
+def write_gripper_node(writer: ScriptWriter, node: Node) -> None:
     """Write a node by its type."""
-    declare_functions(maker)
+    declare_functions(writer)
     match node.get("strategyProgramNodeType"):
         case "Gripper":
-            _write_motion(maker, node, around)
+            _write_motion(writer, node)
         case "Gripper Activate":
             reset = node.data.get("ResetAndActivateKey") == "true"
             label = f"Gripper {'Reset and ' if reset else ''}Activate"
-            maker.put(node, around, label, "rq_init()", f"rq_activate_all_grippers({reset})")
+            writer.put(node, label, "rq_init()", f"rq_activate_all_grippers({reset})")
         case "Grip Check":
-            _write_check(maker, node, around)
+            _write_check(writer, node)
         case kind:
             raise node.tree.unknown(f"a node {kind!r} of the URCap {ROBOTIQ!r}")
 
 
-def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
+def _write_motion(writer: ScriptWriter, node: Node) -> None:
     """Write the motion of one or more grippers: each has its target before the first of them moves."""
-    writer, grippers = maker.writer, _grippers(node, "slaveIds")
+    grippers = _grippers(node, "slaveIds")
     percents = [_percent(node, f"{key}InDouble", key) for key in ("position", "speed", "force")]
     request = ", ".join(f"{_rounded(percent * 255.0 / 100.0)}" for percent in percents)
-    calibration = maker.installation.grippers.calibrations.get(grippers[0])
+    calibration = writer.installation.grippers.calibrations.get(grippers[0])
     if percents[0] in (0.0, 100.0):
         motion = "Close" if percents[0] else "Open"
     elif calibration is None:
         motion = f"Move{_rounded(percents[0])}%"
     else:
         motion = f"Move{_rounded(calibration.width(percents[0]))}mm"
-    maker.put(node, around, f"Gripper {motion} ({', '.join(map(str, grippers))})")
+    writer.put(node, f"Gripper {motion} ({', '.join(map(str, grippers))})")
     for n in grippers:
         with writer.block(f"if not(gripper_connected[{n - 1}]):"):
             writer.add(f'popup("Gripper {n} does not answer.", "No connection", False, True, True)')
@@ -75,8 +75,8 @@ def _write_motion(maker: UrpMaker, node: Node, around: Around) -> None:
         writer.add(*(f'rq_wait("{n}")' for n in grippers))
 
 
-def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
-    writer, data, (n, *others) = maker.writer, node.data, _grippers(node, "GripperIdKey")
+def _write_check(writer: ScriptWriter, node: Node) -> None:
+    data, (n, *others) = node.data, _grippers(node, "GripperIdKey")
     branches = {child.get("strategyProgramNodeType"): child for child in node.children}
     if branches.keys() != {"If", "Else"} or others:
         raise node.tree.undefined("a Grip Check node needs one gripper, an If and an Else")
@@ -88,22 +88,22 @@ def _write_check(maker: UrpMaker, node: Node, around: Around) -> None:
         middle, more, less = (_percent(node, key) * 2.55 for key in keys)
         label, position = "If grip validated", f'rq_current_pos("{n}")'
         condition += f" and {position} >= {middle - less:.2f} and {position} <= {middle + more:.2f}"
-    maker.put(node, around, "Grip Check")
-    writer.label(branches["If"].number, label + " " * 10, "noBreak")
+    writer.put(node, "Grip Check")
+    writer.put(branches["If"], label + " " * 10, mark="noBreak")
     with writer.branch(f"if ({condition}):"):
-        maker.write_children(branches["If"], around)
+        writer.write_children(branches["If"])
     with writer.block("else:"):
-        writer.label(branches["Else"].number, "Else", "noBreak")
-        maker.write_children(branches["Else"], around)
+        writer.put(branches["Else"], "Else", mark="noBreak")
+        writer.write_children(branches["Else"])
 
 
 def _grippers(node: Node, key: str) -> list[int]:
     """Return the numbers of the grippers that a node names, in its order; gripper 1 if it names none."""
     names = (node.data.get(key, "").strip("[] ") or "9").split(",")
-    numbers = [_NUMBERS.get(name.strip()) for name in names]
-    if None in numbers or len({*numbers}) < len(numbers):
+    numbers = [_NUMBERS.get(name.strip(), 0) for name in names]
+    if 0 in numbers or len({*numbers}) < len(numbers):
         raise node.tree.unknown(f"a node of the grippers {','.join(names)[:100]!r}")
-    return [number for number in numbers if number is not None]
+    return numbers
 
 
 def _percent(node: Node, *keys: str) -> float:

@@ -11,9 +11,9 @@ from typing import Any
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
-from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import ProgramFolder
+from ur_emulator.program_files.names import is_identifier
 from ur_emulator.program_files.reader import ProgramReader, XmlTree, unpack
-from ur_emulator.program_files.script_writer import is_identifier
 from urscript.values import Pose
 
 SUFFIX = ".variables"
@@ -27,7 +27,7 @@ _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|(.))")
 _CONTROLS = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
 
 
-def read_variables(reader: ProgramReader, file: FoundFile) -> dict[str, str]:
+def read_variables(reader: ProgramReader, file: PurePosixPath) -> dict[str, str]:
     """Return name -> value of a file, in its order.
 
     ProgramFileError if it cannot be read, has too many variables, or something else than variables.
@@ -59,7 +59,7 @@ def write_variables(folder: ProgramFolder, installation: str, values: Mapping[st
         new = _new_xml(ProgramReader(folder).parsed(file, data), values)
     else:
         new = _new_properties(data, values)
-    folder.write(file.inside, new if data is raw else gzip.compress(new, mtime=0))
+    folder.write(file, new if data is raw else gzip.compress(new, mtime=0))
 
 
 def literal(value: Any, depth: int = 0) -> str:
@@ -81,7 +81,7 @@ def literal(value: Any, depth: int = 0) -> str:
     return ""
 
 
-def _xml_items(reader: ProgramReader, file: FoundFile, data: bytes) -> Iterator[tuple[str, str]]:
+def _xml_items(reader: ProgramReader, file: PurePosixPath, data: bytes) -> Iterator[tuple[str, str]]:
     root = reader.parsed(file, data).root
     if root.tag != _ROOT:
         raise ProgramFileError(f"{file.name} is a <{root.tag}>, not <{_ROOT}>")

@@ -14,7 +14,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.steps import Steps
 from ur_emulator.program_files.installation import ExternalControlPc
-from ur_emulator.program_files.script_writer import one_line
+from ur_emulator.program_files.names import one_line
 
 REQUEST = b"request_program\n"
 # For so long the box waits for a connection and for the first line [real s]; the first is the URCap's.

@@ -116,7 +116,7 @@ class DashboardAnswers:
             yield from loading
             installation = _path_of(self._player.installation)
             return row.reply(path=_path_of(self._player.loaded), installation=installation)
-        path = self._player.folder.find(name).wire_path
+        path = self._player.folder.wire_path(self._player.folder.find(name))
         self._box.start_alone(loading)
         return row.reply(path=path)
 

@@ -214,7 +214,8 @@ class RobotApiAnswers:
         return {"state": self._program_state, "details": ""}
 
     def _load(self, name: str) -> Steps[dict[str, Any]]:
-        yield from self._player.load(files.find_program(self._player.folder, name).wire_path)
+        folder = self._player.folder
+        yield from self._player.load(folder.wire_path(files.find_program(folder, name)))
         return {"name": name}
 
     # --- program files

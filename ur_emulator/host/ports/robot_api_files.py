@@ -10,13 +10,7 @@ from pathlib import PurePosixPath
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ArgumentError, FileMissingError, ProgramFileError, RefusedError
-from ur_emulator.program_files.folder import (
-    PROGRAM_SUFFIX,
-    SCRIPT_SUFFIX,
-    URPX_SUFFIX,
-    FoundFile,
-    ProgramFolder,
-)
+from ur_emulator.program_files.folder import PROGRAM_SUFFIX, SCRIPT_SUFFIX, URPX_SUFFIX, ProgramFolder
 from ur_emulator.program_files.reader import ProgramReader
 from ur_emulator.program_files.urpx import Information, information_of, read_urpx
 
@@ -25,7 +19,7 @@ _BLOCK = 4_096
 KINDS = (URPX_SUFFIX, PROGRAM_SUFFIX, SCRIPT_SUFFIX)
 
 
-def find_program(folder: ProgramFolder, name: str) -> FoundFile:
+def find_program(folder: ProgramFolder, name: str) -> PurePosixPath:
     """Return the file of a program; FileMissingError if there is none of that name."""
     for kind in KINDS:
         if folder.has(name + kind):
@@ -44,7 +38,7 @@ def list_programs(folder: ProgramFolder) -> list[Information]:
 
 def _information(folder: ProgramFolder, name: str) -> Information:
     file = find_program(folder, name)
-    if file.inside.suffix == URPX_SUFFIX:
+    if file.suffix == URPX_SUFFIX:
         with suppress(ProgramFileError):
             return read_urpx(file.name, ProgramReader(folder).unpacked(file)).information | {"name": name}
     return information_of(name)

@@ -22,7 +22,7 @@ from typing import Any
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError
 from ur_emulator.machine.controller.clock import clock_time
-from ur_emulator.program_files.folder import FoundFile, ProgramFolder
+from ur_emulator.program_files.folder import ProgramFolder
 
 # --- A temporary folder: it goes away with the box, or, after a box was killed, when the next one is made
 #
@@ -118,7 +118,9 @@ class BoxFacts:
 
 def save_log(folder: ProgramFolder, facts: BoxFacts) -> str:
     """Write the log, in place of what was written before; return the name of the file on the wire."""
-    return folder.write(PurePosixPath(LOG_NAME), facts.log.encode("utf-8")).wire_path
+    file = PurePosixPath(LOG_NAME)
+    folder.write(file, facts.log.encode("utf-8"))
+    return folder.wire_path(file)
 
 
 def flight_report(folder: ProgramFolder, kind: str, facts: BoxFacts) -> str:
@@ -168,10 +170,10 @@ def _all_flight_reports(folder: ProgramFolder) -> dict[str, bytes]:
     return {f"{REPORT_FOLDER}/{file.name}": folder.read(file, BUDGETS.report_bytes) for file in reports}
 
 
-def _flight_reports(folder: ProgramFolder, place: PurePosixPath) -> dict[int, FoundFile]:
+def _flight_reports(folder: ProgramFolder, place: PurePosixPath) -> dict[int, PurePosixPath]:
     """Return the flight reports in a folder by their numbers."""
     return {
-        int(match[1]): FoundFile(inside)
+        int(match[1]): inside
         for inside, _ in folder.sizes()
         if inside.parent == place and (match := _FLIGHT_REPORT.fullmatch(inside.name))
     }
