@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from os import PathLike
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self, overload
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, overload
 
 from protocol.ur_types import Ports
 from ur_emulator.errors import EmulatorError
@@ -25,57 +25,19 @@ from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT,
 from ur_emulator.host.control_api.operations import BoxOperations
 
 if TYPE_CHECKING:
+    from ur_emulator.host.box_process import ProcessRack
     from ur_emulator.host.pacing import Pace
+    from ur_emulator.host.rack import LoopRack
     from ur_emulator.machine.commands.operation import Operation
     from ur_emulator.machine.controller.command import Command, Done
     from ur_emulator.machine.models.robot_generation import RobotGeneration
 
-
-class Rack(Protocol):
-    """Boxes that run together somewhere; a number says which one is meant."""
-
-    def start(self) -> None:
-        """Open the ports and run."""
-        ...
-
-    def stop(self) -> None:
-        """Let the boxes end, soon; from any thread."""
-        ...
-
-    def join(self) -> BaseException | None:
-        """End the boxes and wait for that; return the error that has ended one, if there is one."""
-        ...
-
-    def served_at(self, index: int) -> ServedAt:
-        """Where a box is served, and as what."""
-        ...
-
-    def perform(self, index: int, operation: Operation[Any]) -> Any:
-        """Have an operation done; return its result."""
-        ...
-
-    def submit(self, index: int, command: Command, done: Done | None) -> None:
-        """Submit a command for the next cycle."""
-        ...
-
-    def log(self, index: int) -> tuple[LogEntry, ...]:
-        """Return the last entries of the log, the oldest first."""
-        ...
-
-    def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
-        """Call `follower` with every entry from now on."""
-        ...
-
-    def end_of(self, index: int) -> tuple[bool, Exception | None]:
-        """Return whether a client has switched the box off, and the error that has ended it."""
-        ...
+# Boxes that run together somewhere; in their methods a number says which one is meant.
+Rack: TypeAlias = "LoopRack | ProcessRack | AttachedBox"
 
 
-def make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
-    """Assemble boxes in a process of their own, or on a loop in this one.
-
-    EmulatorError if an argument is not allowed, or there are no boxes, or too many.
-    """
+def _make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
+    """Assemble boxes in a process of their own, or on a loop in this one."""
     check_count(len(options))
     if in_process:
         from ur_emulator.host.rack import LoopRack
@@ -163,7 +125,7 @@ class BoxControl(BoxOperations):
 
     @property
     def _served_at(self) -> ServedAt:
-        return self._rack.served_at(self._index)
+        return self._rack.served[self._index]
 
     def _perform(self, operation: Operation[Any]) -> Any:
         __tracebackhide__ = True
@@ -275,7 +237,7 @@ class ControlBox(_Running, BoxControl):
             scene,
             journal,
         )
-        super().__init__(make_rack([options], in_process=in_process))
+        super().__init__(_make_rack([options], in_process=in_process))
 
     @staticmethod
     def many(count: int, *, in_process: bool = False, **options: Any) -> BoxRack:
@@ -330,7 +292,7 @@ class BoxRack(_Running, Sequence[BoxControl]):
             EmulatorError: an argument is not among the allowed ones, or there are no boxes, or too many.
         """
         every = [one if isinstance(one, BoxOptions) else BoxOptions(**one) for one in options]
-        self._rack = make_rack(every, in_process=in_process)
+        self._rack = _make_rack(every, in_process=in_process)
         self._boxes = tuple(BoxControl(self._rack, index) for index in range(len(every)))
 
     @overload

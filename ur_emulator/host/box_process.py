@@ -15,7 +15,6 @@ import socket
 import threading
 import time
 import weakref
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
@@ -23,7 +22,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
-from ur_emulator.host.box_log import MAX_ENTRIES, LogEntry
+from ur_emulator.host.box_log import LogBook, LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.runtime.processes import Child, Pipe, Role, framed, read_message, start_child
 
@@ -41,7 +40,11 @@ _LOOK_PERIOD = 1.0
 
 
 class ProcessRack:
-    """Boxes in a process of their own, as the user's process sees them; used from any thread."""
+    """Boxes in a process of their own, as the user's process sees them; used from any thread.
+
+    Attributes:
+        served: where the boxes are served, and as what.
+    """
 
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Start the process and have the boxes assembled; nothing listens yet.
@@ -62,16 +65,15 @@ class ProcessRack:
         self._has_ended = False
         self._said_farewell = False
         self._failure: Exception | None = None
-        self._logs = [deque[LogEntry](maxlen=MAX_ENTRIES) for _ in options]
-        self._followers: list[list[Callable[[LogEntry], None]]] = [[] for _ in options]
+        self._logs = [LogBook() for _ in options]
         self._ends: list[tuple[bool, Exception | None]] = [(False, None)] * len(options)
-        self._served: list[ServedAt] = self._ask_for_boxes((os.getpid(), os.getcwd(), list(options)))
+        self.served = self._ask_for_boxes((os.getpid(), os.getcwd(), list(options)))
 
     # --- life
 
     def start(self) -> None:
         """Open the ports and run; PortError if one is taken."""
-        self._served = self._ask_for_boxes("start")
+        self.served = self._ask_for_boxes("start")
         self._reader = threading.Thread(target=_read, args=(weakref.ref(self), self._child.pipe), daemon=True)
         self._reader.start()
 
@@ -99,10 +101,6 @@ class ProcessRack:
 
     # --- what a user asks of the box with a number
 
-    def served_at(self, index: int) -> ServedAt:
-        """Where a box is served, and as what."""
-        return self._served[index]
-
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
         if threading.current_thread() is self._reader:
@@ -121,11 +119,11 @@ class ProcessRack:
     def log(self, index: int) -> tuple[LogEntry, ...]:
         """Return the last entries of the log, the oldest first; also after the end."""
         self._catch_up()
-        return tuple(self._logs[index])
+        return self._logs[index].entries
 
     def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
         """Call `follower` with every entry from now on, in a thread of its own."""
-        self._followers[index].append(follower)
+        self._logs[index].follow(follower)
 
     def end_of(self, index: int) -> tuple[bool, Exception | None]:
         """Return whether a client has switched the box off, and the error that has ended it."""
@@ -197,9 +195,7 @@ class ProcessRack:
                     future.set_exception(error)
             case ("entries", index, entries):
                 for entry in entries:
-                    self._logs[index].append(entry)
-                    for follower in self._followers[index]:
-                        follower(entry)
+                    self._logs[index].add(entry)
             case ("end", index, is_shut_down, failure):
                 self._ends[index] = (is_shut_down, failure)
             case ("farewell",):
@@ -273,19 +269,15 @@ def run(pipe: socket.socket) -> None:
         os.chdir(folder)  # names of files are relative to that of the user's process
         try:
             rack = LoopRack(options)
-        except EmulatorError as error:
-            pipe.sendall(framed(pickle.dumps(([], error))))
-            return
-        pipe.sendall(framed(pickle.dumps(([box.served_at for box in rack.boxes], None))))
-        if pickle.loads(read_message(pipe)) != "start":
-            rack.close()
-            return
-        try:
+            pipe.sendall(framed(pickle.dumps((rack.served, None))))
+            if pickle.loads(read_message(pipe)) != "start":
+                rack.close()
+                return
             rack.listen()
         except EmulatorError as error:
             pipe.sendall(framed(pickle.dumps(([], error))))
-            return
-        _Link(rack, Pipe(pipe), owner).run()
+        else:
+            _Link(rack, Pipe(pipe), owner).run()
 
 
 class _Link:
@@ -305,7 +297,7 @@ class _Link:
         signal.signal(signal.SIGTERM, lambda number, frame: rack.stop())
         for box in rack.boxes:
             box.log.follow(lambda entry: loop.call_soon(self._send_news, self._fail))
-        self._pipe.send(pickle.dumps(([box.served_at for box in rack.boxes], None)))
+        self._put(rack.served, None)
         self._watch()
         self._look()
         with suppress(EmulatorError):  # of one of the boxes: it is sent below

@@ -70,10 +70,12 @@ class LoopRack:
         watch = MemoryWatch(self.loop.tasks)
         for box in self.boxes:
             box.watch_memory(watch)
-        self._run()
-        failure = next((box.failure for box in self.boxes if box.failure is not None), None)
-        if failure is not None:
-            raise failure
+        try:
+            self.loop.run()
+        finally:
+            self.close()
+        if self._failure is not None:
+            raise self._failure
 
     def start(self) -> None:
         """Open the ports and run in a thread; PortError if one is taken."""
@@ -98,7 +100,7 @@ class LoopRack:
                 )
         else:
             self.close()
-        return self._loop_failure or next((box.failure for box in self.boxes if box.failure), None)
+        return self._loop_failure or self._failure
 
     def close(self) -> None:
         """Close all boxes and the loop; in its thread after its last turn."""
@@ -106,17 +108,17 @@ class LoopRack:
             box.close()
         self.loop.close()
 
-    def _run(self) -> None:
-        try:
-            self.loop.run()
-        finally:
-            self.close()
+    @property
+    def _failure(self) -> Exception | None:
+        return next((box.failure for box in self.boxes if box.failure is not None), None)
 
     def _run_in_thread(self) -> None:
         try:
-            self._run()
+            self.loop.run()
         except BaseException as failure:
             self._loop_failure = failure
+        finally:
+            self.close()
 
     def _end(self, box: Box) -> None:
         """Close a box that was switched off or has failed; after the last one there is nothing to do."""
@@ -126,9 +128,10 @@ class LoopRack:
 
     # --- what a user asks of the box with a number
 
-    def served_at(self, index: int) -> ServedAt:
-        """Where a box is served, and as what."""
-        return self.boxes[index].served_at
+    @property
+    def served(self) -> list[ServedAt]:
+        """Where the boxes are served, and as what."""
+        return [box.served_at for box in self.boxes]
 
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done, from any thread but that of the loop; return its result."""

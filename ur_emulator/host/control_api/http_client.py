@@ -97,21 +97,16 @@ _ERRORS = {400: ArgumentError, 408: WaitTimeoutError, 409: RefusedError}
 class AttachedBox:
     """A box that somebody else serves; it goes on when this process ends.
 
-    Its methods are those of a `Rack` (`ur_emulator.emulator`) with one box.
+    Its methods are those of a `Rack` (`ur_emulator.emulator`) with one box; `served` says where that is.
     """
 
     def __init__(self, host: str, port: int, token: str | None) -> None:
         """Ask it who it is; ControlError if no box answers there, or not without its token."""
         self._client = ControlClient(host, port, token)
         facts = self._client.perform(ReadIdentity())
-        ports = facts["ports"]
-        self._served_at = ServedAt(
-            title=f"{facts['robot']} {facts['software']}",
-            serial_number=facts["serial_number"],
-            host=host,
-            ports=Ports.of({name: number for name, number in ports.items() if name != "control"}),
-            control_port=port,
-        )
+        numbers = Ports.of({name: number for name, number in facts["ports"].items() if name != "control"})
+        title = f"{facts['robot']} {facts['software']}"
+        self.served = [ServedAt(title, facts["serial_number"], host, numbers, control_port=port)]
 
     def start(self) -> None:
         """Do nothing: it runs."""
@@ -122,10 +117,6 @@ class AttachedBox:
     def join(self) -> BaseException | None:
         """Let go of the box."""
         return None
-
-    def served_at(self, index: int) -> ServedAt:
-        """Where it is served, and as what."""
-        return self._served_at
 
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
