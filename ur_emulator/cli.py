@@ -318,16 +318,8 @@ def pendant(
     _check_window()
     if token is not None:
         os.environ[PAGE_TOKEN_VARIABLE] = token
-    options = _window_options(
-        hosts=hosts,
-        control_ports=control_port or (),
-        port_base=port_base,
-        port=port,
-        view=view,
-        tool=tool,
-        cell=cell,
-        listen=listen,
-    )
+    where = {"hosts": hosts, "control_ports": control_port or (), "port_base": port_base}
+    options = _window_options(**where, port=port, view=view, tool=tool, cell=cell, listen=listen)
     # A shell has a command in the background ignore it, also after `execv`, but not what was caught.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.execv(sys.executable, [*_WINDOW, options])

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from ur_emulator.machine.controller.command import Command, Done
     from ur_emulator.machine.models.robot_generation import RobotGeneration
 
-# Boxes that run together somewhere; in their methods a number says which one is meant.
-Rack: TypeAlias = "LoopRack | ProcessRack | AttachedBox"
+# Boxes that run together; in their methods a number says which one is meant.
+OwnRack: TypeAlias = "LoopRack | ProcessRack"
 
 
-def _make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
+def _make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> OwnRack:
     """Assemble boxes in a process of their own, or on a loop in this one."""
     check_count(len(options))
     if in_process:
@@ -54,7 +54,7 @@ class BoxControl(BoxOperations):
     `push`, `wait_until`, `state`, `log` and so on may be called from any thread.
     """
 
-    def __init__(self, rack: Rack, index: int = 0) -> None:
+    def __init__(self, rack: OwnRack | AttachedBox, index: int = 0) -> None:
         self._rack = rack
         self._index = index
 
@@ -141,27 +141,27 @@ class BoxControl(BoxOperations):
 class _Running:
     """Boxes for one `with`."""
 
-    _rack: Rack
+    _own: OwnRack
 
     def stop(self) -> None:
         """Let the boxes end, soon; from any thread."""
-        self._rack.stop()
+        self._own.stop()
 
     def close(self) -> None:
         """End, and close all ports and connections; harmless if that has been done."""
-        self._rack.join()
+        self._own.join()
 
     def __enter__(self) -> Self:
         """Open the ports and run."""
         __tracebackhide__ = True
-        self._rack.start()
+        self._own.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End; an error that ended a box earlier is raised here."""
-        failure = self._rack.join()
+        failure = self._own.join()
         if failure is not None and error is None:
             raise failure
 
@@ -237,7 +237,8 @@ class ControlBox(_Running, BoxControl):
             scene,
             journal,
         )
-        super().__init__(_make_rack([options], in_process=in_process))
+        self._own = _make_rack([options], in_process=in_process)
+        super().__init__(self._own)
 
     @staticmethod
     def many(count: int, *, in_process: bool = False, **options: Any) -> BoxRack:
@@ -292,8 +293,8 @@ class BoxRack(_Running, Sequence[BoxControl]):
             EmulatorError: an argument is not among the allowed ones, or there are no boxes, or too many.
         """
         every = [one if isinstance(one, BoxOptions) else BoxOptions(**one) for one in options]
-        self._rack = _make_rack(every, in_process=in_process)
-        self._boxes = tuple(BoxControl(self._rack, index) for index in range(len(every)))
+        self._own = _make_rack(every, in_process=in_process)
+        self._boxes = tuple(BoxControl(self._own, index) for index in range(len(every)))
 
     @overload
     def __getitem__(self, index: int) -> BoxControl: ...

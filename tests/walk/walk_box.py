@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ur_emulator.errors import EmulatorError
+from ur_emulator.errors import ArgumentError, EmulatorError
 from ur_emulator.host.box import Box
 from ur_emulator.host.box_options import BoxOptions
 from ur_emulator.host.control_api.operations import make
@@ -163,7 +163,12 @@ class WalkBox:
 
     def perform(self, name: str, /, **arguments: object) -> None:
         """Have an operation of the control API done, in a cycle or some; what is refused is refused."""
-        self._do(lambda done: self._box.operations.begin(make(name, arguments), done))
+        try:
+            operation = make(name, arguments)
+        except ArgumentError:
+            self.tick(1)  # as for one that the state refuses
+        else:
+            self._do(lambda done: self._box.operations.begin(operation, done))
 
     def steps(self, steps: Steps[Any]) -> None:
         """Have done what the player does in steps."""

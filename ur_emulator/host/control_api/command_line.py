@@ -154,18 +154,16 @@ def plain(result: Mapping[str, Any]) -> str:
 
 
 def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
-    need = "" if not parameter.is_required else "; required"
-    default = (
-        "" if parameter.is_required or parameter.default is None else f"; default {_text(parameter.default)}"
-    )
-    about = f"{parameter.meaning} ({parameter.allowed}{default}{need})".replace("%", "%%")
-    words: dict[str, Any] = {"help": about, "metavar": "X"}
+    default = "" if parameter.default is None else f"; default {_text(parameter.default)}"
+    note = "; required" if parameter.is_required else default
+    about = f"{parameter.meaning} ({parameter.allowed}{note})".replace("%", "%%")
+    more: dict[str, Any] = {}
     if parameter.kind is Kind.BOOLEAN and parameter.default is False:
-        words |= {"nargs": "?", "const": "true"}
+        more = {"nargs": "?", "const": "true"}
     if parameter.kind is Kind.VECTOR:
         least, most = parameter.lengths
-        words |= {"nargs": most if least == most else "*"}
-    command.add_argument(_option(parameter), dest=parameter.name, **words)
+        more = {"nargs": most if least == most else "*"}
+    command.add_argument(_option(parameter), dest=parameter.name, help=about, metavar="X", **more)
     if parameter.kind is Kind.SCRIPT:
         command.add_argument(
             f"--{parameter.name}-file", metavar="FILE", help=f"{parameter.name} from a file of this machine"

@@ -97,7 +97,7 @@ _ERRORS = {400: ArgumentError, 408: WaitTimeoutError, 409: RefusedError}
 class AttachedBox:
     """A box that somebody else serves; it goes on when this process ends.
 
-    Its methods are those of a `Rack` (`ur_emulator.emulator`) with one box; `served` says where that is.
+    Its methods are those of a rack with one box (`ur_emulator.emulator`); `served` says where that is.
     """
 
     def __init__(self, host: str, port: int, token: str | None) -> None:
@@ -107,16 +107,6 @@ class AttachedBox:
         numbers = Ports.of({name: number for name, number in facts["ports"].items() if name != "control"})
         title = f"{facts['robot']} {facts['software']}"
         self.served = [ServedAt(title, facts["serial_number"], host, numbers, control_port=port)]
-
-    def start(self) -> None:
-        """Do nothing: it runs."""
-
-    def stop(self) -> None:
-        """Do nothing: who serves it ends it."""
-
-    def join(self) -> BaseException | None:
-        """Let go of the box."""
-        return None
 
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""

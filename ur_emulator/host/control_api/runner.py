@@ -4,6 +4,7 @@ All is done in the thread of the loop, step by step as cycles pass.
 """
 
 import threading
+from collections.abc import Generator
 from concurrent.futures import Future
 from typing import Any
 
@@ -63,7 +64,8 @@ class OperationRunner:
         if operation.is_logged and not operation.only_reads:
             box.announce(LogAdded("Control", _shown(operation)))
         if isinstance(operation, StepOperation):
-            return (yield from operation.steps(self._context))
+            result = operation.steps(self._context)
+            return (yield from result) if isinstance(result, Generator) else result
         assert isinstance(operation, CommandOperation)
         result = yield from box.apply(operation)
         return {**(result or {}), "tick": box.snapshot.tick}
