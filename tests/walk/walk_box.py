@@ -19,6 +19,7 @@ from ur_emulator.host.box_options import BoxOptions
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.pacing import Situation
 from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.controller.events import Event
@@ -67,7 +68,8 @@ class WalkBox:
             tool=kind.tool, services=kind.services, journal=programs / JOURNAL,
         )  # fmt: skip
         self._loop = EventLoop(precise=False)
-        self._box = Box(options, loop=self._loop)
+        self._tasks = TaskQueue(self._loop)
+        self._box = Box(options, tasks=self._tasks)
         assert self._box._journal is not None
         self._box._journal._waits = True
         self._box.on_end = self._loop.stop
@@ -116,7 +118,7 @@ class WalkBox:
     # --- the pacer
 
     def may_tick(self, now: float, situation: Situation) -> bool:
-        if self._left <= 0 or not self._loop.tasks.is_idle:
+        if self._left <= 0 or not self._tasks.is_idle:
             return False
         self._left -= 1
         return True
@@ -157,7 +159,7 @@ class WalkBox:
 
         def is_settled() -> bool:
             left[0] -= 1
-            return left[0] <= 0 and self._loop.tasks.is_idle
+            return left[0] <= 0 and self._tasks.is_idle
 
         self._run(is_settled)
 
@@ -232,6 +234,7 @@ class WalkBox:
         for sock in (*self.clients.values(), *self.peers, self.listener):
             sock.close()
         self._box.close()
+        self._tasks.close()
         self._loop.close()
 
 

@@ -22,10 +22,11 @@ from ur_emulator.host.player.player import ProgramPlayer, start_up
 from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, SendingPorts, answering_ports
 from ur_emulator.host.ports.script_intake import ProgramIntake
 from ur_emulator.host.reports.report_writer import ReportWriter
-from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
+from ur_emulator.host.runtime.event_loop import WAKE_UP
 from ur_emulator.host.runtime.listener import Port
 from ur_emulator.host.runtime.memory import MemoryWatch
 from ur_emulator.host.runtime.processes import Role, prepare_children
+from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
@@ -133,12 +134,12 @@ class Box:
     """
 
     def __init__(
-        self, options: BoxOptions, *, loop: EventLoop, phase: float = 0.0, lead: float = WAKE_UP
+        self, options: BoxOptions, *, tasks: TaskQueue, phase: float = 0.0, lead: float = WAKE_UP
     ) -> None:
         """Assemble the box; nothing listens before `listen`. EmulatorError if an argument is not allowed.
 
         Args:
-            loop: perhaps shared with other boxes.
+            tasks: with their loop perhaps shared with other boxes.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
         """
@@ -148,19 +149,20 @@ class Box:
         folder = ProgramFolder(None if options.programs is None else Path(options.programs))
         self._options = options
         self._choice = choice
-        self._loop = loop
+        self._loop = loop = tasks.loop
+        self._tasks = tasks
         machine = choice.make_machine(options)
         self._box = ServedBox(
             machine,
             choice.identity,
             make_pacer(choice.pace, period, options.speed, phase, lead),
-            loop,
+            tasks,
             self._fail,
         )
         self._network = self._box.network = LoopNetwork(
             loop, machine.network, period, self._box.arrive, self._box.report, options.host
         )
-        self._intake = ProgramIntake(loop.tasks, self._box)
+        self._intake = ProgramIntake(tasks, self._box)
         self._player = ProgramPlayer(
             self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
         )
@@ -262,7 +264,7 @@ class Box:
         )
         self._loop.keep_pace(self._box.controller.period_s)
         self._loop.add(self._box)
-        self._loop.tasks.start()
+        self._tasks.start()
         begin = start_up(self._box, self._player)
         self._loop.call_soon_threadsafe(lambda: self._box.start_alone(begin), self._fail)
 

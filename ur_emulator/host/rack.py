@@ -16,6 +16,7 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.pacing import Pace
 from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.host.runtime.memory import MemoryWatch, own_process
+from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.controller.command import Command, Done
 
@@ -33,13 +34,14 @@ class LoopRack:
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Assemble the boxes; nothing listens yet. Two boxes need two addresses, or a `port_base` each."""
         self.loop = EventLoop(precise=any(one.pace not in _LOCKSTEP for one in options))
+        self.tasks = TaskQueue(self.loop)
         # Several boxes would compute at each other's deadlines.
         lead = WAKE_UP if len(options) == 1 else 0.0
         self._thread: threading.Thread | None = None
         self._loop_failure: BaseException | None = None
         try:
             self.boxes = tuple(
-                Box(one, loop=self.loop, phase=k / len(options), lead=lead) for k, one in enumerate(options)
+                Box(one, tasks=self.tasks, phase=k / len(options), lead=lead) for k, one in enumerate(options)
             )
         except BaseException:
             self.loop.close()
@@ -67,7 +69,7 @@ class LoopRack:
         An error that has ended the loop or a box is raised at the end.
         """
         own_process()
-        watch = MemoryWatch(self.loop.tasks)
+        watch = MemoryWatch(self.tasks)
         for box in self.boxes:
             box.watch_memory(watch)
         try:
@@ -106,6 +108,7 @@ class LoopRack:
         """Close all boxes and the loop; in its thread after its last turn."""
         for box in self.boxes:
             box.close()
+        self.tasks.close()
         self.loop.close()
 
     @property

@@ -14,6 +14,7 @@ import errno
 import gc
 import importlib
 import os
+import resource
 import selectors
 import signal
 import socket
@@ -35,6 +36,7 @@ _READ_SIZE: Final = 1 << 18
 # Bytes of what the server tells of a child: its number, then its exit code.
 _NUMBER: Final = 4
 _KILL: Final = b"k"
+PAGE: Final = resource.getpagesize()
 # How long a process that ends waits for its server [s].
 _FAREWELL: Final = 2.0
 _COMMAND: Final = (
@@ -141,6 +143,27 @@ class Pipe:
             messages.append(bytes(memoryview(self._inbox)[_HEAD:end]))
             del self._inbox[:end]
         return messages
+
+
+# --- what the system tells of a process
+
+
+def resident(process: int | str = "self") -> int:
+    """Return what a process has in memory [bytes]; 0 where the system does not tell."""
+    try:
+        with open(f"/proc/{process}/statm", "rb") as file:
+            return int(file.read().split()[1]) * PAGE
+    except OSError:
+        return 0
+
+
+def is_stopped(process: int) -> bool:
+    """Return whether a process is stopped, as by SIGSTOP; False where the system does not tell."""
+    try:
+        with open(f"/proc/{process}/stat", "rb") as file:
+            return file.read().rpartition(b") ")[2][:1] == b"T"
+    except OSError:
+        return False
 
 
 # --- in the process that asks

@@ -21,19 +21,21 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import EmulatorError, WorkerError
 from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
-from ur_emulator.host.runtime.memory import is_stopped, resident
+from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.runtime.processes import (
     OUT_OF_MEMORY,
     Child,
     Pipe,
     Role,
     framed,
+    is_stopped,
     read_message,
+    resident,
     start_child,
 )
 
@@ -123,28 +125,6 @@ _LOOK_PERIOD = 0.25
 _FOR_EVER = 60.0
 
 
-class Loop(Protocol):
-    """The part of a loop that a task queue uses."""
-
-    def watch(
-        self, sock: socket.socket, events: int, callback: Callable[[int], None], failed: Failed
-    ) -> None:
-        """Call `callback(events)` whenever `sock` is ready, `failed` with an error in it."""
-        ...
-
-    def unwatch(self, sock: socket.socket) -> None:
-        """Stop watching `sock`."""
-        ...
-
-    def call_soon(self, call: Callable[[], None], failed: Failed) -> None:
-        """Run `call` in the loop, soon, and `failed` with an error in it."""
-        ...
-
-    def call_later(self, delay: float, call: Callable[[], None], failed: Failed) -> None:
-        """Run `call` in the loop after `delay` seconds, and `failed` with an error in it."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Ticket:
     """What decides when a task that waits has its turn.
@@ -199,10 +179,10 @@ class _Process:
 
 
 class TaskQueue:
-    """Tasks in the order of their tickets; used in the loop's thread."""
+    """Tasks in the order of their tickets; used in the thread of `loop`."""
 
-    def __init__(self, loop: Loop) -> None:
-        self._loop = loop
+    def __init__(self, loop: EventLoop) -> None:
+        self.loop = loop
         self._waiting: list[Task] = []
         self._under_way: dict[_Process, Task] = {}
         # The process that does the next task; those that do long ones are only in `_under_way`.
@@ -275,12 +255,12 @@ class TaskQueue:
             self._process = process = _Process()
             self._watch(process)
             look = partial(self._look_at, process)
-            self._loop.watch(process.child.life, selectors.EVENT_READ, look, self._fail)
+            self.loop.watch(process.child.life, selectors.EVENT_READ, look, self._fail)
         return self._process
 
     def _watch(self, process: _Process) -> None:
         ready = partial(self._on_ready, process)
-        self._loop.watch(process.pipe.sock, process.pipe.events, ready, partial(self._lose, process))
+        self.loop.watch(process.pipe.sock, process.pipe.events, ready, partial(self._lose, process))
 
     def _begin_next(self) -> None:
         if self._process in self._under_way or (task := self._take_next()) is None:
@@ -289,7 +269,7 @@ class TaskQueue:
             process = self._start()
         except OSError as error:
             problem = WorkerError(f"the process for it cannot be started ({error}): try again later")
-            self._loop.call_soon(lambda: self._finish(task, None, problem), task.failed)
+            self.loop.call_soon(lambda: self._finish(task, None, problem), task.failed)
             return
         self._under_way[process] = task
         task.began = time.monotonic()
@@ -317,7 +297,7 @@ class TaskQueue:
         try:
             answers = process.pipe.receive()
         except EOFError:
-            self._loop.unwatch(process.pipe.sock)  # `life` says how it has ended
+            self.loop.unwatch(process.pipe.sock)  # `life` says how it has ended
             return
         for answer in answers:
             if process in self._under_way:
@@ -338,7 +318,7 @@ class TaskQueue:
 
     def _look_later(self) -> None:
         self._is_looking = True
-        self._loop.call_later(_LOOK_PERIOD, self._look, self._fail)
+        self.loop.call_later(_LOOK_PERIOD, self._look, self._fail)
 
     def _look(self) -> None:
         """Set tasks apart that take long; end those that take for ever or whose process was stopped."""
@@ -404,8 +384,8 @@ class TaskQueue:
     def _release(self, process: _Process) -> None:
         """Release what is left of a process that has ended or was killed."""
         self._killed.discard(process)
-        self._loop.unwatch(process.child.life)
-        self._loop.unwatch(process.pipe.sock)
+        self.loop.unwatch(process.child.life)
+        self.loop.unwatch(process.pipe.sock)
         process.child.close()
 
     def _finish(self, task: Task, result: Any, error: Exception | None) -> None:
