@@ -142,7 +142,7 @@ def serve(
     except ImportError as error:
         _complain(str(error))
         raise typer.Exit(ExitCode.FAILED) from None
-    from ur_emulator.host.runtime.processes import Role, prepare_children
+    from ur_emulator.host.runtime.processes import prepare_workers
 
     has_pendant = pendant or pendant_view
     if has_pendant:
@@ -153,7 +153,7 @@ def serve(
         control_port = 0  # for what the window does beside what a pendant can
         token = token if is_loopback(host) else token or token_urlsafe()
     raise_descriptor_limit()
-    prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
+    prepare_workers()  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
     from ur_emulator.host.rack import LoopRack
     from ur_emulator.host.runtime.line_writer import LineWriter

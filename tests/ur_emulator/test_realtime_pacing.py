@@ -96,9 +96,7 @@ def test_the_lead_is_at_most_a_quarter_of_a_short_period():
 def served_box():
     """A box in real time, alone in its loop."""
     machine = Machine(robot_by_name("ur3"), CB3.fidelity("exact"), 0)
-    return ServedBox(
-        machine, None, RealtimePacer(PERIOD, lead=0.0004), SimpleNamespace(loop=None), pytest.fail
-    )
+    return ServedBox(machine, None, RealtimePacer(PERIOD, lead=0.0004), None, pytest.fail)
 
 
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():

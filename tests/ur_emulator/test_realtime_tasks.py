@@ -148,6 +148,7 @@ def test_a_task_does_not_take_long_while_its_process_has_not_begun(bench, monkey
     for number in range(3):
         other.submit(operator.add, number, 1)
     assert other.run() == [1, 2, 3]
+    other.tasks.close()
     other.loop.close()
 
 

@@ -25,7 +25,7 @@ from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import WAKE_UP
 from ur_emulator.host.runtime.listener import Port
 from ur_emulator.host.runtime.memory import MemoryWatch
-from ur_emulator.host.runtime.processes import Role, prepare_children
+from ur_emulator.host.runtime.processes import prepare_workers
 from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
 from ur_emulator.host.script_network.loop_network import LoopNetwork
@@ -144,7 +144,7 @@ class Box:
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
         """
         choice = Choice.of(options)
-        prepare_children(Role.WORKER)  # the compiler is loaded while the box is assembled
+        prepare_workers()  # the compiler is loaded while the box is assembled
         period = choice.model.generation.period_s
         folder = ProgramFolder(None if options.programs is None else Path(options.programs))
         self._options = options
@@ -296,7 +296,7 @@ class Box:
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
-        self._box.close(NotRunningError())
+        self._box.steps.close(NotRunningError())
         self.operations.close()
         self._intake.close()
         self._reports.close()

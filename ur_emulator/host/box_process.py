@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 _END_TIMEOUT = 10.0
 # How long the boxes' process waits at its end until its last messages are read [s].
 _FAREWELL = 1.0
+# How long the boxes' process may take to close its ports when the user's has ended [s].
+GRACE = 5.0
 # How often the boxes' process looks whether the user's process lives [s].
 _LOOK_PERIOD = 1.0
 
@@ -107,14 +109,11 @@ class ProcessRack:
             raise ControlError(
                 f"{operation.api_name} called in the thread of the box's log, which cannot wait: use `submit`"
             )
-        return self._request("perform", index, operation)
+        return self._begin("perform", index, operation).result()
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Submit a command for the next cycle; `done` is called in a thread of its own."""
-        future: Future[Any] = Future()
-        if done is not None:
-            future.add_done_callback(partial(_tell, done))
-        self._begin(future, "submit", index, command)
+        self._begin("submit", index, command, done=done)
 
     def log(self, index: int) -> tuple[LogEntry, ...]:
         """Return the last entries of the log, the oldest first; also after the end."""
@@ -135,7 +134,7 @@ class ProcessRack:
         """Wait until all has come that the boxes have to tell by now."""
         if threading.current_thread() is not self._reader:
             with suppress(NotRunningError):
-                self._request("news")
+                self._begin("news").result()
 
     # --- messages
 
@@ -158,13 +157,11 @@ class ProcessRack:
         with self._sending:
             self._child.pipe.sendall(data)
 
-    def _request(self, kind: str, *request: Any) -> Any:
-        """Ask for something and wait for it; ControlError if it was not done."""
+    def _begin(self, kind: str, *request: Any, done: Done | None = None) -> Future[Any]:
+        """Ask for something; return its result, a ControlError if it was not done."""
         future: Future[Any] = Future()
-        self._begin(future, kind, *request)
-        return future.result()
-
-    def _begin(self, future: Future[Any], kind: str, *request: Any) -> None:
+        if done is not None:
+            future.add_done_callback(partial(_tell, done))
         with self._state:
             if self._has_ended or self._reader is None:
                 raise NotRunningError(
@@ -182,6 +179,7 @@ class ProcessRack:
         except Exception as error:
             del self._futures[number]
             raise ArgumentError(f"it cannot be sent to the process of the box: {error}") from None
+        return future
 
     def _take(self, message: Any) -> None:
         """Take a message of the boxes; in the reading thread."""
@@ -214,11 +212,9 @@ class ProcessRack:
 
     def _how_it_ended(self) -> str:
         self._child.wait()
-        code = self._child.exit_code
-        if code is None:
+        if self._child.exit_code is None:
             return "has ended, nobody knows why"
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        return f"was ended {how}: its log shows what it did last"
+        return f"{self._child.end}: its log shows what it did last"
 
     def _why_ended(self) -> str:
         return NotRunningError.ENDED if self._failure is None else str(self._failure)

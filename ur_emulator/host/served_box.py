@@ -306,10 +306,6 @@ class ServedBox:
             # arguments both would wait for the collector, which looks rarely.
             outcome, arguments = Future(), ()
 
-    def close(self, error: Exception) -> None:
-        """End all steps with an error, and the tasks that they wait for."""
-        self.steps.close(error)
-
     # --- what the pacer asks
 
     @property

@@ -121,11 +121,9 @@ class EventLoop:
         self._waker, self._wake_end = socket.socketpair()
         for end in (self._waker, self._wake_end):
             end.setblocking(False)
-        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes, _raise)
-        # Sub-millisecond waits need the selector's own descriptor to be selectable; that is so for epoll
-        # and kqueue.
-        descriptor = getattr(self._selector, "fileno", None)
-        self._descriptor: int | None = descriptor() if precise and descriptor is not None else None
+        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes, end_loop)
+        # Waits of less than a millisecond select the selector's own descriptor, of epoll or kqueue.
+        self._descriptor = self._selector.fileno() if precise else None
 
     # --- sockets
 
@@ -182,13 +180,8 @@ class EventLoop:
 
     def call_later(self, delay: float, call: Callable[[], None], failed: Failed) -> None:
         """As `call_soon`, after `delay` seconds or a little later: for what needs no cycle."""
-        due = time.monotonic() + delay
-        timer: tuple[float, int, Callable[[], None]] = (
-            due,
-            next(self._order),
-            partial(guarded, failed, call),
-        )
-        heappush(self._timers, timer)
+        timer: Callable[[], None] = partial(guarded, failed, call)
+        heappush(self._timers, (time.monotonic() + delay, next(self._order), timer))
 
     # --- other threads
 
@@ -327,6 +320,6 @@ class EventLoop:
             self._wake_end.recv(4096)
 
 
-def _raise(error: Exception) -> None:
-    """Let an error end the loop."""
+def end_loop(error: Exception) -> None:
+    """Let an error of ours end the loop."""
     raise error

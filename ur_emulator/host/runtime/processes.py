@@ -49,23 +49,15 @@ class Role(Enum):
     """What a child does: the byte that asks for it.
 
     The module of a role has `prepare`, which the server calls once before it forks, `run(pipe)`, the main
-    function of the child, and `clean_up`, which the server calls when a child has ended in another way.
+    function of the child, `clean_up`, which the server calls when a child has ended in another way, and
+    `GRACE`: how long a child may take to end when the other end of its life is gone [s].
     """
 
     WORKER = b"w"
     BOX = b"b"
 
-    @property
-    def module(self) -> str:
-        """Name of its module."""
-        return {Role.WORKER: "ur_emulator.host.runtime.worker", Role.BOX: "ur_emulator.host.box_process"}[
-            self
-        ]
 
-    @property
-    def grace(self) -> float:
-        """How long it may take to end when the other end of its life is gone [s]; a box closes its ports."""
-        return {Role.WORKER: 0.0, Role.BOX: 5.0}[self]
+_MODULES: Final = {Role.WORKER: "ur_emulator.host.runtime.worker", Role.BOX: "ur_emulator.host.box_process"}
 
 
 # --- messages
@@ -209,6 +201,14 @@ class Child:
         while not self.look():
             pass
 
+    @property
+    def end(self) -> str:
+        """How it has ended, for people; `exit_code` must be known."""
+        code = self.exit_code
+        assert code is not None
+        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        return f"was ended {how}"
+
     def close(self) -> None:
         """Let go of the child: it ends if it has not."""
         with suppress(OSError):
@@ -237,10 +237,10 @@ def start_child(role: Role) -> Child:
         its_life.close()
 
 
-def prepare_children(role: Role) -> None:
-    """Let the server load the code of a role now; a server that cannot be started is no error yet."""
+def prepare_workers() -> None:
+    """Let the server load the code of workers now; a server that cannot be started is no error yet."""
     with suppress(OSError):
-        _ask(role, ())
+        _ask(Role.WORKER, ())
 
 
 class _Server:
@@ -333,8 +333,7 @@ def _forget_server() -> None:
     _children.clear()
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_server)
+os.register_at_fork(after_in_child=_forget_server)
 
 
 # --- in the server
@@ -400,7 +399,8 @@ class _ForkServer:
             gc.collect()
             gc.freeze()  # children write into fewer pages that they share
         if descriptors:
-            self._fork(role, *map(_as_socket, descriptors))
+            pipe, life = (socket.socket(fileno=descriptor) for descriptor in descriptors)
+            self._fork(role, pipe, life)
 
     def _fork(self, role: Role, pipe: socket.socket, life: socket.socket) -> None:
         """Fork a child; its channel lets it have children of its own."""
@@ -420,7 +420,7 @@ class _ForkServer:
                     _be_child(partial(self._module(role).run, pipe), its_channel)
         self._tell(life, pid)
         self._lives[pid] = role, life
-        self._selector.register(life, selectors.EVENT_READ, partial(self._on_life, pid, life, role.grace))
+        self._selector.register(life, selectors.EVENT_READ, partial(self._on_life, pid))
         self._add_channel(channel)
 
     def _leave(self) -> None:
@@ -432,13 +432,14 @@ class _ForkServer:
         self._wake_end.close()
         self._selector.close()
 
-    def _on_life(self, pid: int, life: socket.socket, grace: float) -> None:
+    def _on_life(self, pid: int) -> None:
         """Who asked for a child wants its end, or has gone."""
+        role, life = self._lives[pid]
         try:
             word = life.recv(1)
         except OSError:
             word = b""
-        self._doomed[pid] = time.monotonic() + (0.0 if word == _KILL else grace)
+        self._doomed[pid] = time.monotonic() + (0.0 if word == _KILL else self._module(role).GRACE)
         self._selector.unregister(life)
 
     def _kill_doomed(self) -> None:
@@ -471,11 +472,7 @@ class _ForkServer:
 
     @staticmethod
     def _module(role: Role) -> Any:
-        return importlib.import_module(role.module)
-
-
-def _as_socket(descriptor: int) -> socket.socket:
-    return socket.socket(fileno=descriptor)
+        return importlib.import_module(_MODULES[role])
 
 
 def _be_child(run: Callable[[], None], channel: socket.socket) -> NoReturn:

@@ -26,7 +26,7 @@ from typing import Any, Final
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import EmulatorError, WorkerError
 from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
-from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.runtime.event_loop import EventLoop, end_loop
 from ur_emulator.host.runtime.processes import (
     OUT_OF_MEMORY,
     Child,
@@ -39,6 +39,8 @@ from ur_emulator.host.runtime.processes import (
     start_child,
 )
 
+# A process that has ended is not waited for.
+GRACE: Final = 0.0
 LONG: Final = 1.0
 """After so much real time a task takes long, and after so much processor time it has a lower priority [s]."""
 # By so much the priority of a long task is lower: the loop comes first.
@@ -187,7 +189,8 @@ class TaskQueue:
         self._under_way: dict[_Process, Task] = {}
         # The process that does the next task; those that do long ones are only in `_under_way`.
         self._process: _Process | None = None
-        self._killed: set[_Process] = set()
+        # All that have not ended yet.
+        self._processes: set[_Process] = set()
         self._is_looking = False
 
     @property
@@ -241,8 +244,7 @@ class TaskQueue:
     def close(self) -> None:
         """Drop all tasks and let go of all processes."""
         self._waiting.clear()
-        processes = {*self._under_way, *self._killed, *([self._process] if self._process else [])}
-        for process in processes:
+        for process in tuple(self._processes):
             process.child.kill()
             self._release(process)
         self._under_way.clear()
@@ -253,9 +255,10 @@ class TaskQueue:
     def _start(self) -> _Process:
         if self._process is None:
             self._process = process = _Process()
+            self._processes.add(process)
             self._watch(process)
             look = partial(self._look_at, process)
-            self.loop.watch(process.child.life, selectors.EVENT_READ, look, self._fail)
+            self.loop.watch(process.child.life, selectors.EVENT_READ, look, end_loop)
         return self._process
 
     def _watch(self, process: _Process) -> None:
@@ -318,7 +321,7 @@ class TaskQueue:
 
     def _look_later(self) -> None:
         self._is_looking = True
-        self.loop.call_later(_LOOK_PERIOD, self._look, self._fail)
+        self.loop.call_later(_LOOK_PERIOD, self._look, end_loop)
 
     def _look(self) -> None:
         """Set tasks apart that take long; end those that take for ever or whose process was stopped."""
@@ -368,7 +371,7 @@ class TaskQueue:
             self._process = None
         if error is not None:
             process.child.kill()
-        reason = repr(error) if error else _reason(process.child.exit_code)
+        reason = repr(error) if error else _reason(process.child)
         self._release(process)
         if task is not None:
             self._finish(task, None, WorkerError(reason))
@@ -376,14 +379,13 @@ class TaskQueue:
     def _kill(self, process: _Process) -> None:
         """Let a process end, which takes a moment; it is released afterwards."""
         process.child.kill()
-        self._killed.add(process)
         self._under_way.pop(process, None)
         if process is self._process:
             self._process = None
 
     def _release(self, process: _Process) -> None:
         """Release what is left of a process that has ended or was killed."""
-        self._killed.discard(process)
+        self._processes.discard(process)
         self.loop.unwatch(process.child.life)
         self.loop.unwatch(process.pipe.sock)
         process.child.close()
@@ -393,18 +395,13 @@ class TaskQueue:
             guarded(task.failed, task.done, result, error)
         self._begin_next()
 
-    @staticmethod
-    def _fail(error: Exception) -> None:
-        """Let an error of ours end the loop."""
-        raise error
 
-
-def _reason(code: int | None) -> str:
-    if code == -signal.SIGPROF:
+def _reason(child: Child) -> str:
+    """Say why a task is refused whose process has ended."""
+    if child.exit_code == -signal.SIGPROF:
         return f"it takes more than {BUDGETS.task_seconds:g} s of processor time: make it shorter"
-    if code == OUT_OF_MEMORY:
+    if child.exit_code == OUT_OF_MEMORY:
         return out_of_memory()
-    if code is None:
+    if child.exit_code is None:
         return "the process that did it has ended: try again"
-    how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-    return f"the process that did it was ended {how}: try again"
+    return f"the process that did it {child.end}: try again"
