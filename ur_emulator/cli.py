@@ -366,14 +366,12 @@ class _WindowProcess:
 
 
 def raise_descriptor_limit() -> int:
-    """Raise this process's limit of descriptors as far as the system allows; return it, 0 without one.
+    """Raise this process's limit of descriptors as far as the system allows; return it.
 
     Each client takes a descriptor, and some systems start with 256.
     """
-    try:
-        import resource
-    except ImportError:
-        return 0
+    import resource
+
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED_DESCRIPTORS if hard == resource.RLIM_INFINITY else min(WANTED_DESCRIPTORS, hard)
     if soft == resource.RLIM_INFINITY or soft >= wanted:

@@ -11,7 +11,6 @@ from protocol.primary.messages import ReportLevel
 from protocol.serial_numbers import simulated_serial
 from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotType, SoftwareVersion
 from ur_emulator.errors import EmulatorError, ModelError, NotRunningError
-from ur_emulator.host.box_log import BoxLog
 from ur_emulator.host.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.runner import OperationRunner
@@ -159,6 +158,7 @@ class Box:
             tasks,
             self._fail,
         )
+        self.log = self._box.log
         self._network = self._box.network = LoopNetwork(
             loop, machine.network, period, self._box.arrive, self._box.report, options.host
         )
@@ -184,11 +184,6 @@ class Box:
         self.is_shut_down = False
         self.failure: Exception | None = None
         self.on_end: Callable[[], None] = self.close
-
-    @property
-    def log(self) -> BoxLog:
-        """What PolyScope's log tab would show."""
-        return self._box.log
 
     def submit(self, command: Command, done: Done | None = None) -> None:
         """Ask for something as a client of the box would, from any thread; it acts in the next cycle.

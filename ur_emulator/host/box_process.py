@@ -13,9 +13,8 @@ import pickle
 import signal
 import socket
 import threading
-import time
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
@@ -273,28 +272,27 @@ def run(pipe: socket.socket) -> None:
         except EmulatorError as error:
             pipe.sendall(framed(pickle.dumps(([], error))))
         else:
-            _Link(rack, Pipe(pipe), owner).run()
+            _Link(rack, pipe, owner).run()
 
 
-class _Link:
+class _Link(Pipe):
     """The boxes' end of the pipe, in their loop; `owner` is the number of the process of their user."""
 
-    def __init__(self, rack: LoopRack, pipe: Pipe, owner: int) -> None:
+    def __init__(self, rack: LoopRack, pipe: socket.socket, owner: int) -> None:
         self._rack = rack
-        self._pipe = pipe
         self._owner = owner
         # Entries of each log that were sent.
         self._n_sent = [0] * len(rack.boxes)
-        self._ended: set[int] = set()
+        self._has_ended: set[int] = set()
+        super().__init__(rack.loop, pipe)
 
     def run(self) -> None:
         """Run the boxes until their end."""
         rack, loop = self._rack, self._rack.loop
         signal.signal(signal.SIGTERM, lambda number, frame: rack.stop())
         for box in rack.boxes:
-            box.log.follow(lambda entry: loop.call_soon(self._send_news, self._fail))
+            box.log.follow(lambda entry: loop.call_soon(self._send_news, self.failed))
         self._put(rack.served, None)
-        self._watch()
         self._look()
         with suppress(EmulatorError):  # of one of the boxes: it is sent below
             rack.serve_forever()
@@ -306,27 +304,11 @@ class _Link:
             os.kill(self._owner, 0)
         except ProcessLookupError:
             self._rack.stop()
-        self._rack.loop.call_later(_LOOK_PERIOD, self._look, self._fail)
+        self._rack.loop.call_later(_LOOK_PERIOD, self._look, self.failed)
 
-    def _watch(self) -> None:
-        self._rack.loop.watch(self._pipe.sock, self._pipe.events, self._on_ready, self._fail)
-
-    def _on_ready(self, events: int) -> None:
-        self._pipe.flush()
-        if self._pipe.is_clear:
-            self._send_news()
-        try:
-            messages = self._pipe.receive()
-        except EOFError:
-            self._rack.loop.unwatch(self._pipe.sock)
-            self._rack.stop()
-            return
-        for message in messages:
-            self._take(pickle.loads(message))
-        self._watch()
-
-    def _take(self, message: tuple[Any, ...]) -> None:
-        match message:
+    def take(self, message: bytes) -> None:
+        """Take a message of the user's process."""
+        match pickle.loads(message):
             case ("stop",):
                 self._rack.stop()
             case ("perform", number, index, operation):
@@ -336,44 +318,53 @@ class _Link:
             case ("news", number):
                 self._answer(number, None, None)
 
+    def close(self) -> None:
+        """Let the boxes end with the pipe: without it nobody can."""
+        super().close()
+        self._rack.stop()
+
+    def failed(self, error: Exception) -> None:
+        """End the boxes with an error of ours."""
+        self.close()
+        raise error
+
+    def _sent(self) -> None:
+        self._send_news()
+
     def _answer(self, number: int, result: Any, error: Exception | None) -> None:
         self._put_news()
         self._put("answer", number, result, _portable(error))
-        self._watch()
 
     def _send_news(self) -> None:
         """Send what is new, unless the other end has not read what was sent before."""
-        if self._pipe.is_clear:
+        if not self._outbox:
             self._put_news()
-            self._watch()
 
     def _put_news(self) -> None:
-        """Send new entries of the logs, and which boxes have ended and how."""
+        for message in self._news():
+            self._put(*message)
+
+    def _news(self) -> Iterator[tuple[Any, ...]]:
+        """Yield new entries of the logs, and which boxes have ended and how."""
         for index, box in enumerate(self._rack.boxes):
             if box.log.count > self._n_sent[index]:
                 entries = box.log.since(self._n_sent[index])
                 self._n_sent[index] = box.log.count
-                self._put("entries", index, entries)
-            if (box.is_shut_down or box.failure) and index not in self._ended:
-                self._ended.add(index)
-                self._put("end", index, box.is_shut_down, _portable(box.failure))
+                yield "entries", index, entries
+            if (box.is_shut_down or box.failure) and index not in self._has_ended:
+                self._has_ended.add(index)
+                yield "end", index, box.is_shut_down, _portable(box.failure)
 
     def _put(self, *message: Any) -> None:
-        self._pipe.send(pickle.dumps(message))
+        self.send(framed(pickle.dumps(message)))
 
     def _say_farewell(self) -> None:
-        """Send the last news."""
-        self._put_news()
-        self._put("farewell")
-        end = time.monotonic() + _FAREWELL
-        while not self._pipe.is_clear and time.monotonic() < end:
-            time.sleep(0.001)
-            self._pipe.flush()
-
-    def _fail(self, error: Exception) -> None:
-        """Without the pipe nobody can end the boxes."""
-        self._rack.stop()
-        raise error
+        """Send the last news, and wait for a moment until they are read: the loop has ended."""
+        if self._sock is not None:
+            last = [framed(pickle.dumps(message)) for message in (*self._news(), ("farewell",))]
+            self._sock.settimeout(_FAREWELL)
+            with suppress(OSError):
+                self._sock.sendall(b"".join((self._outbox, *last)))
 
 
 def _portable(error: Exception | None) -> Exception | None:

@@ -94,6 +94,11 @@ class ControlClient:
 _ERRORS = {400: ArgumentError, 408: WaitTimeoutError, 409: RefusedError}
 
 
+def log_entry(values: Mapping[str, Any]) -> LogEntry:
+    """Return an entry of the log from JSON."""
+    return LogEntry(**{**values, "level": ReportLevel[values["level"]]})
+
+
 class AttachedBox:
     """A box that somebody else serves; it goes on when this process ends.
 
@@ -119,8 +124,7 @@ class AttachedBox:
 
     def log(self, index: int) -> tuple[LogEntry, ...]:
         """Return the last entries of the log, the oldest first."""
-        entries = self._client.whole_log(ReadLog())["entries"]
-        return tuple(LogEntry(**{**entry, "level": ReportLevel[entry["level"]]}) for entry in entries)
+        return tuple(map(log_entry, self._client.whole_log(ReadLog())["entries"]))
 
     def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
         """Raise ControlError: its log is read with operations."""

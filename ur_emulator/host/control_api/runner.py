@@ -7,6 +7,7 @@ import threading
 from collections.abc import Generator
 from concurrent.futures import Future
 from typing import Any
+from weakref import WeakSet
 
 from ur_emulator.errors import ControlError, NotRunningError
 from ur_emulator.host.control_api.step_operations import Context, StepOperation
@@ -26,7 +27,7 @@ class OperationRunner:
         self._loop = loop
         self._context = context
         self._lock = threading.Lock()
-        self._awaited: set[Future[Any]] = set()
+        self._awaited: WeakSet[Future[Any]] = WeakSet()
         self._is_closed = False
 
     def perform(self, operation: Operation[Any]) -> Any:
@@ -48,11 +49,7 @@ class OperationRunner:
                 self.begin(operation, settle(future))
 
         self._loop.call_soon_threadsafe(start, future.set_exception)
-        try:
-            return future.result()
-        finally:
-            with self._lock:
-                self._awaited.discard(future)
+        return future.result()
 
     def begin(self, operation: Operation[Any], finished: Finished) -> None:
         """Begin with an operation, in the thread of the loop; `finished` gets its result or its error."""

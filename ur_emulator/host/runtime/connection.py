@@ -1,4 +1,4 @@
-"""TCP sockets in the loop, and the connection of a client.
+"""Sockets in the loop, and the connection of a client.
 
 A socket never blocks; what the kernel does not take waits in an outbox. A package is sent whole, or not.
 """
@@ -82,7 +82,8 @@ class BufferedSocket(ABC):
 
     def _open(self, sock: socket.socket) -> None:
         """Begin with a connected, non-blocking socket."""
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if sock.family != socket.AF_UNIX:
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._sock = sock
         self.is_open = self._can_send = True
         self._watch()

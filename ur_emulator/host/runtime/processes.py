@@ -24,11 +24,15 @@ import threading
 import time
 import traceback
 import weakref
+from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum
 from functools import partial
 from typing import Any, Final, NoReturn, cast
+
+from ur_emulator.host.runtime.connection import BufferedSocket
+from ur_emulator.host.runtime.event_loop import EventLoop
 
 # Bytes of the length in front of a message, big-endian.
 _HEAD: Final = 8
@@ -82,59 +86,37 @@ def _read(pipe: socket.socket, size: int) -> bytes:
     return bytes(data)
 
 
-class Pipe:
-    """A pipe as a loop uses it: nothing waits."""
+class Pipe(BufferedSocket):
+    """A pipe in a loop: nothing waits. `take` gets the messages that have come completely.
 
-    def __init__(self, sock: socket.socket) -> None:
-        sock.setblocking(False)
-        self.sock = sock
-        self._outbox = bytearray()
+    Its end is no event: who has a pipe learns in another way that the other process has ended.
+    """
+
+    def __init__(self, loop: EventLoop, sock: socket.socket) -> None:
+        super().__init__(loop, sys.maxsize, _READ_SIZE)
         self._inbox = bytearray()
+        sock.setblocking(False)
+        self._open(sock)
 
-    @property
-    def events(self) -> int:
-        """What the loop waits for."""
-        return selectors.EVENT_READ | (selectors.EVENT_WRITE if self._outbox else 0)
+    @abstractmethod
+    def take(self, message: bytes) -> None:
+        """Take a message."""
 
-    @property
-    def is_clear(self) -> bool:
-        """Whether everything was sent."""
-        return not self._outbox
-
-    def send(self, message: bytes) -> None:
-        """Send a message, as much as goes now; `flush` sends the rest."""
-        self._outbox += framed(message)
-        self.flush()
-
-    def flush(self) -> None:
-        """Send what goes now. An end that is gone is noticed by `receive`."""
-        try:
-            del self._outbox[: self.sock.send(self._outbox)]
-        except BlockingIOError:
-            return
-        except OSError:
-            self._outbox.clear()
-
-    def receive(self) -> list[bytes]:
-        """Return the messages that have come completely.
-
-        Raises:
-            EOFError: the other end is gone.
-        """
-        try:
-            data = self.sock.recv(_READ_SIZE)
-        except BlockingIOError:
-            return []
-        except OSError:
-            data = b""
-        if not data:
-            raise EOFError
+    def _received(self, data: bytes) -> None:
         self._inbox += data
-        messages = []
         while len(self._inbox) >= (end := _HEAD + int.from_bytes(self._inbox[:_HEAD], "big")):
-            messages.append(bytes(memoryview(self._inbox)[_HEAD:end]))
+            message = bytes(memoryview(self._inbox)[_HEAD:end])
             del self._inbox[:end]
-        return messages
+            self.take(message)
+
+    def _ended(self) -> None:
+        self.close()
+
+    def _send_failed(self) -> None:
+        self.close()
+
+    def _sent(self) -> None:
+        pass
 
 
 # --- what the system tells of a process

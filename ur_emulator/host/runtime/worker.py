@@ -7,6 +7,8 @@ somebody else for more than a moment. A task that takes too much processor time 
 The queue looks at the clock itself: a process may be stopped.
 """
 
+from __future__ import annotations
+
 import gc
 import os
 import pickle
@@ -161,13 +163,14 @@ class Task:
     began: float = 0.0
 
 
-class _Process:
-    """A worker process; `memory_at_rest` is what it held when it began [bytes]."""
+class _Process(Pipe):
+    """A worker process, and the pipe to it; `memory_at_rest` is what it held when it began [bytes]."""
 
-    def __init__(self) -> None:
+    def __init__(self, queue: TaskQueue) -> None:
+        self._queue = queue
         self.child: Child = start_child(Role.WORKER)
-        self.pipe = Pipe(self.child.pipe)
         self.memory_at_rest = 0
+        super().__init__(queue.loop, self.child.pipe)
 
     @property
     def memory(self) -> int:
@@ -178,6 +181,14 @@ class _Process:
     def growth(self) -> int:
         """What it holds beyond what it held when it began [bytes]."""
         return max(0, self.memory - self.memory_at_rest)
+
+    def take(self, message: bytes) -> None:
+        """Take the answer to a task."""
+        self._queue.answered(self, message)
+
+    def failed(self, error: Exception) -> None:
+        """Do without the process after an error of ours."""
+        self._queue.lose(self, error)
 
 
 class TaskQueue:
@@ -254,16 +265,11 @@ class TaskQueue:
 
     def _start(self) -> _Process:
         if self._process is None:
-            self._process = process = _Process()
+            self._process = process = _Process(self)
             self._processes.add(process)
-            self._watch(process)
             look = partial(self._look_at, process)
             self.loop.watch(process.child.life, selectors.EVENT_READ, look, end_loop)
         return self._process
-
-    def _watch(self, process: _Process) -> None:
-        ready = partial(self._on_ready, process)
-        self.loop.watch(process.pipe.sock, process.pipe.events, ready, partial(self._lose, process))
 
     def _begin_next(self) -> None:
         if self._process in self._under_way or (task := self._take_next()) is None:
@@ -276,9 +282,8 @@ class TaskQueue:
             return
         self._under_way[process] = task
         task.began = time.monotonic()
-        process.pipe.send(task.request)
+        process.send(framed(task.request))
         task.request = b""  # the pipe keeps what it has not sent yet
-        self._watch(process)
         if not self._is_looking:
             self._look_later()
 
@@ -291,24 +296,10 @@ class TaskQueue:
         self._waiting.remove(task)
         return task
 
-    def _on_ready(self, process: _Process, events: int) -> None:
-        if events & selectors.EVENT_WRITE:
-            process.pipe.flush()
-            self._watch(process)
-        if not events & selectors.EVENT_READ:
-            return
-        try:
-            answers = process.pipe.receive()
-        except EOFError:
-            self.loop.unwatch(process.pipe.sock)  # `life` says how it has ended
-            return
-        for answer in answers:
-            if process in self._under_way:
-                self._answered(process, answer)
-
-    def _answered(self, process: _Process, answer: bytes) -> None:
+    def answered(self, process: _Process, answer: bytes) -> None:
         """Take the answer to a task; a process in which one took long has a low priority, and goes."""
-        task = self._under_way.pop(process)
+        if (task := self._under_way.pop(process, None)) is None:
+            return
         if process is not self._process or time.monotonic() - task.began >= LONG:
             self._kill(process)
         try:
@@ -358,13 +349,13 @@ class TaskQueue:
     def _look_at(self, process: _Process, events: int) -> None:
         """Take what the server tells of a process: it has begun, or ended."""
         if process.child.look():
-            self._lose(process)
+            self.lose(process)
         else:
             process.memory_at_rest = process.memory
             if process in self._under_way:  # its task has waited for it until now
                 self._under_way[process].began = time.monotonic()
 
-    def _lose(self, process: _Process, error: Exception | None = None) -> None:
+    def lose(self, process: _Process, error: Exception | None = None) -> None:
         """Do without a process that has ended, or with which we failed; its task fails."""
         task = self._under_way.pop(process, None)
         if process is self._process:
@@ -387,7 +378,7 @@ class TaskQueue:
         """Release what is left of a process that has ended or was killed."""
         self._processes.discard(process)
         self.loop.unwatch(process.child.life)
-        self.loop.unwatch(process.pipe.sock)
+        process.close()
         process.child.close()
 
     def _finish(self, task: Task, result: Any, error: Exception | None) -> None:
