@@ -170,7 +170,7 @@ class WalkBox:
         except ArgumentError:
             self.tick(1)  # as for one that the state refuses
         else:
-            self._do(lambda done: self._box.operations.begin(operation, done))
+            self._do(lambda done: self._box.begin(operation, done))
 
     def steps(self, steps: Steps[Any]) -> None:
         """Have done what the player does in steps."""

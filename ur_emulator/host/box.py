@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection
+import threading
+from collections.abc import Callable, Collection, Generator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 from protocol.primary.messages import ReportLevel
 from protocol.serial_numbers import simulated_serial
 from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotType, SoftwareVersion
-from ur_emulator.errors import EmulatorError, ModelError, NotRunningError
+from ur_emulator.errors import ControlError, EmulatorError, ModelError, NotRunningError
 from ur_emulator.host.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
 from ur_emulator.host.control_api.operations import make
-from ur_emulator.host.control_api.runner import OperationRunner
-from ur_emulator.host.control_api.step_operations import Context
+from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.journal import Journal
 from ur_emulator.host.pacing import Pace, make_pacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
@@ -29,7 +31,10 @@ from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
+from ur_emulator.host.steps import Finished, Steps, settle
+from ur_emulator.machine.commands.operation import CommandOperation, Operation
 from ur_emulator.machine.controller.command import Command, Done
+from ur_emulator.machine.controller.events import LogAdded
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import RobotModel
@@ -38,6 +43,9 @@ from ur_emulator.machine.plant.scene import load_scene
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel, tools_by_name
+
+# Longest value of an argument in the log, in characters.
+_MAX_SHOWN = 60
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -126,7 +134,6 @@ class Box:
     Attributes:
         served_at: where clients find it, and as what.
         log: programs, errors, modes, text messages, clients.
-        operations: does what users ask of it.
         is_shut_down: a dashboard client has switched the box off: its ports are closed.
         failure: the error that has ended the box, None while there is none.
         on_end: called in the loop's thread when the box was switched off or an error has ended it.
@@ -168,7 +175,10 @@ class Box:
         )
         self._reports = ReportWriter(self._box, self._player)
         self._journal = self._open_journal()
-        self.operations = OperationRunner(loop, Context(self._box, self._player, self._identity_now, make))
+        self._context = Context(self._box, self._player, self._identity_now, make)
+        self._lock = threading.Lock()
+        self._awaited: WeakSet[Future[Any]] = WeakSet()
+        self._is_closed = False
         sending = SendingPorts.make(self._box, self._intake)
         ports = (
             sending.by_name
@@ -185,15 +195,49 @@ class Box:
         self.failure: Exception | None = None
         self.on_end: Callable[[], None] = self.close
 
-    def submit(self, command: Command, done: Done | None = None) -> None:
-        """Ask for something as a client of the box would, from any thread; it acts in the next cycle.
+    # --- what users ask of it
 
-        Args:
-            command: one of `machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
-            done: called in that cycle, in the thread of the box: with its result and None, or with
-                None and the error, a `RefusedError` if it was refused.
-        """
+    def submit(self, command: Command, done: Done | None = None) -> None:
+        """Take a command for the next cycle, from any thread; `done` is called then, in that of the loop."""
         self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done), self._fail)
+
+    def perform(self, operation: Operation[Any]) -> Any:
+        """Do an operation, from any thread but the loop's; return its result, or raise ControlError."""
+        if self._loop.is_own_thread:
+            raise ControlError(
+                f"{operation.api_name} called in the thread of the box, which cannot wait: use `submit`"
+            )
+        future: Future[Any] = Future()
+        with self._lock:
+            if self._is_closed or not self._loop.is_running:
+                raise NotRunningError(
+                    NotRunningError.ENDED if self._is_closed else "the box does not run: start it first"
+                )
+            self._awaited.add(future)
+
+        def start() -> None:
+            if not self._is_closed:
+                self.begin(operation, settle(future))
+
+        self._loop.call_soon_threadsafe(start, future.set_exception)
+        return future.result()
+
+    def begin(self, operation: Operation[Any], finished: Finished) -> None:
+        """Begin with an operation, in the thread of the loop; `finished` gets its result or its error."""
+        self._box.steps.start(self.operate(operation), finished)
+
+    def operate(self, operation: Operation[Any]) -> Steps[Any]:
+        """Write an operation into the log, do it, and return its result; in the thread of the loop."""
+        if operation.is_logged and not operation.only_reads:
+            self._box.announce(LogAdded("Control", _shown(operation)))
+        if isinstance(operation, StepOperation):
+            result = operation.steps(self._context)
+            return (yield from result) if isinstance(result, Generator) else result
+        assert isinstance(operation, CommandOperation)
+        result = yield from self._box.apply(operation)
+        return {**(result or {}), "tick": self._box.snapshot.tick}
+
+    # --- what it is made of
 
     def watch_memory(self, watch: MemoryWatch) -> None:
         """Have the memory of the process measured after each cycle; before the box runs."""
@@ -230,7 +274,7 @@ class Box:
         from ur_emulator.host.control_api.http_answers import ControlAnswers
         from ur_emulator.host.ports.http import HttpPort
 
-        answers = ControlAnswers(self.operations, self._options.host, self._options.control_token)
+        answers = ControlAnswers(self.operate, self._options.host, self._options.control_token)
         return {CONTROL: HttpPort(self._box, answers)}
 
     # --- life
@@ -292,7 +336,12 @@ class Box:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
         self._box.steps.close(NotRunningError())
-        self.operations.close()
+        with self._lock:
+            self._is_closed = True
+            awaited = tuple(self._awaited)
+        for future in awaited:
+            if not future.done():
+                future.set_exception(NotRunningError())
         self._intake.close()
         self._reports.close()
         self._network.close()
@@ -300,3 +349,13 @@ class Box:
         if self._journal is not None:
             self._journal.close()
         give_back(self)
+
+
+def _shown(operation: Operation[Any]) -> str:
+    """Return an operation as one line for the log."""
+    words = [operation.api_name]
+    for key, value in operation.as_given.items():
+        if value is not None:
+            text = " ".join(str(value).split())
+            words.append(f"{key}={text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + '...'}")
+    return " ".join(words)

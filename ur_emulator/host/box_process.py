@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
 from ur_emulator.host.box_log import LogBook, LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt
-from ur_emulator.host.runtime.processes import Child, Pipe, Role, framed, read_message, start_child
+from ur_emulator.host.runtime.processes import BOX, Child, Pipe, framed, read_message, start_child
 
 if TYPE_CHECKING:
     from ur_emulator.host.rack import LoopRack
@@ -54,7 +54,7 @@ class ProcessRack:
         there is no process to be had.
         """
         try:
-            self._child: Child = start_child(Role.BOX)
+            self._child: Child = start_child(BOX)
         except OSError as error:
             raise EmulatorError(f"the process of the box cannot be started: {error}") from None
         self._let_go = weakref.finalize(self, self._child.close)
@@ -312,7 +312,7 @@ class _Link(Pipe):
             case ("stop",):
                 self._rack.stop()
             case ("perform", number, index, operation):
-                self._rack.boxes[index].operations.begin(operation, partial(self._answer, number))
+                self._rack.boxes[index].begin(operation, partial(self._answer, number))
             case ("submit", number, index, command):
                 self._rack.boxes[index].submit(command, partial(self._answer, number))
             case ("news", number):

@@ -138,7 +138,7 @@ class LoopRack:
 
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done, from any thread but that of the loop; return its result."""
-        return self.boxes[index].operations.perform(operation)
+        return self.boxes[index].perform(operation)
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Submit a command for the next cycle, from any thread."""

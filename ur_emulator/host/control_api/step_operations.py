@@ -52,9 +52,6 @@ class StepOperation(Operation[R_co]):
         """
 
 
-# --- What the box is and does, and its log
-
-
 class ReadState(StepOperation[BoxState]):
     """What the box is doing at the end of its last cycle."""
 
@@ -118,9 +115,6 @@ class AddToLog(StepOperation[int]):
         return {"tick": context.box.snapshot.tick}
 
 
-# --- `wait_until`, and its conditions: each parameter with the present value in the box
-
-
 def _shows(controller: Controller, *, popup: bool) -> bool:
     """Return whether the pendant shows a popup, or a question."""
     pendant = controller.state.pendant
@@ -128,6 +122,7 @@ def _shows(controller: Controller, *, popup: bool) -> bool:
     return asked or (popup and bool(pendant.shown))
 
 
+# Parameters of `wait_until`, each with the present value in the box.
 CONDITIONS: dict[str, Callable[[Controller], object]] = {
     "robot_mode": lambda controller: RobotMode(controller.snapshot.robot_mode).name,
     "safety_mode": lambda controller: SafetyMode(controller.snapshot.safety_mode).name,
@@ -198,9 +193,6 @@ class WaitUntil(StepOperation[BoxState]):
             yield
 
 
-# --- `at`: an operation at an exact time of the robot
-
-
 class At(StepOperation[int]):
     """Do an operation at an exact time of the robot: in the first cycle that ends then, or later.
 
@@ -231,9 +223,6 @@ class At(StepOperation[int]):
         tick = box.controller.generation.tick_at(self.time)
         box.schedule(tick, operation, done)
         return {"tick": tick}
-
-
-# --- `run_program`
 
 
 def read_script(path: Path) -> str:

@@ -27,11 +27,9 @@ from ur_emulator.host.runtime.barrier import Report, guarded
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.runtime.event_loop import EventLoop
 
-# --- A spare descriptor: a process that has none left needs one to refuse a client
-
 
 class SpareDescriptor:
-    """A descriptor that is released for a moment when all others are in use."""
+    """A descriptor that is released for a moment when no other is left: to refuse a client needs one."""
 
     def __init__(self) -> None:
         self._descriptor: int | None = None
@@ -64,11 +62,8 @@ class SpareDescriptor:
             self._descriptor = None
 
 
-# --- How many clients a box has, by their addresses and ports: who comes on top of the limits is refused
-
-
 class ClientLimits:
-    """Counts the clients of a box, and refuses those beyond its limits."""
+    """Counts the clients of a box by their addresses and ports, and refuses those beyond its limits."""
 
     def __init__(self) -> None:
         self._taken: Counter[tuple[str | int, ...]] = Counter()
@@ -311,15 +306,14 @@ def _listening_socket(host: str, number: int) -> socket.socket:
     return sock
 
 
-# --- Lines of the log about clients that come and go: a storm of them must not empty the log
-
 _WINDOW = 60.0  # s
 
 
 class ClientLines:
-    """Writes so many lines a minute into the log, and counts the others.
+    """Writes so many lines a minute about clients into the log: a storm of them must not empty it.
 
-    The clock is monotonic [s]; also where the time of the box stands still, clients come and go.
+    The others are counted. The clock is monotonic [s]; also where the time of the box stands still, clients
+    come and go.
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:

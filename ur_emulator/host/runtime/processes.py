@@ -27,7 +27,6 @@ import weakref
 from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
-from enum import Enum
 from functools import partial
 from typing import Any, Final, NoReturn, cast
 
@@ -49,22 +48,13 @@ _COMMAND: Final = (
 )
 
 
-class Role(Enum):
-    """What a child does: the byte that asks for it.
-
-    The module of a role has `prepare`, which the server calls once before it forks, `run(pipe)`, the main
-    function of the child, `clean_up`, which the server calls when a child has ended in another way, and
-    `GRACE`: how long a child may take to end when the other end of its life is gone [s].
-    """
-
-    WORKER = b"w"
-    BOX = b"b"
-
-
-_MODULES: Final = {Role.WORKER: "ur_emulator.host.runtime.worker", Role.BOX: "ur_emulator.host.box_process"}
-
-
-# --- messages
+# What a child does: the byte that asks for it, and its module. That has `prepare`, which the server calls
+# once before it forks, `run(pipe)`, the main function of the child, `clean_up`, which the server calls when a
+# child has ended in another way, and `GRACE`: how long a child may take to end when the other end of its life
+# is gone [s].
+WORKER: Final = b"w"
+BOX: Final = b"b"
+_MODULES: Final = {WORKER: "ur_emulator.host.runtime.worker", BOX: "ur_emulator.host.box_process"}
 
 
 def framed(message: bytes) -> bytes:
@@ -117,9 +107,6 @@ class Pipe(BufferedSocket):
 
     def _sent(self) -> None:
         pass
-
-
-# --- what the system tells of a process
 
 
 def resident(process: int | str = "self") -> int:
@@ -203,7 +190,7 @@ class Child:
         self.life.close()
 
 
-def start_child(role: Role) -> Child:
+def start_child(role: bytes) -> Child:
     """Start a child; OSError if it cannot be started."""
     pipe, its_pipe = socket.socketpair()
     life, its_life = socket.socketpair()
@@ -222,7 +209,7 @@ def start_child(role: Role) -> Child:
 def prepare_workers() -> None:
     """Let the server load the code of workers now; a server that cannot be started is no error yet."""
     with suppress(OSError):
-        _ask(Role.WORKER, ())
+        _ask(WORKER, ())
 
 
 class _Server:
@@ -275,14 +262,14 @@ _server: _Server | None = None
 _children: weakref.WeakSet[Child] = weakref.WeakSet()
 
 
-def _ask(role: Role, descriptors: tuple[int, ...]) -> None:
+def _ask(role: bytes, descriptors: tuple[int, ...]) -> None:
     """Ask the server for a child, or, without descriptors, to load what one needs."""
     global _server
     with _lock:
         if _server is not None:
             try:
                 _server.look()
-                socket.send_fds(_server.channel, [role.value], descriptors)
+                socket.send_fds(_server.channel, [role], descriptors)
                 return
             except OSError as error:
                 if error.errno in (errno.EMFILE, errno.ETOOMANYREFS):
@@ -290,7 +277,7 @@ def _ask(role: Role, descriptors: tuple[int, ...]) -> None:
                 _server.end()
                 _server = None
         _server = _Server.start()
-        socket.send_fds(_server.channel, [role.value], descriptors)
+        socket.send_fds(_server.channel, [role], descriptors)
 
 
 @atexit.register
@@ -336,11 +323,11 @@ class _ForkServer:
 
     def __init__(self, channel: socket.socket) -> None:
         self._selector = selectors.DefaultSelector()
-        self._lives: dict[int, tuple[Role, socket.socket]] = {}
+        self._lives: dict[int, tuple[bytes, socket.socket]] = {}
         # Process -> when it is killed; its life is closed [s, monotonic].
         self._doomed: dict[int, float] = {}
         self._channels = 0
-        self._prepared: set[Role] = set()
+        self._prepared: set[bytes] = set()
         self._wake, wake_end = socket.socketpair()
         for end in (self._wake, wake_end):
             end.setblocking(False)
@@ -374,17 +361,16 @@ class _ForkServer:
             channel.close()
             self._channels -= 1
             return
-        role = Role(request)
-        if role not in self._prepared:
-            self._prepared.add(role)
-            self._module(role).prepare()
+        if request not in self._prepared:
+            self._prepared.add(request)
+            self._module(request).prepare()
             gc.collect()
             gc.freeze()  # children write into fewer pages that they share
         if descriptors:
             pipe, life = (socket.socket(fileno=descriptor) for descriptor in descriptors)
-            self._fork(role, pipe, life)
+            self._fork(request, pipe, life)
 
-    def _fork(self, role: Role, pipe: socket.socket, life: socket.socket) -> None:
+    def _fork(self, role: bytes, pipe: socket.socket, life: socket.socket) -> None:
         """Fork a child; its channel lets it have children of its own."""
         with pipe:
             channel, its_channel = socket.socketpair()
@@ -453,7 +439,7 @@ class _ForkServer:
             life.send(number.to_bytes(_NUMBER, "big", signed=True))
 
     @staticmethod
-    def _module(role: Role) -> Any:
+    def _module(role: bytes) -> Any:
         return importlib.import_module(_MODULES[role])
 
 

@@ -31,9 +31,9 @@ from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
 from ur_emulator.host.runtime.event_loop import EventLoop, end_loop
 from ur_emulator.host.runtime.processes import (
     OUT_OF_MEMORY,
+    WORKER,
     Child,
     Pipe,
-    Role,
     framed,
     is_stopped,
     read_message,
@@ -168,7 +168,7 @@ class _Process(Pipe):
 
     def __init__(self, queue: TaskQueue) -> None:
         self._queue = queue
-        self.child: Child = start_child(Role.WORKER)
+        self.child: Child = start_child(WORKER)
         self.memory_at_rest = 0
         super().__init__(queue.loop, self.child.pipe)
 
