@@ -328,7 +328,8 @@ class _Link(Pipe):
         self.close()
         raise error
 
-    def _sent(self) -> None:
+    def _flush(self) -> None:
+        super()._flush()
         self._send_news()
 
     def _answer(self, number: int, result: Any, error: Exception | None) -> None:

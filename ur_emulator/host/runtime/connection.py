@@ -92,17 +92,13 @@ class BufferedSocket(ABC):
     def _received(self, data: bytes) -> None:
         """Take what has arrived."""
 
-    @abstractmethod
     def _ended(self) -> None:
         """The peer sends nothing more."""
+        self.close()
 
-    @abstractmethod
     def _send_failed(self) -> None:
         """The peer takes nothing any more."""
-
-    @abstractmethod
-    def _sent(self) -> None:
-        """The outbox is empty again."""
+        self.close()
 
     def _watch(self) -> None:
         """Register with the loop what the socket waits for at present."""
@@ -144,7 +140,6 @@ class BufferedSocket(ABC):
         del self._outbox[:sent]
         if not self._outbox:
             self._watch()
-            self._sent()
 
 
 # Kernel buffer for sending: small, so that a slow reader gets fresh data and a silent one costs little
@@ -288,6 +283,11 @@ class Connection(BufferedSocket):
         self._sent()
         if self.is_open:
             self._watch()
+
+    def _flush(self) -> None:
+        super()._flush()
+        if not self._outbox:
+            self._sent()
 
     def _sent(self) -> None:
         self._backlog.discard(self)

@@ -192,7 +192,7 @@ class EventLoop:
 
     def call_soon_threadsafe(self, call: Callable[[], None], failed: Failed) -> None:
         """As `call_soon`, from any thread; beside `stop` the only method for other threads."""
-        self._calls.append(partial(guarded, failed, call))
+        self.call_soon(call, failed)
         self._wake()
 
     def stop(self) -> None:

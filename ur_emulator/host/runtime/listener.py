@@ -167,11 +167,10 @@ class Listener:
         self._spare = spare
         self._reads_http = reads_http
         self._refuses = False
-        self._paused_until: float | None = None
         self._sock = _listening_socket(host, number)
         self.connections: dict[Connection, None] = {}
         self.number: int = self._sock.getsockname()[1]
-        loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
+        self._listen()
 
     @property
     def clients(self) -> list[str]:
@@ -180,22 +179,10 @@ class Listener:
 
     def close(self) -> None:
         """Stop listening, and close all connections."""
-        self._loop.remove(self)
         self._loop.unwatch(self._sock)
         self._sock.close()
         for connection in tuple(self.connections):
             connection.close()
-
-    def advance(self, now: float) -> float:
-        """Listen again at the end of a pause; called by the loop only in one."""
-        if self._paused_until is None:
-            self._paused_until = now + PAUSE
-        if now >= self._paused_until:
-            self._paused_until = None
-            self._loop.remove(self)
-            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
-            return now
-        return self._paused_until
 
     def failed(self, error: Exception) -> None:
         """Pause after an error of ours in accepting clients."""
@@ -265,7 +252,11 @@ class Listener:
 
     def _pause(self) -> None:
         self._loop.unwatch(self._sock)
-        self._loop.add(self)
+        self._loop.call_later(PAUSE, self._listen, self.failed)
+
+    def _listen(self) -> None:
+        if self._sock.fileno() >= 0:  # it may have been closed in a pause
+            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
 
     def _closed(self, host: str, connection: Connection) -> None:
         del self.connections[connection]

@@ -13,12 +13,11 @@ from __future__ import annotations
 
 import ctypes
 import gc
-import resource
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from ur_emulator.budgets import BUDGETS, MIB
-from ur_emulator.host.runtime.processes import PAGE, resident
+from ur_emulator.host.runtime.processes import limit_memory, resident
 from ur_emulator.machine.commands.programs import EndPrograms
 
 if TYPE_CHECKING:
@@ -51,9 +50,7 @@ def own_process() -> None:
     gc.disable()
     with suppress(OSError, AttributeError):  # long blocks go back when they are freed, where that can be set
         ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _LONG_BLOCK)
-    with suppress(OSError, ValueError), open("/proc/self/statm", "rb") as file:
-        limit = int(file.read().split()[5]) * PAGE + BUDGETS.memory + _MARGIN
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, resource.getrlimit(resource.RLIMIT_DATA)[1]))
+    limit_memory(BUDGETS.memory + _MARGIN)
 
 
 class Box(Protocol):

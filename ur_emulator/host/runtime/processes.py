@@ -39,7 +39,7 @@ _READ_SIZE: Final = 1 << 18
 # Bytes of what the server tells of a child: its number, then its exit code.
 _NUMBER: Final = 4
 _KILL: Final = b"k"
-PAGE: Final = resource.getpagesize()
+_PAGE: Final = resource.getpagesize()
 # How long a process that ends waits for its server [s].
 _FAREWELL: Final = 2.0
 _COMMAND: Final = (
@@ -99,23 +99,21 @@ class Pipe(BufferedSocket):
             del self._inbox[:end]
             self.take(message)
 
-    def _ended(self) -> None:
-        self.close()
-
-    def _send_failed(self) -> None:
-        self.close()
-
-    def _sent(self) -> None:
-        pass
-
 
 def resident(process: int | str = "self") -> int:
     """Return what a process has in memory [bytes]; 0 where the system does not tell."""
     try:
         with open(f"/proc/{process}/statm", "rb") as file:
-            return int(file.read().split()[1]) * PAGE
+            return int(file.read().split()[1]) * _PAGE
     except OSError:
         return 0
+
+
+def limit_memory(allowed: int) -> None:
+    """Limit the data of this process to what it has and so many bytes more, where the system tells it."""
+    with suppress(OSError, ValueError), open("/proc/self/statm", "rb") as file:
+        limit = int(file.read().split()[5]) * _PAGE + allowed
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, resource.getrlimit(resource.RLIMIT_DATA)[1]))
 
 
 def is_stopped(process: int) -> bool:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import gc
 import os
 import pickle
-import resource
 import selectors
 import signal
 import socket
@@ -21,7 +20,6 @@ from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
@@ -36,6 +34,7 @@ from ur_emulator.host.runtime.processes import (
     Pipe,
     framed,
     is_stopped,
+    limit_memory,
     read_message,
     resident,
     start_child,
@@ -68,7 +67,7 @@ def run(pipe: socket.socket) -> None:
     gc.enable()
     gc.set_threshold(_MANY_OBJECTS)
     signal.signal(signal.SIGVTALRM, _take_long)
-    _limit_memory()
+    limit_memory(BUDGETS.task_memory)
     with pipe, suppress(OSError, EOFError):
         while True:
             task = read_message(pipe)
@@ -89,14 +88,6 @@ def out_of_memory() -> str:
 def _take_long(number: int, frame: FrameType | None) -> None:
     """Go on with a lower priority: the queue has a new process for the next tasks."""
     os.nice(_NICENESS)
-
-
-def _limit_memory() -> None:
-    """Limit what this process has beside what it needs for itself; some systems do not report that amount."""
-    with suppress(OSError):
-        n_pages = int(Path("/proc/self/statm").read_text().split()[5])
-        limit = n_pages * resource.getpagesize() + BUDGETS.task_memory
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def _answer(task: bytes) -> bytes:
