@@ -236,13 +236,10 @@ class _Server:
                 raise
         return cls(channel, process)
 
-    def look(self) -> None:
-        """See that it lives; OSError if it has ended.
-
-        For a moment after its end, a child that it has just forked holds its channel.
-        """
-        if self.process is not None and self.process.poll() is not None:
-            raise ChildProcessError(f"the server has ended with exit code {self.process.returncode}")
+    @property
+    def has_ended(self) -> bool:
+        """Whether it is gone; for a moment afterwards, a child that it has just forked holds its channel."""
+        return self.process is not None and self.process.poll() is not None
 
     def end(self) -> None:
         """Let it end with all its children, and wait for that, for a moment."""
@@ -264,16 +261,16 @@ def _ask(role: bytes, descriptors: tuple[int, ...]) -> None:
     """Ask the server for a child, or, without descriptors, to load what one needs."""
     global _server
     with _lock:
-        if _server is not None:
+        if _server is not None and not _server.has_ended:
             try:
-                _server.look()
                 socket.send_fds(_server.channel, [role], descriptors)
                 return
             except OSError as error:
                 if error.errno in (errno.EMFILE, errno.ETOOMANYREFS):
                     raise
-                _server.end()
-                _server = None
+        if _server is not None:
+            _server.end()
+            _server = None  # also if none can be started
         _server = _Server.start()
         socket.send_fds(_server.channel, [role], descriptors)
 
@@ -309,6 +306,7 @@ os.register_at_fork(after_in_child=_forget_server)
 def serve_forks() -> None:
     """Fork children until nobody asks any more and all have ended; the main function of the server."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # where it is ignored nobody learns how a child has ended
     gc.disable()
     channel = socket.socket(fileno=os.dup(0))
     with open(os.devnull, "rb") as nothing:
@@ -317,27 +315,22 @@ def serve_forks() -> None:
 
 
 class _ForkServer:
-    """Forks children of the process at its channel, reports how they end, ends those whose life is closed."""
+    """Forks children of the process at its channel, reports how they end, ends those whose life is closed.
+
+    Each child has a channel, too, for children of its own; the end of the channel is that of the child.
+    """
 
     def __init__(self, channel: socket.socket) -> None:
         self._selector = selectors.DefaultSelector()
         self._lives: dict[int, tuple[bytes, socket.socket]] = {}
         # Process -> when it is killed; its life is closed [s, monotonic].
         self._doomed: dict[int, float] = {}
-        self._channels = 0
         self._prepared: set[bytes] = set()
-        self._wake, wake_end = socket.socketpair()
-        for end in (self._wake, wake_end):
-            end.setblocking(False)
-        signal.signal(signal.SIGCHLD, lambda number, frame: None)
-        signal.set_wakeup_fd(wake_end.fileno(), warn_on_full_buffer=False)
-        self._wake_end = wake_end
-        self._selector.register(self._wake, selectors.EVENT_READ, self._reap)
         self._add_channel(channel)
 
     def run(self) -> None:
         """Work until nobody asks any more and all children have ended."""
-        while self._channels or self._lives:
+        while self._selector.get_map():
             timeout = min(self._doomed.values(), default=None)
             ready = self._selector.select(None if timeout is None else max(0.0, timeout - time.monotonic()))
             for key, _ in ready:
@@ -345,11 +338,10 @@ class _ForkServer:
                     key.data()
             self._kill_doomed()
 
-    def _add_channel(self, channel: socket.socket) -> None:
-        self._channels += 1
-        self._selector.register(channel, selectors.EVENT_READ, partial(self._take_request, channel))
+    def _add_channel(self, channel: socket.socket, child: int | None = None) -> None:
+        self._selector.register(channel, selectors.EVENT_READ, partial(self._take_request, channel, child))
 
-    def _take_request(self, channel: socket.socket) -> None:
+    def _take_request(self, channel: socket.socket, child: int | None) -> None:
         try:
             request, descriptors, _, _ = socket.recv_fds(channel, 1, 2)
         except OSError:
@@ -357,7 +349,8 @@ class _ForkServer:
         if not request:
             self._selector.unregister(channel)
             channel.close()
-            self._channels -= 1
+            if child is not None:
+                self._reap(child)
             return
         if request not in self._prepared:
             self._prepared.add(request)
@@ -369,7 +362,6 @@ class _ForkServer:
             self._fork(request, pipe, life)
 
     def _fork(self, role: bytes, pipe: socket.socket, life: socket.socket) -> None:
-        """Fork a child; its channel lets it have children of its own."""
         with pipe:
             channel, its_channel = socket.socketpair()
             with its_channel:
@@ -387,15 +379,12 @@ class _ForkServer:
         self._tell(life, pid)
         self._lives[pid] = role, life
         self._selector.register(life, selectors.EVENT_READ, partial(self._on_life, pid))
-        self._add_channel(channel)
+        self._add_channel(channel, pid)
 
     def _leave(self) -> None:
         """In a child: close what belongs to the server."""
-        signal.set_wakeup_fd(-1)
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         for key in tuple(self._selector.get_map().values()):
             cast(socket.socket, key.fileobj).close()
-        self._wake_end.close()
         self._selector.close()
 
     def _on_life(self, pid: int) -> None:
@@ -414,22 +403,19 @@ class _ForkServer:
             del self._doomed[pid]
             os.kill(pid, signal.SIGKILL)
 
-    def _reap(self) -> None:
-        with suppress(BlockingIOError):
-            self._wake.recv(4096)
-        while self._lives:
-            pid, status = os.waitpid(-1, os.WNOHANG)
-            if not pid:
-                return
-            role, life = self._lives.pop(pid)
-            self._doomed.pop(pid, None)
-            with suppress(KeyError):
-                self._selector.unregister(life)
-            code = os.waitstatus_to_exitcode(status)
-            if code:
-                self._module(role).clean_up()
-            with life:
-                self._tell(life, code)
+    def _reap(self, pid: int) -> None:
+        """A child has ended; one that has only closed its channel ends now."""
+        os.kill(pid, signal.SIGKILL)
+        _, status = os.waitpid(pid, 0)
+        role, life = self._lives.pop(pid)
+        self._doomed.pop(pid, None)
+        with suppress(KeyError):
+            self._selector.unregister(life)
+        code = os.waitstatus_to_exitcode(status)
+        if code:
+            self._module(role).clean_up()
+        with life:
+            self._tell(life, code)
 
     @staticmethod
     def _tell(life: socket.socket, number: int) -> None:
