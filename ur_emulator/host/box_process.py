@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
@@ -61,7 +62,7 @@ class ProcessRack:
         self._sending = threading.Lock()
         self._state = threading.Lock()
         self._futures: dict[int, Future[Any]] = {}
-        self._n_requests = 0
+        self._numbers = count(1)
         self._reader: threading.Thread | None = None
         self._has_ended = False
         self._said_farewell = False
@@ -166,8 +167,7 @@ class ProcessRack:
                 raise NotRunningError(
                     self._why_ended() if self._has_ended else "the box does not run: start it first"
                 )
-            self._n_requests += 1
-            number = self._n_requests
+            number = next(self._numbers)
             self._futures[number] = future
         try:
             self._send((kind, number, *request))

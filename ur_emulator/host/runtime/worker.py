@@ -348,12 +348,9 @@ class TaskQueue:
 
     def lose(self, process: _Process, error: Exception | None = None) -> None:
         """Do without a process that has ended, or with which we failed; its task fails."""
-        task = self._under_way.pop(process, None)
-        if process is self._process:
-            self._process = None
-        if error is not None:
-            process.child.kill()
+        task = self._under_way.get(process)
         reason = repr(error) if error else _reason(process.child)
+        self._kill(process)
         self._release(process)
         if task is not None:
             self._finish(task, None, WorkerError(reason))
