@@ -247,8 +247,7 @@ class Box:
         options = self._options
         if options.journal is None:
             return None
-        waits = self._choice.pace is Pace.LOCKSTEP
-        journal = Journal(Path(options.journal), options, self._box.notice, waits=waits)
+        journal = Journal(Path(options.journal), options, self._box.notice)
         self._box.keep = journal.write
         return journal
 

@@ -42,14 +42,13 @@ class JournalError(EmulatorError):
 class Journal:
     """Writes the journal of one box, in a thread of its own: a slow disk delays no cycle."""
 
-    def __init__(
-        self, path: Path, options: BoxOptions, report: Callable[[str], None], *, waits: bool
-    ) -> None:
+    def __init__(self, path: Path, options: BoxOptions, report: Callable[[str], None]) -> None:
         """Open the file and write the first line.
+
+        In lockstep a cycle waits when too many others are not written yet; in real time it is lost.
 
         Args:
             report: writes into the log of the box that cycles were lost.
-            waits: a cycle waits when too many others are not written yet (lockstep); otherwise it is lost.
 
         Raises:
             JournalError: the file cannot be written.
@@ -62,7 +61,7 @@ class Journal:
             raise JournalError(f"journal {path} given: {error.strerror}") from None
         self._path = path
         self._report = report
-        self._waits = waits
+        self._waits = Pace(options.pace) is Pace.LOCKSTEP
         # Number, inputs and answer of each cycle; without inputs: so many cycles are lost. None is the end.
         self._cycles: Queue[tuple[int, Sequence[Input] | None, Answer | None] | None]
         self._cycles = Queue(BUDGETS.journal_cycles)
