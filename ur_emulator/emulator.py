@@ -23,6 +23,7 @@ from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt, check_count, counted_up
 from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
 from ur_emulator.host.control_api.operations import BoxOperations
+from ur_emulator.host.control_api.step_operations import ReadLog
 
 if TYPE_CHECKING:
     from ur_emulator.host.box_process import ProcessRack
@@ -129,13 +130,12 @@ class BoxControl(BoxOperations):
 
     def _perform(self, operation: Operation[Any]) -> Any:
         __tracebackhide__ = True
+        if isinstance(operation, ReadLog):  # also after the end
+            return self._rack.log(self._index)
         try:
             return self._rack.perform(self._index, operation)
         except EmulatorError as error:
             raise error.with_traceback(None) from None  # pytest shows the line of the test only
-
-    def _log_entries(self) -> tuple[LogEntry, ...]:
-        return self._rack.log(self._index)
 
 
 class _Running:
