@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
+from protocol.errors import ProtocolError
 from protocol.primary.messages import ReportLevel
 from protocol.serial_numbers import simulated_serial
 from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotType, SoftwareVersion
 from ur_emulator.errors import ControlError, EmulatorError, ModelError, NotRunningError
-from ur_emulator.host.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
+from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.journal import Journal
@@ -72,8 +73,8 @@ class Choice:
         software = generation.software(version)
         fidelity = generation.fidelity(options.fidelity)
         closed = generation.closed_ports(options.services)
-        pace = parse_pace(options.pace)
         options.check()
+        pace = Pace(options.pace)
         if not (options.remote_control or generation.has_remote_control):
             raise EmulatorError(
                 f"local control given: a box of the {generation.name} has none, "
@@ -118,7 +119,11 @@ class Choice:
 
         EmulatorError if the numbers of its ports are not all numbers of TCP.
         """
-        standard, without = standard_ports(options.port_base or 0), {CONTROL, *self.closed}
+        try:
+            standard = Ports.standard(options.port_base or 0)
+        except ProtocolError as error:
+            raise EmulatorError(str(error)) from None
+        without = {CONTROL, *self.closed}
         return ServedAt(
             title=f"{self.model.title} {self.model.generation.name} {self.version}",
             serial_number=self.identity.serial_number,

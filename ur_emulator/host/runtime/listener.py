@@ -78,10 +78,7 @@ class ClientLimits:
 
     def release(self, host: str, port: int) -> None:
         """Forget a client that is gone."""
-        for key, _, _ in _limits(host, port):
-            self._taken[key] -= 1
-            if not self._taken[key]:
-                del self._taken[key]
+        self._taken -= Counter(key for key, _, _ in _limits(host, port))  # what is at 0 goes
 
 
 def _limits(host: str, port: int) -> tuple[tuple[tuple[str | int, ...], int, str], ...]:
