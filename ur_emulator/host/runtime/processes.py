@@ -77,10 +77,7 @@ def _read(pipe: socket.socket, size: int) -> bytes:
 
 
 class Pipe(BufferedSocket):
-    """A pipe in a loop: nothing waits. `take` gets the messages that have come completely.
-
-    Its end is no event: who has a pipe learns in another way that the other process has ended.
-    """
+    """A pipe in a loop: nothing waits; it closes when the other end is gone. `take` gets whole messages."""
 
     def __init__(self, loop: EventLoop, sock: socket.socket) -> None:
         super().__init__(loop, sys.maxsize, _READ_SIZE)
