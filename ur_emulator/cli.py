@@ -44,6 +44,13 @@ WANTED_DESCRIPTORS = 65_536
 app = new_app("An emulated Universal Robots control box.")
 
 
+def _option(text: str, *names: str, **more: Any) -> Any:
+    return typer.Option(*names, help=text, **more)
+
+
+_window_port = partial(_option, "Port of the window; 0 takes a free one.", min=0, max=65535)
+
+
 @app.command(
     epilog=examples(
         "ur-emulator serve",
@@ -54,102 +61,79 @@ app = new_app("An emulated Universal Robots control box.")
     )
 )
 def serve(
-    robot: Annotated[str, typer.Option(help="Type of the arm, or FILE.toml: an arm of your own.")] = "ur3",
+    robot: Annotated[str, _option("Type of the arm, or FILE.toml: an arm of your own.")] = "ur3",
     software: Annotated[
         str | None,
-        typer.Option(
+        _option(
+            "Software the box runs; decides packet layouts and builtins.",
             "--software",
             "--version",
-            help="Software the box runs; decides packet layouts and builtins.",
             show_default="the usual one of the arm's generation",
         ),
     ] = None,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; 127.0.0.1 keeps other machines out.")
-    ] = "127.0.0.1",
+    host: Annotated[str, _option("Address to listen on; 127.0.0.1 keeps other machines out.")] = "127.0.0.1",
     pace: Annotated[
-        str, typer.Option(help="realtime, or lockstep: as fast as the processor, and repeatable.")
+        str, _option("realtime, or lockstep: as fast as the processor, and repeatable.")
     ] = "realtime",
-    speed: Annotated[float, typer.Option(help="Times as fast as real time (realtime pace only).")] = 1.0,
-    seed: Annotated[int, typer.Option(help="Which arm: calibration, gear phases, delays, noise.")] = 0,
+    speed: Annotated[float, _option("Times as fast as real time (realtime pace only).")] = 1.0,
+    seed: Annotated[int, _option("Which arm: calibration, gear phases, delays, noise.")] = 0,
     fidelity: Annotated[
-        str,
-        typer.Option(
-            help="How imperfect the arm is: exact (no physics), ideal, typical, poor, or FILE.toml."
-        ),
+        str, _option("How imperfect the arm is: exact (no physics), ideal, typical, poor, or FILE.toml.")
     ] = "typical",
-    port_base: Annotated[int, typer.Option(help="Offset added to all standard ports.")] = 0,
+    port_base: Annotated[int, _option("Offset added to all standard ports.")] = 0,
     boxes: Annotated[
-        int, typer.Option(help="How many boxes; --host and --seed are those of the first, then counted up.")
+        int, _option("How many boxes; --host and --seed are those of the first, then counted up.")
     ] = 1,
-    tool: Annotated[
-        str, typer.Option(help="On the flange: none, robotiq-2f85 and others, or FILE.toml.")
-    ] = "none",
+    tool: Annotated[str, _option("On the flange: none, robotiq-2f85 and others, or FILE.toml.")] = "none",
     scene: Annotated[
-        Path | None,
-        typer.Option(help="Around the arm, with things to grip: a cell file (.toml), or MJCF (.xml)."),
+        Path | None, _option("Around the arm, with things to grip: a cell file (.toml), or MJCF (.xml).")
     ] = None,
     programs: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder of programs (.urp, .script) and installations, for the dashboard's load and play."
-        ),
+        _option("Folder of programs (.urp, .script) and installations, for the dashboard's load and play."),
     ] = None,
     skip_unknown_nodes: Annotated[
         bool,
-        typer.Option(
-            "--skip-unknown-nodes",
-            help="Run .urp programs without the nodes that are not known, as of URCaps.",
+        _option(
+            "Run .urp programs without the nodes that are not known, as of URCaps.", "--skip-unknown-nodes"
         ),
     ] = False,
     remote_control: Annotated[
         bool,
-        typer.Option(
+        _option(
+            "Whether clients may command an e-Series box: the dashboard, and scripts on 30001 to 30003.",
             "--remote-control/--local-control",
-            help="Whether clients may command an e-Series box: the dashboard, and scripts on 30001 to 30003.",
         ),
     ] = True,
     control_port: Annotated[
         int | None,
-        typer.Option(
-            help="Open the control API over HTTP on this port, for `ur-emulator ctl` (its default: 29900)."
-        ),
+        _option("Open the control API over HTTP on this port, for `ur-emulator ctl` (its default: 29900)."),
     ] = None,
     token: Annotated[
         str | None,
-        typer.Option(
-            help="What requests to the control API must show; better in the environment, "
+        _option(
+            "What requests to the control API must show; better in the environment, "
             "where other users of the machine do not see it.",
             envvar=TOKEN_VARIABLE,
             show_envvar=True,
         ),
     ] = None,
     services: Annotated[
-        str, typer.Option(help="Services of a PolyScope X box to enable: primary,rtde.", show_default="none")
+        str, _option("Services of a PolyScope X box to enable: primary,rtde.", show_default="none")
     ] = "",
     pendant: Annotated[
-        bool, typer.Option("--pendant", help="Open a window on the box in the browser, on port 29980.")
+        bool, _option("Open a window on the box in the browser, on port 29980.", "--pendant")
     ] = False,
-    pendant_view: Annotated[bool, typer.Option("--pendant-view", help="The same, to look only.")] = False,
-    window_port: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=65535, help="Port of the window; 0 takes a free one.", show_default="29980 + port base"
-        ),
-    ] = None,
-    window_host: Annotated[
-        str, typer.Option(help="Address of this machine that the window is on.")
-    ] = "127.0.0.1",
-    ready_file: Annotated[
-        Path | None, typer.Option(help="Write address and ports here (JSON) when ready.")
-    ] = None,
+    pendant_view: Annotated[bool, _option("The same, to look only.", "--pendant-view")] = False,
+    window_port: Annotated[int | None, _window_port(show_default="29980 + port base")] = None,
+    window_host: Annotated[str, _option("Address of this machine that the window is on.")] = "127.0.0.1",
+    ready_file: Annotated[Path | None, _option("Write address and ports here (JSON) when ready.")] = None,
     journal: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write the inputs of each cycle here, for `ur-emulator replay`."),
+        _option("Write the inputs of each cycle here, for `ur-emulator replay`.", metavar="FILE"),
     ] = None,
     log: Annotated[
-        bool,
-        typer.Option("--log", "-v", help="Show the log of the box on stderr: programs, errors, clients."),
+        bool, _option("Show the log of the box on stderr: programs, errors, clients.", "--log", "-v")
     ] = False,
 ) -> None:
     """Serve a control box, or several, powered on with the brakes released, until Ctrl-C."""
@@ -158,7 +142,7 @@ def serve(
     except ImportError as error:
         _complain(str(error))
         raise typer.Exit(ExitCode.FAILED) from None
-    from ur_emulator.host.runtime.processes import Role, prepare_children
+    from ur_emulator.host.runtime.processes import prepare_workers
 
     has_pendant = pendant or pendant_view
     if has_pendant:
@@ -169,7 +153,7 @@ def serve(
         control_port = 0  # for what the window does beside what a pendant can
         token = token if is_loopback(host) else token or token_urlsafe()
     raise_descriptor_limit()
-    prepare_children(Role.WORKER)  # the compiler is loaded while the box is loaded
+    prepare_workers()  # the compiler is loaded while the box is loaded
     os.environ.setdefault("MUJOCO_GL", "disabled")  # the box draws nothing
     from ur_emulator.host.rack import LoopRack
     from ur_emulator.host.runtime.line_writer import LineWriter
@@ -207,7 +191,7 @@ def serve(
         for name in _END_SIGNALS:
             signal.signal(name, lambda number, frame: rack.stop())
         rack.listen()
-        served = [box.served_at for box in rack.boxes]
+        served = rack.served
         if ready_file is not None:
             _write_ready_file(ready_file, served)
     except (EmulatorError, ProtocolError, OSError) as error:
@@ -307,26 +291,24 @@ def ctl(
 )
 def pendant(
     hosts: Annotated[list[str], typer.Argument(metavar="HOST...", help="Boxes or real arms.")],
-    port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of the window; 0 takes a free one.")
-    ] = PENDANT_PORT,
-    port_base: Annotated[int, typer.Option(help="Offset of the robots' ports, as given to the box.")] = 0,
+    port: Annotated[int, _window_port()] = PENDANT_PORT,
+    port_base: Annotated[int, _option("Offset of the robots' ports, as given to the box.")] = 0,
     control_port: Annotated[
         list[int] | None,
-        typer.Option(help="Control API of an emulated box, once for each host: opens what no pendant has."),
+        _option("Control API of an emulated box, once for each host: opens what no pendant has."),
     ] = None,
-    view: Annotated[bool, typer.Option("--view", help="Show only, hold nothing.")] = False,
+    view: Annotated[bool, _option("Show only, hold nothing.", "--view")] = False,
     tool: Annotated[
-        str | None, typer.Option(help="Tool of a robot without a control API: a name, or FILE.toml.")
+        str | None, _option("Tool of a robot without a control API: a name, or FILE.toml.")
     ] = None,
-    cell: Annotated[Path | None, typer.Option(help="What stands around such a robot: a cell file.")] = None,
+    cell: Annotated[Path | None, _option("What stands around such a robot: a cell file.")] = None,
     listen: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Address of this machine that the window is on.")
     ] = "127.0.0.1",
     token: Annotated[
         str | None,
-        typer.Option(
-            help="What a page must show, as /?token=...; needed beyond loopback.",
+        _option(
+            "What a page must show, as /?token=...; needed beyond loopback.",
             envvar=PAGE_TOKEN_VARIABLE,
             show_envvar=True,
         ),
@@ -336,16 +318,8 @@ def pendant(
     _check_window()
     if token is not None:
         os.environ[PAGE_TOKEN_VARIABLE] = token
-    options = _window_options(
-        hosts=hosts,
-        control_ports=control_port or (),
-        port_base=port_base,
-        port=port,
-        view=view,
-        tool=tool,
-        cell=cell,
-        listen=listen,
-    )
+    where = {"hosts": hosts, "control_ports": control_port or (), "port_base": port_base}
+    options = _window_options(**where, port=port, view=view, tool=tool, cell=cell, listen=listen)
     # A shell has a command in the background ignore it, also after `execv`, but not what was caught.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.execv(sys.executable, [*_WINDOW, options])
@@ -392,14 +366,12 @@ class _WindowProcess:
 
 
 def raise_descriptor_limit() -> int:
-    """Raise this process's limit of descriptors as far as the system allows; return it, 0 without one.
+    """Raise this process's limit of descriptors as far as the system allows; return it.
 
     Each client takes a descriptor, and some systems start with 256.
     """
-    try:
-        import resource
-    except ImportError:
-        return 0
+    import resource
+
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED_DESCRIPTORS if hard == resource.RLIM_INFINITY else min(WANTED_DESCRIPTORS, hard)
     if soft == resource.RLIM_INFINITY or soft >= wanted:

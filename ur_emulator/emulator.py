@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from os import PathLike
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self, overload
+from typing import TYPE_CHECKING, Any, Self, TypeAlias, overload
 
 from protocol.ur_types import Ports
 from ur_emulator.errors import EmulatorError
@@ -23,59 +23,22 @@ from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt, check_count, counted_up
 from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, AttachedBox
 from ur_emulator.host.control_api.operations import BoxOperations
+from ur_emulator.host.control_api.step_operations import ReadLog
 
 if TYPE_CHECKING:
+    from ur_emulator.host.box_process import ProcessRack
     from ur_emulator.host.pacing import Pace
+    from ur_emulator.host.rack import LoopRack
     from ur_emulator.machine.commands.operation import Operation
     from ur_emulator.machine.controller.command import Command, Done
     from ur_emulator.machine.models.robot_generation import RobotGeneration
 
-
-class Rack(Protocol):
-    """Boxes that run together somewhere; a number says which one is meant."""
-
-    def start(self) -> None:
-        """Open the ports and run."""
-        ...
-
-    def stop(self) -> None:
-        """Let the boxes end, soon; from any thread."""
-        ...
-
-    def join(self) -> BaseException | None:
-        """End the boxes and wait for that; return the error that has ended one, if there is one."""
-        ...
-
-    def served_at(self, index: int) -> ServedAt:
-        """Where a box is served, and as what."""
-        ...
-
-    def perform(self, index: int, operation: Operation[Any]) -> Any:
-        """Have an operation done; return its result."""
-        ...
-
-    def submit(self, index: int, command: Command, done: Done | None) -> None:
-        """Submit a command for the next cycle."""
-        ...
-
-    def log(self, index: int) -> tuple[LogEntry, ...]:
-        """Return the last entries of the log, the oldest first."""
-        ...
-
-    def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
-        """Call `follower` with every entry from now on."""
-        ...
-
-    def end_of(self, index: int) -> tuple[bool, Exception | None]:
-        """Return whether a client has switched the box off, and the error that has ended it."""
-        ...
+# Boxes that run together; in their methods a number says which one is meant.
+OwnRack: TypeAlias = "LoopRack | ProcessRack"
 
 
-def make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> Rack:
-    """Assemble boxes in a process of their own, or on a loop in this one.
-
-    EmulatorError if an argument is not allowed, or there are no boxes, or too many.
-    """
+def _make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> OwnRack:
+    """Assemble boxes in a process of their own, or on a loop in this one."""
     check_count(len(options))
     if in_process:
         from ur_emulator.host.rack import LoopRack
@@ -92,7 +55,7 @@ class BoxControl(BoxOperations):
     `push`, `wait_until`, `state`, `log` and so on may be called from any thread.
     """
 
-    def __init__(self, rack: Rack, index: int = 0) -> None:
+    def __init__(self, rack: OwnRack | AttachedBox, index: int = 0) -> None:
         self._rack = rack
         self._index = index
 
@@ -163,43 +126,42 @@ class BoxControl(BoxOperations):
 
     @property
     def _served_at(self) -> ServedAt:
-        return self._rack.served_at(self._index)
+        return self._rack.served[self._index]
 
     def _perform(self, operation: Operation[Any]) -> Any:
         __tracebackhide__ = True
+        if isinstance(operation, ReadLog):  # also after the end
+            return self._rack.log(self._index)
         try:
             return self._rack.perform(self._index, operation)
         except EmulatorError as error:
             raise error.with_traceback(None) from None  # pytest shows the line of the test only
 
-    def _log_entries(self) -> tuple[LogEntry, ...]:
-        return self._rack.log(self._index)
-
 
 class _Running:
     """Boxes for one `with`."""
 
-    _rack: Rack
+    _own: OwnRack
 
     def stop(self) -> None:
         """Let the boxes end, soon; from any thread."""
-        self._rack.stop()
+        self._own.stop()
 
     def close(self) -> None:
         """End, and close all ports and connections; harmless if that has been done."""
-        self._rack.join()
+        self._own.join()
 
     def __enter__(self) -> Self:
         """Open the ports and run."""
         __tracebackhide__ = True
-        self._rack.start()
+        self._own.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End; an error that ended a box earlier is raised here."""
-        failure = self._rack.join()
+        failure = self._own.join()
         if failure is not None and error is None:
             raise failure
 
@@ -275,7 +237,8 @@ class ControlBox(_Running, BoxControl):
             scene,
             journal,
         )
-        super().__init__(make_rack([options], in_process=in_process))
+        self._own = _make_rack([options], in_process=in_process)
+        super().__init__(self._own)
 
     @staticmethod
     def many(count: int, *, in_process: bool = False, **options: Any) -> BoxRack:
@@ -330,8 +293,8 @@ class BoxRack(_Running, Sequence[BoxControl]):
             EmulatorError: an argument is not among the allowed ones, or there are no boxes, or too many.
         """
         every = [one if isinstance(one, BoxOptions) else BoxOptions(**one) for one in options]
-        self._rack = make_rack(every, in_process=in_process)
-        self._boxes = tuple(BoxControl(self._rack, index) for index in range(len(every)))
+        self._own = _make_rack(every, in_process=in_process)
+        self._boxes = tuple(BoxControl(self._own, index) for index in range(len(every)))
 
     @overload
     def __getitem__(self, index: int) -> BoxControl: ...

@@ -1,21 +1,4 @@
-"""What can go wrong inside the control box, as one tree.
-
-EmulatorError
-├── ModelError        an unknown robot or fidelity name, or numbers that make no arm
-├── KinematicsError   arguments of the controller's own kinematics make no sense
-├── PlantError        the physics cannot go on: a target that is not a number, or a diverged simulation
-├── ProgramFileError  a program or installation file cannot be used
-│   ├── FileMissingError      there is no such file
-│   ├── UndefinedError        something in it is not filled in, or names what is not there
-│   └── UnknownNodeError      no script is known for a node of a program
-├── ControlError      an operation of the control API was not done
-│   ├── ArgumentError         it was given something that it does not take
-│   ├── RefusedError          the state of the box stands against it
-│   │   ├── WaitTimeoutError  what was waited for did not come (a TimeoutError as well)
-│   │   └── WorkerError       the process for long tasks could not be started, or has ended
-│   └── NotRunningError       the box does not run, or has ended before it was done
-└── PortError         a TCP port of the box cannot be opened
-    └── PortPermissionError   because this user may not
+"""What can go wrong inside the control box.
 
 Every message is one line: what was given, what is allowed, what to do. Errors of URScript programs are
 not here: they belong to the program (`urscript.errors`), not to the box.

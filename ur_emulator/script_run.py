@@ -43,7 +43,7 @@ _TRUE, _FALSE = frozenset({"true", "yes", "1"}), frozenset({"false", "no", "0"})
 
 
 class ScriptBox:
-    """A box for one program (see urscript.robot.ScriptRobot).
+    """A box for one program (see urscript.robot.ScriptRobot), and the run of it as a service of a loop.
 
     Attributes:
         step_time: control cycle [s].
@@ -60,80 +60,49 @@ class ScriptBox:
         asked = f"{software[0]}.{software[1]}"
         model = robot_by_name(robot, asked)
         version = model.software_version(asked)
-        self._loop = EventLoop()
-        self._machine = Machine(
+        self._machine = machine = Machine(
             model, model.generation.fidelity(fidelity), seed, version=(version.major, version.minor)
         )
-        self._controller = self._machine.controller
-        self._answers = deque(answers)
-        self._start_tick = self._controller.snapshot.tick
+        self._controller = machine.controller
         self.title = f"{model.title}, fidelity {fidelity}, seed {seed}"
         self.step_time = self._controller.period_s
+        self._loop = EventLoop()
+        self._network = LoopNetwork(self._loop, machine.network, self.step_time, machine.take, _raise)
+        self._answers = deque(answers)
+        self._commands: list[Command] = []
+        self._first_tick = self._controller.snapshot.tick
+        self._status = RunStatus.RUNNING
+        self._is_over = False
+        # From the start to the end of the program, and from the first cycle to the last [s].
+        self._robot_time = self._real_time = 0.0
+        self._began = math.nan
+        self._due = -math.inf
+        self._waits_since = math.inf
+        # The last move that was under way at the beginning of a cycle.
+        self._move: Move | None = None
+        self._rest = model.generation.cycles(REST_TIME)
 
     @property
     def time(self) -> float:
         """Robot time since the program began [s]: at the start of the present cycle."""
-        return (self._controller.snapshot.tick - self._start_tick) * self.step_time
+        return self._cycles * self.step_time
 
     def run(self, program: CompiledProgram, limit: float, report: Callable[[Report], None]) -> RunEnd:
         """Run a program to its end and the arm to rest; see urscript.robot.ScriptRobot."""
-        run = _Run(self._machine, self._loop, self._answers, limit, report)
-        run.submit(StartProgram(program, loaded=True))
-        self._loop.add(run)
+        self._limit_cycles = round(min(limit / self.step_time, 1e15))
+        self._send = report
+        self._commands.append(StartProgram(program, loaded=True))
+        self._loop.add(self)
         try:
             self._loop.run()
         except KeyboardInterrupt:
-            run.interrupt()
+            if not self._is_over:
+                self._end(RunStatus.INTERRUPTED)
+            self._tick((*self._commands, StopProgram()))
         finally:
             self._loop.close()
         now = self._controller.snapshot
-        return RunEnd(run.status, run.robot_time, run.real_time, now.actual_q, now.actual_tcp_pose)
-
-
-class _Run:
-    """One run as a service of the loop: ticks, answers for the operator, knows when it is over.
-
-    Attributes:
-        robot_time: from the start to the end of the program [s].
-        real_time: from the first cycle to the last [s].
-    """
-
-    def __init__(
-        self,
-        machine: Machine,
-        loop: EventLoop,
-        answers: deque[str],
-        limit: float,
-        report: Callable[[Report], None],
-    ) -> None:
-        self.status = RunStatus.RUNNING
-        self.robot_time = self.real_time = 0.0
-        self._machine = machine
-        self._controller = controller = machine.controller
-        self._network = LoopNetwork(loop, machine.network, controller.period_s, machine.take, _raise)
-        self._loop = loop
-        self._answers = answers
-        self._limit_cycles = round(min(limit / controller.period_s, 1e15))
-        self._send = report
-        self._commands: list[Command] = []
-        self._first_tick = controller.snapshot.tick
-        self._began = math.nan
-        self._due = -math.inf
-        self._waits_since = math.inf
-        self._is_over = False
-        # The last move that was under way at the beginning of a cycle.
-        self._move: Move | None = None
-        self._rest = controller.generation.cycles(REST_TIME)
-
-    def submit(self, command: Command) -> None:
-        """Take a command for the next cycle."""
-        self._commands.append(command)
-
-    def interrupt(self) -> None:
-        """End the program at once, after Ctrl-C."""
-        if not self._is_over:
-            self._end(RunStatus.INTERRUPTED)
-        self._tick((*self._commands, StopProgram()))
+        return RunEnd(self._status, self._robot_time, self._real_time, now.actual_q, now.actual_tcp_pose)
 
     # --- the loop
 
@@ -141,7 +110,7 @@ class _Run:
         """Tick, unless it is not time to; return when to be called next at the latest."""
         if math.isnan(self._began):
             self._began = now
-        self.real_time = now - self._began
+        self._real_time = now - self._began
         if not self._commands and not self._is_over and self._controller.waits_outside:
             if now < self._due:
                 return self._due
@@ -149,10 +118,9 @@ class _Run:
         else:
             self._waits_since = math.inf
         commands, self._commands = self._commands, []
-        motion = self._controller.state.motion
-        self._move = motion.move or self._move
+        self._move = self._controller.state.motion.move or self._move
         answer = self._tick(commands)
-        self._due = now + self._controller.period_s
+        self._due = now + self.step_time
         for event in answer.events:
             self._take(event)
         if self._is_at_rest():
@@ -182,13 +150,13 @@ class _Run:
 
     def _is_at_rest(self) -> bool:
         """Update the state of the run; True when nothing more is expected."""
-        controller, cycles = self._controller, self._cycles
+        controller = self._controller
         if not self._is_over:
             if not controller.programs.is_running:
                 self._end(RunStatus.FINISHED)
             elif controller.state.safety.is_stopped and not controller.state.motion.is_moving:
                 self._end(RunStatus.STOPPED)
-            elif cycles >= self._limit_cycles:
+            elif self._cycles >= self._limit_cycles:
                 self._end(RunStatus.RUNNING)
             return False
         self._rest -= 1
@@ -201,11 +169,11 @@ class _Run:
     def _end(self, status: RunStatus) -> None:
         """The program is over, or has to be; from now on only the arm matters."""
         self._is_over = True
-        if self.status is RunStatus.RUNNING:
-            self.status = status
+        if self._status is RunStatus.RUNNING:
+            self._status = status
         # Up to the beginning of its last cycle, as in all reports; a program that was ended had all of it.
         cycles = self._cycles - (status is not RunStatus.RUNNING)
-        self.robot_time = max(0, cycles) * self._controller.period_s
+        self._robot_time = max(0, cycles) * self.step_time
         self._commands.append(StopProgram())
 
     # --- what is said
@@ -215,7 +183,7 @@ class _Run:
             case ev.TextPrinted(text):
                 self._report(ReportKind.TEXT, text)
             case ev.ScriptFailed(line, column, text):
-                self.status = RunStatus.FAILED
+                self._status = RunStatus.FAILED
                 self._report(ReportKind.FAILURE, text, line, column)
             case ev.ErrorReported(code, argument, _, text):
                 coded = f"C{code}A{argument}: {text}" if code else text
@@ -247,7 +215,7 @@ class _Run:
             self._commands.append(answer)
             return
         given = "and there is no answer" if text is None else f"but the answer is '{text}'"
-        self.status = RunStatus.FAILED
+        self._status = RunStatus.FAILED
         message = f"the program asks for {_KINDS[kind]}: '{question}', {given} (--answer)"
         self._report(ReportKind.FAILURE, message, *self._place())
         self._commands.append(StopProgram())
@@ -261,7 +229,7 @@ class _Run:
         return run.position(next((it for it in run.threads if it is owner), run.threads[0]))
 
     def _report(self, kind: ReportKind, text: str, line: int = 0, column: int = 0) -> None:
-        time = max(0, self._cycles - 1) * self._controller.period_s
+        time = max(0, self._cycles - 1) * self.step_time
         self._send(Report(time, kind, text, line, column))
 
 

@@ -254,7 +254,7 @@ class Robot:
                     box, seen = AttachedBox(at.host, at.control_port, at.token), 0
                     self.log.clear()
                     # Which ports it has: that of the dashboard server is not there with PolyScope X.
-                    self.address = replace(at, ports=box.served_at(0).ports)
+                    self.address = replace(at, ports=box.served[0].ports)
                 state: BoxState = box.perform(0, ReadState())
                 if next(turns) % _LOG_EVERY == 0:
                     news = box.perform(0, ReadLog(after=seen))

@@ -147,6 +147,7 @@ class FuzzBox:
         )
         inside(box).on_end = lambda: None
         self.served, self.loop = inside(box)._box, inside(box)._loop
+        self.tasks = inside(box)._tasks
         self.controller = self.served.controller
         self.generation = self.controller.state.robot.generation
         self.period = self.generation.period_s
@@ -321,7 +322,7 @@ class FuzzBox:
             service.advance(time.monotonic())
         self.loop.call_soon(_nothing, _raise)  # so that it does not wait
         self.loop._dispatch(time.monotonic() + _NEVER)
-        while not self.loop.tasks.is_idle:
+        while not self.tasks.is_idle:
             self.loop._dispatch(time.monotonic() + _NEVER)
         assert not self.defects, self.defects
 

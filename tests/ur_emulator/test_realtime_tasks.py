@@ -17,7 +17,7 @@ from ur_emulator.errors import WorkerError
 from ur_emulator.host.runtime import processes
 from ur_emulator.host.runtime import worker as module
 from ur_emulator.host.runtime.event_loop import EventLoop
-from ur_emulator.host.runtime.worker import Ticket
+from ur_emulator.host.runtime.worker import TaskQueue, Ticket
 from ur_emulator.program_files.compiling import compile_text
 from urscript.catalogue import catalogue_for
 from urscript.program import ProgramStatus, compile_program
@@ -29,6 +29,7 @@ class Bench:
 
     def __init__(self):
         self.loop = EventLoop()
+        self.tasks = TaskQueue(self.loop)
         self.results = []
         self.n_wanted = None
 
@@ -36,11 +37,11 @@ class Bench:
         return self.submit_at(Ticket(object()), function, *arguments)
 
     def submit_at(self, place, function, *arguments):
-        return self.loop.tasks.submit(lambda *it: self._note(*it), pytest.fail, place, function, *arguments)
+        return self.tasks.submit(lambda *it: self._note(*it), pytest.fail, place, function, *arguments)
 
     def _note(self, result, error):
         self.results.append(result if error is None else error)
-        if self.loop.tasks.is_idle or len(self.results) == self.n_wanted:
+        if self.tasks.is_idle or len(self.results) == self.n_wanted:
             self.loop.stop()
 
     def run(self, n_wanted=None):
@@ -60,6 +61,7 @@ class Bench:
 def bench():
     bench = Bench()
     yield bench
+    bench.tasks.close()
     bench.loop.close()
 
 
@@ -126,6 +128,7 @@ def test_a_process_that_is_stopped_costs_one_task_and_does_not_outlive_the_loop(
     assert str(stopped) == "the process that did it was stopped: try again"
     assert has_ended(pid)
     os.kill(other, signal.SIGSTOP)
+    bench.tasks.close()
     bench.loop.close()
     assert has_ended(other)
 
@@ -145,6 +148,7 @@ def test_a_task_does_not_take_long_while_its_process_has_not_begun(bench, monkey
     for number in range(3):
         other.submit(operator.add, number, 1)
     assert other.run() == [1, 2, 3]
+    other.tasks.close()
     other.loop.close()
 
 
@@ -196,8 +200,9 @@ def test_a_task_that_takes_long_does_not_hold_up_the_next_of_others(bench):
     first, second, too_many = bench.run(3)
     assert first == second != pid
     assert str(too_many).startswith("it takes long, and so does what another client has sent: ")
-    bench.loop.tasks.drop(long)
+    bench.tasks.drop(long)
     assert bench.run() == [3]
+    bench.tasks.close()
     bench.loop.close()
     assert has_ended(pid)
 
@@ -206,11 +211,12 @@ def test_a_task_that_is_dropped_does_not_hold_up_the_next(bench):
     pid = bench.ask(os.getpid)
     running, waiting = bench.submit(signal.pause), bench.submit(operator.add, 1, 2)
     bench.submit(os.getpid)
-    bench.loop.tasks.drop(waiting)
-    bench.loop.tasks.drop(running)
+    bench.tasks.drop(waiting)
+    bench.tasks.drop(running)
     (other,) = bench.run()
     assert other != pid
-    bench.loop.tasks.drop(running)
+    bench.tasks.drop(running)
+    bench.tasks.close()
     bench.loop.close()
     assert has_ended(pid)
 
@@ -218,6 +224,7 @@ def test_a_task_that_is_dropped_does_not_hold_up_the_next(bench):
 def test_a_loop_that_ends_does_not_wait_for_its_task(bench):
     pid = bench.ask(os.getpid)
     bench.submit(signal.pause)
+    bench.tasks.close()
     bench.loop.close()
     assert has_ended(pid)
 
@@ -228,7 +235,7 @@ def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, mon
 
     with monkeypatch.context() as patch:
         patch.setattr(module, "start_child", fail)
-        bench.loop.tasks.start()
+        bench.tasks.start()
         bench.submit(operator.add, 1, 2)
         bench.submit(operator.add, 3, 4)
         first, second = bench.run()
@@ -269,7 +276,7 @@ def test_a_fork_leaves_the_process_to_its_parent(bench):
     pid = bench.ask(os.getpid)
     child = os.fork()
     if not child:
-        mine = processes.start_child(processes.Role.WORKER)
+        mine = processes.start_child(processes.WORKER)
         os._exit(set(processes._children) != {mine})
     assert os.waitpid(child, 0)[1] == 0
     assert bench.ask(os.getpid) == pid

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ur_emulator.errors import EmulatorError
+from ur_emulator.errors import ArgumentError, EmulatorError
 from ur_emulator.host.box import Box
 from ur_emulator.host.box_options import BoxOptions
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.pacing import Situation
 from ur_emulator.host.runtime.event_loop import EventLoop
+from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.steps import Steps
 from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.controller.events import Event
@@ -67,7 +68,8 @@ class WalkBox:
             tool=kind.tool, services=kind.services, journal=programs / JOURNAL,
         )  # fmt: skip
         self._loop = EventLoop(precise=False)
-        self._box = Box(options, loop=self._loop)
+        self._tasks = TaskQueue(self._loop)
+        self._box = Box(options, tasks=self._tasks)
         assert self._box._journal is not None
         self._box._journal._waits = True
         self._box.on_end = self._loop.stop
@@ -116,7 +118,7 @@ class WalkBox:
     # --- the pacer
 
     def may_tick(self, now: float, situation: Situation) -> bool:
-        if self._left <= 0 or not self._loop.tasks.is_idle:
+        if self._left <= 0 or not self._tasks.is_idle:
             return False
         self._left -= 1
         return True
@@ -157,13 +159,18 @@ class WalkBox:
 
         def is_settled() -> bool:
             left[0] -= 1
-            return left[0] <= 0 and self._loop.tasks.is_idle
+            return left[0] <= 0 and self._tasks.is_idle
 
         self._run(is_settled)
 
     def perform(self, name: str, /, **arguments: object) -> None:
         """Have an operation of the control API done, in a cycle or some; what is refused is refused."""
-        self._do(lambda done: self._box.operations.begin(make(name, arguments), done))
+        try:
+            operation = make(name, arguments)
+        except ArgumentError:
+            self.tick(1)  # as for one that the state refuses
+        else:
+            self._do(lambda done: self._box.begin(operation, done))
 
     def steps(self, steps: Steps[Any]) -> None:
         """Have done what the player does in steps."""
@@ -227,6 +234,7 @@ class WalkBox:
         for sock in (*self.clients.values(), *self.peers, self.listener):
             sock.close()
         self._box.close()
+        self._tasks.close()
         self._loop.close()
 
 

@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection
+import threading
+from collections.abc import Callable, Collection, Generator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
+from protocol.errors import ProtocolError
 from protocol.primary.messages import ReportLevel
 from protocol.serial_numbers import simulated_serial
 from protocol.ur_types import LOCKSTEP_MASTERBOARD, SIMULATED_MASTERBOARD, Ports, RobotType, SoftwareVersion
-from ur_emulator.errors import EmulatorError, ModelError, NotRunningError
-from ur_emulator.host.box_log import BoxLog
-from ur_emulator.host.box_options import BoxOptions, ServedAt, parse_pace, standard_ports
+from ur_emulator.errors import ControlError, EmulatorError, ModelError, NotRunningError
+from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.control_api.operations import make
-from ur_emulator.host.control_api.runner import OperationRunner
-from ur_emulator.host.control_api.step_operations import Context
+from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.journal import Journal
 from ur_emulator.host.pacing import Pace, make_pacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
 from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, SendingPorts, answering_ports
 from ur_emulator.host.ports.script_intake import ProgramIntake
 from ur_emulator.host.reports.report_writer import ReportWriter
-from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
+from ur_emulator.host.runtime.event_loop import WAKE_UP
 from ur_emulator.host.runtime.listener import Port
 from ur_emulator.host.runtime.memory import MemoryWatch
-from ur_emulator.host.runtime.processes import Role, prepare_children
+from ur_emulator.host.runtime.processes import prepare_workers
+from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
+from ur_emulator.host.steps import Finished, Steps, settle
+from ur_emulator.machine.commands.operation import CommandOperation, Operation
 from ur_emulator.machine.controller.command import Command, Done
+from ur_emulator.machine.controller.events import LogAdded
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import RobotModel
@@ -38,6 +44,9 @@ from ur_emulator.machine.plant.scene import load_scene
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel, tools_by_name
+
+# Longest value of an argument in the log, in characters.
+_MAX_SHOWN = 60
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -64,8 +73,8 @@ class Choice:
         software = generation.software(version)
         fidelity = generation.fidelity(options.fidelity)
         closed = generation.closed_ports(options.services)
-        pace = parse_pace(options.pace)
         options.check()
+        pace = Pace(options.pace)
         if not (options.remote_control or generation.has_remote_control):
             raise EmulatorError(
                 f"local control given: a box of the {generation.name} has none, "
@@ -110,7 +119,11 @@ class Choice:
 
         EmulatorError if the numbers of its ports are not all numbers of TCP.
         """
-        standard, without = standard_ports(options.port_base or 0), {CONTROL, *self.closed}
+        try:
+            standard = Ports.standard(options.port_base or 0)
+        except ProtocolError as error:
+            raise EmulatorError(str(error)) from None
+        without = {CONTROL, *self.closed}
         return ServedAt(
             title=f"{self.model.title} {self.model.generation.name} {self.version}",
             serial_number=self.identity.serial_number,
@@ -126,47 +139,51 @@ class Box:
     Attributes:
         served_at: where clients find it, and as what.
         log: programs, errors, modes, text messages, clients.
-        operations: does what users ask of it.
         is_shut_down: a dashboard client has switched the box off: its ports are closed.
         failure: the error that has ended the box, None while there is none.
         on_end: called in the loop's thread when the box was switched off or an error has ended it.
     """
 
     def __init__(
-        self, options: BoxOptions, *, loop: EventLoop, phase: float = 0.0, lead: float = WAKE_UP
+        self, options: BoxOptions, *, tasks: TaskQueue, phase: float = 0.0, lead: float = WAKE_UP
     ) -> None:
         """Assemble the box; nothing listens before `listen`. EmulatorError if an argument is not allowed.
 
         Args:
-            loop: perhaps shared with other boxes.
+            tasks: with their loop perhaps shared with other boxes.
             phase: which part of a period its cycles lie after those of the first box of the loop.
             lead: how long before its deadline a cycle may be computed [s] (realtime pace only).
         """
         choice = Choice.of(options)
-        prepare_children(Role.WORKER)  # the compiler is loaded while the box is assembled
+        prepare_workers()  # the compiler is loaded while the box is assembled
         period = choice.model.generation.period_s
         folder = ProgramFolder(None if options.programs is None else Path(options.programs))
         self._options = options
         self._choice = choice
-        self._loop = loop
+        self._loop = loop = tasks.loop
+        self._tasks = tasks
         machine = choice.make_machine(options)
         self._box = ServedBox(
             machine,
             choice.identity,
             make_pacer(choice.pace, period, options.speed, phase, lead),
-            loop,
+            tasks,
             self._fail,
         )
+        self.log = self._box.log
         self._network = self._box.network = LoopNetwork(
             loop, machine.network, period, self._box.arrive, self._box.report, options.host
         )
-        self._intake = ProgramIntake(loop.tasks, self._box)
+        self._intake = ProgramIntake(tasks, self._box)
         self._player = ProgramPlayer(
             self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
         )
         self._reports = ReportWriter(self._box, self._player)
         self._journal = self._open_journal()
-        self.operations = OperationRunner(loop, Context(self._box, self._player, self._identity_now, make))
+        self._context = Context(self._box, self._player, self._identity_now, make)
+        self._lock = threading.Lock()
+        self._awaited: WeakSet[Future[Any]] = WeakSet()
+        self._is_closed = False
         sending = SendingPorts.make(self._box, self._intake)
         ports = (
             sending.by_name
@@ -183,20 +200,49 @@ class Box:
         self.failure: Exception | None = None
         self.on_end: Callable[[], None] = self.close
 
-    @property
-    def log(self) -> BoxLog:
-        """What PolyScope's log tab would show."""
-        return self._box.log
+    # --- what users ask of it
 
     def submit(self, command: Command, done: Done | None = None) -> None:
-        """Ask for something as a client of the box would, from any thread; it acts in the next cycle.
-
-        Args:
-            command: one of `machine.commands`, such as `programs.ClosePopup()` or `power.PowerOff()`.
-            done: called in that cycle, in the thread of the box: with its result and None, or with
-                None and the error, a `RefusedError` if it was refused.
-        """
+        """Take a command for the next cycle, from any thread; `done` is called then, in that of the loop."""
         self._loop.call_soon_threadsafe(lambda: self._box.submit(command, done), self._fail)
+
+    def perform(self, operation: Operation[Any]) -> Any:
+        """Do an operation, from any thread but the loop's; return its result, or raise ControlError."""
+        if self._loop.is_own_thread:
+            raise ControlError(
+                f"{operation.api_name} called in the thread of the box, which cannot wait: use `submit`"
+            )
+        future: Future[Any] = Future()
+        with self._lock:
+            if self._is_closed or not self._loop.is_running:
+                raise NotRunningError(
+                    NotRunningError.ENDED if self._is_closed else "the box does not run: start it first"
+                )
+            self._awaited.add(future)
+
+        def start() -> None:
+            if not self._is_closed:
+                self.begin(operation, settle(future))
+
+        self._loop.call_soon_threadsafe(start, future.set_exception)
+        return future.result()
+
+    def begin(self, operation: Operation[Any], finished: Finished) -> None:
+        """Begin with an operation, in the thread of the loop; `finished` gets its result or its error."""
+        self._box.steps.start(self.operate(operation), finished)
+
+    def operate(self, operation: Operation[Any]) -> Steps[Any]:
+        """Write an operation into the log, do it, and return its result; in the thread of the loop."""
+        if operation.is_logged and not operation.only_reads:
+            self._box.announce(LogAdded("Control", _shown(operation)))
+        if isinstance(operation, StepOperation):
+            result = operation.steps(self._context)
+            return (yield from result) if isinstance(result, Generator) else result
+        assert isinstance(operation, CommandOperation)
+        result = yield from self._box.apply(operation)
+        return {**(result or {}), "tick": self._box.snapshot.tick}
+
+    # --- what it is made of
 
     def watch_memory(self, watch: MemoryWatch) -> None:
         """Have the memory of the process measured after each cycle; before the box runs."""
@@ -206,8 +252,7 @@ class Box:
         options = self._options
         if options.journal is None:
             return None
-        waits = self._choice.pace is Pace.LOCKSTEP
-        journal = Journal(Path(options.journal), options, self._box.notice, waits=waits)
+        journal = Journal(Path(options.journal), options, self._box.notice)
         self._box.keep = journal.write
         return journal
 
@@ -233,7 +278,7 @@ class Box:
         from ur_emulator.host.control_api.http_answers import ControlAnswers
         from ur_emulator.host.ports.http import HttpPort
 
-        answers = ControlAnswers(self.operations, self._options.host, self._options.control_token)
+        answers = ControlAnswers(self.operate, self._options.host, self._options.control_token)
         return {CONTROL: HttpPort(self._box, answers)}
 
     # --- life
@@ -262,7 +307,7 @@ class Box:
         )
         self._loop.keep_pace(self._box.controller.period_s)
         self._loop.add(self._box)
-        self._loop.tasks.start()
+        self._tasks.start()
         begin = start_up(self._box, self._player)
         self._loop.call_soon_threadsafe(lambda: self._box.start_alone(begin), self._fail)
 
@@ -294,8 +339,13 @@ class Box:
     def close(self) -> None:
         """Close all ports and connections, in the loop's thread or after it; harmless if closed already."""
         self._loop.remove(self._box)
-        self._box.close(NotRunningError())
-        self.operations.close()
+        self._box.steps.close(NotRunningError())
+        with self._lock:
+            self._is_closed = True
+            awaited = tuple(self._awaited)
+        for future in awaited:
+            if not future.done():
+                future.set_exception(NotRunningError())
         self._intake.close()
         self._reports.close()
         self._network.close()
@@ -303,3 +353,13 @@ class Box:
         if self._journal is not None:
             self._journal.close()
         give_back(self)
+
+
+def _shown(operation: Operation[Any]) -> str:
+    """Return an operation as one line for the log."""
+    words = [operation.api_name]
+    for key, value in operation.as_given.items():
+        if value is not None:
+            text = " ".join(str(value).split())
+            words.append(f"{key}={text if len(text) <= _MAX_SHOWN else text[: _MAX_SHOWN - 3] + '...'}")
+    return " ".join(words)

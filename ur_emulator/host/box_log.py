@@ -53,13 +53,11 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
-class BoxLog:
+class LogBook:
     """The last entries; followers are called with new ones. `count` includes those that were removed."""
 
-    def __init__(self, generation: RobotGeneration) -> None:
-        """Begin an empty log; the generation of the robot decides how long a cycle is."""
+    def __init__(self) -> None:
         self.count = 0
-        self._generation = generation
         self._entries: deque[LogEntry] = deque(maxlen=MAX_ENTRIES)
         self._followers: list[Callable[[LogEntry], None]] = []
 
@@ -69,7 +67,7 @@ class BoxLog:
         return tuple(self._entries)
 
     def since(self, count: int) -> list[LogEntry]:
-        """Return what is kept of all entries but the first `count`; in the loop's thread."""
+        """Return what is kept of all entries but the first `count`; in the thread that adds."""
         new = max(0, self.count - count)
         return list(islice(self._entries, max(0, len(self._entries) - new), None))
 
@@ -77,10 +75,24 @@ class BoxLog:
         """Call `follower` with every entry from now on; it must not block and must not raise."""
         self._followers.append(follower)
 
+    def add(self, entry: LogEntry) -> None:
+        """Take an entry."""
+        self._entries.append(entry)
+        self.count += 1
+        for follower in self._followers:
+            follower(entry)
+
+
+class BoxLog(LogBook):
+    """The log of a box; the generation of its robot decides how long a cycle is."""
+
+    def __init__(self, generation: RobotGeneration) -> None:
+        super().__init__()
+        self._generation = generation
+
     def note(self, event: events.Event, tick: int) -> None:
         """Write down an event of the controller."""
-        level, source, text, code = _describe(event)
-        self.write(tick, source, text, level, code)
+        self.write(tick, *_describe(event))
 
     def write(
         self, tick: int, source: str, text: str, level: ReportLevel = ReportLevel.INFO, code: str = ""
@@ -88,49 +100,42 @@ class BoxLog:
         """Write an entry; what is too long is cut."""
         if len(text) > MAX_TEXT:
             text = text[: MAX_TEXT - 3] + "..."
-        entry = LogEntry(tick, self._generation.seconds(tick), level, source, text.rstrip("\r\n"), code)
-        self._entries.append(entry)
-        self.count += 1
-        for follower in self._followers:
-            follower(entry)
+        time = self._generation.seconds(tick)
+        self.add(LogEntry(tick, time, level, source, text.rstrip("\r\n"), code))
 
 
-_Line = tuple[ReportLevel, str, str, str]
-
-
-def _line(source: str, text: str, level: ReportLevel = ReportLevel.INFO, code: str = "") -> _Line:
-    return level, source, text, code
+# Source and text of an entry; perhaps its level, and its code.
+_Line = tuple[str, str] | tuple[str, str, ReportLevel] | tuple[str, str, ReportLevel, str]
 
 
 def _describe(event: events.Event) -> _Line:
-    """Return level, source, text and code of the entry for an event."""
     match event:
         case events.ProgramStarted(name):
-            return _line("Program", f"Starting program: {name}")
+            return "Program", f"Starting program: {name}"
         case events.ProgramStopped(name):
-            return _line("Program", f"Program stopped: {name}")
+            return "Program", f"Program stopped: {name}"
         case events.ProgramPaused(name):
-            return _line("Program", f"Program paused: {name}")
+            return "Program", f"Program paused: {name}"
         case events.ProgramResumed(name):
-            return _line("Program", f"Program resumed: {name}")
+            return "Program", f"Program resumed: {name}"
         case events.TextPrinted(text):
-            return _line("Program", text)
+            return "Program", text
         case events.ScriptFailed(_, _, text, secondary, log_text):
             prefix = "Secondary program: " if secondary else ""
-            return _line("Program", prefix + (log_text or text), ReportLevel.FAULT)
+            return "Program", prefix + (log_text or text), ReportLevel.FAULT
         case events.ErrorReported(code, argument, level, text):
             # Warnings of ours that have no number go without one.
-            return _line("Controller", text, level, f"C{code}A{argument}" if code else "")
+            return "Controller", text, level, f"C{code}A{argument}" if code else ""
         case events.SafetyModeChanged(safety_mode):
             mode = SafetyMode(safety_mode)
             level = ReportLevel.INFO if mode is SafetyMode.NORMAL else ReportLevel.WARNING
-            return _line("Safety", f"Safety mode: {mode.name}", level)
+            return "Safety", f"Safety mode: {mode.name}", level
         case events.RobotModeChanged(robot_mode):
-            return _line("Controller", f"Robot mode: {RobotMode(robot_mode).name}")
+            return "Controller", f"Robot mode: {RobotMode(robot_mode).name}"
         case events.LogAdded(source, text):
-            return _line(source, text)
+            return source, text
         case events.ValueRequested(_, kind, text):
-            return _line("Program", f"Waiting for a value ({kind.name.lower()}): {text}")
+            return "Program", f"Waiting for a value ({kind.name.lower()}): {text}"
         case events.PopupShown(title, text, warning, error):
             level = ReportLevel.FAULT if error else ReportLevel.WARNING if warning else ReportLevel.INFO
-            return _line("Program", f"Popup: {title}: {text}", level)
+            return "Program", f"Popup: {title}: {text}", level

@@ -10,7 +10,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from protocol.errors import ProtocolError
 from protocol.ur_types import Ports
 from ur_emulator.errors import EmulatorError
 from ur_emulator.host.pacing import Pace
@@ -58,6 +57,12 @@ class BoxOptions:
 
     def check(self) -> None:
         """Check the arguments that need no table; EmulatorError for one that is not allowed."""
+        try:
+            Pace(self.pace)
+        except ValueError:
+            raise EmulatorError(
+                f"unknown pace {self.pace!r}: choose one of {', '.join(p.value for p in Pace)}"
+            ) from None
         if not 0.0 < self.speed < math.inf:
             raise EmulatorError(f"speed {self.speed:g} given: it must be above 0 and finite, 1 is real time")
         if self.seed < 0:
@@ -118,24 +123,6 @@ def is_loopback(host: str) -> bool:
         return host.lower() == "localhost" or ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def standard_ports(base: int) -> Ports:
-    """Return the standard ports, moved by an offset; EmulatorError if they are not all ports of TCP."""
-    try:
-        return Ports.standard(base)
-    except ProtocolError as error:
-        raise EmulatorError(str(error)) from None
-
-
-def parse_pace(pace: str | Pace) -> Pace:
-    """Return the pace of that name; EmulatorError if there is none."""
-    try:
-        return Pace(pace)
-    except ValueError:
-        raise EmulatorError(
-            f"unknown pace {pace!r}: choose one of {', '.join(p.value for p in Pace)}"
-        ) from None
 
 
 def check_count(count: int) -> None:

@@ -13,19 +13,18 @@ import pickle
 import signal
 import socket
 import threading
-import time
 import weakref
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from ur_emulator.errors import ArgumentError, ControlError, EmulatorError, NotRunningError
-from ur_emulator.host.box_log import MAX_ENTRIES, LogEntry
+from ur_emulator.host.box_log import LogBook, LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt
-from ur_emulator.host.runtime.processes import Child, Pipe, Role, framed, read_message, start_child
+from ur_emulator.host.runtime.processes import BOX, Child, Pipe, framed, read_message, start_child
 
 if TYPE_CHECKING:
     from ur_emulator.host.rack import LoopRack
@@ -36,12 +35,18 @@ if TYPE_CHECKING:
 _END_TIMEOUT = 10.0
 # How long the boxes' process waits at its end until its last messages are read [s].
 _FAREWELL = 1.0
+# How long the boxes' process may take to close its ports when the user's has ended [s].
+GRACE = 5.0
 # How often the boxes' process looks whether the user's process lives [s].
 _LOOK_PERIOD = 1.0
 
 
 class ProcessRack:
-    """Boxes in a process of their own, as the user's process sees them; used from any thread."""
+    """Boxes in a process of their own, as the user's process sees them; used from any thread.
+
+    Attributes:
+        served: where the boxes are served, and as what.
+    """
 
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Start the process and have the boxes assembled; nothing listens yet.
@@ -50,28 +55,27 @@ class ProcessRack:
         there is no process to be had.
         """
         try:
-            self._child: Child = start_child(Role.BOX)
+            self._child: Child = start_child(BOX)
         except OSError as error:
             raise EmulatorError(f"the process of the box cannot be started: {error}") from None
         self._let_go = weakref.finalize(self, self._child.close)
         self._sending = threading.Lock()
         self._state = threading.Lock()
         self._futures: dict[int, Future[Any]] = {}
-        self._n_requests = 0
+        self._numbers = count(1)
         self._reader: threading.Thread | None = None
         self._has_ended = False
         self._said_farewell = False
         self._failure: Exception | None = None
-        self._logs = [deque[LogEntry](maxlen=MAX_ENTRIES) for _ in options]
-        self._followers: list[list[Callable[[LogEntry], None]]] = [[] for _ in options]
+        self._logs = [LogBook() for _ in options]
         self._ends: list[tuple[bool, Exception | None]] = [(False, None)] * len(options)
-        self._served: list[ServedAt] = self._ask_for_boxes((os.getpid(), os.getcwd(), list(options)))
+        self.served = self._ask_for_boxes((os.getpid(), os.getcwd(), list(options)))
 
     # --- life
 
     def start(self) -> None:
         """Open the ports and run; PortError if one is taken."""
-        self._served = self._ask_for_boxes("start")
+        self.served = self._ask_for_boxes("start")
         self._reader = threading.Thread(target=_read, args=(weakref.ref(self), self._child.pipe), daemon=True)
         self._reader.start()
 
@@ -99,33 +103,26 @@ class ProcessRack:
 
     # --- what a user asks of the box with a number
 
-    def served_at(self, index: int) -> ServedAt:
-        """Where a box is served, and as what."""
-        return self._served[index]
-
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
         if threading.current_thread() is self._reader:
             raise ControlError(
                 f"{operation.api_name} called in the thread of the box's log, which cannot wait: use `submit`"
             )
-        return self._request("perform", index, operation)
+        return self._begin("perform", index, operation).result()
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Submit a command for the next cycle; `done` is called in a thread of its own."""
-        future: Future[Any] = Future()
-        if done is not None:
-            future.add_done_callback(partial(_tell, done))
-        self._begin(future, "submit", index, command)
+        self._begin("submit", index, command, done=done)
 
     def log(self, index: int) -> tuple[LogEntry, ...]:
         """Return the last entries of the log, the oldest first; also after the end."""
         self._catch_up()
-        return tuple(self._logs[index])
+        return self._logs[index].entries
 
     def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
         """Call `follower` with every entry from now on, in a thread of its own."""
-        self._followers[index].append(follower)
+        self._logs[index].follow(follower)
 
     def end_of(self, index: int) -> tuple[bool, Exception | None]:
         """Return whether a client has switched the box off, and the error that has ended it."""
@@ -137,7 +134,7 @@ class ProcessRack:
         """Wait until all has come that the boxes have to tell by now."""
         if threading.current_thread() is not self._reader:
             with suppress(NotRunningError):
-                self._request("news")
+                self._begin("news").result()
 
     # --- messages
 
@@ -160,20 +157,17 @@ class ProcessRack:
         with self._sending:
             self._child.pipe.sendall(data)
 
-    def _request(self, kind: str, *request: Any) -> Any:
-        """Ask for something and wait for it; ControlError if it was not done."""
+    def _begin(self, kind: str, *request: Any, done: Done | None = None) -> Future[Any]:
+        """Ask for something; return its result, a ControlError if it was not done."""
         future: Future[Any] = Future()
-        self._begin(future, kind, *request)
-        return future.result()
-
-    def _begin(self, future: Future[Any], kind: str, *request: Any) -> None:
+        if done is not None:
+            future.add_done_callback(partial(_tell, done))
         with self._state:
             if self._has_ended or self._reader is None:
                 raise NotRunningError(
                     self._why_ended() if self._has_ended else "the box does not run: start it first"
                 )
-            self._n_requests += 1
-            number = self._n_requests
+            number = next(self._numbers)
             self._futures[number] = future
         try:
             self._send((kind, number, *request))
@@ -184,6 +178,7 @@ class ProcessRack:
         except Exception as error:
             del self._futures[number]
             raise ArgumentError(f"it cannot be sent to the process of the box: {error}") from None
+        return future
 
     def _take(self, message: Any) -> None:
         """Take a message of the boxes; in the reading thread."""
@@ -197,9 +192,7 @@ class ProcessRack:
                     future.set_exception(error)
             case ("entries", index, entries):
                 for entry in entries:
-                    self._logs[index].append(entry)
-                    for follower in self._followers[index]:
-                        follower(entry)
+                    self._logs[index].add(entry)
             case ("end", index, is_shut_down, failure):
                 self._ends[index] = (is_shut_down, failure)
             case ("farewell",):
@@ -218,11 +211,9 @@ class ProcessRack:
 
     def _how_it_ended(self) -> str:
         self._child.wait()
-        code = self._child.exit_code
-        if code is None:
+        if self._child.exit_code is None:
             return "has ended, nobody knows why"
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        return f"was ended {how}: its log shows what it did last"
+        return f"{self._child.end}: its log shows what it did last"
 
     def _why_ended(self) -> str:
         return NotRunningError.ENDED if self._failure is None else str(self._failure)
@@ -273,40 +264,35 @@ def run(pipe: socket.socket) -> None:
         os.chdir(folder)  # names of files are relative to that of the user's process
         try:
             rack = LoopRack(options)
-        except EmulatorError as error:
-            pipe.sendall(framed(pickle.dumps(([], error))))
-            return
-        pipe.sendall(framed(pickle.dumps(([box.served_at for box in rack.boxes], None))))
-        if pickle.loads(read_message(pipe)) != "start":
-            rack.close()
-            return
-        try:
+            pipe.sendall(framed(pickle.dumps((rack.served, None))))
+            if pickle.loads(read_message(pipe)) != "start":
+                rack.close()
+                return
             rack.listen()
         except EmulatorError as error:
             pipe.sendall(framed(pickle.dumps(([], error))))
-            return
-        _Link(rack, Pipe(pipe), owner).run()
+        else:
+            _Link(rack, pipe, owner).run()
 
 
-class _Link:
+class _Link(Pipe):
     """The boxes' end of the pipe, in their loop; `owner` is the number of the process of their user."""
 
-    def __init__(self, rack: LoopRack, pipe: Pipe, owner: int) -> None:
+    def __init__(self, rack: LoopRack, pipe: socket.socket, owner: int) -> None:
         self._rack = rack
-        self._pipe = pipe
         self._owner = owner
         # Entries of each log that were sent.
         self._n_sent = [0] * len(rack.boxes)
-        self._ended: set[int] = set()
+        self._has_ended: set[int] = set()
+        super().__init__(rack.loop, pipe)
 
     def run(self) -> None:
         """Run the boxes until their end."""
         rack, loop = self._rack, self._rack.loop
         signal.signal(signal.SIGTERM, lambda number, frame: rack.stop())
         for box in rack.boxes:
-            box.log.follow(lambda entry: loop.call_soon(self._send_news, self._fail))
-        self._pipe.send(pickle.dumps(([box.served_at for box in rack.boxes], None)))
-        self._watch()
+            box.log.follow(lambda entry: loop.call_soon(self._send_news, self.failed))
+        self._put(rack.served, None)
         self._look()
         with suppress(EmulatorError):  # of one of the boxes: it is sent below
             rack.serve_forever()
@@ -318,74 +304,68 @@ class _Link:
             os.kill(self._owner, 0)
         except ProcessLookupError:
             self._rack.stop()
-        self._rack.loop.call_later(_LOOK_PERIOD, self._look, self._fail)
+        self._rack.loop.call_later(_LOOK_PERIOD, self._look, self.failed)
 
-    def _watch(self) -> None:
-        self._rack.loop.watch(self._pipe.sock, self._pipe.events, self._on_ready, self._fail)
-
-    def _on_ready(self, events: int) -> None:
-        self._pipe.flush()
-        if self._pipe.is_clear:
-            self._send_news()
-        try:
-            messages = self._pipe.receive()
-        except EOFError:
-            self._rack.loop.unwatch(self._pipe.sock)
-            self._rack.stop()
-            return
-        for message in messages:
-            self._take(pickle.loads(message))
-        self._watch()
-
-    def _take(self, message: tuple[Any, ...]) -> None:
-        match message:
+    def take(self, message: bytes) -> None:
+        """Take a message of the user's process."""
+        match pickle.loads(message):
             case ("stop",):
                 self._rack.stop()
             case ("perform", number, index, operation):
-                self._rack.boxes[index].operations.begin(operation, partial(self._answer, number))
+                self._rack.boxes[index].begin(operation, partial(self._answer, number))
             case ("submit", number, index, command):
                 self._rack.boxes[index].submit(command, partial(self._answer, number))
             case ("news", number):
                 self._answer(number, None, None)
 
+    def close(self) -> None:
+        """Let the boxes end with the pipe: without it nobody can."""
+        super().close()
+        self._rack.stop()
+
+    def failed(self, error: Exception) -> None:
+        """End the boxes with an error of ours."""
+        self.close()
+        raise error
+
+    def _flush(self) -> None:
+        super()._flush()
+        self._send_news()
+
     def _answer(self, number: int, result: Any, error: Exception | None) -> None:
         self._put_news()
         self._put("answer", number, result, _portable(error))
-        self._watch()
 
     def _send_news(self) -> None:
         """Send what is new, unless the other end has not read what was sent before."""
-        if self._pipe.is_clear:
+        if not self._outbox:
             self._put_news()
-            self._watch()
 
     def _put_news(self) -> None:
-        """Send new entries of the logs, and which boxes have ended and how."""
+        for message in self._news():
+            self._put(*message)
+
+    def _news(self) -> Iterator[tuple[Any, ...]]:
+        """Yield new entries of the logs, and which boxes have ended and how."""
         for index, box in enumerate(self._rack.boxes):
             if box.log.count > self._n_sent[index]:
                 entries = box.log.since(self._n_sent[index])
                 self._n_sent[index] = box.log.count
-                self._put("entries", index, entries)
-            if (box.is_shut_down or box.failure) and index not in self._ended:
-                self._ended.add(index)
-                self._put("end", index, box.is_shut_down, _portable(box.failure))
+                yield "entries", index, entries
+            if (box.is_shut_down or box.failure) and index not in self._has_ended:
+                self._has_ended.add(index)
+                yield "end", index, box.is_shut_down, _portable(box.failure)
 
     def _put(self, *message: Any) -> None:
-        self._pipe.send(pickle.dumps(message))
+        self.send(framed(pickle.dumps(message)))
 
     def _say_farewell(self) -> None:
-        """Send the last news."""
-        self._put_news()
-        self._put("farewell")
-        end = time.monotonic() + _FAREWELL
-        while not self._pipe.is_clear and time.monotonic() < end:
-            time.sleep(0.001)
-            self._pipe.flush()
-
-    def _fail(self, error: Exception) -> None:
-        """Without the pipe nobody can end the boxes."""
-        self._rack.stop()
-        raise error
+        """Send the last news, and wait for a moment until they are read: the loop has ended."""
+        if self._sock is not None:
+            last = [framed(pickle.dumps(message)) for message in (*self._news(), ("farewell",))]
+            self._sock.settimeout(_FAREWELL)
+            with suppress(OSError):
+                self._sock.sendall(b"".join((self._outbox, *last)))
 
 
 def _portable(error: Exception | None) -> Exception | None:

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import json
 import threading
-import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
+from queue import Full, Queue
 from typing import IO, Any, Final
 
 from ur_emulator.budgets import BUDGETS
@@ -43,14 +42,13 @@ class JournalError(EmulatorError):
 class Journal:
     """Writes the journal of one box, in a thread of its own: a slow disk delays no cycle."""
 
-    def __init__(
-        self, path: Path, options: BoxOptions, report: Callable[[str], None], *, waits: bool
-    ) -> None:
+    def __init__(self, path: Path, options: BoxOptions, report: Callable[[str], None]) -> None:
         """Open the file and write the first line.
+
+        In lockstep a cycle waits when too many others are not written yet; in real time it is lost.
 
         Args:
             report: writes into the log of the box that cycles were lost.
-            waits: a cycle waits when too many others are not written yet (lockstep); otherwise it is lost.
 
         Raises:
             JournalError: the file cannot be written.
@@ -63,12 +61,11 @@ class Journal:
             raise JournalError(f"journal {path} given: {error.strerror}") from None
         self._path = path
         self._report = report
-        self._waits = waits
-        # Number, inputs and answer of each cycle; without inputs: so many cycles are lost.
-        self._cycles: deque[tuple[int, Sequence[Input] | None, Answer | None]] = deque()
+        self._waits = Pace(options.pace) is Pace.LOCKSTEP
+        # Number, inputs and answer of each cycle; without inputs: so many cycles are lost. None is the end.
+        self._cycles: Queue[tuple[int, Sequence[Input] | None, Answer | None] | None]
+        self._cycles = Queue(BUDGETS.journal_cycles)
         self._tick = self._lost = 0
-        self._has_work = threading.Event()
-        self._is_closed = False
         self._digest = Digest()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
@@ -76,39 +73,33 @@ class Journal:
     def write(self, inputs: Sequence[Input], answer: Answer | None) -> None:
         """Take a cycle, in the thread of the loop; one that an error has ended has no answer."""
         self._tick = self._tick + 1 if answer is None else answer.snapshot.tick
-        while self._waits and len(self._cycles) >= BUDGETS.journal_cycles and self._thread.is_alive():
-            time.sleep(0.001)
-        if len(self._cycles) >= BUDGETS.journal_cycles:
+        try:
+            if self._lost:
+                self._cycles.put((self._lost, None, None), block=self._waits)
+                self._lost = 0
+            self._cycles.put((self._tick, inputs, answer), block=self._waits)
+        except Full:
             if not self._lost:
                 self._report(f"the journal {self._path} has a gap: cycles come faster than they are written")
             self._lost += 1
-            return
-        if self._lost:
-            self._cycles.append((self._lost, None, None))
-            self._lost = 0
-        self._cycles.append((self._tick, inputs, answer))
-        if len(self._cycles) == 1:
-            self._has_work.set()
 
     def close(self) -> None:
         """Write what waits, and close the file; harmless if that was done."""
-        self._is_closed = True
-        self._has_work.set()
+        self._cycles.put(None)
         self._thread.join()
         self._file.close()
 
     def _run(self) -> None:
-        while not (self._is_closed and not self._cycles):
-            self._has_work.wait()
-            self._has_work.clear()
+        can_write = True
+        while (cycle := self._cycles.get()) is not None:
             try:
-                while self._cycles:
-                    self._file.write(self._line(*self._cycles[0]) + "\n")
-                    self._cycles.popleft()
-                self._file.flush()
+                if can_write:
+                    self._file.write(self._line(*cycle) + "\n")
+                    if self._cycles.empty():
+                        self._file.flush()
             except Exception as error:  # of the disk, or ours
                 self._report(f"the journal {self._path} ends here: {error}")
-                return
+                can_write = False  # the rest is taken all the same: nobody waits for it
 
     def _line(self, number: int, inputs: Sequence[Input] | None, answer: Answer | None) -> str:
         if inputs is None:

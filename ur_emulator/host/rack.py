@@ -16,6 +16,7 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.pacing import Pace
 from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
 from ur_emulator.host.runtime.memory import MemoryWatch, own_process
+from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.controller.command import Command, Done
 
@@ -33,13 +34,14 @@ class LoopRack:
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Assemble the boxes; nothing listens yet. Two boxes need two addresses, or a `port_base` each."""
         self.loop = EventLoop(precise=any(one.pace not in _LOCKSTEP for one in options))
+        self.tasks = TaskQueue(self.loop)
         # Several boxes would compute at each other's deadlines.
         lead = WAKE_UP if len(options) == 1 else 0.0
         self._thread: threading.Thread | None = None
         self._loop_failure: BaseException | None = None
         try:
             self.boxes = tuple(
-                Box(one, loop=self.loop, phase=k / len(options), lead=lead) for k, one in enumerate(options)
+                Box(one, tasks=self.tasks, phase=k / len(options), lead=lead) for k, one in enumerate(options)
             )
         except BaseException:
             self.loop.close()
@@ -67,13 +69,15 @@ class LoopRack:
         An error that has ended the loop or a box is raised at the end.
         """
         own_process()
-        watch = MemoryWatch(self.loop.tasks)
+        watch = MemoryWatch(self.tasks)
         for box in self.boxes:
             box.watch_memory(watch)
-        self._run()
-        failure = next((box.failure for box in self.boxes if box.failure is not None), None)
-        if failure is not None:
-            raise failure
+        try:
+            self.loop.run()
+        finally:
+            self.close()
+        if self._failure is not None:
+            raise self._failure
 
     def start(self) -> None:
         """Open the ports and run in a thread; PortError if one is taken."""
@@ -98,25 +102,26 @@ class LoopRack:
                 )
         else:
             self.close()
-        return self._loop_failure or next((box.failure for box in self.boxes if box.failure), None)
+        return self._loop_failure or self._failure
 
     def close(self) -> None:
         """Close all boxes and the loop; in its thread after its last turn."""
         for box in self.boxes:
             box.close()
+        self.tasks.close()
         self.loop.close()
 
-    def _run(self) -> None:
-        try:
-            self.loop.run()
-        finally:
-            self.close()
+    @property
+    def _failure(self) -> Exception | None:
+        return next((box.failure for box in self.boxes if box.failure is not None), None)
 
     def _run_in_thread(self) -> None:
         try:
-            self._run()
+            self.loop.run()
         except BaseException as failure:
             self._loop_failure = failure
+        finally:
+            self.close()
 
     def _end(self, box: Box) -> None:
         """Close a box that was switched off or has failed; after the last one there is nothing to do."""
@@ -126,13 +131,14 @@ class LoopRack:
 
     # --- what a user asks of the box with a number
 
-    def served_at(self, index: int) -> ServedAt:
-        """Where a box is served, and as what."""
-        return self.boxes[index].served_at
+    @property
+    def served(self) -> list[ServedAt]:
+        """Where the boxes are served, and as what."""
+        return [box.served_at for box in self.boxes]
 
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done, from any thread but that of the loop; return its result."""
-        return self.boxes[index].operations.perform(operation)
+        return self.boxes[index].perform(operation)
 
     def submit(self, index: int, command: Command, done: Done | None) -> None:
         """Submit a command for the next cycle, from any thread."""

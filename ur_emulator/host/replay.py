@@ -146,7 +146,7 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
                 try:
                     found = json.loads(line)
                 except ValueError:
-                    raise JournalError(f"{path}, line {number}: it is no line of a journal") from None
+                    found = None
                 if not isinstance(found, dict):
                     raise JournalError(f"{path}, line {number}: it is no line of a journal")
                 yield found

@@ -20,10 +20,9 @@ from ur_emulator.host.box_log import BoxLog
 from ur_emulator.host.pacing import Pacer, RealtimePacer, reader_limit
 from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
 from ur_emulator.host.runtime.connection import Connection
-from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.runtime.listener import Listener
 from ur_emulator.host.runtime.memory import MemoryWatch
-from ur_emulator.host.runtime.worker import Ticket
+from ur_emulator.host.runtime.worker import TaskQueue, Ticket
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.steps import StepRunner, Steps, settle
 from ur_emulator.machine.commands.power import PowerOff
@@ -93,18 +92,18 @@ class ServedBox:
     """
 
     def __init__(
-        self, machine: Machine, identity: BoxIdentity, pacer: Pacer, loop: EventLoop, on_failure: Failed
+        self, machine: Machine, identity: BoxIdentity, pacer: Pacer, tasks: TaskQueue, on_failure: Failed
     ) -> None:
         """Serve a machine.
 
-        The loop expects bytes that a script waits for, and has the worker process. `on_failure` gets the
-        error that has ended a cycle; there will be no further one.
+        The loop of `tasks` expects bytes that a script waits for. `on_failure` gets the error that has ended
+        a cycle; there will be no further one.
         """
         self.machine = machine
         self.controller = machine.controller
         self.identity = identity
         self.steps = StepRunner(partial(self.report, "an answer is lost"))
-        self._loop = loop
+        self._tasks = tasks
         self.log = BoxLog(self.controller.generation)
         self.network: LoopNetwork | None = None
         self.keep: Callable[[Sequence[Input], Answer | None], None] | None = None
@@ -302,20 +301,16 @@ class ServedBox:
             self.steps.advance()
 
         failed = partial(self.report, "an answer is lost")
-        task = self._loop.tasks.submit(done, failed, Ticket(done), function, *arguments)
+        task = self._tasks.submit(done, failed, Ticket(done), function, *arguments)
         try:
             while not outcome.done():
                 yield
             return outcome.result()
         finally:
-            self._loop.tasks.drop(task)
+            self._tasks.drop(task)
             # An error holds this frame by its traceback, and the frame must not hold the error: with the
             # arguments both would wait for the collector, which looks rarely.
             outcome, arguments = Future(), ()
-
-    def close(self, error: Exception) -> None:
-        """End all steps with an error, and the tasks that they wait for."""
-        self.steps.close(error)
 
     # --- what the pacer asks
 
@@ -394,7 +389,7 @@ class ServedBox:
             if self._repeats and self.is_active:
                 if not self.waits_outside:
                     return now  # the next cycle may follow at once, after the sockets have had their turn
-                if self._loop.expect_soon():
+                if self._tasks.loop.expect_soon():
                     self.machine.use_idle_time()
             return self._pacer.next_call(now)
         # While time stands still, every port repeats itself at its own rate, in real seconds: clients take

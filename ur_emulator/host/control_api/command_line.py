@@ -17,7 +17,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ControlError, EmulatorError
 from ur_emulator.host.box_log import printable
 from ur_emulator.host.box_options import TOKEN_VARIABLE, check_token
-from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient
+from ur_emulator.host.control_api.http_client import DEFAULT_HOST, DEFAULT_PORT, ControlClient, log_entry
 from ur_emulator.host.control_api.operations import OPERATIONS, make
 from ur_emulator.host.control_api.step_operations import ReadLog, read_script
 from ur_emulator.machine.commands.operation import Kind, Parameter
@@ -147,25 +147,23 @@ def plain(result: Mapping[str, Any]) -> str:
     if set(result) == {"tick"}:
         return f"done in cycle {result['tick']}"
     if "entries" in result:
-        return "\n".join(map(_log_line, result["entries"]))
+        return "\n".join(str(log_entry(entry)) for entry in result["entries"])
     lines = list(_lines("", result))
     width = max((len(name) for name, _ in lines), default=0)
     return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in lines)
 
 
 def _add_option(command: argparse.ArgumentParser, parameter: Parameter) -> None:
-    need = "" if not parameter.is_required else "; required"
-    default = (
-        "" if parameter.is_required or parameter.default is None else f"; default {_text(parameter.default)}"
-    )
-    about = f"{parameter.meaning} ({parameter.allowed}{default}{need})".replace("%", "%%")
-    words: dict[str, Any] = {"help": about, "metavar": "X"}
+    default = "" if parameter.default is None else f"; default {_text(parameter.default)}"
+    note = "; required" if parameter.is_required else default
+    about = f"{parameter.meaning} ({parameter.allowed}{note})".replace("%", "%%")
+    more: dict[str, Any] = {}
     if parameter.kind is Kind.BOOLEAN and parameter.default is False:
-        words |= {"nargs": "?", "const": "true"}
+        more = {"nargs": "?", "const": "true"}
     if parameter.kind is Kind.VECTOR:
         least, most = parameter.lengths
-        words |= {"nargs": most if least == most else "*"}
-    command.add_argument(_option(parameter), dest=parameter.name, **words)
+        more = {"nargs": most if least == most else "*"}
+    command.add_argument(_option(parameter), dest=parameter.name, help=about, metavar="X", **more)
     if parameter.kind is Kind.SCRIPT:
         command.add_argument(
             f"--{parameter.name}-file", metavar="FILE", help=f"{parameter.name} from a file of this machine"
@@ -189,15 +187,10 @@ def _follow(client: ControlClient, asked: ReadLog, as_json: bool) -> NoReturn:
     while True:
         result = client.perform(asked)
         for entry in result["entries"]:
-            print(json.dumps(entry) if as_json else _log_line(entry), flush=True)
+            print(json.dumps(entry) if as_json else log_entry(entry), flush=True)
         asked = replace(asked, after=result["next"])
         if len(result["entries"]) < BUDGETS.log_entries:
             time.sleep(_FOLLOW_PERIOD)
-
-
-def _log_line(entry: Mapping[str, Any]) -> str:
-    code = f"{entry['code']} " if entry["code"] else ""
-    return printable(f"{entry['time']:.3f} {entry['level']} {entry['source']}: {code}{entry['text']}")
 
 
 def _lines(prefix: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:

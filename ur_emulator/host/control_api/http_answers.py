@@ -4,16 +4,17 @@ Where the port has a token, a request must show it.
 """
 
 import hmac
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 from urllib.parse import parse_qsl
 
 from ur_emulator.errors import ArgumentError, EmulatorError, NotRunningError, RefusedError, WaitTimeoutError
 from ur_emulator.host.control_api.operations import OPERATIONS, describe, make
-from ur_emulator.host.control_api.runner import OperationRunner
 from ur_emulator.host.control_api.step_operations import WaitUntil
 from ur_emulator.host.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.steps import Steps
+from ur_emulator.machine.commands.operation import Operation
 
 PREFIX = "/v1/"
 LIST = "operations"
@@ -23,11 +24,14 @@ _GONE = HttpAnswer(503, {"error": "the client has gone"})
 class ControlAnswers:
     """Does the operations that requests name.
 
-    `own_host` is the address that the port is bound to; each request must show the token, if there is one.
+    `operate` does one in steps; `own_host` is the address that the port is bound to; each request must show
+    the token, if there is one.
     """
 
-    def __init__(self, runner: OperationRunner, own_host: str, token: str | None) -> None:
-        self._runner = runner
+    def __init__(
+        self, operate: Callable[[Operation[Any]], Steps[Any]], own_host: str, token: str | None
+    ) -> None:
+        self._operate = operate
         self._own_host = own_host
         self._token = token
 
@@ -46,7 +50,7 @@ class ControlAnswers:
         try:
             given = _from_query(name, request.query) if method == "GET" else request.json_object()
             operation = make(name, given)
-            steps = self._runner.steps(operation)
+            steps = self._operate(operation)
             while True:
                 next(steps)
                 if connection.has_ended and isinstance(operation, WaitUntil):

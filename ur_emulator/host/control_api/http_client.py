@@ -94,38 +94,24 @@ class ControlClient:
 _ERRORS = {400: ArgumentError, 408: WaitTimeoutError, 409: RefusedError}
 
 
+def log_entry(values: Mapping[str, Any]) -> LogEntry:
+    """Return an entry of the log from JSON."""
+    return LogEntry(**{**values, "level": ReportLevel[values["level"]]})
+
+
 class AttachedBox:
     """A box that somebody else serves; it goes on when this process ends.
 
-    Its methods are those of a `Rack` (`ur_emulator.emulator`) with one box.
+    Its methods are those of a rack with one box (`ur_emulator.emulator`); `served` says where that is.
     """
 
     def __init__(self, host: str, port: int, token: str | None) -> None:
         """Ask it who it is; ControlError if no box answers there, or not without its token."""
         self._client = ControlClient(host, port, token)
         facts = self._client.perform(ReadIdentity())
-        ports = facts["ports"]
-        self._served_at = ServedAt(
-            title=f"{facts['robot']} {facts['software']}",
-            serial_number=facts["serial_number"],
-            host=host,
-            ports=Ports.of({name: number for name, number in ports.items() if name != "control"}),
-            control_port=port,
-        )
-
-    def start(self) -> None:
-        """Do nothing: it runs."""
-
-    def stop(self) -> None:
-        """Do nothing: who serves it ends it."""
-
-    def join(self) -> BaseException | None:
-        """Let go of the box."""
-        return None
-
-    def served_at(self, index: int) -> ServedAt:
-        """Where it is served, and as what."""
-        return self._served_at
+        numbers = Ports.of({name: number for name, number in facts["ports"].items() if name != "control"})
+        title = f"{facts['robot']} {facts['software']}"
+        self.served = [ServedAt(title, facts["serial_number"], host, numbers, control_port=port)]
 
     def perform(self, index: int, operation: Operation[Any]) -> Any:
         """Have an operation done; return its result."""
@@ -138,8 +124,7 @@ class AttachedBox:
 
     def log(self, index: int) -> tuple[LogEntry, ...]:
         """Return the last entries of the log, the oldest first."""
-        entries = self._client.whole_log(ReadLog())["entries"]
-        return tuple(LogEntry(**{**entry, "level": ReportLevel[entry["level"]]}) for entry in entries)
+        return tuple(map(log_entry, self._client.whole_log(ReadLog())["entries"]))
 
     def follow_log(self, index: int, follower: Callable[[LogEntry], None]) -> None:
         """Raise ControlError: its log is read with operations."""

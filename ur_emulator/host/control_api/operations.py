@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from ur_emulator.errors import ArgumentError
-from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.control_api import step_operations as steps
 from ur_emulator.machine.commands import power, programs, safety, surroundings
 from ur_emulator.machine.commands.operation import Operation
@@ -53,14 +52,14 @@ class ReadProperty(property):
     operation: type[Operation[Any]]
 
 
-def reading(operation: type[Operation[R]], read: Callable[[BoxOperations], R] | None = None) -> R:
-    """Return the property for an operation that only reads; `read` asks for it, if not the loop."""
+def reading(operation: type[Operation[R]]) -> R:
+    """Return the property for an operation that only reads."""
 
     def ask(box: BoxOperations) -> Any:
         __tracebackhide__ = True
         return box._perform(operation())
 
-    made = ReadProperty(read or ask)
+    made = ReadProperty(ask)
     made.__doc__ = inspect.getdoc(operation)
     made.operation = operation
     return cast(R, made)
@@ -73,13 +72,9 @@ class BoxOperations:
         """Have an operation done; return its result."""
         raise NotImplementedError
 
-    def _log_entries(self) -> tuple[LogEntry, ...]:
-        """Return the last entries of the log, the oldest first; from any thread, also after the box ended."""
-        raise NotImplementedError
-
     # --- what is going on
     state = reading(steps.ReadState)
-    log = reading(steps.ReadLog, lambda box: box._log_entries())
+    log = reading(steps.ReadLog)
     identity = reading(steps.ReadIdentity)
     wait_until = method(steps.WaitUntil)
     at = method(steps.At)

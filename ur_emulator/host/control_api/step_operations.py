@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -41,17 +42,14 @@ class Context:
 
 
 class StepOperation(Operation[R_co]):
-    """An operation that is done in steps."""
+    """An operation that takes no cycle, or is done in steps."""
 
     @abstractmethod
-    def steps(self, context: Context) -> Steps[Any]:
-        """Do it; yield to wait for the next cycle. The result is a dataclass or fits into JSON.
+    def steps(self, context: Context) -> Any:
+        """Do it; return its result, or steps that end in it: a dataclass, or what fits into JSON.
 
         ControlError: it cannot be done, or not now.
         """
-
-
-# --- What the box is and does, and its log
 
 
 class ReadState(StepOperation[BoxState]):
@@ -62,9 +60,8 @@ class ReadState(StepOperation[BoxState]):
     )
     only_reads: ClassVar[bool] = True
 
-    def steps(self, context: Context) -> Steps[Any]:
+    def steps(self, context: Context) -> BoxState:
         """Take the state."""
-        yield from ()
         return take_state(context.box)
 
 
@@ -81,9 +78,8 @@ class ReadLog(StepOperation[tuple[LogEntry, ...]]):
     )
     only_reads: ClassVar[bool] = True
 
-    def steps(self, context: Context) -> Steps[Any]:
+    def steps(self, context: Context) -> dict[str, Any]:
         """Pick the entries."""
-        yield from ()
         log, least = context.box.log, ReportLevel[self.level]
         new = log.since(self.after)
         entries, seen = list[LogEntry](), log.count - len(new)
@@ -102,9 +98,8 @@ class ReadIdentity(StepOperation[dict[str, Any]]):
     result: ClassVar[str] = "software, robot model, serial number, pace, seed, fidelity, address and ports"
     only_reads: ClassVar[bool] = True
 
-    def steps(self, context: Context) -> Steps[Any]:
+    def steps(self, context: Context) -> dict[str, Any]:
         """Ask the box."""
-        yield from ()
         return context.identity()
 
 
@@ -114,32 +109,27 @@ class AddToLog(StepOperation[int]):
     text: str = parameter("the line")
     is_logged: ClassVar[bool] = False
 
-    def steps(self, context: Context) -> Steps[Any]:
+    def steps(self, context: Context) -> dict[str, int]:
         """Write it; that needs no cycle."""
-        yield from ()
         context.box.announce(LogAdded("Control", self.text))
         return {"tick": context.box.snapshot.tick}
 
 
-# --- `wait_until`, and its conditions: each parameter with the present value in the box
-
-
-def _has_popup(controller: Controller) -> bool:
+def _shows(controller: Controller, *, popup: bool) -> bool:
+    """Return whether the pendant shows a popup, or a question."""
     pendant = controller.state.pendant
-    return bool(pendant.shown) or any(r.kind is RequestedType.NONE for r in pendant.requests)
+    asked = any((request.kind is RequestedType.NONE) is popup for request in pendant.requests)
+    return asked or (popup and bool(pendant.shown))
 
 
-def _has_question(controller: Controller) -> bool:
-    return any(r.kind is not RequestedType.NONE for r in controller.state.pendant.requests)
-
-
+# Parameters of `wait_until`, each with the present value in the box.
 CONDITIONS: dict[str, Callable[[Controller], object]] = {
     "robot_mode": lambda controller: RobotMode(controller.snapshot.robot_mode).name,
     "safety_mode": lambda controller: SafetyMode(controller.snapshot.safety_mode).name,
     "program_state": lambda controller: ProgramState(controller.snapshot.runtime_state).name,
     "steady": is_steady,
-    "popup": _has_popup,
-    "question": _has_question,
+    "popup": partial(_shows, popup=True),
+    "question": partial(_shows, popup=False),
 }
 
 
@@ -188,7 +178,12 @@ class WaitUntil(StepOperation[BoxState]):
             if not seen:
                 seen = any(str(self.log) in entry.text for entry in log.since(after))
                 after = max(after, log.count)
-            missing = _unmet(controller, wanted) + ([] if seen else [f"no log entry with {self.log!r}"])
+            present = {name: CONDITIONS[name](controller) for name in wanted}
+            missing = [
+                f"{name} is {now}, not {wanted[name]}" for name, now in present.items() if now != wanted[name]
+            ]
+            if not seen:
+                missing.append(f"no log entry with {self.log!r}")
             if controller.snapshot.tick < begin:
                 missing.append(f"time is {controller.snapshot.timestamp:g} s, not {self.time:g} s")
             if not missing:
@@ -196,17 +191,6 @@ class WaitUntil(StepOperation[BoxState]):
             if monotonic() >= end:
                 raise WaitTimeoutError(f"waited {self.timeout:g} s in vain: {', '.join(missing)}")
             yield
-
-
-def _unmet(controller: Controller, wanted: dict[str, Any]) -> list[str]:
-    """Return, for people, what does not hold."""
-    values = {name: CONDITIONS[name](controller) for name in wanted}
-    return [
-        f"{name} is {value}, not {wanted[name]}" for name, value in values.items() if value != wanted[name]
-    ]
-
-
-# --- `at`: an operation at an exact time of the robot
 
 
 class At(StepOperation[int]):
@@ -225,9 +209,8 @@ class At(StepOperation[int]):
     arguments: Mapping[str, Any] | None = parameter("its parameters by name", default=None)
     result: ClassVar[str] = "`tick`: the cycle in which it will be applied"
 
-    def steps(self, context: Context) -> Steps[Any]:
+    def steps(self, context: Context) -> dict[str, int]:
         """Hand it to the box for its cycle."""
-        yield from ()
         box, name = context.box, self.operation
         operation = context.make(name, dict(self.arguments or {}))
         if not isinstance(operation, CommandOperation):
@@ -240,9 +223,6 @@ class At(StepOperation[int]):
         tick = box.controller.generation.tick_at(self.time)
         box.schedule(tick, operation, done)
         return {"tick": tick}
-
-
-# --- `run_program`
 
 
 def read_script(path: Path) -> str:

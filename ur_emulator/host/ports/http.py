@@ -67,8 +67,7 @@ class HttpRequest:
             raise HttpError(400, f"content type {ascii(content_type)[:60]} given: the body must be {JSON}")
         if not self.body:
             return {}
-        if len(self.body) > BUDGETS.body_bytes:
-            raise too_long(BUDGETS.body_bytes)
+        _check_length(len(self.body), BUDGETS.body_bytes)
         try:
             arguments = json.loads(self.body, parse_constant=_refuse)
         except (ValueError, RecursionError) as error:
@@ -109,13 +108,18 @@ class HttpAnswer:
     headers: tuple[tuple[str, str], ...] = ()
     content_type: str = "application/octet-stream"
 
+    @classmethod
+    def of(cls, error: HttpError) -> HttpAnswer:
+        """Return the answer to a request that is refused."""
+        return cls(error.status, {"error": str(error)}, error.headers)
 
-def too_long(limit: int) -> HttpError:
-    """Return the error about a body with more bytes than `limit`."""
-    return HttpError(413, f"the body is longer than {limit} bytes")
+
+def _check_length(length: int, most: int) -> None:
+    if length > most:
+        raise HttpError(413, f"the body is longer than {most} bytes")
 
 
-def check_head(request: h11.Request) -> None:
+def _check_head(request: h11.Request) -> None:
     """Refuse other versions of HTTP and long headers with an HttpError, before the body is read."""
     if request.http_version not in (b"1.0", b"1.1"):
         raise HttpError(505, f"HTTP {request.http_version.decode('latin-1')} given: this port speaks 1.1")
@@ -227,62 +231,50 @@ class _HttpSession(Session):
         """Read the next piece of a request; after the last one, answer it."""
         try:
             event = self.http.next_event()
-            if isinstance(event, h11.EndOfMessage):
-                self._on_request(self.connection)
-                body, self._body = bytes(self._body), bytearray()
-                yield from self._answer(body)
-                return BUDGETS.client_work
-            return self._read(event)
+            if not isinstance(event, h11.EndOfMessage):
+                return self._read(event)
         except h11.RemoteProtocolError as error:
-            self._reject(error.error_status_hint, f"not understood: {error}")
+            return self._reject(error.error_status_hint, f"not understood: {error}")
         except HttpError as error:
-            self._reject(error.status, str(error))
-        return 0
+            return self._reject(error.status, str(error))
+        self._on_request(self.connection)
+        assert self._request is not None
+        request, self._body = HttpRequest.of(self._request, bytes(self._body)), bytearray()
+        try:
+            answer = yield from self._answers.answer(request, self.connection)
+        except HttpError as error:
+            answer = HttpAnswer.of(error)
+        if self.connection.is_open:
+            self._respond(answer)
+            if self.http.our_state is h11.MUST_CLOSE:
+                self.connection.close_when_sent()
+            elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
+                self.http.start_next_cycle()
+                self._request = None
+        return BUDGETS.client_work
 
     def _read(self, event: h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]) -> int:
         """Take a piece of a request; return what it costs, 0 if more bytes are needed or none will come."""
         if isinstance(event, h11.Request):
             self._request = event
-            check_head(event)
+            _check_head(event)
             if self.http.they_are_waiting_for_100_continue:
                 self._send(h11.InformationalResponse(status_code=100, headers=[]))
         elif isinstance(event, h11.Data):
             self._body += event.data
-            if len(self._body) > self._most_bytes:
-                raise too_long(self._most_bytes)
+            _check_length(len(self._body), self._most_bytes)
         else:
             if event is not h11.NEED_DATA:
                 self.connection.close_when_sent()
             return 0
         return _PIECE_COST
 
-    def _answer(self, body: bytes) -> Steps[None]:
-        """Do what a request asks for, and answer it."""
-        assert self._request is not None
-        try:
-            answer = yield from self._answers.answer(HttpRequest.of(self._request, body), self.connection)
-        except HttpError as error:
-            answer = HttpAnswer(error.status, {"error": str(error)}, error.headers)
-        self._finish(answer)
-
-    # --- answers
-
-    def _finish(self, answer: HttpAnswer) -> None:
-        """Send an answer; then the next request may be read."""
-        if not self.connection.is_open:
-            return
-        self._respond(answer)
-        if self.http.our_state is h11.MUST_CLOSE:
-            self.connection.close_when_sent()
-        elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
-            self.http.start_next_cycle()
-            self._request = None
-
-    def _reject(self, status: int, text: str) -> None:
+    def _reject(self, status: int, text: str) -> int:
         """Answer with an error after which nothing more can be read, and close."""
         if self.http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._respond(HttpAnswer(status, {"error": " ".join(text.split())}, (("Connection", "close"),)))
+            self._respond(HttpAnswer.of(HttpError(status, " ".join(text.split()), ("Connection", "close"))))
         self.connection.close_when_sent()
+        return 0
 
     def _respond(self, answer: HttpAnswer) -> None:
         content_type, body = answer.content_type, answer.result

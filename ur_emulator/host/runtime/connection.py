@@ -1,4 +1,4 @@
-"""TCP sockets in the loop, and the connection of a client.
+"""Sockets in the loop, and the connection of a client.
 
 A socket never blocks; what the kernel does not take waits in an outbox. A package is sent whole, or not.
 """
@@ -82,7 +82,8 @@ class BufferedSocket(ABC):
 
     def _open(self, sock: socket.socket) -> None:
         """Begin with a connected, non-blocking socket."""
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if sock.family != socket.AF_UNIX:
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._sock = sock
         self.is_open = self._can_send = True
         self._watch()
@@ -91,17 +92,13 @@ class BufferedSocket(ABC):
     def _received(self, data: bytes) -> None:
         """Take what has arrived."""
 
-    @abstractmethod
     def _ended(self) -> None:
         """The peer sends nothing more."""
+        self.close()
 
-    @abstractmethod
     def _send_failed(self) -> None:
         """The peer takes nothing any more."""
-
-    @abstractmethod
-    def _sent(self) -> None:
-        """The outbox is empty again."""
+        self.close()
 
     def _watch(self) -> None:
         """Register with the loop what the socket waits for at present."""
@@ -143,7 +140,6 @@ class BufferedSocket(ABC):
         del self._outbox[:sent]
         if not self._outbox:
             self._watch()
-            self._sent()
 
 
 # Kernel buffer for sending: small, so that a slow reader gets fresh data and a silent one costs little
@@ -287,6 +283,11 @@ class Connection(BufferedSocket):
         self._sent()
         if self.is_open:
             self._watch()
+
+    def _flush(self) -> None:
+        super()._flush()
+        if not self._outbox:
+            self._sent()
 
     def _sent(self) -> None:
         self._backlog.discard(self)

@@ -11,22 +11,22 @@ next round by `call_soon`. An error in a callback ends its registration, its own
 loop goes on (see `barrier`).
 """
 
+import gc
 import select
 import selectors
 import socket
+import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from typing import Protocol, cast
 
 from ur_emulator.host.runtime.barrier import Failed, guarded
-from ur_emulator.host.runtime.memory import loop_settings
-from ur_emulator.host.runtime.worker import TaskQueue
 
 # epoll waits in whole milliseconds; a deadline nearer than this is waited for with select(), which knows
 # microseconds.
@@ -44,10 +44,43 @@ _LATE_TURN, _LATE_PART = 500e-6, 1.0 / 16.0
 _POLL_TIME = 200e-6
 # Most waits in a row without polling, after polls that failed.
 _LONGEST_PAUSE = 32
+# In a process of the user: collect rarely, a full collection over a large heap costs more than a cycle has to
+# spare; and let threads take short turns, one with long work shares the interpreter with the loop.
+_RARELY = (50_000, 20, 100)
+_SWITCH_INTERVAL = 1e-4  # s
+
+_lock = threading.Lock()
+_running_loops = 0
+_before = (gc.get_threshold(), sys.getswitchinterval())
 
 
 _Ready = tuple[selectors.SelectorKey, int]
 _Callback = Callable[[int], None]
+
+
+@contextmanager
+def loop_settings() -> Iterator[None]:
+    """Collect rarely and switch threads often in this block, in a process of the user.
+
+    Blocks of several loops may overlap. When the last one ends, the settings are again what they were before
+    the first.
+    """
+    global _running_loops, _before
+    with _lock:
+        if not _running_loops:
+            _before = (gc.get_threshold(), sys.getswitchinterval())
+        _running_loops += 1
+        gc.set_threshold(*_RARELY)
+        sys.setswitchinterval(_SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        with _lock:
+            _running_loops -= 1
+            if not _running_loops:
+                thresholds, interval = _before
+                gc.set_threshold(*thresholds)
+                sys.setswitchinterval(interval)
 
 
 class Service(Protocol):
@@ -67,7 +100,6 @@ class EventLoop:
 
     Attributes:
         is_running: `run` has been called, or will be at once; it has not returned.
-        tasks: work that takes longer than a cycle, done in another process.
     """
 
     def __init__(self, *, precise: bool = True) -> None:
@@ -89,12 +121,9 @@ class EventLoop:
         self._waker, self._wake_end = socket.socketpair()
         for end in (self._waker, self._wake_end):
             end.setblocking(False)
-        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes, _raise)
-        # Sub-millisecond waits need the selector's own descriptor to be selectable; that is so for epoll
-        # and kqueue.
-        descriptor = getattr(self._selector, "fileno", None)
-        self._descriptor: int | None = descriptor() if precise and descriptor is not None else None
-        self.tasks = TaskQueue(self)
+        self.watch(self._wake_end, selectors.EVENT_READ, self._drain_wakes, end_loop)
+        # Waits of less than a millisecond select the selector's own descriptor, of epoll or kqueue.
+        self._descriptor = self._selector.fileno() if precise else None
 
     # --- sockets
 
@@ -151,13 +180,8 @@ class EventLoop:
 
     def call_later(self, delay: float, call: Callable[[], None], failed: Failed) -> None:
         """As `call_soon`, after `delay` seconds or a little later: for what needs no cycle."""
-        due = time.monotonic() + delay
-        timer: tuple[float, int, Callable[[], None]] = (
-            due,
-            next(self._order),
-            partial(guarded, failed, call),
-        )
-        heappush(self._timers, timer)
+        timer: Callable[[], None] = partial(guarded, failed, call)
+        heappush(self._timers, (time.monotonic() + delay, next(self._order), timer))
 
     # --- other threads
 
@@ -168,7 +192,7 @@ class EventLoop:
 
     def call_soon_threadsafe(self, call: Callable[[], None], failed: Failed) -> None:
         """As `call_soon`, from any thread; beside `stop` the only method for other threads."""
-        self._calls.append(partial(guarded, failed, call))
+        self.call_soon(call, failed)
         self._wake()
 
     def stop(self) -> None:
@@ -203,8 +227,7 @@ class EventLoop:
             self._thread = 0
 
     def close(self) -> None:
-        """Release the selector, the wake-up pipe and the process; the loop must not run any more."""
-        self.tasks.close()
+        """Release the selector and the wake-up pipe; the loop must not run any more."""
         self._selector.close()
         self._waker.close()
         self._wake_end.close()
@@ -297,6 +320,6 @@ class EventLoop:
             self._wake_end.recv(4096)
 
 
-def _raise(error: Exception) -> None:
-    """Let an error end the loop."""
+def end_loop(error: Exception) -> None:
+    """Let an error of ours end the loop."""
     raise error

@@ -27,11 +27,9 @@ from ur_emulator.host.runtime.barrier import Report, guarded
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.runtime.event_loop import EventLoop
 
-# --- A spare descriptor: a process that has none left needs one to refuse a client
-
 
 class SpareDescriptor:
-    """A descriptor that is released for a moment when all others are in use."""
+    """A descriptor that is released for a moment when no other is left: to refuse a client needs one."""
 
     def __init__(self) -> None:
         self._descriptor: int | None = None
@@ -64,11 +62,8 @@ class SpareDescriptor:
             self._descriptor = None
 
 
-# --- How many clients a box has, by their addresses and ports: who comes on top of the limits is refused
-
-
 class ClientLimits:
-    """Counts the clients of a box, and refuses those beyond its limits."""
+    """Counts the clients of a box by their addresses and ports, and refuses those beyond its limits."""
 
     def __init__(self) -> None:
         self._taken: Counter[tuple[str | int, ...]] = Counter()
@@ -83,10 +78,7 @@ class ClientLimits:
 
     def release(self, host: str, port: int) -> None:
         """Forget a client that is gone."""
-        for key, _, _ in _limits(host, port):
-            self._taken[key] -= 1
-            if not self._taken[key]:
-                del self._taken[key]
+        self._taken -= Counter(key for key, _, _ in _limits(host, port))  # what is at 0 goes
 
 
 def _limits(host: str, port: int) -> tuple[tuple[tuple[str | int, ...], int, str], ...]:
@@ -172,11 +164,10 @@ class Listener:
         self._spare = spare
         self._reads_http = reads_http
         self._refuses = False
-        self._paused_until: float | None = None
         self._sock = _listening_socket(host, number)
         self.connections: dict[Connection, None] = {}
         self.number: int = self._sock.getsockname()[1]
-        loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
+        self._listen()
 
     @property
     def clients(self) -> list[str]:
@@ -185,22 +176,10 @@ class Listener:
 
     def close(self) -> None:
         """Stop listening, and close all connections."""
-        self._loop.remove(self)
         self._loop.unwatch(self._sock)
         self._sock.close()
         for connection in tuple(self.connections):
             connection.close()
-
-    def advance(self, now: float) -> float:
-        """Listen again at the end of a pause; called by the loop only in one."""
-        if self._paused_until is None:
-            self._paused_until = now + PAUSE
-        if now >= self._paused_until:
-            self._paused_until = None
-            self._loop.remove(self)
-            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
-            return now
-        return self._paused_until
 
     def failed(self, error: Exception) -> None:
         """Pause after an error of ours in accepting clients."""
@@ -270,7 +249,11 @@ class Listener:
 
     def _pause(self) -> None:
         self._loop.unwatch(self._sock)
-        self._loop.add(self)
+        self._loop.call_later(PAUSE, self._listen, self.failed)
+
+    def _listen(self) -> None:
+        if self._sock.fileno() >= 0:  # it may have been closed in a pause
+            self._loop.watch(self._sock, selectors.EVENT_READ, self._accept, self.failed)
 
     def _closed(self, host: str, connection: Connection) -> None:
         del self.connections[connection]
@@ -311,15 +294,14 @@ def _listening_socket(host: str, number: int) -> socket.socket:
     return sock
 
 
-# --- Lines of the log about clients that come and go: a storm of them must not empty the log
-
 _WINDOW = 60.0  # s
 
 
 class ClientLines:
-    """Writes so many lines a minute into the log, and counts the others.
+    """Writes so many lines a minute about clients into the log: a storm of them must not empty it.
 
-    The clock is monotonic [s]; also where the time of the box stands still, clients come and go.
+    The others are counted. The clock is monotonic [s]; also where the time of the box stands still, clients
+    come and go.
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:

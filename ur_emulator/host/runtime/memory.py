@@ -13,25 +13,19 @@ from __future__ import annotations
 
 import ctypes
 import gc
-import resource
-import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from ur_emulator.budgets import BUDGETS, MIB
+from ur_emulator.host.runtime.processes import limit_memory, resident
 from ur_emulator.machine.commands.programs import EndPrograms
 
 if TYPE_CHECKING:
+    from ur_emulator.host.runtime.worker import TaskQueue
     from ur_emulator.machine.controller.command import Command
     from ur_emulator.machine.controller.program_runner import ProgramRunner
     from ur_emulator.machine.machine import Machine
 
-# In a process of the user: collect rarely, a full collection over a large heap costs more than a cycle has to
-# spare; and let threads take short turns, one with long work shares the interpreter with the loop.
-_RARELY = (50_000, 20, 100)
-_SWITCH_INTERVAL = 1e-4  # s
 # Objects that are new when the collector looks at them [1]: so many take a fifth of a millisecond.
 _NEW = 2_000
 # The same where few objects are long [bytes]: the collector looks at all elements of new lists, half a
@@ -47,36 +41,6 @@ _WORTH_IT = 8 * MIB
 _MARGIN = 64 * MIB
 # `M_MMAP_THRESHOLD` of mallopt(3): longer blocks go back to the system when they are freed [bytes].
 _MMAP_THRESHOLD, _LONG_BLOCK = -3, 64 * 1024
-_PAGE = resource.getpagesize()
-
-_lock = threading.Lock()
-_running_loops = 0
-_before = (gc.get_threshold(), sys.getswitchinterval())
-
-
-@contextmanager
-def loop_settings() -> Iterator[None]:
-    """Collect rarely and switch threads often in this block, in a process of the user.
-
-    Blocks of several loops may overlap. When the last one ends, the settings are again what they were before
-    the first.
-    """
-    global _running_loops, _before
-    with _lock:
-        if not _running_loops:
-            _before = (gc.get_threshold(), sys.getswitchinterval())
-        _running_loops += 1
-        gc.set_threshold(*_RARELY)
-        sys.setswitchinterval(_SWITCH_INTERVAL)
-    try:
-        yield
-    finally:
-        with _lock:
-            _running_loops -= 1
-            if not _running_loops:
-                thresholds, interval = _before
-                gc.set_threshold(*thresholds)
-                sys.setswitchinterval(interval)
 
 
 def own_process() -> None:
@@ -86,39 +50,7 @@ def own_process() -> None:
     gc.disable()
     with suppress(OSError, AttributeError):  # long blocks go back when they are freed, where that can be set
         ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _LONG_BLOCK)
-    with suppress(OSError, ValueError), open("/proc/self/statm", "rb") as file:
-        limit = int(file.read().split()[5]) * _PAGE + BUDGETS.memory + _MARGIN
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, resource.getrlimit(resource.RLIMIT_DATA)[1]))
-
-
-def resident(process: int | str = "self") -> int:
-    """Return what a process has in memory [bytes]; 0 where the system does not tell."""
-    try:
-        with open(f"/proc/{process}/statm", "rb") as file:
-            return int(file.read().split()[1]) * _PAGE
-    except OSError:
-        return 0
-
-
-def is_stopped(process: int) -> bool:
-    """Return whether a process is stopped, as by SIGSTOP; False where the system does not tell."""
-    try:
-        with open(f"/proc/{process}/stat", "rb") as file:
-            return file.read().rpartition(b") ")[2][:1] == b"T"
-    except OSError:
-        return False
-
-
-class Tasks(Protocol):
-    """What worker processes do, for the watch."""
-
-    def memory(self) -> int:
-        """Return what they hold beyond what they began with [bytes]."""
-        ...
-
-    def end_for_memory(self) -> None:
-        """End the task that holds most."""
-        ...
+    limit_memory(BUDGETS.memory + _MARGIN)
 
 
 class Box(Protocol):
@@ -134,7 +66,7 @@ class Box(Protocol):
 class MemoryWatch:
     """Watches the memory of a process that only serves boxes."""
 
-    def __init__(self, tasks: Tasks) -> None:
+    def __init__(self, tasks: TaskQueue) -> None:
         self._tasks = tasks
         self._at_rest = self._now = self._collected = resident()
         # What it holds when nothing can be given back.

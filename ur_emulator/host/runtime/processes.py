@@ -14,6 +14,7 @@ import errno
 import gc
 import importlib
 import os
+import resource
 import selectors
 import signal
 import socket
@@ -23,11 +24,14 @@ import threading
 import time
 import traceback
 import weakref
+from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
-from enum import Enum
 from functools import partial
 from typing import Any, Final, NoReturn, cast
+
+from ur_emulator.host.runtime.connection import BufferedSocket
+from ur_emulator.host.runtime.event_loop import EventLoop
 
 # Bytes of the length in front of a message, big-endian.
 _HEAD: Final = 8
@@ -35,6 +39,7 @@ _READ_SIZE: Final = 1 << 18
 # Bytes of what the server tells of a child: its number, then its exit code.
 _NUMBER: Final = 4
 _KILL: Final = b"k"
+_PAGE: Final = resource.getpagesize()
 # How long a process that ends waits for its server [s].
 _FAREWELL: Final = 2.0
 _COMMAND: Final = (
@@ -43,30 +48,13 @@ _COMMAND: Final = (
 )
 
 
-class Role(Enum):
-    """What a child does: the byte that asks for it.
-
-    The module of a role has `prepare`, which the server calls once before it forks, `run(pipe)`, the main
-    function of the child, and `clean_up`, which the server calls when a child has ended in another way.
-    """
-
-    WORKER = b"w"
-    BOX = b"b"
-
-    @property
-    def module(self) -> str:
-        """Name of its module."""
-        return {Role.WORKER: "ur_emulator.host.runtime.worker", Role.BOX: "ur_emulator.host.box_process"}[
-            self
-        ]
-
-    @property
-    def grace(self) -> float:
-        """How long it may take to end when the other end of its life is gone [s]; a box closes its ports."""
-        return {Role.WORKER: 0.0, Role.BOX: 5.0}[self]
-
-
-# --- messages
+# What a child does: the byte that asks for it, and its module. That has `prepare`, which the server calls
+# once before it forks, `run(pipe)`, the main function of the child, `clean_up`, which the server calls when a
+# child has ended in another way, and `GRACE`: how long a child may take to end when the other end of its life
+# is gone [s].
+WORKER: Final = b"w"
+BOX: Final = b"b"
+_MODULES: Final = {WORKER: "ur_emulator.host.runtime.worker", BOX: "ur_emulator.host.box_process"}
 
 
 def framed(message: bytes) -> bytes:
@@ -88,59 +76,50 @@ def _read(pipe: socket.socket, size: int) -> bytes:
     return bytes(data)
 
 
-class Pipe:
-    """A pipe as a loop uses it: nothing waits."""
+class Pipe(BufferedSocket):
+    """A pipe in a loop: nothing waits; it closes when the other end is gone. `take` gets whole messages."""
 
-    def __init__(self, sock: socket.socket) -> None:
-        sock.setblocking(False)
-        self.sock = sock
-        self._outbox = bytearray()
+    def __init__(self, loop: EventLoop, sock: socket.socket) -> None:
+        super().__init__(loop, sys.maxsize, _READ_SIZE)
         self._inbox = bytearray()
+        sock.setblocking(False)
+        self._open(sock)
 
-    @property
-    def events(self) -> int:
-        """What the loop waits for."""
-        return selectors.EVENT_READ | (selectors.EVENT_WRITE if self._outbox else 0)
+    @abstractmethod
+    def take(self, message: bytes) -> None:
+        """Take a message."""
 
-    @property
-    def is_clear(self) -> bool:
-        """Whether everything was sent."""
-        return not self._outbox
-
-    def send(self, message: bytes) -> None:
-        """Send a message, as much as goes now; `flush` sends the rest."""
-        self._outbox += framed(message)
-        self.flush()
-
-    def flush(self) -> None:
-        """Send what goes now. An end that is gone is noticed by `receive`."""
-        try:
-            del self._outbox[: self.sock.send(self._outbox)]
-        except BlockingIOError:
-            return
-        except OSError:
-            self._outbox.clear()
-
-    def receive(self) -> list[bytes]:
-        """Return the messages that have come completely.
-
-        Raises:
-            EOFError: the other end is gone.
-        """
-        try:
-            data = self.sock.recv(_READ_SIZE)
-        except BlockingIOError:
-            return []
-        except OSError:
-            data = b""
-        if not data:
-            raise EOFError
+    def _received(self, data: bytes) -> None:
         self._inbox += data
-        messages = []
         while len(self._inbox) >= (end := _HEAD + int.from_bytes(self._inbox[:_HEAD], "big")):
-            messages.append(bytes(memoryview(self._inbox)[_HEAD:end]))
+            message = bytes(memoryview(self._inbox)[_HEAD:end])
             del self._inbox[:end]
-        return messages
+            self.take(message)
+
+
+def resident(process: int | str = "self") -> int:
+    """Return what a process has in memory [bytes]; 0 where the system does not tell."""
+    try:
+        with open(f"/proc/{process}/statm", "rb") as file:
+            return int(file.read().split()[1]) * _PAGE
+    except OSError:
+        return 0
+
+
+def limit_memory(allowed: int) -> None:
+    """Limit the data of this process to what it has and so many bytes more, where the system tells it."""
+    with suppress(OSError, ValueError), open("/proc/self/statm", "rb") as file:
+        limit = int(file.read().split()[5]) * _PAGE + allowed
+        resource.setrlimit(resource.RLIMIT_DATA, (limit, resource.getrlimit(resource.RLIMIT_DATA)[1]))
+
+
+def is_stopped(process: int) -> bool:
+    """Return whether a process is stopped, as by SIGSTOP; False where the system does not tell."""
+    try:
+        with open(f"/proc/{process}/stat", "rb") as file:
+            return file.read().rpartition(b") ")[2][:1] == b"T"
+    except OSError:
+        return False
 
 
 # --- in the process that asks
@@ -186,6 +165,14 @@ class Child:
         while not self.look():
             pass
 
+    @property
+    def end(self) -> str:
+        """How it has ended, for people; `exit_code` must be known."""
+        code = self.exit_code
+        assert code is not None
+        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        return f"was ended {how}"
+
     def close(self) -> None:
         """Let go of the child: it ends if it has not."""
         with suppress(OSError):
@@ -198,7 +185,7 @@ class Child:
         self.life.close()
 
 
-def start_child(role: Role) -> Child:
+def start_child(role: bytes) -> Child:
     """Start a child; OSError if it cannot be started."""
     pipe, its_pipe = socket.socketpair()
     life, its_life = socket.socketpair()
@@ -214,10 +201,10 @@ def start_child(role: Role) -> Child:
         its_life.close()
 
 
-def prepare_children(role: Role) -> None:
-    """Let the server load the code of a role now; a server that cannot be started is no error yet."""
+def prepare_workers() -> None:
+    """Let the server load the code of workers now; a server that cannot be started is no error yet."""
     with suppress(OSError):
-        _ask(role, ())
+        _ask(WORKER, ())
 
 
 class _Server:
@@ -246,13 +233,10 @@ class _Server:
                 raise
         return cls(channel, process)
 
-    def look(self) -> None:
-        """See that it lives; OSError if it has ended.
-
-        For a moment after its end, a child that it has just forked holds its channel.
-        """
-        if self.process is not None and self.process.poll() is not None:
-            raise ChildProcessError(f"the server has ended with exit code {self.process.returncode}")
+    @property
+    def has_ended(self) -> bool:
+        """Whether it is gone; for a moment afterwards, a child that it has just forked holds its channel."""
+        return self.process is not None and self.process.poll() is not None
 
     def end(self) -> None:
         """Let it end with all its children, and wait for that, for a moment."""
@@ -270,22 +254,22 @@ _server: _Server | None = None
 _children: weakref.WeakSet[Child] = weakref.WeakSet()
 
 
-def _ask(role: Role, descriptors: tuple[int, ...]) -> None:
+def _ask(role: bytes, descriptors: tuple[int, ...]) -> None:
     """Ask the server for a child, or, without descriptors, to load what one needs."""
     global _server
     with _lock:
-        if _server is not None:
+        if _server is not None and not _server.has_ended:
             try:
-                _server.look()
-                socket.send_fds(_server.channel, [role.value], descriptors)
+                socket.send_fds(_server.channel, [role], descriptors)
                 return
             except OSError as error:
                 if error.errno in (errno.EMFILE, errno.ETOOMANYREFS):
                     raise
-                _server.end()
-                _server = None
+        if _server is not None:
+            _server.end()
+            _server = None  # also if none can be started
         _server = _Server.start()
-        socket.send_fds(_server.channel, [role.value], descriptors)
+        socket.send_fds(_server.channel, [role], descriptors)
 
 
 @atexit.register
@@ -310,8 +294,7 @@ def _forget_server() -> None:
     _children.clear()
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_server)
+os.register_at_fork(after_in_child=_forget_server)
 
 
 # --- in the server
@@ -320,6 +303,7 @@ if hasattr(os, "register_at_fork"):
 def serve_forks() -> None:
     """Fork children until nobody asks any more and all have ended; the main function of the server."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # where it is ignored nobody learns how a child has ended
     gc.disable()
     channel = socket.socket(fileno=os.dup(0))
     with open(os.devnull, "rb") as nothing:
@@ -328,27 +312,22 @@ def serve_forks() -> None:
 
 
 class _ForkServer:
-    """Forks children of the process at its channel, reports how they end, ends those whose life is closed."""
+    """Forks children of the process at its channel, reports how they end, ends those whose life is closed.
+
+    Each child has a channel, too, for children of its own; the end of the channel is that of the child.
+    """
 
     def __init__(self, channel: socket.socket) -> None:
         self._selector = selectors.DefaultSelector()
-        self._lives: dict[int, tuple[Role, socket.socket]] = {}
+        self._lives: dict[int, tuple[bytes, socket.socket]] = {}
         # Process -> when it is killed; its life is closed [s, monotonic].
         self._doomed: dict[int, float] = {}
-        self._channels = 0
-        self._prepared: set[Role] = set()
-        self._wake, wake_end = socket.socketpair()
-        for end in (self._wake, wake_end):
-            end.setblocking(False)
-        signal.signal(signal.SIGCHLD, lambda number, frame: None)
-        signal.set_wakeup_fd(wake_end.fileno(), warn_on_full_buffer=False)
-        self._wake_end = wake_end
-        self._selector.register(self._wake, selectors.EVENT_READ, self._reap)
+        self._prepared: set[bytes] = set()
         self._add_channel(channel)
 
     def run(self) -> None:
         """Work until nobody asks any more and all children have ended."""
-        while self._channels or self._lives:
+        while self._selector.get_map():
             timeout = min(self._doomed.values(), default=None)
             ready = self._selector.select(None if timeout is None else max(0.0, timeout - time.monotonic()))
             for key, _ in ready:
@@ -356,11 +335,10 @@ class _ForkServer:
                     key.data()
             self._kill_doomed()
 
-    def _add_channel(self, channel: socket.socket) -> None:
-        self._channels += 1
-        self._selector.register(channel, selectors.EVENT_READ, partial(self._take_request, channel))
+    def _add_channel(self, channel: socket.socket, child: int | None = None) -> None:
+        self._selector.register(channel, selectors.EVENT_READ, partial(self._take_request, channel, child))
 
-    def _take_request(self, channel: socket.socket) -> None:
+    def _take_request(self, channel: socket.socket, child: int | None) -> None:
         try:
             request, descriptors, _, _ = socket.recv_fds(channel, 1, 2)
         except OSError:
@@ -368,19 +346,19 @@ class _ForkServer:
         if not request:
             self._selector.unregister(channel)
             channel.close()
-            self._channels -= 1
+            if child is not None:
+                self._reap(child)
             return
-        role = Role(request)
-        if role not in self._prepared:
-            self._prepared.add(role)
-            self._module(role).prepare()
+        if request not in self._prepared:
+            self._prepared.add(request)
+            self._module(request).prepare()
             gc.collect()
             gc.freeze()  # children write into fewer pages that they share
         if descriptors:
-            self._fork(role, *map(_as_socket, descriptors))
+            pipe, life = (socket.socket(fileno=descriptor) for descriptor in descriptors)
+            self._fork(request, pipe, life)
 
-    def _fork(self, role: Role, pipe: socket.socket, life: socket.socket) -> None:
-        """Fork a child; its channel lets it have children of its own."""
+    def _fork(self, role: bytes, pipe: socket.socket, life: socket.socket) -> None:
         with pipe:
             channel, its_channel = socket.socketpair()
             with its_channel:
@@ -397,25 +375,23 @@ class _ForkServer:
                     _be_child(partial(self._module(role).run, pipe), its_channel)
         self._tell(life, pid)
         self._lives[pid] = role, life
-        self._selector.register(life, selectors.EVENT_READ, partial(self._on_life, pid, life, role.grace))
-        self._add_channel(channel)
+        self._selector.register(life, selectors.EVENT_READ, partial(self._on_life, pid))
+        self._add_channel(channel, pid)
 
     def _leave(self) -> None:
         """In a child: close what belongs to the server."""
-        signal.set_wakeup_fd(-1)
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         for key in tuple(self._selector.get_map().values()):
             cast(socket.socket, key.fileobj).close()
-        self._wake_end.close()
         self._selector.close()
 
-    def _on_life(self, pid: int, life: socket.socket, grace: float) -> None:
+    def _on_life(self, pid: int) -> None:
         """Who asked for a child wants its end, or has gone."""
+        role, life = self._lives[pid]
         try:
             word = life.recv(1)
         except OSError:
             word = b""
-        self._doomed[pid] = time.monotonic() + (0.0 if word == _KILL else grace)
+        self._doomed[pid] = time.monotonic() + (0.0 if word == _KILL else self._module(role).GRACE)
         self._selector.unregister(life)
 
     def _kill_doomed(self) -> None:
@@ -424,22 +400,19 @@ class _ForkServer:
             del self._doomed[pid]
             os.kill(pid, signal.SIGKILL)
 
-    def _reap(self) -> None:
-        with suppress(BlockingIOError):
-            self._wake.recv(4096)
-        while self._lives:
-            pid, status = os.waitpid(-1, os.WNOHANG)
-            if not pid:
-                return
-            role, life = self._lives.pop(pid)
-            self._doomed.pop(pid, None)
-            with suppress(KeyError):
-                self._selector.unregister(life)
-            code = os.waitstatus_to_exitcode(status)
-            if code:
-                self._module(role).clean_up()
-            with life:
-                self._tell(life, code)
+    def _reap(self, pid: int) -> None:
+        """A child has ended; one that has only closed its channel ends now."""
+        os.kill(pid, signal.SIGKILL)
+        _, status = os.waitpid(pid, 0)
+        role, life = self._lives.pop(pid)
+        self._doomed.pop(pid, None)
+        with suppress(KeyError):
+            self._selector.unregister(life)
+        code = os.waitstatus_to_exitcode(status)
+        if code:
+            self._module(role).clean_up()
+        with life:
+            self._tell(life, code)
 
     @staticmethod
     def _tell(life: socket.socket, number: int) -> None:
@@ -447,12 +420,8 @@ class _ForkServer:
             life.send(number.to_bytes(_NUMBER, "big", signed=True))
 
     @staticmethod
-    def _module(role: Role) -> Any:
-        return importlib.import_module(role.module)
-
-
-def _as_socket(descriptor: int) -> socket.socket:
-    return socket.socket(fileno=descriptor)
+    def _module(role: bytes) -> Any:
+        return importlib.import_module(_MODULES[role])
 
 
 def _be_child(run: Callable[[], None], channel: socket.socket) -> NoReturn:

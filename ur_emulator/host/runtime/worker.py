@@ -7,10 +7,11 @@ somebody else for more than a moment. A task that takes too much processor time 
 The queue looks at the clock itself: a process may be stopped.
 """
 
+from __future__ import annotations
+
 import gc
 import os
 import pickle
-import resource
 import selectors
 import signal
 import socket
@@ -19,24 +20,28 @@ from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from types import FrameType
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import EmulatorError, WorkerError
 from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
-from ur_emulator.host.runtime.memory import is_stopped, resident
+from ur_emulator.host.runtime.event_loop import EventLoop, end_loop
 from ur_emulator.host.runtime.processes import (
     OUT_OF_MEMORY,
+    WORKER,
     Child,
     Pipe,
-    Role,
     framed,
+    is_stopped,
+    limit_memory,
     read_message,
+    resident,
     start_child,
 )
 
+# A process that has ended is not waited for.
+GRACE: Final = 0.0
 LONG: Final = 1.0
 """After so much real time a task takes long, and after so much processor time it has a lower priority [s]."""
 # By so much the priority of a long task is lower: the loop comes first.
@@ -62,7 +67,7 @@ def run(pipe: socket.socket) -> None:
     gc.enable()
     gc.set_threshold(_MANY_OBJECTS)
     signal.signal(signal.SIGVTALRM, _take_long)
-    _limit_memory()
+    limit_memory(BUDGETS.task_memory)
     with pipe, suppress(OSError, EOFError):
         while True:
             task = read_message(pipe)
@@ -83,14 +88,6 @@ def out_of_memory() -> str:
 def _take_long(number: int, frame: FrameType | None) -> None:
     """Go on with a lower priority: the queue has a new process for the next tasks."""
     os.nice(_NICENESS)
-
-
-def _limit_memory() -> None:
-    """Limit what this process has beside what it needs for itself; some systems do not report that amount."""
-    with suppress(OSError):
-        n_pages = int(Path("/proc/self/statm").read_text().split()[5])
-        limit = n_pages * resource.getpagesize() + BUDGETS.task_memory
-        resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 
 
 def _answer(task: bytes) -> bytes:
@@ -121,28 +118,6 @@ TaskDone = Callable[[Any, Exception | None], None]
 _LOOK_PERIOD = 0.25
 # After so much real time a task ends [s]: it may wait for a disk for ever.
 _FOR_EVER = 60.0
-
-
-class Loop(Protocol):
-    """The part of a loop that a task queue uses."""
-
-    def watch(
-        self, sock: socket.socket, events: int, callback: Callable[[int], None], failed: Failed
-    ) -> None:
-        """Call `callback(events)` whenever `sock` is ready, `failed` with an error in it."""
-        ...
-
-    def unwatch(self, sock: socket.socket) -> None:
-        """Stop watching `sock`."""
-        ...
-
-    def call_soon(self, call: Callable[[], None], failed: Failed) -> None:
-        """Run `call` in the loop, soon, and `failed` with an error in it."""
-        ...
-
-    def call_later(self, delay: float, call: Callable[[], None], failed: Failed) -> None:
-        """Run `call` in the loop after `delay` seconds, and `failed` with an error in it."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,13 +154,14 @@ class Task:
     began: float = 0.0
 
 
-class _Process:
-    """A worker process; `memory_at_rest` is what it held when it began [bytes]."""
+class _Process(Pipe):
+    """A worker process, and the pipe to it; `memory_at_rest` is what it held when it began [bytes]."""
 
-    def __init__(self) -> None:
-        self.child: Child = start_child(Role.WORKER)
-        self.pipe = Pipe(self.child.pipe)
+    def __init__(self, queue: TaskQueue) -> None:
+        self._queue = queue
+        self.child: Child = start_child(WORKER)
         self.memory_at_rest = 0
+        super().__init__(queue.loop, self.child.pipe)
 
     @property
     def memory(self) -> int:
@@ -197,17 +173,26 @@ class _Process:
         """What it holds beyond what it held when it began [bytes]."""
         return max(0, self.memory - self.memory_at_rest)
 
+    def take(self, message: bytes) -> None:
+        """Take the answer to a task."""
+        self._queue.answered(self, message)
+
+    def failed(self, error: Exception) -> None:
+        """Do without the process after an error of ours."""
+        self._queue.lose(self, error)
+
 
 class TaskQueue:
-    """Tasks in the order of their tickets; used in the loop's thread."""
+    """Tasks in the order of their tickets; used in the thread of `loop`."""
 
-    def __init__(self, loop: Loop) -> None:
-        self._loop = loop
+    def __init__(self, loop: EventLoop) -> None:
+        self.loop = loop
         self._waiting: list[Task] = []
         self._under_way: dict[_Process, Task] = {}
         # The process that does the next task; those that do long ones are only in `_under_way`.
         self._process: _Process | None = None
-        self._killed: set[_Process] = set()
+        # All that have not ended yet.
+        self._processes: set[_Process] = set()
         self._is_looking = False
 
     @property
@@ -261,8 +246,7 @@ class TaskQueue:
     def close(self) -> None:
         """Drop all tasks and let go of all processes."""
         self._waiting.clear()
-        processes = {*self._under_way, *self._killed, *([self._process] if self._process else [])}
-        for process in processes:
+        for process in tuple(self._processes):
             process.child.kill()
             self._release(process)
         self._under_way.clear()
@@ -272,15 +256,11 @@ class TaskQueue:
 
     def _start(self) -> _Process:
         if self._process is None:
-            self._process = process = _Process()
-            self._watch(process)
+            self._process = process = _Process(self)
+            self._processes.add(process)
             look = partial(self._look_at, process)
-            self._loop.watch(process.child.life, selectors.EVENT_READ, look, self._fail)
+            self.loop.watch(process.child.life, selectors.EVENT_READ, look, end_loop)
         return self._process
-
-    def _watch(self, process: _Process) -> None:
-        ready = partial(self._on_ready, process)
-        self._loop.watch(process.pipe.sock, process.pipe.events, ready, partial(self._lose, process))
 
     def _begin_next(self) -> None:
         if self._process in self._under_way or (task := self._take_next()) is None:
@@ -289,13 +269,12 @@ class TaskQueue:
             process = self._start()
         except OSError as error:
             problem = WorkerError(f"the process for it cannot be started ({error}): try again later")
-            self._loop.call_soon(lambda: self._finish(task, None, problem), task.failed)
+            self.loop.call_soon(lambda: self._finish(task, None, problem), task.failed)
             return
         self._under_way[process] = task
         task.began = time.monotonic()
-        process.pipe.send(task.request)
+        process.send(framed(task.request))
         task.request = b""  # the pipe keeps what it has not sent yet
-        self._watch(process)
         if not self._is_looking:
             self._look_later()
 
@@ -308,24 +287,10 @@ class TaskQueue:
         self._waiting.remove(task)
         return task
 
-    def _on_ready(self, process: _Process, events: int) -> None:
-        if events & selectors.EVENT_WRITE:
-            process.pipe.flush()
-            self._watch(process)
-        if not events & selectors.EVENT_READ:
-            return
-        try:
-            answers = process.pipe.receive()
-        except EOFError:
-            self._loop.unwatch(process.pipe.sock)  # `life` says how it has ended
-            return
-        for answer in answers:
-            if process in self._under_way:
-                self._answered(process, answer)
-
-    def _answered(self, process: _Process, answer: bytes) -> None:
+    def answered(self, process: _Process, answer: bytes) -> None:
         """Take the answer to a task; a process in which one took long has a low priority, and goes."""
-        task = self._under_way.pop(process)
+        if (task := self._under_way.pop(process, None)) is None:
+            return
         if process is not self._process or time.monotonic() - task.began >= LONG:
             self._kill(process)
         try:
@@ -338,7 +303,7 @@ class TaskQueue:
 
     def _look_later(self) -> None:
         self._is_looking = True
-        self._loop.call_later(_LOOK_PERIOD, self._look, self._fail)
+        self.loop.call_later(_LOOK_PERIOD, self._look, end_loop)
 
     def _look(self) -> None:
         """Set tasks apart that take long; end those that take for ever or whose process was stopped."""
@@ -375,20 +340,17 @@ class TaskQueue:
     def _look_at(self, process: _Process, events: int) -> None:
         """Take what the server tells of a process: it has begun, or ended."""
         if process.child.look():
-            self._lose(process)
+            self.lose(process)
         else:
             process.memory_at_rest = process.memory
             if process in self._under_way:  # its task has waited for it until now
                 self._under_way[process].began = time.monotonic()
 
-    def _lose(self, process: _Process, error: Exception | None = None) -> None:
+    def lose(self, process: _Process, error: Exception | None = None) -> None:
         """Do without a process that has ended, or with which we failed; its task fails."""
-        task = self._under_way.pop(process, None)
-        if process is self._process:
-            self._process = None
-        if error is not None:
-            process.child.kill()
-        reason = repr(error) if error else _reason(process.child.exit_code)
+        task = self._under_way.get(process)
+        reason = repr(error) if error else _reason(process.child)
+        self._kill(process)
         self._release(process)
         if task is not None:
             self._finish(task, None, WorkerError(reason))
@@ -396,16 +358,15 @@ class TaskQueue:
     def _kill(self, process: _Process) -> None:
         """Let a process end, which takes a moment; it is released afterwards."""
         process.child.kill()
-        self._killed.add(process)
         self._under_way.pop(process, None)
         if process is self._process:
             self._process = None
 
     def _release(self, process: _Process) -> None:
         """Release what is left of a process that has ended or was killed."""
-        self._killed.discard(process)
-        self._loop.unwatch(process.child.life)
-        self._loop.unwatch(process.pipe.sock)
+        self._processes.discard(process)
+        self.loop.unwatch(process.child.life)
+        process.close()
         process.child.close()
 
     def _finish(self, task: Task, result: Any, error: Exception | None) -> None:
@@ -413,18 +374,13 @@ class TaskQueue:
             guarded(task.failed, task.done, result, error)
         self._begin_next()
 
-    @staticmethod
-    def _fail(error: Exception) -> None:
-        """Let an error of ours end the loop."""
-        raise error
 
-
-def _reason(code: int | None) -> str:
-    if code == -signal.SIGPROF:
+def _reason(child: Child) -> str:
+    """Say why a task is refused whose process has ended."""
+    if child.exit_code == -signal.SIGPROF:
         return f"it takes more than {BUDGETS.task_seconds:g} s of processor time: make it shorter"
-    if code == OUT_OF_MEMORY:
+    if child.exit_code == OUT_OF_MEMORY:
         return out_of_memory()
-    if code is None:
+    if child.exit_code is None:
         return "the process that did it has ended: try again"
-    how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-    return f"the process that did it was ended {how}: try again"
+    return f"the process that did it {child.end}: try again"

@@ -224,15 +224,6 @@ class OutgoingConnection(BufferedSocket):
         self._buffers.received(len(data))
         self.read_on()
 
-    def _ended(self) -> None:
-        self.close()
-
-    def _send_failed(self) -> None:
-        self.close()
-
-    def _sent(self) -> None:
-        pass
-
     def _flush(self) -> None:
         super()._flush()
         self._count_unsent()

@@ -13,22 +13,11 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from enum import Enum
-from inspect import getdoc
+from inspect import get_annotations, getdoc
 from itertools import islice
 from math import hypot, inf, isfinite
 from types import NoneType, UnionType
-from typing import (
-    Any,
-    ClassVar,
-    Generic,
-    Literal,
-    TypeVar,
-    Union,
-    dataclass_transform,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Any, ClassVar, Generic, Literal, TypeVar, Union, dataclass_transform, get_args, get_origin
 
 from ur_emulator.errors import ArgumentError
 from ur_emulator.machine.controller.command import BoxParts, Result
@@ -167,7 +156,9 @@ class Parameter:
                 numbers = tuple(islice(value, most + 1))
                 if least <= len(numbers) <= most and all(map(_is_number, numbers)):
                     vector = tuple(map(float, numbers))
-                    return None if self._in_range(hypot(*vector)) is None else vector
+                    # Without a bound no length is computed: it may be too long for a number.
+                    fits = self.high is None or self._in_range(hypot(*vector)) is not None
+                    return vector if fits else None
         return None
 
     def _in_range(self, value: float) -> float | None:
@@ -278,7 +269,7 @@ class Operation(Generic[R_co]):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         dataclass(frozen=True)(cls)
-        types = get_type_hints(cls)
+        types = get_annotations(cls, eval_str=True)
         cls.parameters = tuple(
             Parameter(row.name, default=row.default, **{**_details_of(types[row.name]), **row.metadata})
             for row in fields(cls)  # type: ignore[arg-type]
