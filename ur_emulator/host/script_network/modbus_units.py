@@ -448,7 +448,16 @@ class ModbusClient:
 
 def _signal_of(request: ServeSignal) -> ModbusSignal:
     """Return the host's record of a signal; no values have been read."""
-    r = request
-    signal = ModbusSignal("", r.unit, r.slave, r.address, r.type, r.sequential, count=r.count)
-    signal.number, signal.write_address, signal.values = r.signal, r.write_address, ()
+    signal = ModbusSignal(
+        name="",
+        unit=request.unit,
+        slave=request.slave,
+        address=request.address,
+        type=request.type,
+        sequential=request.sequential,
+        count=request.count,
+        write_address=request.write_address,
+        number=request.signal,
+    )
+    signal.values = ()
     return signal

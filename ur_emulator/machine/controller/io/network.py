@@ -460,13 +460,21 @@ class Network:
         if not signal.number:
             signal.number = next(self._numbers)
             self._signals[signal.number] = signal
-        s = signal
         self.requests.append(
             ServeSignal(
-                s.unit, s.number, wanted, s.slave, s.type, s.address, s.count, s.write_address, s.sequential,
-                s.tolerance, s.output,
+                unit=signal.unit,
+                signal=signal.number,
+                wanted=wanted,
+                slave=signal.slave,
+                type=signal.type,
+                address=signal.address,
+                count=signal.count,
+                write_address=signal.write_address,
+                sequential=signal.sequential,
+                tolerance=signal.tolerance,
+                output=signal.output,
             )
-        )  # fmt: skip
+        )
 
     def forget(self, signal: ModbusSignal) -> None:
         """Drop a signal."""
