@@ -10,7 +10,6 @@ where Ctrl-C does not reach them.
 from __future__ import annotations
 
 import atexit
-import errno
 import gc
 import importlib
 import os
@@ -259,12 +258,10 @@ def _ask(role: bytes, descriptors: tuple[int, ...]) -> None:
     global _server
     with _lock:
         if _server is not None and not _server.has_ended:
-            try:
+            # A child must not close the channel to a server that lives, which would take that for its end.
+            with suppress(BrokenPipeError, ConnectionResetError):
                 socket.send_fds(_server.channel, [role], descriptors)
                 return
-            except OSError as error:
-                if error.errno in (errno.EMFILE, errno.ETOOMANYREFS):
-                    raise
         if _server is not None:
             _server.end()
             _server = None  # also if none can be started
