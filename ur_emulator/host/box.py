@@ -19,7 +19,8 @@ from ur_emulator.host.control_api.step_operations import Context
 from ur_emulator.host.journal import Journal
 from ur_emulator.host.pacing import Pace, make_pacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
-from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, SendingPorts, answering_ports
+from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, answering_ports, sending_ports
+from ur_emulator.host.ports.primary.port import PrimaryPort
 from ur_emulator.host.ports.script_intake import ProgramIntake
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
@@ -167,16 +168,16 @@ class Box:
         self._reports = ReportWriter(self._box, self._player)
         self._journal = self._open_journal()
         self.operations = OperationRunner(loop, Context(self._box, self._player, self._identity_now, make))
-        sending = SendingPorts.make(self._box, self._intake)
-        ports = (
-            sending.by_name
-            | answering_ports(self._box, self._player, self._reports, self._shut_down, options.host)
-            | self._control_port()
-        )
+        sending = sending_ports(self._box, self._intake)
+        ports: dict[str, Port] = {
+            **sending,
+            **answering_ports(self._box, self._player, self._reports, self._shut_down, options.host),
+            **self._control_port(),
+        }
         self._port_set = PortSet(loop, options.host, self._box, ports)
         self._box.attach(
-            (*sending.in_order, self._intake, self._box.steps),
-            [port.send_message for port in sending.messengers],
+            (*sending.values(), self._intake, self._box.steps),
+            [port.send_message for port in sending.values() if isinstance(port, PrimaryPort)],
         )
         self.served_at = choice.served_at(options, ports)
         self.is_shut_down = False

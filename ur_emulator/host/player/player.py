@@ -172,7 +172,7 @@ class ProgramPlayer:
         self._must_be_able_to_play()  # it took a while to get here
         if self.is_paused:
             self._refuse("play", "a program is paused")
-        yield from self._box.start(program, asked, loaded=True)
+        yield from self._box.apply(self._box.start_command(program, asked, loaded=True))
         if self.installation.variables:
             self._box.start_alone(self._keep_variables())
 

@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from http import HTTPStatus
 from ipaddress import ip_address
 from typing import Any, NoReturn, Protocol
@@ -174,20 +174,17 @@ class HttpPort(SessionPort["_HttpSession"]):
     """Answers HTTP requests."""
 
     def __init__(self, box: ServedBox, answers: Answers, most_bytes: int = BUDGETS.body_bytes) -> None:
-        super().__init__(box)  # the session that has been silent longest is the first
-        self._answers = answers
-        self._most_bytes = most_bytes
+        session = partial(
+            _HttpSession, answers=answers, most_bytes=most_bytes, on_request=self._is_not_silent
+        )
+        super().__init__(box, session)  # the session that has been silent longest is the first
 
-    def _begin(self, connection: Connection) -> _HttpSession:
+    def opened(self, connection: Connection) -> None:
+        """Take in a client; if there are too many, close the one that has been silent longest."""
         if len(self._sessions) >= BUDGETS.control_clients:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
-        connection.allow_half_close(self.ended)
-        return _HttpSession(connection, self._box, self._answers, self._most_bytes, self._is_not_silent)
-
-    def ended(self, connection: Connection) -> None:
-        """A client sends nothing more; its requests are still answered."""
-        self._sessions[connection].receive(b"")
+        super().opened(connection)
 
     def _is_not_silent(self, connection: Connection) -> None:
         """A client has sent a whole request."""
@@ -196,6 +193,8 @@ class HttpPort(SessionPort["_HttpSession"]):
 
 class _HttpSession(Session):
     """A client: its HTTP state, and the request that is read or answered."""
+
+    allows_half_close = True
 
     def __init__(
         self,

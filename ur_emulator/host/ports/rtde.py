@@ -6,6 +6,7 @@ The order of packages is in `protocol.rtde.server_connection`; here are rates, o
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from protocol.errors import RemoteProtocolError
 from protocol.rtde.codec import RtdeTextMessage, SetupInputs, SetupOutputs
@@ -33,13 +34,10 @@ class RtdePort(SessionPort["_RtdeSession"]):
     """Streams data packages and takes inputs."""
 
     def __init__(self, box: ServedBox) -> None:
-        super().__init__(box)
+        super().__init__(box, partial(_RtdeSession, answer=self._answer))
         self._streams: tuple[_RtdeSession, ...] = ()
         self._owners: dict[str, Connection] = {}
         self._reports_line = False
-
-    def _begin(self, connection: Connection) -> _RtdeSession:
-        return _RtdeSession(connection, self._box, self._answer)
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; its input variables are free at once."""
