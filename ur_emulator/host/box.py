@@ -17,7 +17,7 @@ from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.runner import OperationRunner
 from ur_emulator.host.control_api.step_operations import Context
 from ur_emulator.host.journal import Journal
-from ur_emulator.host.pacing import Pace, make_pacer
+from ur_emulator.host.pacing import LockstepPacer, Pace, RealtimePacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
 from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, answering_ports, sending_ports
 from ur_emulator.host.ports.primary.port import PrimaryPort
@@ -154,7 +154,9 @@ class Box:
         self._box = ServedBox(
             machine,
             choice.identity,
-            make_pacer(choice.pace, period, options.speed, phase, lead),
+            LockstepPacer(period)
+            if choice.pace is Pace.LOCKSTEP
+            else RealtimePacer(period, options.speed, phase, lead),
             loop,
             self._fail,
         )

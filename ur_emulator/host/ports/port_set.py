@@ -10,7 +10,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.host.player.player import ProgramPlayer
 from ur_emulator.host.ports.dashboard import DashboardAnswers, DashboardSession
-from ur_emulator.host.ports.interpreter import InterpreterIntake, InterpreterPort
+from ur_emulator.host.ports.interpreter import InterpreterPort
 from ur_emulator.host.ports.modbus import ModbusSession
 from ur_emulator.host.ports.primary.port import PrimaryPort
 from ur_emulator.host.ports.primary.robot_state import StateEncoder
@@ -155,7 +155,7 @@ def answering_ports(
         commands = DashboardAnswers(box, player, reports, shut_down)
         ports["dashboard"] = SessionPort(box, partial(DashboardSession, answers=commands))
     if software.has_interpreter:
-        ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
+        ports["interpreter"] = InterpreterPort(box)
     grippers = box.controller.state.grippers
     for kind, (name, make) in SOFTWARE_OF.items():
         if tools := [gripper for gripper in grippers if gripper.tool.kind == kind]:
