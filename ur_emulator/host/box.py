@@ -237,7 +237,7 @@ class Box:
         from ur_emulator.host.ports.http import HttpPort
 
         answers = ControlAnswers(self.operations, self._options.host, self._options.control_token)
-        return {CONTROL: HttpPort(self._box, answers)}
+        return {CONTROL: HttpPort(self._box, answers.answer)}
 
     # --- life
 

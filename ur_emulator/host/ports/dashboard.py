@@ -14,6 +14,7 @@ from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.errors import EmulatorError, FileMissingError, RefusedError
 from ur_emulator.host.player.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.host.ports.session import Session
+from ur_emulator.host.reports.report_files import flight_report, save_log, support_file
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
@@ -172,14 +173,14 @@ class DashboardAnswers:
     # --- files
 
     def _flight_report(self, _: DashboardCommand, kind: str, __: str) -> Steps[_Reply]:
-        return {"id": (yield from self._reports.flight_report(kind))}
+        return {"id": (yield from self._reports.write(flight_report, kind))}
 
     def _support_file(self, _: DashboardCommand, directory: str, __: str) -> Steps[_Reply]:
-        return {"file": (yield from self._reports.support_file(directory))}
+        return {"file": (yield from self._reports.write(support_file, directory))}
 
     def _save_log(self, *_: object) -> Steps[None]:
         try:
-            path = yield from self._reports.save_log()
+            path = yield from self._reports.write(save_log)
         except EmulatorError as error:
             self._box.note(f"saveLog failed: {error}")
             raise

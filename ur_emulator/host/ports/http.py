@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, partial
 from http import HTTPStatus
 from ipaddress import ip_address
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 import h11
 
@@ -162,21 +162,15 @@ def _refuse(word: str) -> NoReturn:
 _PIECE_COST = 4
 
 
-class Answers(Protocol):
-    """What a port has to say."""
-
-    def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
-        """Do what a request asks for; an HttpError is the answer, too."""
-        ...
+# Does what a request of a client asks for; an HttpError is the answer, too.
+Answer = Callable[[HttpRequest, Connection], Steps[HttpAnswer]]
 
 
 class HttpPort(SessionPort["_HttpSession"]):
-    """Answers HTTP requests."""
+    """Answers HTTP requests whose bodies have at most `most_bytes`."""
 
-    def __init__(self, box: ServedBox, answers: Answers, most_bytes: int = BUDGETS.body_bytes) -> None:
-        session = partial(
-            _HttpSession, answers=answers, most_bytes=most_bytes, on_request=self._is_not_silent
-        )
+    def __init__(self, box: ServedBox, answer: Answer, most_bytes: int = BUDGETS.body_bytes) -> None:
+        session = partial(_HttpSession, answer=answer, most_bytes=most_bytes, on_request=self._is_not_silent)
         super().__init__(box, session)  # the session that has been silent longest is the first
 
     def opened(self, connection: Connection) -> None:
@@ -200,12 +194,12 @@ class _HttpSession(Session):
         self,
         connection: Connection,
         box: ServedBox,
-        answers: Answers,
+        answer: Answer,
         most_bytes: int,
         on_request: Callable[[Connection], None],
     ) -> None:
         super().__init__(connection, box)
-        self._answers = answers
+        self._do = answer
         self._most_bytes = most_bytes
         self._on_request = on_request
         self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
@@ -259,7 +253,7 @@ class _HttpSession(Session):
         """Do what a request asks for, and answer it."""
         assert self._request is not None
         try:
-            answer = yield from self._answers.answer(HttpRequest.of(self._request, body), self.connection)
+            answer = yield from self._do(HttpRequest.of(self._request, body), self.connection)
         except HttpError as error:
             answer = HttpAnswer(error.status, {"error": str(error)}, error.headers)
         self._finish(answer)

@@ -1,7 +1,8 @@
 """Port 30020: the lines of interpreter mode are compiled one after the other, appended, answered.
 
-Words get their answers before lines that wait. Lines wait here while no program is in the mode, and while the names that they would find are about to change.
-Clients take turns, so that one that sends thousands of lines does not keep others waiting for all of them.
+Lines wait here while no program is in the mode, and while the names that they would find are about to change;
+words get their answers before lines that wait. Clients take turns, so that one that sends thousands of lines
+does not keep others waiting for all of them.
 """
 
 from collections import Counter, deque

@@ -39,7 +39,7 @@ def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> Port:
     from ur_emulator.host.ports.http import HttpPort
     from ur_emulator.host.ports.onrobot import MOST_BYTES, OnRobotAnswers
 
-    return HttpPort(box, OnRobotAnswers(box, grippers, host), MOST_BYTES)
+    return HttpPort(box, OnRobotAnswers(box, grippers, host).answer, MOST_BYTES)
 
 
 # Kinds of tools, the port of their maker's software, and what makes it for tools and the address of the port.
@@ -168,6 +168,6 @@ def answering_ports(
         from ur_emulator.host.ports.robot_api import RobotApiAnswers
 
         answers = RobotApiAnswers(box, player, reports, shut_down, host)
-        ports[ROBOT_API] = HttpPort(box, answers, BUDGETS.upload_bytes)
+        ports[ROBOT_API] = HttpPort(box, answers.answer, BUDGETS.upload_bytes)
     ports[MODBUS] = SessionPort(box, ModbusSession)  # after the one that matters more where both are missing
     return ports
