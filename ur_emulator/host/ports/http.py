@@ -1,4 +1,4 @@
-"""Ports that speak HTTP: requests are read and checked, `Answers` says what is sent back.
+"""Ports that speak HTTP: requests are read and checked, an `Answer` says what is sent back.
 
 h11 knows HTTP/1.1. The requests of a client are answered in order, one after the other. Everything is
 bounded: header, body, an answer, and the number of clients: the one that has been silent longest is closed
@@ -53,13 +53,6 @@ class HttpRequest:
     headers: Mapping[str, str]
     body: bytes
 
-    @classmethod
-    def of(cls, head: h11.Request, body: bytes) -> HttpRequest:
-        """Return a request from its head and its body."""
-        path, _, query = head.target.decode("latin-1").partition("?")
-        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in head.headers}
-        return cls(head.method.decode("latin-1"), path, query, headers, body)
-
     def json_object(self) -> dict[str, Any]:
         """Return the body as a JSON object, empty without content; HttpError if it is something else."""
         content_type = self.headers.get("content-type", "")
@@ -113,14 +106,6 @@ class HttpAnswer:
 def too_long(limit: int) -> HttpError:
     """Return the error about a body with more bytes than `limit`."""
     return HttpError(413, f"the body is longer than {limit} bytes")
-
-
-def check_head(request: h11.Request) -> None:
-    """Refuse other versions of HTTP and long headers with an HttpError, before the body is read."""
-    if request.http_version not in (b"1.0", b"1.1"):
-        raise HttpError(505, f"HTTP {request.http_version.decode('latin-1')} given: this port speaks 1.1")
-    if len(request.target) + sum(len(name) + len(value) for name, value in request.headers) > MAX_HEADER:
-        raise HttpError(431, f"the header is longer than {MAX_HEADER} bytes")
 
 
 def check_origin(headers: Mapping[str, str], own_host: str) -> None:
@@ -222,8 +207,7 @@ class _HttpSession(Session):
             event = self.http.next_event()
             if isinstance(event, h11.EndOfMessage):
                 self._on_request(self.connection)
-                body, self._body = bytes(self._body), bytearray()
-                yield from self._answer(body)
+                yield from self._answer()
                 return BUDGETS.client_work
             return self._read(event)
         except h11.RemoteProtocolError as error:
@@ -236,7 +220,12 @@ class _HttpSession(Session):
         """Take a piece of a request; return what it costs, 0 if more bytes are needed or none will come."""
         if isinstance(event, h11.Request):
             self._request = event
-            check_head(event)
+            if event.http_version not in (b"1.0", b"1.1"):
+                raise HttpError(
+                    505, f"HTTP {event.http_version.decode('latin-1')} given: this port speaks 1.1"
+                )
+            if len(event.target) + sum(len(name) + len(value) for name, value in event.headers) > MAX_HEADER:
+                raise HttpError(431, f"the header is longer than {MAX_HEADER} bytes")
             if self.http.they_are_waiting_for_100_continue:
                 self._send(h11.InformationalResponse(status_code=100, headers=[]))
         elif isinstance(event, h11.Data):
@@ -249,19 +238,18 @@ class _HttpSession(Session):
             return 0
         return _PIECE_COST
 
-    def _answer(self, body: bytes) -> Steps[None]:
-        """Do what a request asks for, and answer it."""
-        assert self._request is not None
+    def _answer(self) -> Steps[None]:
+        """Do what a request asks for, and answer it; then the next request may be read."""
+        head, body = self._request, bytes(self._body)
+        assert head is not None
+        self._body.clear()
+        path, _, query = head.target.decode("latin-1").partition("?")
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in head.headers}
+        request = HttpRequest(head.method.decode("latin-1"), path, query, headers, body)
         try:
-            answer = yield from self._do(HttpRequest.of(self._request, body), self.connection)
+            answer = yield from self._do(request, self.connection)
         except HttpError as error:
             answer = HttpAnswer(error.status, {"error": str(error)}, error.headers)
-        self._finish(answer)
-
-    # --- answers
-
-    def _finish(self, answer: HttpAnswer) -> None:
-        """Send an answer; then the next request may be read."""
         if not self.connection.is_open:
             return
         self._respond(answer)

@@ -6,7 +6,6 @@ does not keep others waiting for all of them.
 """
 
 from collections import Counter, deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from protocol import interpreter
@@ -161,7 +160,10 @@ class InterpreterPort:
         """Interpret or discard lines until none is left."""
         n_refused = 0
         while self._waiting:
-            refused = next((line for line in self._next_lines() if self._why_not(line)), None)
+            next_lines = [
+                lines[0] for lines in self._waiting.values()
+            ]  # of the client whose turn it is first
+            refused = next(filter(self._why_not, next_lines), None)
             if refused is not None:
                 self._take_out(refused)
                 self._answer(refused, interpreter.discard(self._why_not(refused), refused.text))
@@ -169,9 +171,8 @@ class InterpreterPort:
                 if n_refused % _REFUSED_AT_ONCE == 0:
                     yield
             elif self._queue.takes_lines:
-                line = next(self._next_lines())
+                line = self._current = next_lines[0]
                 self._take_out(line)
-                self._current = line
                 while not (answer := (yield from self._interpret(line))):
                     yield
                 self._current = None
@@ -189,10 +190,6 @@ class InterpreterPort:
         self._current, self._held = None, 0
         for client in clients:
             client.failed(error)
-
-    def _next_lines(self) -> Iterator[_Line]:
-        """Yield the next line of each client, that of the client whose turn it is first."""
-        return (lines[0] for lines in self._waiting.values())
 
     def _take_out(self, line: _Line) -> None:
         """Take the next line of a client, which is the last in turn now."""

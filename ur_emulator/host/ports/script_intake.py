@@ -28,7 +28,7 @@ from ur_emulator.machine.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.program_files.compiling import CompileResult, compile_text
 
-# Words that change nothing here map to None.
+# All words but `SPEED_WORD`; those that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.script_channel).
 WORDS: dict[str, Command | None] = {
     "power on": power.PowerOn(),
@@ -44,17 +44,6 @@ WORDS: dict[str, Command | None] = {
     "confirm user safety parameters": safety.ConfirmSafety(),
 }
 SPEED_WORD = "set speed"
-
-
-def word_command(item: ControlLine) -> Command | str | None:
-    """Return the command that a word stands for, None if it changes nothing, or why there is none."""
-    if item.word != SPEED_WORD:
-        return WORDS.get(item.word, f"'{item.text}' is declared only: this box does not model it yet")
-    try:
-        return programs.SetSpeedSlider(float(item.argument))
-    except (ValueError, ArgumentError):
-        return f"'{item.text}' was ignored: the speed slider takes 0 to 1"
-
 
 # A program costs so much beside its text [bytes].
 _PROGRAM_COST = 2 * KIB
@@ -197,10 +186,13 @@ class ProgramIntake:
             self._senders[sender] = None
 
     def _take_word(self, item: ControlLine) -> None:
-        command = word_command(item)
-        if isinstance(command, str):
-            self._warn(command)
-        elif command is not None:
+        try:
+            is_speed = item.word == SPEED_WORD
+            command = programs.SetSpeedSlider(float(item.argument)) if is_speed else WORDS[item.word]
+        except (ValueError, ArgumentError):
+            self._warn(f"'{item.text}' was ignored: the speed slider takes 0 to 1")
+            return
+        if command is not None:
             self._box.submit(command, in_place_of=item.word)
         if isinstance(command, programs.PauseProgram):
             self._paused = time.monotonic()
