@@ -112,6 +112,7 @@ PROTOCOL_ORDER = (
     {
         "errors",
         "frame_buffer",
+        "packing",
         "pose",
         "serial_numbers",
         "ur_types",

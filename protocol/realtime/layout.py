@@ -18,7 +18,6 @@ bits, see their row.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -30,6 +29,7 @@ from numpy.typing import NDArray
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.frame_buffer import LENGTH_SIZE
+from protocol.packing import attribute, snapshot_packer
 from protocol.ur_types import SoftwareVersion
 from protocol.wire_record import ValueOrigin
 
@@ -241,29 +241,14 @@ class RealtimeLayout:
         internal columns. It raises `LocalProtocolError` when a vector has the wrong length or a value is not
         a number, and `AttributeError` when the object lacks a column.
         """
-        # One expression, all columns flattened into one call: this runs every cycle.
-        arguments = ", ".join(
-            "0.0, " * (column.count - 1) + "0.0"
+        arguments = [
+            ", ".join(["0.0"] * column.count)
             if column.origin is ValueOrigin.INTERNAL_ZERO
-            else f"{'*' if column.count > 1 else ''}s.{column.attribute}"
+            else attribute(column.attribute, column.count)
             for column in self.columns
-        )
-        count = (self.size - LENGTH_SIZE) // _FLOAT_SIZE
-        source = (
-            "def encode(s):\n"
-            "    try:\n"
-            f"        return pack({self.size}, {arguments})\n"
-            "    except (error, TypeError) as problem:\n"
-            "        raise explain(s, problem) from None\n"
-        )
-        names: dict[str, Any] = {
-            "pack": struct.Struct(f">i{count}d").pack,
-            "error": struct.error,
-            "explain": self._explain,
-        }
-        exec(compile(source, f"<realtime encoder, {self.size} bytes>", "exec"), names)
-        encode: Callable[[Any], bytes] = names["encode"]
-        return encode
+        ]
+        letters = "d" * sum(column.count for column in self.columns)
+        return snapshot_packer(self._prefix, letters, arguments, self._explain)
 
     def _explain(self, snapshot: Any, problem: Exception) -> LocalProtocolError:
         for column in self.columns:

@@ -12,6 +12,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
+from protocol.packing import attribute, snapshot_packer
 from protocol.rtde.fields import RtdeField
 from protocol.rtde.types import RtdeType, RtdeValue
 
@@ -102,22 +103,6 @@ def snapshot_encoder(fields: Sequence[RtdeField], header: bytes) -> Callable[[An
 
 @lru_cache(maxsize=64)
 def _make_encoder(fields: tuple[RtdeField, ...], header: bytes) -> Callable[[Any], bytes]:
-    # One expression, all values flattened into one call: this runs every cycle. The text is made of names of
-    # the tables only, never of what a client has sent.
-    arguments = "".join(
-        f", {field.constant!r}"
-        if not field.comes_from
-        else f", {'*' * (field.type.count > 1)}s.{field.comes_from}"
-        for field in fields
-    )
-    source = (
-        "def encode(s):\n"
-        "    try:\n"
-        f"        return pack(header{arguments})\n"
-        "    except (error, TypeError) as problem:\n"
-        "        raise explain(s, problem) from None\n"
-    )
-
     def explain(snapshot: Any, problem: Exception) -> LocalProtocolError:
         for field in fields:
             value: Any = field.constant
@@ -130,13 +115,8 @@ def _make_encoder(fields: tuple[RtdeField, ...], header: bytes) -> Callable[[Any
         return LocalProtocolError(f"this snapshot cannot be encoded: {problem}")
 
     letters = "".join(field.type.letters for field in fields)
-    names: dict[str, Any] = {
-        "header": header,
-        "pack": struct.Struct(f">{len(header)}s{letters}").pack,
-        "error": struct.error,
-        "explain": explain,
-    }
-    exec(compile(source, "<rtde encoder>", "exec"), names)
-    # Out of its own globals: a function that keeps itself alive is found by a full garbage collection only.
-    encode: Callable[[Any], bytes] = names.pop("encode")
-    return encode
+    arguments = [
+        attribute(field.comes_from, field.type.count) if field.comes_from else repr(field.constant)
+        for field in fields
+    ]
+    return snapshot_packer(header, letters, arguments, explain)

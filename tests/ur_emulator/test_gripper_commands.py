@@ -14,9 +14,10 @@ from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.host.pacing import RealtimePacer
 from ur_emulator.host.ports.http import HttpRequest
-from ur_emulator.host.ports.modbus import ModbusPort
+from ur_emulator.host.ports.modbus import ModbusSession
 from ur_emulator.host.ports.onrobot import OnRobotAnswers
 from ur_emulator.host.ports.robotiq import RobotiqPort
+from ur_emulator.host.ports.session import SessionPort
 from ur_emulator.host.ports.tool_line import ToolLinePort
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
 from ur_emulator.machine.commands.grippers import ExchangeRegisters, OperateGrippers
@@ -49,7 +50,7 @@ class Served(ServedBox):
         self.attach((self.steps,))
         self.journal = []
         robotiq, onrobot = controller.state.grippers
-        self.robotiq, self.modbus = RobotiqPort(self, [robotiq]), ModbusPort(self)
+        self.robotiq, self.modbus = RobotiqPort(self, [robotiq]), SessionPort(self, ModbusSession)
         self.tool_line = ToolLinePort(self, [self.robotiq])
         self._calls = OnRobotAnswers(self, [onrobot], "127.0.0.1")
 

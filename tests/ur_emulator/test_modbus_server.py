@@ -14,7 +14,8 @@ from ur_emulator import ControlBox, cli
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortError, PortPermissionError
 from ur_emulator.host import rack
-from ur_emulator.host.ports.modbus import ModbusPort
+from ur_emulator.host.ports.modbus import ModbusSession
+from ur_emulator.host.ports.session import SessionPort
 from ur_emulator.host.runtime import listener
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.runtime.listener import ClientLimits, Listener
@@ -38,7 +39,7 @@ class PortBench(Bench):
         super().__init__()
         self.commands = []
         self.box = BareBox(None, self.controller, self.commands)
-        self.port = ModbusPort(self.box)
+        self.port = SessionPort(self.box, ModbusSession)
 
     def cycle(self):
         """Advance by a cycle, in which all acts that was written."""

@@ -476,11 +476,11 @@ def test_labels_of_software_up_to_3_2():
 def test_a_program_without_labels_is_not_watched(bench):
     bench.client()
     bench.start("def p():\n" + FOREVER)
-    assert not bench.port._labels.is_watching
+    assert bench.port._labels._run is None
     bench.start(LABELLED)
-    assert bench.port._labels.is_watching
+    assert bench.port._labels._run is not None
     bench.tick(1, StopProgram())
-    assert not bench.port._labels.is_watching
+    assert bench.port._labels._run is None
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from dashboard_support import Dashboard
 
 from protocol.primary.messages import LONGEST_TITLE, PopupMessage, ReportLevel
 from ur_emulator.host.control_api.step_operations import ReadState
+from ur_emulator.host.ports.dashboard import DashboardAnswers
 from ur_emulator.host.ports.session import Session
 from ur_emulator.host.runtime import listener
 from ur_emulator.host.script_network.sockets import ScriptConnection
@@ -82,7 +83,7 @@ def test_an_error_of_a_port_that_forgets_a_client_harms_nobody(box, monkeypatch)
 def test_an_error_while_requests_are_answered_ends_their_connection(box, monkeypatch):
     with Dashboard(box) as other, Dashboard(box) as dashboard:
         with monkeypatch.context() as patch:
-            patch.setattr(inside(box)._port_set._ports["dashboard"]._answers, "answer", fail)
+            patch.setattr(DashboardAnswers, "answer", fail)
             dashboard.send("robotmode")
             assert dashboard.is_closed()
         assert other.ask("robotmode") == "Robotmode: RUNNING"

@@ -19,9 +19,10 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.journal import Journal
-from ur_emulator.host.pacing import Pace, make_pacer
+from ur_emulator.host.pacing import LockstepPacer, Pace, RealtimePacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
-from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, SendingPorts, answering_ports
+from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, answering_ports, sending_ports
+from ur_emulator.host.ports.primary.port import PrimaryPort
 from ur_emulator.host.ports.script_intake import ProgramIntake
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import WAKE_UP
@@ -166,7 +167,9 @@ class Box:
         self._box = ServedBox(
             machine,
             choice.identity,
-            make_pacer(choice.pace, period, options.speed, phase, lead),
+            LockstepPacer(period)
+            if choice.pace is Pace.LOCKSTEP
+            else RealtimePacer(period, options.speed, phase, lead),
             tasks,
             self._fail,
         )
@@ -184,16 +187,16 @@ class Box:
         self._lock = threading.Lock()
         self._awaited: WeakSet[Future[Any]] = WeakSet()
         self._is_closed = False
-        sending = SendingPorts.make(self._box, self._intake)
-        ports = (
-            sending.by_name
-            | answering_ports(self._box, self._player, self._reports, self._shut_down, options.host)
-            | self._control_port()
-        )
+        sending = sending_ports(self._box, self._intake)
+        ports: dict[str, Port] = {
+            **sending,
+            **answering_ports(self._box, self._player, self._reports, self._shut_down, options.host),
+            **self._control_port(),
+        }
         self._port_set = PortSet(loop, options.host, self._box, ports)
         self._box.attach(
-            (*sending.in_order, self._intake, self._box.steps),
-            [port.send_message for port in sending.messengers],
+            (*sending.values(), self._intake, self._box.steps),
+            [port.send_message for port in sending.values() if isinstance(port, PrimaryPort)],
         )
         self.served_at = choice.served_at(options, ports)
         self.is_shut_down = False
@@ -279,7 +282,7 @@ class Box:
         from ur_emulator.host.ports.http import HttpPort
 
         answers = ControlAnswers(self.operate, self._options.host, self._options.control_token)
-        return {CONTROL: HttpPort(self._box, answers)}
+        return {CONTROL: HttpPort(self._box, answers.answer)}
 
     # --- life
 

@@ -107,7 +107,6 @@ class RealtimePacer:
         self._lead = min(lead, 0.25 * self._period)
         self._deadline = math.nan
         self.publish_at = -math.inf
-        self.lost_cycles = 0
 
     def may_tick(self, now: float, situation: Situation) -> bool:
         """True from the lead before the deadline on; each call that returns True uses one deadline."""
@@ -118,7 +117,6 @@ class RealtimePacer:
         behind = now - self._deadline
         if behind > MAX_BACKLOG:
             skipped = int(behind / self._period)
-            self.lost_cycles += skipped
             self._deadline += skipped * self._period
             situation.fell_behind(skipped)
         self.publish_at = self._deadline
@@ -163,10 +161,3 @@ class LockstepPacer:
     def next_call(self, now: float) -> float:
         """One real period on: time for the heartbeat and for the real-seconds limits."""
         return now + self._period
-
-
-def make_pacer(
-    pace: Pace, period_s: float, speed: float = 1.0, phase: float = 0.0, lead: float = 0.0
-) -> Pacer:
-    """Return the pacer of that name; see `RealtimePacer` for the arguments."""
-    return LockstepPacer(period_s) if pace is Pace.LOCKSTEP else RealtimePacer(period_s, speed, phase, lead)

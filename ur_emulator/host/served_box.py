@@ -271,26 +271,15 @@ class ServedBox:
             yield
         return outcome.result()
 
-    def start(self, program: CompiledProgram, asked: float, *, loaded: bool = False) -> Steps[None]:
-        """Start a program, and end after its first cycle.
+    def start_command(self, program: CompiledProgram, asked: float, **options: bool) -> StartProgram:
+        """Return the command that starts a program; `asked`: when somebody wanted it, in monotonic time [s].
 
-        Args:
-            asked: when somebody asked for it, in monotonic time [s].
-            loaded: it was loaded from a file and played.
-
-        Raises:
-            RefusedError: a program has begun that was asked for later, or no program may run now.
+        RefusedError if a program has begun that was asked for later.
         """
-        if why := self.why_too_old(program, asked):
-            raise RefusedError(why)
-        yield from self.apply(StartProgram(program, loaded=loaded))
-
-    def why_too_old(self, program: CompiledProgram, asked: float) -> str:
-        """Return why a program does not begin that was asked for then; "": it is the newest from now on."""
         if asked < self.newest:
-            return f"program {program.name} does not begin: a newer one was compiled before it"
+            raise RefusedError(f"program {program.name} does not begin: a newer one was compiled before it")
         self.newest = asked
-        return ""
+        return StartProgram(program, **options)
 
     def in_worker(self, function: Callable[..., T], *arguments: Any) -> Steps[T]:
         """Do what takes longer than a cycle in the worker process; return its result."""

@@ -18,6 +18,11 @@ Steps = Generator[None, None, T]
 Finished = Callable[[Any, Exception | None], None]
 
 
+def result_of(work: T | Steps[T]) -> Steps[T]:
+    """Do work to its end and return its result; work that never waits is no generator but the result."""
+    return (yield from work) if isinstance(work, Generator) else work
+
+
 class StepRunner:
     """Advances all steps of one box; in the thread of its loop."""
 

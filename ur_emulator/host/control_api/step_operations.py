@@ -277,7 +277,7 @@ class RunProgram(StepOperation[int]):
             if isinstance(outcome, ScriptFailed):
                 raise ArgumentError(f"the program does not compile: {outcome.log_text or outcome.text}")
             program = outcome
-            yield from box.start(program, asked)
+            yield from box.apply(box.start_command(program, asked))
         name, tick, run = program.name, box.snapshot.tick, programs.latest
         if self.wait and run is not None and run.program is program:  # a `sec` has ended already
             while programs.latest is run and box.snapshot.runtime_state != ProgramState.STOPPED:

@@ -4,7 +4,6 @@ Every action is done in steps (see `host.steps`). What cannot be done is refused
 the box is switched on, the default installation of its folder says what is loaded and started.
 """
 
-import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -26,7 +25,6 @@ from ur_emulator.machine.commands.programs import (
     why_not_running,
 )
 from ur_emulator.machine.controller.events import ScriptFailed
-from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 from ur_emulator.machine.controller.safety.safety_state import limits_of
 from ur_emulator.machine.controller.status_words import RUNNING_STATES
 from ur_emulator.program_files.compiling import (
@@ -38,6 +36,7 @@ from ur_emulator.program_files.compiling import (
 from ur_emulator.program_files.folder import ProgramFolder
 from ur_emulator.program_files.installation import ExternalControlPc, Installation, StartUp
 from ur_emulator.program_files.installation_reader import DEFAULT_NAME, NEW_BOX
+from ur_emulator.program_files.lines import LINE_KINDS
 from ur_emulator.program_files.variables_file import literal, write_variables
 
 if TYPE_CHECKING:
@@ -173,7 +172,7 @@ class ProgramPlayer:
         self._must_be_able_to_play()  # it took a while to get here
         if self.is_paused:
             self._refuse("play", "a program is paused")
-        yield from self._box.start(program, asked, loaded=True)
+        yield from self._box.apply(self._box.start_command(program, asked, loaded=True))
         if self.installation.variables:
             self._box.start_alone(self._keep_variables())
 
@@ -335,8 +334,13 @@ class ProgramPlayer:
         raise MissingFileRefusal(text) if isinstance(why, FileMissingError) else RefusedError(text)
 
 
-_LINE = re.compile(r"([a-z_]+)\[(\d)\]")
-_GROUPS = {"digital_in": STANDARD, "config_in": CONFIGURABLE, "tool_in": TOOL}
+# Digital inputs by their own names: group, as in the names of builtins, and index.
+_DIGITAL_INPUTS = {
+    f"{kind.name}[{index}]": (kind.group, index)
+    for kind in LINE_KINDS
+    if kind.is_input and kind.group.endswith("_digital")
+    for index in range(kind.actions)
+}
 
 
 def start_up(box: ServedBox, player: ProgramPlayer) -> Steps[None]:
@@ -351,23 +355,14 @@ def start_up(box: ServedBox, player: ProgramPlayer) -> Steps[None]:
         program = player.loaded
         if program is None or not start.start_line:
             return
-        bit = _input_bit(player.installation.lines.get(start.start_line, start.start_line))
-        if bit is None:
+        line = _DIGITAL_INPUTS.get(player.installation.lines.get(start.start_line, start.start_line))
+        if line is None:
             box.note(f"{start.program} is not started by {start.start_line!r}: it is no digital input")
             return
-        lines = box.controller.state.io
-        before = lines.read_digital_in(bit)
-        while lines.read_digital_in(bit) is before or before is start.start_level:
-            before = lines.read_digital_in(bit)
+        lines = box.controller.state.io_configuration
+        before = lines.is_high(*line)
+        while lines.is_high(*line) is before or before is start.start_level:
+            before = lines.is_high(*line)
             yield
         if player.loaded is not None and player.loaded.wire_path == program.wire_path:
             yield from player.play(THIS_MACHINE)
-
-
-def _input_bit(line: str) -> int | None:
-    """Return the bit of a digital input in the word of all; None for a line that is none."""
-    match = _LINE.fullmatch(line)
-    group = _GROUPS.get(match[1]) if match else None
-    if match is None or group is None or int(match[2]) >= group.count:
-        return None
-    return group.bits[int(match[2])]

@@ -1,4 +1,4 @@
-"""Ports that speak HTTP: requests are read and checked, `Answers` says what is sent back.
+"""Ports that speak HTTP: requests are read and checked, an `Answer` says what is sent back.
 
 h11 knows HTTP/1.1. The requests of a client are answered in order, one after the other. Everything is
 bounded: header, body, an answer, and the number of clients: the one that has been silent longest is closed
@@ -11,10 +11,10 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from http import HTTPStatus
 from ipaddress import ip_address
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 import h11
 
@@ -53,13 +53,6 @@ class HttpRequest:
     headers: Mapping[str, str]
     body: bytes
 
-    @classmethod
-    def of(cls, head: h11.Request, body: bytes) -> HttpRequest:
-        """Return a request from its head and its body."""
-        path, _, query = head.target.decode("latin-1").partition("?")
-        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in head.headers}
-        return cls(head.method.decode("latin-1"), path, query, headers, body)
-
     def json_object(self) -> dict[str, Any]:
         """Return the body as a JSON object, empty without content; HttpError if it is something else."""
         content_type = self.headers.get("content-type", "")
@@ -67,7 +60,8 @@ class HttpRequest:
             raise HttpError(400, f"content type {ascii(content_type)[:60]} given: the body must be {JSON}")
         if not self.body:
             return {}
-        _check_length(len(self.body), BUDGETS.body_bytes)
+        if len(self.body) > BUDGETS.body_bytes:
+            raise too_long(BUDGETS.body_bytes)
         try:
             arguments = json.loads(self.body, parse_constant=_refuse)
         except (ValueError, RecursionError) as error:
@@ -108,23 +102,10 @@ class HttpAnswer:
     headers: tuple[tuple[str, str], ...] = ()
     content_type: str = "application/octet-stream"
 
-    @classmethod
-    def of(cls, error: HttpError) -> HttpAnswer:
-        """Return the answer to a request that is refused."""
-        return cls(error.status, {"error": str(error)}, error.headers)
 
-
-def _check_length(length: int, most: int) -> None:
-    if length > most:
-        raise HttpError(413, f"the body is longer than {most} bytes")
-
-
-def _check_head(request: h11.Request) -> None:
-    """Refuse other versions of HTTP and long headers with an HttpError, before the body is read."""
-    if request.http_version not in (b"1.0", b"1.1"):
-        raise HttpError(505, f"HTTP {request.http_version.decode('latin-1')} given: this port speaks 1.1")
-    if len(request.target) + sum(len(name) + len(value) for name, value in request.headers) > MAX_HEADER:
-        raise HttpError(431, f"the header is longer than {MAX_HEADER} bytes")
+def too_long(limit: int) -> HttpError:
+    """Return the error about a body with more bytes than `limit`."""
+    return HttpError(413, f"the body is longer than {limit} bytes")
 
 
 def check_origin(headers: Mapping[str, str], own_host: str) -> None:
@@ -166,32 +147,23 @@ def _refuse(word: str) -> NoReturn:
 _PIECE_COST = 4
 
 
-class Answers(Protocol):
-    """What a port has to say."""
-
-    def answer(self, request: HttpRequest, connection: Connection) -> Steps[HttpAnswer]:
-        """Do what a request asks for; an HttpError is the answer, too."""
-        ...
+# Does what a request of a client asks for; an HttpError is the answer, too.
+Answer = Callable[[HttpRequest, Connection], Steps[HttpAnswer]]
 
 
 class HttpPort(SessionPort["_HttpSession"]):
-    """Answers HTTP requests."""
+    """Answers HTTP requests whose bodies have at most `most_bytes`."""
 
-    def __init__(self, box: ServedBox, answers: Answers, most_bytes: int = BUDGETS.body_bytes) -> None:
-        super().__init__(box)  # the session that has been silent longest is the first
-        self._answers = answers
-        self._most_bytes = most_bytes
+    def __init__(self, box: ServedBox, answer: Answer, most_bytes: int = BUDGETS.body_bytes) -> None:
+        session = partial(_HttpSession, answer=answer, most_bytes=most_bytes, on_request=self._is_not_silent)
+        super().__init__(box, session)  # the session that has been silent longest is the first
 
-    def _begin(self, connection: Connection) -> _HttpSession:
+    def opened(self, connection: Connection) -> None:
+        """Take in a client; if there are too many, close the one that has been silent longest."""
         if len(self._sessions) >= BUDGETS.control_clients:
             idle = [other for other, session in self._sessions.items() if not session.is_busy]
             (idle or list(self._sessions))[0].close()
-        connection.allow_half_close(self.ended)
-        return _HttpSession(connection, self._box, self._answers, self._most_bytes, self._is_not_silent)
-
-    def ended(self, connection: Connection) -> None:
-        """A client sends nothing more; its requests are still answered."""
-        self._sessions[connection].receive(b"")
+        super().opened(connection)
 
     def _is_not_silent(self, connection: Connection) -> None:
         """A client has sent a whole request."""
@@ -201,16 +173,18 @@ class HttpPort(SessionPort["_HttpSession"]):
 class _HttpSession(Session):
     """A client: its HTTP state, and the request that is read or answered."""
 
+    allows_half_close = True
+
     def __init__(
         self,
         connection: Connection,
         box: ServedBox,
-        answers: Answers,
+        answer: Answer,
         most_bytes: int,
         on_request: Callable[[Connection], None],
     ) -> None:
         super().__init__(connection, box)
-        self._answers = answers
+        self._do = answer
         self._most_bytes = most_bytes
         self._on_request = on_request
         self.http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEADER)
@@ -231,50 +205,65 @@ class _HttpSession(Session):
         """Read the next piece of a request; after the last one, answer it."""
         try:
             event = self.http.next_event()
-            if not isinstance(event, h11.EndOfMessage):
-                return self._read(event)
+            if isinstance(event, h11.EndOfMessage):
+                self._on_request(self.connection)
+                yield from self._answer()
+                return BUDGETS.client_work
+            return self._read(event)
         except h11.RemoteProtocolError as error:
-            return self._reject(error.error_status_hint, f"not understood: {error}")
+            self._reject(error.error_status_hint, f"not understood: {error}")
         except HttpError as error:
-            return self._reject(error.status, str(error))
-        self._on_request(self.connection)
-        assert self._request is not None
-        request, self._body = HttpRequest.of(self._request, bytes(self._body)), bytearray()
-        try:
-            answer = yield from self._answers.answer(request, self.connection)
-        except HttpError as error:
-            answer = HttpAnswer.of(error)
-        if self.connection.is_open:
-            self._respond(answer)
-            if self.http.our_state is h11.MUST_CLOSE:
-                self.connection.close_when_sent()
-            elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
-                self.http.start_next_cycle()
-                self._request = None
-        return BUDGETS.client_work
+            self._reject(error.status, str(error))
+        return 0
 
     def _read(self, event: h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]) -> int:
         """Take a piece of a request; return what it costs, 0 if more bytes are needed or none will come."""
         if isinstance(event, h11.Request):
             self._request = event
-            _check_head(event)
+            if event.http_version not in (b"1.0", b"1.1"):
+                raise HttpError(
+                    505, f"HTTP {event.http_version.decode('latin-1')} given: this port speaks 1.1"
+                )
+            if len(event.target) + sum(len(name) + len(value) for name, value in event.headers) > MAX_HEADER:
+                raise HttpError(431, f"the header is longer than {MAX_HEADER} bytes")
             if self.http.they_are_waiting_for_100_continue:
                 self._send(h11.InformationalResponse(status_code=100, headers=[]))
         elif isinstance(event, h11.Data):
             self._body += event.data
-            _check_length(len(self._body), self._most_bytes)
+            if len(self._body) > self._most_bytes:
+                raise too_long(self._most_bytes)
         else:
             if event is not h11.NEED_DATA:
                 self.connection.close_when_sent()
             return 0
         return _PIECE_COST
 
-    def _reject(self, status: int, text: str) -> int:
+    def _answer(self) -> Steps[None]:
+        """Do what a request asks for, and answer it; then the next request may be read."""
+        head, body = self._request, bytes(self._body)
+        assert head is not None
+        self._body.clear()
+        path, _, query = head.target.decode("latin-1").partition("?")
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in head.headers}
+        request = HttpRequest(head.method.decode("latin-1"), path, query, headers, body)
+        try:
+            answer = yield from self._do(request, self.connection)
+        except HttpError as error:
+            answer = HttpAnswer(error.status, {"error": str(error)}, error.headers)
+        if not self.connection.is_open:
+            return
+        self._respond(answer)
+        if self.http.our_state is h11.MUST_CLOSE:
+            self.connection.close_when_sent()
+        elif self.http.our_state is h11.DONE and self.http.their_state is h11.DONE:
+            self.http.start_next_cycle()
+            self._request = None
+
+    def _reject(self, status: int, text: str) -> None:
         """Answer with an error after which nothing more can be read, and close."""
         if self.http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            self._respond(HttpAnswer.of(HttpError(status, " ".join(text.split()), ("Connection", "close"))))
+            self._respond(HttpAnswer(status, {"error": " ".join(text.split())}, (("Connection", "close"),)))
         self.connection.close_when_sent()
-        return 0
 
     def _respond(self, answer: HttpAnswer) -> None:
         content_type, body = answer.content_type, answer.result

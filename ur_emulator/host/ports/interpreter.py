@@ -1,11 +1,11 @@
 """Port 30020: the lines of interpreter mode are compiled one after the other, appended, answered.
 
-Lines wait here while no program is in the mode, and while the names that they would find are about to change.
-Clients take turns, so that one that sends thousands of lines does not keep others waiting for all of them.
+Lines wait here while no program is in the mode, and while the names that they would find are about to change;
+words get their answers before lines that wait. Clients take turns, so that one that sends thousands of lines
+does not keep others waiting for all of them.
 """
 
 from collections import Counter, deque
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from protocol import interpreter
@@ -48,19 +48,18 @@ class _Line:
         return _LINE_COST + len(self.text)
 
 
-class InterpreterIntake:
-    """Turns lines into statements of the running program."""
+class InterpreterPort:
+    """Turns the lines of its clients into statements of the running program."""
 
     def __init__(self, box: ServedBox) -> None:
-        """Begin with nothing; `box` takes them."""
         self._box = box
-        self._catalogue = box.identity.software.catalogue
+        self._lines: dict[Connection, interpreter.InterpreterConnection] = {}
         # By client; the one whose turn is next is first.
         self._waiting: dict[Connection, deque[_Line]] = {}
         self._current: _Line | None = None
         self._n_taken = self._skipped_up_to = self._n_compiled = 0
-        # Lines that have no answer, and what they are counted with [bytes].
-        self._n_waiting = self._held = 0
+        # What the lines that have no answer are counted with [bytes].
+        self._held = 0
         self._is_serving = False
         # Who waits for the answer to a word that acts in the next cycle.
         self._asking: dict[interpreter.Word, list[Connection]] = {}
@@ -71,7 +70,35 @@ class InterpreterIntake:
 
     # --- clients
 
-    def take(self, client: Connection, text: str) -> None:
+    def opened(self, client: Connection) -> None:
+        """Wait for lines; a client that has closed its sending side still gets its answers."""
+        client.allow_half_close(self._ended)
+        self._lines[client] = interpreter.InterpreterConnection()
+
+    def received(self, client: Connection, data: bytes) -> None:
+        """Take lines; a client whose line has no end is disconnected."""
+        lines = self._lines[client]
+        try:
+            lines.receive_data(data)
+        except ProtocolError:
+            client.close()
+            return
+        while (event := lines.next_event()) is not None:
+            if isinstance(event, interpreter.Statements):
+                self._take(client, event.text)
+            else:
+                self._take_word(client, event)
+
+    def closed(self, client: Connection) -> None:
+        """Forget the client; its lines are executed, as programs are whose sender has gone."""
+        self._lines.pop(client, None)
+
+    def _ended(self, client: Connection) -> None:
+        """A client sends nothing more: close it when all its lines are answered."""
+        if client not in self._waiting and (self._current is None or self._current.client is not client):
+            client.close_when_sent()
+
+    def _take(self, client: Connection, text: str) -> None:
         """Take a line of statements."""
         self._n_taken += 1
         line = _Line(client, text, self._n_taken, self._queue.run, self._queue.n_cleanups)
@@ -79,14 +106,12 @@ class InterpreterIntake:
             _send(client, interpreter.discard(interpreter.TOO_MANY, text))
             return
         self._held += line.cost
-        self._n_waiting += 1
         self._waiting.setdefault(client, deque()).append(line)
         if not self._is_serving:
             self._is_serving = True
             self._box.steps.start(self._serve(), self._served)
 
-    def take_word(self, client: Connection, word: interpreter.Word) -> None:
-        """Take a word."""
+    def _take_word(self, client: Connection, word: interpreter.Word) -> None:
         queue = self._queue
         match word:
             case interpreter.Word.ABORT:
@@ -101,12 +126,8 @@ class InterpreterIntake:
             case interpreter.Word.LAST_CLEARED:
                 _send(client, interpreter.state(queue.last_cleared, word))
             case interpreter.Word.UNEXECUTED:
-                _send(client, interpreter.state(queue.n_ready + self._n_waiting, word))
-
-    def ended(self, client: Connection) -> None:
-        """A client sends nothing more: close it when all its lines are answered."""
-        if client not in self._waiting and (self._current is None or self._current.client is not client):
-            client.close_when_sent()
+                n_waiting = sum(map(len, self._waiting.values())) + (self._current is not None)
+                _send(client, interpreter.state(queue.n_ready + n_waiting, word))
 
     def _act(self, client: Connection, word: interpreter.Word, command: Command) -> None:
         """Do what a word asks for, and answer when it is done; a word acts once in a cycle."""
@@ -139,7 +160,10 @@ class InterpreterIntake:
         """Interpret or discard lines until none is left."""
         n_refused = 0
         while self._waiting:
-            refused = next((line for line in self._next_lines() if self._why_not(line)), None)
+            next_lines = [
+                lines[0] for lines in self._waiting.values()
+            ]  # of the client whose turn it is first
+            refused = next(filter(self._why_not, next_lines), None)
             if refused is not None:
                 self._take_out(refused)
                 self._answer(refused, interpreter.discard(self._why_not(refused), refused.text))
@@ -147,9 +171,8 @@ class InterpreterIntake:
                 if n_refused % _REFUSED_AT_ONCE == 0:
                     yield
             elif self._queue.takes_lines:
-                line = next(self._next_lines())
+                line = self._current = next_lines[0]
                 self._take_out(line)
-                self._current = line
                 while not (answer := (yield from self._interpret(line))):
                     yield
                 self._current = None
@@ -164,13 +187,9 @@ class InterpreterIntake:
             return
         clients = set(self._waiting) | ({self._current.client} if self._current else set())
         self._waiting.clear()
-        self._current, self._n_waiting, self._held = None, 0, 0
+        self._current, self._held = None, 0
         for client in clients:
             client.failed(error)
-
-    def _next_lines(self) -> Iterator[_Line]:
-        """Yield the next line of each client, that of the client whose turn it is first."""
-        return (lines[0] for lines in self._waiting.values())
 
     def _take_out(self, line: _Line) -> None:
         """Take the next line of a client, which is the last in turn now."""
@@ -186,10 +205,11 @@ class InterpreterIntake:
             return interpreter.discard(reason, line.text)
         if not queue.takes_lines:
             return b""
+        catalogue = self._box.identity.software.catalogue
         epoch, self._n_compiled = queue.epoch, self._n_compiled + 1
         try:
             outcome = yield from self._box.in_worker(
-                compile_line, line.text, self._n_compiled, queue.scope, queue.added, self._catalogue
+                compile_line, line.text, self._n_compiled, queue.scope, queue.added, catalogue
             )
         except WorkerError as error:
             outcome = f"Compile error: {error}"
@@ -206,49 +226,13 @@ class InterpreterIntake:
     def _answer(self, line: _Line, answer: bytes) -> None:
         """Answer a line, and close a client that sends nothing more after its last one."""
         self._held -= line.cost
-        self._n_waiting -= 1
         client = line.client
         _send(client, answer)
         if client.is_open and client.has_ended:
-            self.ended(client)
+            self._ended(client)
 
 
 def _send(client: Connection, answer: bytes) -> None:
     """Answer a client; one that does not read is closed, for an answer less would shift all that follow."""
     if client.is_open and not client.send(answer) and client.dropped:
         client.close()
-
-
-# --- Port 30020: each line gets an answer; words get theirs before lines that wait
-
-
-class InterpreterPort:
-    """Takes the lines of its clients."""
-
-    def __init__(self, intake: InterpreterIntake) -> None:
-        """Serve a box; `intake` gets the lines of all its clients."""
-        self._intake = intake
-        self._lines: dict[Connection, interpreter.InterpreterConnection] = {}
-
-    def opened(self, connection: Connection) -> None:
-        """Wait for lines; a client that has closed its sending side still gets its answers."""
-        connection.allow_half_close(self._intake.ended)
-        self._lines[connection] = interpreter.InterpreterConnection()
-
-    def received(self, connection: Connection, data: bytes) -> None:
-        """Take lines; a client whose line has no end is disconnected."""
-        lines = self._lines[connection]
-        try:
-            lines.receive_data(data)
-        except ProtocolError:
-            connection.close()
-            return
-        while (event := lines.next_event()) is not None:
-            if isinstance(event, interpreter.Statements):
-                self._intake.take(connection, event.text)
-            else:
-                self._intake.take_word(connection, event)
-
-    def closed(self, connection: Connection) -> None:
-        """Forget the client; its lines are executed, as programs are whose sender has gone."""
-        self._lines.pop(connection, None)

@@ -9,7 +9,7 @@ Source: UR "Modbus server" article (docs/protocol/modbus.md); exceptions: Modbus
 
 from protocol import modbus
 from protocol.errors import RemoteProtocolError
-from ur_emulator.host.ports.session import Session, SessionPort
+from ur_emulator.host.ports.session import Session
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
 from ur_emulator.host.steps import Steps
@@ -24,15 +24,8 @@ _READS = (modbus.ModbusFunction.READ_HOLDING_REGISTERS, modbus.ModbusFunction.RE
 _REQUEST_COST, _VALUES_PER_UNIT = 4, 4
 
 
-class ModbusPort(SessionPort["_ModbusSession"]):
-    """Answers Modbus requests."""
-
-    def _begin(self, connection: Connection) -> "_ModbusSession":
-        return _ModbusSession(connection, self._box)
-
-
-class _ModbusSession(Session):
-    """A client."""
+class ModbusSession(Session):
+    """A client that sends Modbus requests."""
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
         super().__init__(connection, box)

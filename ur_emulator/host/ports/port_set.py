@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import PortPermissionError
 from ur_emulator.host.player.player import ProgramPlayer
-from ur_emulator.host.ports.dashboard import DashboardAnswers, DashboardPort
-from ur_emulator.host.ports.interpreter import InterpreterIntake, InterpreterPort
-from ur_emulator.host.ports.modbus import ModbusPort
+from ur_emulator.host.ports.dashboard import DashboardAnswers, DashboardSession
+from ur_emulator.host.ports.interpreter import InterpreterPort
+from ur_emulator.host.ports.modbus import ModbusSession
 from ur_emulator.host.ports.primary.port import PrimaryPort
 from ur_emulator.host.ports.primary.robot_state import StateEncoder
 from ur_emulator.host.ports.realtime import RealtimePort
 from ur_emulator.host.ports.robotiq import RobotiqPort
 from ur_emulator.host.ports.rtde import RtdePort
 from ur_emulator.host.ports.script_intake import ProgramIntake
+from ur_emulator.host.ports.session import SessionPort
 from ur_emulator.host.ports.tool_line import ToolLinePort
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import EventLoop
@@ -38,7 +39,7 @@ def _onrobot_port(box: ServedBox, grippers: Sequence[Any], host: str) -> Port:
     from ur_emulator.host.ports.http import HttpPort
     from ur_emulator.host.ports.onrobot import MOST_BYTES, OnRobotAnswers
 
-    return HttpPort(box, OnRobotAnswers(box, grippers, host), MOST_BYTES)
+    return HttpPort(box, OnRobotAnswers(box, grippers, host).answer, MOST_BYTES)
 
 
 # Kinds of tools, the port of their maker's software, and what makes it for tools and the address of the port.
@@ -125,46 +126,23 @@ class PortSet:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class SendingPorts:
-    """The ports that send in cycles, also to clients that ask for nothing.
+def sending_ports(box: ServedBox, intake: ProgramIntake) -> dict[str, RealtimePort | RtdePort | PrimaryPort]:
+    """Make the ports that send in cycles, also to clients that ask for nothing, by their names in `Ports`.
 
-    Those for frames, and those for states and messages, are followed by the same without scripts.
+    First those whose clients act on a cycle. Scripts that clients send go to the intake; the ports `_ro` take
+    none.
     """
-
-    realtime: tuple[RealtimePort, RealtimePort]
-    rtde: RtdePort
-    messengers: tuple[PrimaryPort, ...]
-
-    @classmethod
-    def make(cls, box: ServedBox, intake: ProgramIntake) -> SendingPorts:
-        """Make the ports; scripts that clients send go to the intake."""
-        software, controller = box.identity.software, box.controller
-        states = StateEncoder(
-            software, controller.state.arm, controller.state.safety, box.identity.masterboard
-        )
-        return cls(
-            (RealtimePort(software.realtime, intake), RealtimePort(software.realtime, None)),
-            RtdePort(box),
-            tuple(
-                PrimaryPort(software, controller, takes, states, all_messages=all_messages)
-                for takes in (intake, None)
-                for all_messages in (True, False)
-            ),
-        )
-
-    @property
-    def in_order(self) -> tuple[RealtimePort | RtdePort | PrimaryPort, ...]:
-        """All of them, first those whose clients act on a cycle."""
-        realtime, realtime_ro = self.realtime
-        primary, secondary, *read_only = self.messengers
-        return (realtime, self.rtde, primary, secondary, realtime_ro, *read_only)
-
-    @property
-    def by_name(self) -> dict[str, Port]:
-        """All of them by their names in `Ports`."""
-        names = ("realtime", "rtde", "primary", "secondary", "realtime_ro", "primary_ro", "secondary_ro")
-        return dict(zip(names, self.in_order, strict=True))
+    software, controller = box.identity.software, box.controller
+    states = StateEncoder(software, controller.state.arm, controller.state.safety, box.identity.masterboard)
+    return {
+        "realtime": RealtimePort(software.realtime, intake),
+        "rtde": RtdePort(box),
+        "primary": PrimaryPort(software, controller, intake, states, all_messages=True),
+        "secondary": PrimaryPort(software, controller, intake, states, all_messages=False),
+        "realtime_ro": RealtimePort(software.realtime, None),
+        "primary_ro": PrimaryPort(software, controller, None, states, all_messages=True),
+        "secondary_ro": PrimaryPort(software, controller, None, states, all_messages=False),
+    }
 
 
 def answering_ports(
@@ -174,9 +152,10 @@ def answering_ports(
     software = box.identity.software
     ports: dict[str, Port] = {}
     if software.dashboard:
-        ports["dashboard"] = DashboardPort(box, DashboardAnswers(box, player, reports, shut_down))
+        commands = DashboardAnswers(box, player, reports, shut_down)
+        ports["dashboard"] = SessionPort(box, partial(DashboardSession, answers=commands))
     if software.has_interpreter:
-        ports["interpreter"] = InterpreterPort(InterpreterIntake(box))
+        ports["interpreter"] = InterpreterPort(box)
     grippers = box.controller.state.grippers
     for kind, (name, make) in SOFTWARE_OF.items():
         if tools := [gripper for gripper in grippers if gripper.tool.kind == kind]:
@@ -189,6 +168,6 @@ def answering_ports(
         from ur_emulator.host.ports.robot_api import RobotApiAnswers
 
         answers = RobotApiAnswers(box, player, reports, shut_down, host)
-        ports[ROBOT_API] = HttpPort(box, answers, BUDGETS.upload_bytes)
-    ports[MODBUS] = ModbusPort(box)  # after the one that matters more where both are missing
+        ports[ROBOT_API] = HttpPort(box, answers.answer, BUDGETS.upload_bytes)
+    ports[MODBUS] = SessionPort(box, ModbusSession)  # after the one that matters more where both are missing
     return ports

@@ -1,6 +1,6 @@
 """The Robot API of PolyScope X: a method for each call; `protocol.robot_api` lists the calls."""
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from html import escape
 from http import HTTPStatus
@@ -13,10 +13,11 @@ from ur_emulator.errors import ArgumentError, EmulatorError, FileMissingError, R
 from ur_emulator.host.player.player import MissingFileRefusal, ProgramPlayer
 from ur_emulator.host.ports import robot_api_files as files
 from ur_emulator.host.ports.http import HttpAnswer, HttpError, HttpRequest, check_origin
+from ur_emulator.host.reports.report_files import flight_report, flight_report_archive
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
-from ur_emulator.host.steps import Steps
+from ur_emulator.host.steps import Steps, result_of
 from ur_emulator.machine.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.machine.commands.programs import ClosePopup, ShowPopup
 from ur_emulator.machine.commands.safety import RestartSafety, UnlockProtectiveStop
@@ -77,7 +78,7 @@ _STATUS = (
     (ArgumentError, 400),
     (EmulatorError, 422),
 )
-# The answer to a call, or steps that end in it; what is no `HttpAnswer` is sent with status 200.
+# The answer to a call, or steps that end in it; what is no `HttpAnswer` is sent with status 200, None as {}.
 _Method = Callable[[HttpRequest, str], object]
 
 
@@ -124,7 +125,7 @@ class RobotApiAnswers:
             "POST /programs/v1": lambda request, _: self._store_program(request, is_new=True),
             "PUT /programs/v1": lambda request, _: self._store_program(request, is_new=False),
             "GET /programs/v1/{name}": lambda _, name: box.in_worker(files.read_program, player.folder, name),
-            "POST /popup/v1": lambda request, _: self._applied(ShowPopup(request.text("message"))),
+            "POST /popup/v1": lambda request, _: box.apply(ShowPopup(request.text("message"))),
             "DELETE /popup/v1": self._close_popups,
             "DELETE /popup/v1/safety": lambda *_: _NOT_CLOSED,
             "GET /versions/v1": lambda *_: {"marketingVersion": str(software.version), "baselineVersion": ""},
@@ -157,16 +158,14 @@ class RobotApiAnswers:
             raise HttpError(404, f"there is no {ascii(request.path)[:80]}: see {robot_api.BASE}/openapi.json")
         if call.needs_remote and not self._box.remote_period:
             raise HttpError(403, _LOCAL)
-        answer = self._methods[f"{call.method} {call.path}"](request, argument)
-        if isinstance(answer, Generator):
-            answer = yield from answer
+        answer = yield from result_of(self._methods[f"{call.method} {call.path}"](request, argument))
         if not isinstance(answer, HttpAnswer):
-            answer = HttpAnswer(200, answer)
+            answer = HttpAnswer(200, {} if answer is None else answer)
         return replace(answer, result={"message": call.message} | answer.result) if call.message else answer
 
     # --- robot
 
-    def _change_robot_state(self, request: HttpRequest, _: str) -> Steps[dict[str, Any]]:
+    def _change_robot_state(self, request: HttpRequest, _: str) -> Steps[None]:
         """Do an action; where it powers the arm or opens its brakes, answer when that is done."""
         action, mode = request.word("action", _COMMANDS), RobotMode(self._box.snapshot.robot_mode)
         if mode not in _POWERED_FROM.get(action, RobotMode):
@@ -174,7 +173,6 @@ class RobotApiAnswers:
         yield from self._box.apply(_COMMANDS[action]())
         while action in _POWERED_FROM and self._box.controller.state.mode.is_changing:
             yield
-        return {}
 
     def _operational_mode(self) -> str:
         mode = self._box.controller.state.operational.mode
@@ -242,21 +240,16 @@ class RobotApiAnswers:
         yield from self._box.apply(ClosePopup())
         return HttpAnswer(200, {"closed": True})
 
-    def _add_to_log(self, request: HttpRequest, _: str) -> dict[str, Any]:
+    def _add_to_log(self, request: HttpRequest, _: str) -> None:
         self._box.announce(LogAdded("Robot API", request.text("message")))
-        return {}
 
     def _flight_report(self, *_: object) -> Steps[dict[str, Any]]:
-        yield from self._reports.flight_report()
+        yield from self._reports.write(flight_report, "")
         return {"details": None}
 
     def _support_files(self, *_: object) -> Steps[HttpAnswer]:
-        archive = yield from self._reports.archive()
+        archive = yield from self._reports.write(flight_report_archive)
         return HttpAnswer(200 if archive else 204, archive, content_type="application/zip")
-
-    def _applied(self, command: Command) -> Steps[dict[str, Any]]:
-        yield from self._box.apply(command)
-        return {}
 
 
 def _error_body(status: int, text: str) -> dict[str, Any]:

@@ -7,13 +7,13 @@ shows it before the next exchange of the gripper, so nobody waits for it. All cl
 
 from collections import deque
 from collections.abc import Sequence
+from functools import partial
 
 from protocol import robotiq
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.ports.session import Session, SessionPort
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
-from ur_emulator.host.steps import Steps
 from ur_emulator.machine.commands.grippers import OperateGrippers
 from ur_emulator.machine.tools.robotiq import RobotiqGripper
 
@@ -33,7 +33,7 @@ class RobotiqPort(SessionPort["_RobotiqSession"]):
     """Answers requests for the variables of `grippers`, which are known by their unit."""
 
     def __init__(self, box: ServedBox, grippers: Sequence[RobotiqGripper]) -> None:
-        super().__init__(box)
+        super().__init__(box, partial(_RobotiqSession, port=self))
         self.grippers = {gripper.unit: gripper for gripper in grippers}
         # What SETs have written since the cycle of that number, by unit and name.
         self._written: dict[int, dict[str, int]] = {}
@@ -43,9 +43,6 @@ class RobotiqPort(SessionPort["_RobotiqSession"]):
     def has_clients(self) -> bool:
         """Somebody uses the software of the gripper."""
         return bool(self._sessions)
-
-    def _begin(self, connection: Connection) -> "_RobotiqSession":
-        return _RobotiqSession(connection, self._box, self)
 
     def write(self, unit: int, values: Sequence[tuple[str, int]]) -> None:
         """Have a gripper take variables; all that come between two cycles are one command.
@@ -73,12 +70,11 @@ class _RobotiqSession(Session):
     def _take(self, data: bytes) -> None:
         self._requests.extend(self._parser.receive(data))
 
-    def _answer_next(self) -> Steps[int]:
+    def _answer_next(self) -> int:
         requests = [self._requests.popleft() for _ in range(min(len(self._requests), _TOGETHER))]
         if requests and not self.connection.send(b"".join(map(self._answer, requests))):
             self.connection.close()  # without its answer, a client takes the next one for it
         return len(requests) * _REQUEST_COST
-        yield  # a generator that never waits
 
     def _answer(self, request: robotiq.Request) -> bytes:
         match request:

@@ -6,6 +6,7 @@ The order of packages is in `protocol.rtde.server_connection`; here are rates, o
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from protocol.errors import RemoteProtocolError
 from protocol.rtde.codec import RtdeTextMessage, SetupInputs, SetupOutputs
@@ -33,13 +34,10 @@ class RtdePort(SessionPort["_RtdeSession"]):
     """Streams data packages and takes inputs."""
 
     def __init__(self, box: ServedBox) -> None:
-        super().__init__(box)
+        super().__init__(box, partial(_RtdeSession, answer=self._answer))
         self._streams: tuple[_RtdeSession, ...] = ()
         self._owners: dict[str, Connection] = {}
         self._reports_line = False
-
-    def _begin(self, connection: Connection) -> _RtdeSession:
-        return _RtdeSession(connection, self._box, self._answer)
 
     def closed(self, connection: Connection) -> None:
         """Forget the client; its input variables are free at once."""
@@ -59,17 +57,17 @@ class RtdePort(SessionPort["_RtdeSession"]):
                 session.connection.send(package)
 
     def _answer(self, session: _RtdeSession, request: object) -> None:
-        connection = session.connection
-        in_use: tuple[str, ...] = ()
+        connection, protocol = session.connection, session.protocol
         if isinstance(request, SetupInputs):
-            in_use = tuple(n for n in request.names if self._owners.get(n, connection) is not connection)
-        n_recipes = len(session.protocol.input_recipes)
-        has_room = not isinstance(request, SetupInputs) or session.has_room(len(request.names))
-        reply = session.protocol.reply(in_use, has_room=has_room)
-        if isinstance(request, SetupInputs) and len(session.protocol.input_recipes) > n_recipes:
-            self._owners.update(dict.fromkeys(request.names, connection))
-        if isinstance(request, SetupOutputs):
-            session.wants_line = _SCRIPT_LINE in request.names
+            in_use = [name for name in request.names if self._owners.get(name, connection) is not connection]
+            n_recipes = len(protocol.input_recipes)
+            reply = protocol.reply(in_use, has_room=session.has_room(len(request.names)))
+            if len(protocol.input_recipes) > n_recipes:
+                self._owners.update(dict.fromkeys(request.names, connection))
+        else:
+            reply = protocol.reply()
+            if isinstance(request, SetupOutputs):
+                session.wants_line = _SCRIPT_LINE in request.names
         session.restart()
         self._find_streams()
         if not connection.send(reply):

@@ -13,12 +13,11 @@ import time
 from collections import deque
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
 
 from protocol.primary.messages import ReportLevel
 from protocol.script_channel import ControlLine, Overflow, ProgramText, ScriptChannel
 from ur_emulator.budgets import BUDGETS, KIB, of_cycle
-from ur_emulator.errors import ArgumentError
+from ur_emulator.errors import ArgumentError, RefusedError
 from ur_emulator.host.runtime.barrier import describe_error
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.runtime.worker import Task, TaskQueue, Ticket
@@ -29,7 +28,7 @@ from ur_emulator.machine.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.program_files.compiling import CompileResult, compile_text
 
-# Words that change nothing here map to None.
+# All words but `SPEED_WORD`; those that change nothing here map to None.
 # Source: what PolyScope and public clients send on the script ports (protocol.script_channel).
 WORDS: dict[str, Command | None] = {
     "power on": power.PowerOn(),
@@ -46,17 +45,6 @@ WORDS: dict[str, Command | None] = {
 }
 SPEED_WORD = "set speed"
 
-
-def word_command(item: ControlLine) -> Command | str | None:
-    """Return the command that a word stands for, None if it changes nothing, or why there is none."""
-    if item.word != SPEED_WORD:
-        return WORDS.get(item.word, f"'{item.text}' is declared only: this box does not model it yet")
-    try:
-        return programs.SetSpeedSlider(float(item.argument))
-    except (ValueError, ArgumentError):
-        return f"'{item.text}' was ignored: the speed slider takes 0 to 1"
-
-
 # A program costs so much beside its text [bytes].
 _PROGRAM_COST = 2 * KIB
 
@@ -69,8 +57,7 @@ class Sender:
     Attributes:
         remote_period: number of the period of remote control in which it has connected, see `Pendant`.
         channel: what it has sent of a program that is not complete.
-        waiting: its programs that wait, in order.
-        compiling: its program that is being compiled, or whose result waits for the next cycle.
+        programs: those that have not begun, in order; only the first may be compiled.
         n_sent: how many programs it has sent since none of its waited.
         held: script of it that the box keeps, as `BUDGETS` counts it [bytes].
         is_open: its connection is open.
@@ -79,24 +66,20 @@ class Sender:
 
     remote_period: int = 1
     channel: ScriptChannel = field(default_factory=ScriptChannel)
-    waiting: deque[Program] = field(default_factory=deque)
-    compiling: Program | None = None
+    programs: deque[Program] = field(default_factory=deque)
     n_sent: int = 0
     held: int = 0
     is_open: bool = True
     is_told: bool = False
-
-    @property
-    def programs(self) -> tuple[Program, ...]:
-        """All its programs that have not begun."""
-        return (*self.waiting, *(() if self.compiling is None else (self.compiling,)))
 
 
 @dataclass(eq=False, repr=False, slots=True)
 class Program:
     """A program that waits; its ticket decides when it is compiled. A secondary one cannot be stopped.
 
-    `stops`: how often the program had been stopped when it arrived.
+    Attributes:
+        stops: how often the program had been stopped when it arrived.
+        task: compiles it, or has done so; None before.
     """
 
     sender: Sender
@@ -105,7 +88,6 @@ class Program:
     stops: int
     is_secondary: bool
     task: Task | None = None
-    outcome: CompileResult | None = None
 
     @property
     def cost(self) -> int:
@@ -132,8 +114,9 @@ class ProgramIntake:
         self._box = box
         # Those with programs that have not begun.
         self._senders: dict[Sender, None] = {}
-        self._ready: deque[Program] = deque()
-        self._held = self._held_gone = 0
+        # Those that are compiled, in the order in which they begin.
+        self._ready: dict[Program, CompileResult] = {}
+        self._held = 0
         # When the program was paused last, 0 if it goes on.
         self._paused = 0.0
         self._stops = 0
@@ -171,7 +154,6 @@ class ProgramIntake:
         """Keep some programs of a client that has gone, and drop what is not complete."""
         self._hold(sender, -sender.channel.pending)
         sender.is_open = False
-        self._held_gone += sender.held
         self._drop_gone()
 
     def publish(self, snapshot: Snapshot) -> None:
@@ -200,13 +182,15 @@ class ProgramIntake:
             self._hold(sender, -program.cost)
             self._tell(sender)
         else:
-            sender.waiting.append(program)
+            sender.programs.append(program)
             self._senders[sender] = None
 
     def _take_word(self, item: ControlLine) -> None:
-        command = word_command(item)
-        if isinstance(command, str):
-            self._warn(command)
+        try:
+            is_speed = item.word == SPEED_WORD
+            command = programs.SetSpeedSlider(float(item.argument)) if is_speed else WORDS[item.word]
+        except (ValueError, ArgumentError):
+            self._warn(f"'{item.text}' was ignored: the speed slider takes 0 to 1")
             return
         if command is not None:
             self._box.submit(command, in_place_of=item.word)
@@ -222,8 +206,6 @@ class ProgramIntake:
     def _hold(self, sender: Sender, n_bytes: int) -> None:
         self._held += n_bytes
         sender.held += n_bytes
-        if not sender.is_open:
-            self._held_gone += n_bytes
         if not sender.held:
             sender.n_sent, sender.is_told = 0, False
 
@@ -245,8 +227,8 @@ class ProgramIntake:
 
     def _begin(self, sender: Sender) -> None:
         """Have the next program of a client compiled, unless there are enough for this cycle."""
-        if sender.compiling is None and sender.waiting and len(self._ready) < self._programs_per_cycle:
-            program = sender.compiling = sender.waiting.popleft()
+        if _is_idle(sender) and len(self._ready) < self._programs_per_cycle:
+            program = sender.programs[0]
             program.task = self._tasks.submit(
                 partial(self._compiled, program),
                 partial(self._failed, program),
@@ -258,11 +240,10 @@ class ProgramIntake:
                 program.is_secondary,
             )
 
-    def _compiled(self, program: Program, outcome: Any, error: Exception | None) -> None:
+    def _compiled(self, program: Program, outcome: CompileResult, error: Exception | None) -> None:
         if error is not None:
             outcome = ScriptFailed(1, 1, f"the program cannot be compiled: {error}")
-        program.task, program.outcome = None, outcome
-        self._ready.append(program)
+        self._ready[program] = outcome
         self._hand_over()
 
     def _failed(self, program: Program, error: Exception) -> None:
@@ -273,26 +254,26 @@ class ProgramIntake:
         """Hand over what is compiled, as much as a cycle takes, and go on with compiling."""
         while self._ready and self._n_programs < self._programs_per_cycle:
             self._n_programs += 1
-            program = self._ready.popleft()
-            self._start(program)
+            program = next(iter(self._ready))
+            self._start(program, self._ready.pop(program))
             self._drop(program)
-        idle = [sender for sender in self._senders if sender.waiting and sender.compiling is None]
-        for sender in sorted(idle, key=lambda sender: sender.waiting[0].ticket.arrived):
+        idle = filter(_is_idle, self._senders)
+        for sender in sorted(idle, key=lambda sender: sender.programs[0].ticket.arrived):
             self._begin(sender)
 
-    def _start(self, program: Program) -> None:
-        outcome = program.outcome
-        assert outcome is not None
+    def _start(self, program: Program, outcome: CompileResult) -> None:
+        arrived = program.ticket.arrived
         if isinstance(outcome, ScriptFailed):
             self._box.announce(outcome)
         elif program.is_secondary:
             self._box.submit(programs.StartProgram(outcome))
         elif program.stops != self._box.stops:
             self._warn(f"program {outcome.name} was stopped before it began")
-        elif why := self._box.why_too_old(outcome, program.ticket.arrived):
-            self._warn(why)
         else:
-            self._box.submit(programs.StartProgram(outcome, program.ticket.arrived < self._paused))
+            try:
+                self._box.submit(self._box.start_command(outcome, arrived, pauses=arrived < self._paused))
+            except RefusedError as error:
+                self._warn(str(error))
 
     def _drop_gone(self) -> None:
         """Drop programs of clients that have gone until the rest keeps its budget, the longest one aside.
@@ -304,12 +285,10 @@ class ProgramIntake:
         if not waiting:
             return
         longest = max(waiting, key=lambda program: (program.cost, -program.ticket.arrived))
-        while self._held_gone - longest.cost > BUDGETS.script_bytes_gone:
+        while sum(other.held for other in gone) - longest.cost > BUDGETS.script_bytes_gone:
             greediest = max(gone, key=lambda other: other.held - (other is longest.sender) * longest.cost)
             self._tell(greediest)
-            ordered = (*reversed(greediest.waiting), greediest.compiling)
-            newest = (program for program in ordered if program not in (None, longest))
-            self._drop(next(newest))
+            self._drop(next(program for program in reversed(greediest.programs) if program is not longest))
 
     def _drop_stopped(self) -> None:
         """Drop the programs that arrived before the last stop."""
@@ -327,18 +306,18 @@ class ProgramIntake:
     def _drop(self, program: Program) -> None:
         """Let go of a program that was handed over, or that is no longer wanted."""
         sender = program.sender
-        if sender.compiling is program:
-            sender.compiling = None
-        else:
-            sender.waiting.remove(program)
+        sender.programs.remove(program)
         if program.task is not None:
             self._tasks.drop(program.task)
-            program.task = None
-        elif program in self._ready:
-            self._ready.remove(program)
+        self._ready.pop(program, None)
         self._hold(sender, -program.cost)
-        if not (sender.waiting or sender.compiling):
+        if not sender.programs:
             self._senders.pop(sender, None)
+
+
+def _is_idle(sender: Sender) -> bool:
+    """Whether a client has a program that waits, and none that is compiled."""
+    return bool(sender.programs) and sender.programs[0].task is None
 
 
 class ScriptPort:

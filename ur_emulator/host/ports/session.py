@@ -1,6 +1,7 @@
 """A client whose requests are answered in order, however many cycles each takes."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import partial
 from typing import ClassVar, Generic, TypeVar
 
@@ -9,7 +10,7 @@ from ur_emulator.errors import NotRunningError
 from ur_emulator.host.runtime.barrier import guarded
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.served_box import ServedBox
-from ur_emulator.host.steps import Steps
+from ur_emulator.host.steps import Steps, result_of
 
 
 class Session(ABC):
@@ -21,9 +22,11 @@ class Session(ABC):
     Attributes:
         is_busy: its requests are being answered.
         most_of_the_gone: how many requests are still answered when their client is gone.
+        allows_half_close: a client that has closed its sending side still gets its answers.
     """
 
     most_of_the_gone: ClassVar[int] = 0
+    allows_half_close: ClassVar[bool] = False
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
         """Prepare; nothing has arrived yet."""
@@ -37,10 +40,6 @@ class Session(ABC):
         if self.is_busy:
             self.connection.set_reading(False)
         self._take(data)
-        self.answer_requests()
-
-    def answer_requests(self) -> None:
-        """Begin to answer what has arrived; harmless if that has begun."""
         if not self.is_busy:
             self.is_busy = True
             self._answer_for_a_turn()
@@ -50,7 +49,7 @@ class Session(ABC):
         """Keep what has arrived."""
 
     @abstractmethod
-    def _answer_next(self) -> Steps[int]:
+    def _answer_next(self) -> int | Steps[int]:
         """Answer the next request; return what it has cost in units of work, 0 if none is there."""
 
     def _answer_for_a_turn(self) -> None:
@@ -65,7 +64,7 @@ class Session(ABC):
         while self._is_served():
             if work <= 0 or self._box.snapshot is not snapshot:
                 return True
-            cost = yield from self._answer_next()
+            cost = yield from result_of(self._answer_next())
             if not cost:
                 break
             work -= cost
@@ -99,21 +98,20 @@ class Session(ABC):
 _S = TypeVar("_S", bound=Session)
 
 
-class SessionPort(ABC, Generic[_S]):
+class SessionPort(Generic[_S]):
     """A port whose clients speak first; each has a session, which answers its requests in order."""
 
-    def __init__(self, box: ServedBox) -> None:
-        """Serve a box."""
+    def __init__(self, box: ServedBox, begin: Callable[[Connection, ServedBox], _S]) -> None:
+        """Serve a box; `begin` makes the session of a new client."""
         self._box = box
+        self._begin = begin
         self._sessions: dict[Connection, _S] = {}
-
-    @abstractmethod
-    def _begin(self, connection: Connection) -> _S:
-        """Return the session of a new client."""
 
     def opened(self, connection: Connection) -> None:
         """Take in a client."""
-        self._sessions[connection] = self._begin(connection)
+        session = self._sessions[connection] = self._begin(connection, self._box)
+        if session.allows_half_close:
+            connection.allow_half_close(self._ended)
 
     def received(self, connection: Connection, data: bytes) -> None:
         """Take bytes and answer what can be answered now."""
@@ -122,3 +120,7 @@ class SessionPort(ABC, Generic[_S]):
     def closed(self, connection: Connection) -> None:
         """Forget the client; what it has begun goes on."""
         self._sessions.pop(connection, None)
+
+    def _ended(self, connection: Connection) -> None:
+        """The client sends nothing more; it is closed when its requests are answered."""
+        self._sessions[connection].receive(b"")

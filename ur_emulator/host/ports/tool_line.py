@@ -10,6 +10,7 @@ pause would ask thousands of times a second.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 from protocol import modbus_rtu
 from ur_emulator.host.ports.robotiq import RobotiqPort
@@ -28,11 +29,8 @@ class ToolLinePort(SessionPort["_LineSession"]):
 
     def __init__(self, box: ServedBox, users: Sequence[RobotiqPort]) -> None:
         """Clients of the `users` have the line before those of this port."""
-        super().__init__(box)
+        super().__init__(box, partial(_LineSession, port=self))
         self._users = users
-
-    def _begin(self, connection: Connection) -> "_LineSession":
-        return _LineSession(connection, self._box, self)
 
     def has_line(self, connection: Connection) -> bool:
         """Whether a client has the line; what others send is lost."""

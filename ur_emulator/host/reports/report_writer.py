@@ -36,30 +36,17 @@ class ReportWriter:
             "python": platform.python_version(),
         }
 
-    def flight_report(self, kind: str = "") -> Steps[str]:
-        """Write a flight report; return its number."""
-        return self._written(report_files.flight_report, kind)
-
-    def support_file(self, directory: str) -> Steps[str]:
-        """Write a support file into a directory; return its name."""
-        return self._written(report_files.support_file, directory)
-
-    def save_log(self) -> Steps[str]:
-        """Write the log; return the name of the file on the wire."""
-        return self._written(report_files.save_log)
-
-    def archive(self) -> Steps[bytes]:
-        """Return an archive of all flight reports, b"" without one."""
-        return self._written(report_files.flight_report_archive)
-
     def close(self) -> None:
         """Remove what was written into a temporary folder."""
         temporary, self._temporary = self._temporary, None
         if temporary is not None:
             temporary.close()
 
-    def _written(self, write: Callable[..., T], *arguments: str) -> Steps[T]:
-        """Write a report in the worker process; a box without programs gets a temporary folder now."""
+    def write(self, function: Callable[..., T], *arguments: str) -> Steps[T]:
+        """Have a function of `report_files` write a report in the worker process; return its result.
+
+        A box without programs gets a temporary folder now.
+        """
         facts = self._facts()
         if not self._folder.exists:
             try:
@@ -67,7 +54,7 @@ class ReportWriter:
             except OSError as error:
                 raise ProgramFileError(f"no temporary folder: {error.strerror or error}") from None
             self._folder = ProgramFolder(self._temporary.path)
-        return (yield from self._box.in_worker(write, self._folder, *arguments, facts))
+        return (yield from self._box.in_worker(function, self._folder, *arguments, facts))
 
     def _facts(self) -> report_files.BoxFacts:
         box, player = self._box, self._player

@@ -132,10 +132,8 @@ class PrimaryPort(ScriptPort):
 
     def publish(self, snapshot: Snapshot) -> None:
         """Send a state and what has changed of the variables if they are due in this cycle."""
-        if self._clients and self._labels.is_watching:
-            message = self._labels.message(self._now)
-            if message is not None:
-                self._send(self._package(message))
+        if self._clients and (message := self._labels.message(self._now)) is not None:
+            self._send(self._package(message))
         cycle_rate = self._controller.generation.cycle_rate
         self._phase += STATE_RATE
         if self._phase < cycle_rate:
@@ -181,7 +179,4 @@ class PrimaryPort(ScriptPort):
     def _begin_report(self, run: RunningProgram | None) -> None:
         """Turn to the variables and labels of a run, or to none."""
         self._variables.begin(run)
-        if run is None:
-            self._labels.end()
-        else:
-            self._labels.begin(run)
+        self._labels.begin(run)

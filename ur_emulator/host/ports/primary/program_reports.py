@@ -233,25 +233,13 @@ class LabelReporter:
 
     def __init__(self, version: SoftwareVersion) -> None:
         self._tells_of_threads = ProgramThreadsMessage.SINCE.covers(version)
-        self._begun: RunningProgram | None = None
         self._run: RunningProgram | None = None
         self._sent: tuple[ThreadLabel, ...] = ()
 
-    @property
-    def is_watching(self) -> bool:
-        """True while a program with labels runs."""
-        return self._run is not None
-
-    def begin(self, run: RunningProgram) -> None:
-        """Turn to a run; one without labels is not watched."""
-        if run is not self._begun:
-            self._begun = run
-            self._run = run if "$" in run.program.source.text else None
+    def begin(self, run: RunningProgram | None) -> None:
+        """Turn to a run, or to none; one without labels is not watched."""
+        self._run = run if run is not None and "$" in run.program.source.text else None
         self._sent = ()
-
-    def end(self) -> None:
-        """Forget the run."""
-        self._begun = self._run = None
 
     def message(self, timestamp: int) -> RobotMessage | None:
         """Return the message of this cycle, or None if nothing has changed."""
