@@ -30,10 +30,10 @@ from ur_emulator.machine.models.fidelity import REVERSAL_SPEED
 from ur_emulator.machine.models.generations import E_SERIES
 from ur_emulator.machine.models.mjcf import GRAVITY
 from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
-from ur_emulator.machine.plant.arm_physics import compile_physics, physics_spec
 from ur_emulator.machine.plant.drives import ServoGains
 from ur_emulator.machine.plant.friction import Friction
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.machine.plant.physics_model import compile_physics, physics_spec
 from ur_emulator.machine.plant.plant import Plant
 
 Q = (0.3, -1.2, 1.9, -0.7, 1.1, 0.4)

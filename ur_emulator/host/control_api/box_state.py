@@ -171,7 +171,7 @@ def take_state(box: ServedBox) -> BoxState:
         analog_outputs=now.analog_values[2:4],
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
-        obstacles=physics.obstacles.names,
+        obstacles=tuple(shape.name for shape in physics.scene.obstacles),
         things=_things(controller),
         shapes=(*physics.shapes, *map(_shape_of, controller.state.safety.limits.boundaries.planes)),
         contacts=physics.contacts,

@@ -186,13 +186,9 @@ class ArmPlant(ABC):
         """Put a scene around the arm, see `Scene.furnish`."""
         self._acted_on("scene").scene.furnish(surroundings)
 
-    def put_thing(self, thing: Thing) -> None:
-        """Add a thing at rest, see `Scene.put`."""
-        self._acted_on(f"thing {thing.name}").scene.put(thing)
-
-    def put_obstacle(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Add an obstacle, see `Obstacles.put`."""
-        self._acted_on(f"obstacle {name}").obstacles.put(name, shape, size, pose)
+    def put(self, thing: Thing) -> None:
+        """Add a thing or an obstacle, see `Scene.put`."""
+        self._acted_on(f"{thing.kind} {thing.name}").scene.put(thing)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
         """Set the true payload at the flange, which the controller does not know.

@@ -5,7 +5,7 @@ gives
 
     tau = kp (control - q) - kv qd + bias,   control = q_set + lead qd_set + tau_set / kp + trim
 
-with lead = kv / kp. The law itself lives in MuJoCo's actuators (`arm_physics.py`); `control` comes from the
+with lead = kv / kp. The law itself lives in MuJoCo's actuators (`physics_model.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
 at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
 It counts errors in whole dead bands (`Fidelity.servo_dead_band`): a smaller one stays, where friction holds

@@ -21,13 +21,11 @@ class Shape(NamedTuple):
         geom: MuJoCo's type.
         to_mujoco: its sizes, as in `things.SIZES`, as MuJoCo's sizes.
         from_mujoco: the inverse.
-        half_extent: half edges of the smallest box around it, of MuJoCo's sizes [m]; 0 for a plane.
     """
 
     geom: mujoco.mjtGeom
     to_mujoco: Callable[..., Vector3]
     from_mujoco: Callable[..., tuple[float, ...]]
-    half_extent: Callable[[float, float, float], Vector3]
 
 
 def _half(x: float, y: float, z: float) -> Vector3:
@@ -47,14 +45,12 @@ def _of_rod(r: float, half: float, _: float) -> tuple[float, float]:
 
 
 SHAPES = {
-    "box": Shape(_GEOM.mjGEOM_BOX, _half, _double, lambda x, y, z: (x, y, z)),
-    "sphere": Shape(
-        _GEOM.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0), lambda r, *_: (r,), lambda r, *_: (r, r, r)
-    ),
-    "capsule": Shape(_GEOM.mjGEOM_CAPSULE, _rod, _of_rod, lambda r, half, _: (r, r, half + r)),
+    "box": Shape(_GEOM.mjGEOM_BOX, _half, _double),
+    "sphere": Shape(_GEOM.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0), lambda r, *_: (r,)),
+    "capsule": Shape(_GEOM.mjGEOM_CAPSULE, _rod, _of_rod),
     # A wall without end, of which a part is drawn; what is on the side of negative z is inside it.
-    "plane": Shape(_GEOM.mjGEOM_PLANE, lambda: (5.0, 5.0, 0.1), lambda *_: (), lambda *_: (0.0, 0.0, 0.0)),
-    "cylinder": Shape(_GEOM.mjGEOM_CYLINDER, _rod, _of_rod, lambda r, half, _: (r, r, half)),
+    "plane": Shape(_GEOM.mjGEOM_PLANE, lambda: (5.0, 5.0, 0.1), lambda *_: ()),
+    "cylinder": Shape(_GEOM.mjGEOM_CYLINDER, _rod, _of_rod),
 }
 # By MuJoCo's types; what people do not give is drawn as the box around it.
 BY_GEOM = {int(shape.geom): (name, shape.from_mujoco) for name, shape in SHAPES.items()} | {
