@@ -133,9 +133,9 @@ class ArmPlant(ABC):
     ) -> None:
         """Take the command of a cycle; arguments as of `step`."""
 
-    @abstractmethod
     def complete_cycle(self) -> None:
-        """Let the arm move by the command that waits; the results are the same to the last bit."""
+        """Let the arm move by the command that waits, if one does; that changes no bit."""
+        return
 
     def sense(self) -> PlantState:
         """Return what the sensors say; it stays the same until the next step."""
@@ -222,12 +222,12 @@ class ArmPlant(ABC):
         self.complete_cycle()
         self.range.q_min, self.range.q_max = q_min, q_max
 
-    @abstractmethod
     def hold_trim(self) -> None:
-        """Hold the trim of the servos until the target moves, if the arm presses against an obstacle.
+        """Hold the trim of the servos, if there are some, until the target moves, if the arm presses.
 
         Otherwise its integral would raise the contact force more and more.
         """
+        return
 
     @property
     def fingers(self) -> list[FingerState]:

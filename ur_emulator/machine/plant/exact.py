@@ -50,12 +50,6 @@ class ExactPlant(ArmPlant):
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
 
-    def complete_cycle(self) -> None:
-        """Do nothing: the position depends on the target alone."""
-
-    def hold_trim(self) -> None:
-        """Do nothing: this arm presses against nothing."""
-
     def _follow(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> None:
         moment = self._dynamics.evaluate(np.array(q), np.array(qd, dtype=np.float64), np.array(qdd))
         self._q, self._qd, self._moment = six(q), six(qd), six(moment.tolist())

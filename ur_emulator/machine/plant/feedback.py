@@ -14,6 +14,7 @@ from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.mjcf import GRAVITY
 from ur_emulator.machine.models.robot_model import RobotModel
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
+from ur_emulator.machine.plant.drives import Drives
 from ur_emulator.machine.plant.sensors import REC_ACCELERATION, Record, Sensors, WrenchFor
 
 # --- GearRipple: the kinematic transmission error of the strain wave gears; GearWithPlay: their backlash, too
@@ -130,11 +131,9 @@ class GearWithPlay(GearRipple):
 class Feedback:
     """Gears and sensors of one arm.
 
-    A cycle is `take` or `take_rest`.
+    A cycle is `follow` or `take_rest`.
 
     Attributes:
-        capture_at: number of the sub-step whose beginning is the measured moment; after the last sub-step:
-            its end.
         reading: what the sensors say of the last cycle.
     """
 
@@ -143,7 +142,8 @@ class Feedback:
         n_substeps = generation.n_substeps
         # From the measured moment to the end of the plant's cycle, which comes a cycle later, see `Plant`.
         age_substeps = max(0, round(fidelity.feedback_age / (generation.substep_us * 1e-6)) - n_substeps)
-        self.capture_at = -age_substeps % n_substeps if age_substeps else n_substeps
+        # Number of the sub-step whose beginning is the measured moment; after the last sub-step: its end.
+        self._capture_at = -age_substeps % n_substeps if age_substeps else n_substeps
         self.gear = (GearWithPlay if fidelity.backlash else GearRipple)(robot, fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, generation.period_s)
         # The first record is that of this cycle; the next one, which is the oldest, is read.
@@ -158,21 +158,13 @@ class Feedback:
         """Joint angles (6,) at which the brakes hold the arm [rad]."""
         return self._rest.q
 
-    @property
-    def captured(self) -> NDArray[np.float64]:
-        """Takes what MuJoCo's sensors say at the measured moment, see `sensors.REC_SIMULATED`."""
-        return self._records[0].simulated
-
-    def take(self, physics: ArmPhysics, expected_current: NDArray[np.float64]) -> None:
-        """Read the sensors of an arm whose cycle has been computed.
-
-        Args:
-            expected_current: of the motors, by the controller's model (6,) [A].
-        """
+    def follow(self, physics: ArmPhysics, drives: Drives) -> None:
+        """Let the drives move the arm for a cycle, and read its sensors."""
         record, loads = self._records[0], physics.loads
+        physics.run(drives, self._capture_at, record.simulated)
         self.gear.apply(record)
         if not self._has_force_sensor:
-            record.expected_current[:] = expected_current
+            record.expected_current[:] = drives.expected_current
             self._read(physics.wrench_for)
             return
         record.wrench[:] = loads.wrench if loads.is_unexpected else 0.0

@@ -50,7 +50,6 @@ def physics_spec(
     # are for scenes with many bodies and only cost time here.
     off = mujoco.mjtDisableBit
     option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_ISLAND | off.mjDSBL_MIDPHASE
-    _add_joint_physics(spec, robot)
     _add_drives(spec, robot, gains)
     _add_hulls(spec, robot, dh)
     _add_sensors(spec)
@@ -77,16 +76,13 @@ def compile_physics(spec: mujoco.MjSpec, speed: float) -> mujoco.MjModel:
     return model
 
 
-def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
+def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:
+    """Add rotors, friction and servos of the joints."""
     for i, name in enumerate(JOINTS):
         joint = spec.joint(name)
         joint.armature = robot.armature[i]
         joint.damping = [robot.viscous_fast[i], 0.0, 0.0]
         joint.frictionloss = robot.coulomb[i]
-
-
-def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:
-    for i, name in enumerate(JOINTS):
         drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
         drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE

@@ -143,10 +143,9 @@ class Plant(ArmPlant):
         if not is_free:
             drives.actual_speed[:] = physics.qd
             drives.advance()
-        physics.run(drives, feedback.capture_at, feedback.captured)
+        feedback.follow(physics, drives)
         np.multiply(physics.torque, self._per_torque, self._currents)
         self._control_current = currents = six(self._currents.tolist())
-        feedback.take(physics, drives.expected_current)
         if physics.has_diverged:
             raise PlantError(
                 f"the simulation diverged in cycle {self.cycle}: joint speeds {physics.qd.tolist()} rad/s; "
