@@ -12,8 +12,7 @@ from ur_emulator.machine.commands.operation import CommandOperation, parameter, 
 from ur_emulator.machine.controller.command import BoxParts, refuse
 from ur_emulator.machine.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.machine.models.robot_model import Vector3, six
-from ur_emulator.machine.models.things import SIZES, Thing
-from ur_emulator.machine.plant.physics_model import SLIDING_FRICTION
+from ur_emulator.machine.models.things import SIZES, SLIDING_FRICTION, Thing
 
 # --- What is wired to the inputs of the box and the tool
 

@@ -14,6 +14,9 @@ SIZES: dict[str, tuple[str, ...]] = {
     "cylinder": ("radius", "length along z"),
 }
 
+# Of what has no friction of its own: arm, table, obstacles; assumed: a tool of metal or plastic on a table.
+SLIDING_FRICTION = 0.3
+
 
 @dataclass(frozen=True, slots=True)
 class Thing:

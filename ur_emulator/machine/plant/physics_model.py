@@ -11,6 +11,7 @@ import mujoco
 
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
 from ur_emulator.machine.models.robot_model import DhRow, RobotModel
+from ur_emulator.machine.models.things import SLIDING_FRICTION
 from ur_emulator.machine.plant.drives import ServoGains
 from ur_emulator.machine.plant.hand import add_tool
 from ur_hil.tools import ToolModel
@@ -21,8 +22,6 @@ TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the t
 # rattle under a tool that is drawn over them.
 CONTACT_SOLREF = (0.010, 1.0)
 CONTACT_SOLIMP = (0.3, 0.95, 0.0005, 0.5, 2.0)
-# Sliding friction of what touches; assumed: a tool of metal or plastic on a table.
-SLIDING_FRICTION = 0.3
 
 
 def physics_spec(
