@@ -319,7 +319,7 @@ def test_true_friction_rises_as_fast_as_the_compensation(robot, share):
     """Servos without gains press with a share of the dry friction: joints creep at that share of the speed."""
     no_gains = ServoGains(np.zeros(6), 0.0)
     model = compile_physics(
-        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, robot.generation.substep_us * 1e-6, ()),
+        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, ()),
         TYPICAL.friction_rise,
     )
     model.opt.gravity[:] = 0.0

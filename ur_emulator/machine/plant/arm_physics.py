@@ -22,7 +22,7 @@ from ur_emulator.machine.plant.loads import Loads
 from ur_emulator.machine.plant.physics_model import compile_physics, physics_spec
 from ur_emulator.machine.plant.scene import OBSTACLE, Scene
 from ur_emulator.machine.plant.sensors import REC_Q, REC_QD
-from ur_emulator.machine.plant.shapes import BY_GEOM, DrawnBox, collide, contacts_at, pose_of
+from ur_emulator.machine.plant.shapes import BY_GEOM, SHAPES, DrawnBox, collide, pose_of
 from ur_hil.tools import ToolModel
 
 # MuJoCo's Coulomb friction is a soft constraint, see `compile_physics`. In freedrive a joint would creep
@@ -76,8 +76,8 @@ class ArmPhysics:
         tools: Sequence[ToolModel] = (),
     ) -> None:
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
-        dh, substep = calibrated_dh(robot, calibration), robot.generation.substep_us * 1e-6
-        self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), substep, tools)
+        dh = calibrated_dh(robot, calibration)
+        self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), tools)
         model = compile_physics(spec, fidelity.friction_rise)
         presliding = fidelity.friction_presliding
         self._sizes = {size: getattr(model, size) for size in (*_SET_LATER, *_STATE)}
@@ -125,7 +125,8 @@ class ArmPhysics:
 
     def _recompile(self) -> None:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
-        before, model, data = self.model, *self._spec.recompile(self.model, self.data)
+        before = self.model
+        model, data = self._spec.recompile(before, self.data)
         collide(model, data)
         for kept, old, new in ((_SET_LATER, before, model), (_STATE, self.data, data)):
             for size, fields in kept.items():
@@ -225,16 +226,15 @@ class ArmPhysics:
         self._sliding_shapes: list[tuple[BodyShape, Vector3, int]] = []
         self._moving_shapes: list[tuple[BodyShape, int, DrawnBox]] = []
         for geom in range(model.ngeom):
-            body, row = model.body(model.geom_bodyid[geom]), BY_GEOM.get(int(model.geom_type[geom]))
+            body, shape = model.body(model.geom_bodyid[geom]), BY_GEOM.get(int(model.geom_type[geom]))
             name = self._name_of(geom)
-            if row is None or body.name in LINKS or body.name.startswith(OBSTACLE) or name == "base":
+            if shape is None or body.name in LINKS or body.name.startswith(OBSTACLE) or name == "base":
                 continue
-            (shape, from_mujoco), is_carried = row, bool(self._is_arm[body.id])
-            box = DrawnBox.of(model, geom)
+            is_carried, box = bool(self._is_arm[body.id]), DrawnBox.of(model, geom)
             position, rotation = box.place(data, geom)
             if is_carried:
                 position, rotation = to_flange @ (position - flange), to_flange @ rotation
-            size = from_mujoco(*box.size.tolist())
+            size = SHAPES[shape].from_mujoco(box.size)
             drawn = BodyShape(name, is_carried, shape, size, pose_of(position, rotation))
             carrier = model.body(model.body_weldid[body.id])
             joint = int(carrier.jntadr[0])
@@ -274,10 +274,6 @@ class ArmPhysics:
         """Stand still at once, wherever the arm is."""
         self.qd[:] = 0.0
         mujoco.mj_kinematics(self.model, self.data)
-
-    def touches(self, q: Sequence[float]) -> bool:
-        """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        return bool(contacts_at(self.model, np.array([*q, *self.data.qpos[6:]])).ncon)
 
     def run(self, drives: Drives, capture_at: int, captured: NDArray[np.float64]) -> None:
         """Advance by the sub-steps of a cycle.

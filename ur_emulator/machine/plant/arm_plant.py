@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +26,7 @@ from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.machine.plant.shapes import collide
 from ur_emulator.machine.plant.thermometers import Thermometers
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
@@ -180,7 +182,11 @@ class ArmPlant(ABC):
 
     def touches(self, q: Sequence[float]) -> bool:
         """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        return self._physics.touches(q)
+        model, now = self._physics.model, self._physics.data
+        there = mujoco.MjData(model)
+        there.qpos[:] = [*q, *now.qpos[6:]]
+        collide(model, there)
+        return bool(there.ncon)
 
     def furnish(self, surroundings: Cell | Path) -> None:
         """Put a scene around the arm, see `Scene.furnish`."""
@@ -191,11 +197,7 @@ class ArmPlant(ABC):
         self._acted_on(f"{thing.kind} {thing.name}").scene.put(thing)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Set the true payload at the flange, which the controller does not know.
-
-        From now on `set_payload` only declares. The mass is in kg, the centre of gravity in the flange frame
-        [m]. PlantError when the mass is negative or a number is not finite.
-        """
+        """Set the true payload; from now on `set_payload` only declares. See `Loads.attach`."""
         self._acted_on("payload").loads.attach(mass, cog)
 
     def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:

@@ -87,7 +87,7 @@ class Loads:
             set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
-        """Set the true payload, which the controller does not know; errors as in `check_payload`."""
+        """Set the true payload, which the controller does not know; see `declare`."""
         check_payload(mass, cog)
         self._true = (*self._tools, (mass, cog))
         self._attached = True

@@ -29,7 +29,6 @@ def physics_spec(
     dh: Sequence[DhRow],
     mass_scale: Sequence[float],
     gains: ServoGains,
-    substep: float,
     tools: Sequence[ToolModel],
 ) -> mujoco.MjSpec:
     """Return the plant's model, not compiled; see `arm_spec` for the mechanism.
@@ -37,11 +36,10 @@ def physics_spec(
     Args:
         dh: its six true rows.
         mass_scale: six factors on the link masses.
-        substep: physics time step [s].
     """
     spec = arm_spec(robot, dh, mass_scale)
     option = spec.option
-    option.timestep = substep
+    option.timestep = robot.generation.substep_us * 1e-6
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # Round friction cones: on a pyramid a drawn tool jumps from edge to edge.
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

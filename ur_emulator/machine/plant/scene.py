@@ -236,4 +236,4 @@ def _add_body(spec: mujoco.MjSpec, name: str, thing: Thing) -> None:
 
 def _add_shape(body: mujoco.MjsBody, shape: str, size: tuple[float, ...], friction: float) -> mujoco.MjsGeom:
     kind = SHAPES[shape]
-    return body.add_geom(type=kind.geom, size=kind.to_mujoco(*size), friction=[friction, 0.005, 0.0001])
+    return body.add_geom(type=kind.geom, size=kind.to_mujoco(size), friction=[friction, 0.005, 0.0001])
