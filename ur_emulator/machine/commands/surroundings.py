@@ -14,8 +14,6 @@ from ur_emulator.machine.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.machine.models.robot_model import Vector3, six
 from ur_emulator.machine.models.things import SIZES, SLIDING_FRICTION, Thing
 
-# --- What is wired to the inputs of the box and the tool
-
 
 class SetDigitalInput(CommandOperation):
     """Let a digital input be high or low from now on."""
@@ -52,9 +50,6 @@ class SetAnalogInput(CommandOperation):
         line.value = value
 
 
-# --- Forces on the flange, and a payload that no program has declared
-
-
 # The largest force limit of the safety settings [N]; about the length of a tool [m].
 MAX_FORCE, MAX_LEVER = 250.0, 0.3
 
@@ -84,9 +79,6 @@ class AttachPayload(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         box.plant.attach_load(self.mass, self.cog)
-
-
-# --- Obstacles: sizes and poses are checked before they reach the physics
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
@@ -146,9 +138,6 @@ class RemoveObstacle(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         box.plant.physics.scene.remove("obstacle", self.name)
-
-
-# --- Things that can be moved: what an arm grips, pushes and drops
 
 
 ThingShape = Literal["box", "cylinder", "sphere"]

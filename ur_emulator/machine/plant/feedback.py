@@ -17,22 +17,25 @@ from ur_emulator.machine.plant.arm_physics import ArmPhysics
 from ur_emulator.machine.plant.drives import Drives
 from ur_emulator.machine.plant.sensors import REC_ACCELERATION, Record, Sensors, WrenchFor
 
-# --- GearRipple: the kinematic transmission error of the strain wave gears; GearWithPlay: their backlash, too
-#
-# The ratio of a strain wave gear is not constant: the joint leads and lags the motor by up to a tenth of a
-# milliradian, in waves along the joint's angle. The motor is what the drive holds; the joint is what the
-# encoder at the output reports. The waves are those of the fidelity, their phases the box's own, by its seed.
-#
-# A motor's torque constant and cogging change with its angle, too: four waves a motor turn, which the current
-# compensates, also at rest. Of a real UR3's base 45 mA (O); that the servo lets none of it into the motion is
-# chosen.
-
 _GEAR_RATIO = 101.0  # of all sizes
 _CURRENT_CYCLES = 4.0 * _GEAR_RATIO
 
 
 class GearRipple:
-    """q_joint = q_motor + e(q_motor), both counted at the joint [rad]; and the ripple of the motors."""
+    """Strain wave gears: q_joint = q_motor + e(q_motor), both counted at the joint [rad]; ripple of motors.
+
+    The ratio of a strain wave gear is not constant: the joint leads and lags the motor by up to a tenth of a
+    milliradian, in waves along the joint's angle. The motor is what the drive holds; the joint is what the
+    encoder at the output reports. The waves are those of the fidelity, their phases the box's own.
+
+    A motor's torque constant and cogging change with its angle, too: four waves a motor turn, which the
+    current compensates, also at rest. Of a real UR3's base 45 mA (O); that the servo lets none of it into the
+    motion is chosen.
+
+    Attributes:
+        error: e (6,) [rad], after `evaluate`.
+        slope: de/dq (6,) [1], after `evaluate`.
+    """
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
         ripples = fidelity.ripples
@@ -71,7 +74,7 @@ class GearRipple:
         self.slope: NDArray[np.float64] = self._sum[6:12]
 
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
-        """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
+        """Set `error` and `slope` for motor positions q_motor (6,) [rad]."""
         waves = self._waves
         self._cycles.dot(q_motor, waves)
         np.add(waves, self._phases, waves)

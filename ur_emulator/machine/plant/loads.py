@@ -13,8 +13,6 @@ from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6
 from ur_hil.arithmetic import add_up
 from ur_hil.tools import ToolModel
 
-# --- the payload body of a compiled MuJoCo arm
-
 _DENSITY = 2700.0  # kg/m³, aluminium: gives a payload without a stated inertia a plausible one
 
 
