@@ -286,7 +286,7 @@ def test_a_thing_that_has_moved_stays_when_it_cannot_be_put_again(width):
     bench.scene.move("block", (0.5, 0.5, 0.9, 0.0, 0.0, 0.0))
     bench.run(0.3, width)
     before = {name: bench.scene.state(name) for name in bench.scene.names}
-    assert before["block"].twist[2] < -2.0  # they fall
+    assert before["block"].speed[2] < -2.0  # they fall
     with pytest.raises(RefusedError, match="the arm is where it should be"):
         bench.scene.put(Thing("block", "sphere", (0.2,), 5.0, 0.5, bench.place))
     assert {name: bench.scene.state(name) for name in bench.scene.names} == before

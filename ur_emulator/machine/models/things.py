@@ -44,11 +44,19 @@ class Thing:
 
 
 @dataclass(frozen=True, slots=True)
-class ThingState:
-    """Where a thing is now: pose in the base frame [m, rad], linear and angular velocity [m/s, rad/s]."""
+class ThingNow:
+    """A thing around the arm, as it is now; in the base frame.
 
+    Attributes:
+        name: by which it is moved and removed.
+        pose: of its middle [m, rotation vector in rad].
+        speed: [m/s, rad/s].
+        touches_tool: it touches the arm or its tool.
+    """
+
+    name: str
     pose: Vector6
-    twist: Vector6
+    speed: Vector6
     touches_tool: bool
 
 

@@ -15,7 +15,7 @@ from protocol.pose import rpy_to_rotvec
 from ur_emulator.errors import ModelError, RefusedError
 from ur_emulator.machine.models.mjcf import LINKS
 from ur_emulator.machine.models.robot_model import Vector6, six
-from ur_emulator.machine.models.things import BodyShape, Thing, ThingState
+from ur_emulator.machine.models.things import BodyShape, Thing, ThingNow
 from ur_emulator.machine.plant.physics_model import CONTACT_SOLIMP, CONTACT_SOLREF
 from ur_emulator.machine.plant.shapes import SHAPES, quaternion
 from ur_hil.cell import Cell, load_cell
@@ -170,7 +170,7 @@ class Scene:
         self._data.qpos[q : q + 7] = (*pose[:3], *quaternion(pose[3:]))
         self._data.qvel[v : v + 6] = 0.0
 
-    def state(self, name: str) -> ThingState:
+    def state(self, name: str) -> ThingNow:
         """Where a thing is."""
         model, data = self._model, self._data
         body = self._find("thing", name)
@@ -180,7 +180,8 @@ class Scene:
         mujoco.mju_quat2Vel(turn, data.qpos[q + 3 : q + 7], 1.0)
         mujoco.mju_quat2Mat(rotation, data.qpos[q + 3 : q + 7])
         spin = rotation.reshape(3, 3) @ data.qvel[v + 3 : v + 6]  # MuJoCo has it in the thing's own axes
-        return ThingState(
+        return ThingNow(
+            name,
             six([*data.qpos[q : q + 3].tolist(), *turn.tolist()]),
             six([*data.qvel[v : v + 3].tolist(), *spin.tolist()]),
             self._arm in self._touching(body),
