@@ -142,11 +142,6 @@ class ArmPhysics:
         return int(self.data.ncon)
 
     @property
-    def has_company(self) -> bool:
-        """Fingers or things move beside the joints."""
-        return bool(self.model.nv > 6)
-
-    @property
     def has_diverged(self) -> bool:
         """Whether the simulation has diverged."""
         return not self.qd.dot(self.qd) < _RUNAWAY**2
@@ -304,7 +299,9 @@ class ArmPhysics:
             captured[REC_QD] = self.qd
 
     def run_beside(self, n_steps: int) -> None:
-        """Advance what moves beside the arm while the brakes hold it."""
+        """Advance fingers and things while the brakes hold the arm."""
+        if self.model.nv == 6:
+            return
         q = self.q.copy()
         for _ in range(n_steps):
             mujoco.mj_step(self.model, self.data)

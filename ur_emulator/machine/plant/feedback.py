@@ -137,6 +137,7 @@ class Feedback:
     A cycle is `follow` or `take_rest`.
 
     Attributes:
+        q_rest: joint angles (6,) at which the brakes hold the arm [rad].
         reading: what the sensors say of the last cycle.
     """
 
@@ -153,13 +154,9 @@ class Feedback:
         self._records = deque(Record() for _ in range(1 + max(0, age_substeps - 1) // n_substeps))
         self._read_at = 1 % len(self._records)
         self._rest = Record()
+        self.q_rest = self._rest.q
         self._has_force_sensor = generation.force_sensing.has_sensor
         self.reading = self._sensors.read(self._rest)
-
-    @property
-    def q_rest(self) -> NDArray[np.float64]:
-        """Joint angles (6,) at which the brakes hold the arm [rad]."""
-        return self._rest.q
 
     def follow(self, physics: ArmPhysics, drives: Drives) -> None:
         """Let the drives move the arm for a cycle, and read its sensors."""

@@ -61,7 +61,6 @@ class Loads:
         # What hangs on the flange; empty: what is declared does.
         self._true: tuple[tuple[float, Vector3], ...] = self._tools
         self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
-        self._attached = False
         self._weigh()
 
     def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -88,7 +87,6 @@ class Loads:
         """Set the true payload, which the controller does not know; see `declare`."""
         check_payload(mass, cog)
         self._true = (*self._tools, (mass, cog))
-        self._attached = True
         self._weigh()
         set_payload_body(self._model, mass, cog)
 
@@ -130,5 +128,5 @@ class Loads:
         loads = [*self._true, (-self._declared[0], self._declared[1])]
         self._excess_force = GRAVITY * add_up(mass for mass, _ in loads)
         self._excess_weight = sum((GRAVITY * mass * np.array(cog) for mass, cog in loads), np.zeros(3))
-        differs = bool(self._true) and (self._excess_force != 0.0 or self._excess_weight.any())
-        self.is_unexpected = self._push is not None or self._attached or bool(differs)
+        differs = bool(self._true) and (self._excess_force != 0.0 or bool(self._excess_weight.any()))
+        self.is_unexpected = self._push is not None or differs

@@ -189,8 +189,7 @@ class Plant(ArmPlant):
         """Advance by a cycle with the brakes on."""
         if not self._is_braked:
             self._engage_brakes()
-        if self._physics.has_company:
-            self._physics.run_beside(self.robot.generation.n_substeps)
+        self._physics.run_beside(self.robot.generation.n_substeps)
         self._feedback.take_rest()
 
     def _engage_brakes(self) -> None:
