@@ -17,7 +17,7 @@ from ur_emulator.machine.models.robot_model import RobotModel, Vector3
 from ur_emulator.machine.models.things import BodyShape, Contact
 from ur_emulator.machine.plant.drives import Drives, ServoGains
 from ur_emulator.machine.plant.friction import Presliding
-from ur_emulator.machine.plant.hand import make_hand
+from ur_emulator.machine.plant.hand import Cup, Hand
 from ur_emulator.machine.plant.loads import Loads
 from ur_emulator.machine.plant.physics_model import compile_physics, physics_spec
 from ur_emulator.machine.plant.scene import OBSTACLE, Scene
@@ -84,7 +84,7 @@ class ArmPhysics:
         self._presliding = Presliding(presliding) if presliding else None
         self.loads = Loads(tools)
         self.scene = Scene(spec, self._recompile)
-        self.hands = tuple(make_hand(tool, i) for i, tool in enumerate(tools))
+        self.hands = tuple(Hand(tool, i) if tool.stroke else Cup(i) for i, tool in enumerate(tools))
         self._bind(model, mujoco.MjData(model))
         for hand in self.hands:
             hand.open_half()
