@@ -22,7 +22,6 @@ from ur_emulator.machine.commands.programs import StartProgram
 from ur_emulator.machine.commands.surroundings import Push
 from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.machine import Machine
-from ur_emulator.machine.models.calibration import calibrated_dh
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import TYPICAL
 from ur_emulator.machine.models.mjcf import LINKS, arm_spec, to_body
@@ -97,7 +96,7 @@ class Stage:
     """The arm as the physics has it, on a table, under a camera."""
 
     def __init__(self, controller, width=900, height=760):
-        dh = calibrated_dh(UR3, controller.plant.calibration)
+        dh = controller.plant.dh
         spec = arm_spec(UR3, dh, (1.0,) * 6)
         world = spec.worldbody
         kinds, patterns = mujoco.mjtTexture, mujoco.mjtBuiltin

@@ -14,7 +14,7 @@ HOST = Path(__file__).parent.parent / "ur_emulator" / "host"
 ROOTS = {"machine", "controller", "grippers"}
 # Methods of the machine that only tell something.
 READS = {
-    "as_dict", "find", "get", "has_calls", "is_high", "items", "may_unlock", "position", "read_digital_in",
+    "as_dict", "find", "get", "is_high", "items", "may_unlock", "position", "read_digital_in",
     "read_global", "seconds", "state", "summary", "tick_at", "unread", "values", "inverse", "cycles",
     "software", "answer", "count", "index", "variables", "jacobian",
 }  # fmt: skip

@@ -37,8 +37,8 @@ from ur_emulator.errors import ProgramFileError
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.machine.controller.clock import Clock
+from ur_emulator.machine.controller.io.network import Network
 from ur_emulator.machine.models.generations import CB3
-from ur_emulator.machine.scripting.network import Network
 from ur_emulator.machine.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.program_files.compiling import load_and_compile
 from ur_emulator.program_files.folder import ProgramFolder
@@ -312,7 +312,7 @@ class _Answers:
                 yield
 
     def _turn(self):
-        self._clock.advance()
+        self._clock.tick += 1
         self._outside.carry_out(self._network.take_requests())
         for service in tuple(self._loop._services):
             service.advance(time.monotonic())

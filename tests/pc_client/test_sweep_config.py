@@ -157,9 +157,9 @@ def test_a_file_that_is_not_there(tmp_path):
 
 
 def test_fidelities_are_those_of_the_box():
-    from ur_emulator.machine.models.fidelity import FIDELITIES as OF_THE_BOX
+    from ur_emulator.machine.models.generations import CB3
 
-    assert set(FIDELITIES) == {it.name for it in OF_THE_BOX}
+    assert set(FIDELITIES) == {it.name for it in CB3.fidelities}
 
 
 def test_every_key_is_explained_in_the_documentation():

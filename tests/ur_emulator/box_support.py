@@ -2,9 +2,10 @@
 
 import socket
 import struct
+import xmlrpc.client
 from contextlib import contextmanager
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from typing import Any
 
 from protocol.frame_buffer import FrameBuffer
 from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
@@ -12,15 +13,32 @@ from protocol.primary.messages import TextMessage
 from protocol.primary.packages import RobotState, decode_package
 from protocol.realtime.layout import layout_for_size
 from protocol.ur_types import SoftwareVersion
+from ur_emulator.errors import RefusedError
 from ur_emulator.host.pacing import RealtimePacer
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
 from ur_emulator.machine.commands.programs import StartProgram
-from ur_emulator.machine.controller.command import Submitted
 from ur_emulator.machine.controller.controller import SETTLE_TIME, Controller
+from ur_emulator.machine.controller.io.network import (
+    BytesArrived,
+    CallEnded,
+    CallProcedure,
+    CloseServer,
+    CloseSocket,
+    ForgetSignal,
+    OpenSocket,
+    ReleaseUnit,
+    ResetUnit,
+    SendBytes,
+    SendToUnit,
+    ServeSignal,
+    SignalServed,
+    SignalType,
+    SocketClosed,
+    SocketOpened,
+)
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.generations import CB3
 from ur_emulator.machine.models.robots import robot_by_name
-from ur_emulator.machine.scripting.network import Network
 from ur_emulator.machine.scripting.robot_host import robot_hosts
 from urscript import compile_program
 
@@ -34,14 +52,16 @@ def inside(box):
 
 
 class FakeSocket:
-    """A script socket whose other end is the test."""
+    """A socket whose other end is the test: what the test says is in `inbox` until the socket has it."""
 
-    def __init__(self):
+    def __init__(self, number=0):
+        self.number = number
         self.problem = ""
         self.inbox = bytearray()
         self.sent = bytearray()
-        self.is_connecting = self.is_own = False
+        self.is_connecting = False
         self.is_open = True
+        self._was_connecting = self._was_open = True
 
     def send(self, data):
         if self.is_open:
@@ -49,7 +69,22 @@ class FakeSocket:
         return self.is_open
 
     def close(self):
-        self.is_open = False
+        self.is_open = self.is_connecting = False
+
+    def arrivals(self):
+        """What has changed since the last call, for the machine."""
+        if self._was_connecting and not self.is_connecting:
+            self._was_connecting = False
+            if self.is_open:
+                yield SocketOpened(self.number, self.is_own)
+        if self.inbox:
+            yield BytesArrived(self.number, bytes(self.inbox))
+            self.inbox.clear()
+        if self._was_open and not (self.is_open or self.is_connecting):
+            self._was_open = False
+            yield SocketClosed(self.number, self.problem)
+
+    is_own = False
 
 
 class FakeModbusUnit:
@@ -57,64 +92,108 @@ class FakeModbusUnit:
 
     Attributes:
         memory: (signal type, address) to a value, 0 where there is none; inputs and outputs are separate.
-        log: what it was asked, in order.
+        log: what it was asked, in order; signals by their address.
         trouble: what it reports of every signal instead of answering.
+        device_error: what it reports of every signal.
     """
 
     def __init__(self):
         self.memory = {}
         self.log = []
         self.trouble = ""
+        self.device_error = 0
         self.is_released = False
 
-    def want(self, signal):
-        kind = int(signal.type.single)
-        first = signal.write_address if signal.reads_back else signal.address
-        signal.trouble = self.trouble
-        signal.connection_error = -2 if self.trouble else 0
-        self.log.append((signal.name, "read" if signal.output is None else signal.output))
+    def serve(self, wanted):
+        """Do what is wanted of a signal; return what the machine gets."""
+        self.log.append((wanted.address, "read" if wanted.output is None else wanted.output))
         if self.trouble:
-            return
-        if signal.output is not None:
-            self.memory.update({(kind, first + i): value for i, value in enumerate(signal.output)})
-        if signal.output is None or signal.reads_back:
-            read = range(signal.address, signal.address + signal.count)
-            signal.values = tuple(self.memory.get((kind, address), 0) for address in read)
-
-    def describe(self, signal):
-        pass
-
-    def forget(self, signal):
-        self.log.append((signal.name, "forgotten"))
-
-    def send(self, slave, function_code, data):
-        self.log.append((slave, function_code, data))
-
-    def reset(self):
-        self.log.append("reset")
-
-    def release(self):
-        self.is_released = True
+            return SignalServed(wanted.signal, (), self.trouble, self.device_error, -2)
+        kind, reads_back = int(wanted.type.single), wanted.type is SignalType.READ_WRITE_REGISTERS
+        first = wanted.write_address if reads_back else wanted.address
+        if wanted.output is not None:
+            self.memory.update({(kind, first + i): value for i, value in enumerate(wanted.output)})
+        read = range(wanted.address, wanted.address + wanted.count)
+        values = tuple(self.memory.get((kind, address), 0) for address in read)
+        return SignalServed(wanted.signal, values, "", self.device_error, 0)
 
 
 class FakeNetwork:
-    """Connects every script at once, or never if `refuse` is set; Modbus units by "host:port"."""
+    """The host of a bench: connects every script, or none if `refuse` is set; Modbus units by "host:port".
+
+    What it does is known to the machine in the next cycle.
+    """
 
     def __init__(self, *, refuse=False):
         self.refuse = refuse
         self.sockets = []
         self.modbus_units = {}
+        self._addresses = {}
+        self._arrivals = []
 
-    def open(self, host, port):
-        sock = FakeSocket()
+    def make_socket(self, number, host, port):
+        sock = FakeSocket(number)
         sock.is_open = not self.refuse
-        self.sockets.append(sock)
         return sock
 
+    def open(self, host, port):
+        """Connect as a host does for itself."""
+        self.sockets.append(self.make_socket(0, host, port))
+        return self.sockets[-1]
+
+    def call(self, request, method, arguments):
+        """Do a call of a remote procedure."""
+        self._arrivals.append(CallEnded(request.call, None, f"no method {method}"))
+
+    def close_server(self, server):
+        pass
+
     def modbus_unit(self, address):
-        unit = self.modbus_units.setdefault(str(address), FakeModbusUnit())
-        unit.is_released = False
-        return unit
+        return self.modbus_units.setdefault(str(address), FakeModbusUnit())
+
+    def serve(self, unit, request):
+        self._arrivals.append(unit.serve(request))
+
+    def carry_out(self, requests):
+        for request in requests:
+            match request:
+                case OpenSocket(number, host, port):
+                    self.sockets.append(self.make_socket(number, host, port))
+                case SendBytes(number, data):
+                    self._socket(number).send(data)
+                case CloseSocket(number):
+                    self._socket(number).close()
+                case CallProcedure(body=body):
+                    arguments, method = xmlrpc.client.loads(body)
+                    self.call(request, method, list(arguments))
+                case CloseServer(server):
+                    self.close_server(server)
+                case _:
+                    self._serve_unit(request, self.modbus_unit(request.unit))
+
+    def arrivals(self):
+        """What the machine gets in the next cycle."""
+        arrivals, self._arrivals = self._arrivals, []
+        for sock in self.sockets:
+            arrivals += sock.arrivals()
+        return arrivals
+
+    def _socket(self, number):
+        return next(sock for sock in self.sockets if sock.number == number)
+
+    def _serve_unit(self, request, unit):
+        unit.is_released = isinstance(request, ReleaseUnit)
+        match request:
+            case ServeSignal(signal=number):
+                self._addresses[number] = request.address
+                if request.wanted:
+                    self.serve(unit, request)
+            case ForgetSignal(_, number):
+                unit.log.append((self._addresses[number], "forgotten"))
+            case SendToUnit(_, slave, function_code, data):
+                unit.log.append((slave, function_code, data))
+            case ResetUnit():
+                unit.log.append("reset")
 
 
 def printed(events):
@@ -130,7 +209,7 @@ class Bench:
             replace(robot_by_name(robot), generation=generation),
             generation.fidelity(fidelity),
             seed,
-            partial(robot_hosts, network=self.network),
+            robot_hosts,
             **kwargs,
         )
         self.events = []
@@ -141,8 +220,15 @@ class Bench:
         return self.controller.snapshot
 
     def tick(self, n=1, *commands):
+        outside = self.controller.state.network
         for _ in range(n):
+            for arrival in self.network.arrivals():
+                outside.take(arrival)
             self.snapshots.append(self.controller.tick(commands))
+            self.network.carry_out(outside.take_requests())
+            for _, error in self.controller.outcomes:
+                if error is not None and not isinstance(error, RefusedError):
+                    raise error
             commands = ()
             self.events += self.controller.state.events.take()
         return self.now
@@ -159,7 +245,7 @@ class Bench:
         self.start(text)
         for _ in range(limit):
             moves = box.programs.has_work or box.state.motion.is_moving or box.state.mode.is_changing
-            rested = 0 if moves or box.safety.is_stopping else rested + 1
+            rested = 0 if moves or box.safety.is_braking else rested + 1
             if not box.is_active or rested > box.generation.cycles(2 * SETTLE_TIME):
                 break
             self.tick()
@@ -174,10 +260,27 @@ class Bench:
 
 
 def machine_of(controller):
-    """A machine that has this controller; what its scripts open is the bench's."""
+    """A machine that has this controller."""
     machine = Machine.__new__(Machine)
-    machine.controller, machine.network = controller, Network()
+    machine.controller, machine.network = controller, controller.state.network
     return machine
+
+
+@dataclass(frozen=True)
+class Submitted:
+    """A command whose sender gets the result, or the error, which ends only the command."""
+
+    command: Any
+    done: Any
+
+    def apply(self, box):
+        try:
+            result = self.command.apply(box)
+        except Exception as error:
+            self.done(None, error)
+            return None
+        self.done(result, None)
+        return result
 
 
 class BareBox(ServedBox):

@@ -89,7 +89,6 @@ class ChunkRun:
             self._tick(-1, commands)
 
     def _tick(self, cycle, commands):
-        self.network.deliver()
         first = len(self.bench.events)
         due, self._due = self._due, []
         self.bench.tick(1, *commands, *due)

@@ -4,77 +4,39 @@ A peer is a function of the bytes that came since it last answered: it returns w
 Nothing comes within the cycle in which it is asked for.
 """
 
-from box_support import Bench, FakeNetwork
+from box_support import Bench, FakeNetwork, FakeSocket
 
 from protocol.script_channel import ControlLine, ProgramText, ScriptChannel
 from ur_emulator.machine.commands.programs import StartProgram, StopProgram
-from ur_emulator.machine.scripting.network import RemoteCallError
+from ur_emulator.machine.controller.io.network import CallEnded
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 from urscript.errors import ScriptError
 
 
-class PeerSocket:
+class PeerSocket(FakeSocket):
     """A script's connection to a peer; None is a port where nobody listens."""
 
-    def __init__(self, peer):
-        self.problem = ""
-        self.inbox = bytearray()
-        self.sent = bytearray()
-        self.is_connecting = True
-        self.is_open = False
-        self._peer = peer
+    def __init__(self, number, peer):
+        super().__init__(number)
+        self.is_connecting, self.is_open = True, False
+        self.peer = peer
         self._unread = b""
 
-    def deliver(self):
+    def arrivals(self):
         if self.is_connecting:
             self.is_connecting = False
-            self.is_open = self._peer is not None
-            if self.is_open:
-                self.inbox += getattr(self._peer, "greeting", b"")
+            self.is_open = self.peer is not None
+            self.inbox += getattr(self.peer, "greeting", b"")
         elif self.is_open:
-            used, said = self._peer(self._unread)
+            used, said = self.peer(self._unread)
             self._unread = self._unread[used:]
             self.inbox += said
+        return super().arrivals()
 
     def send(self, data):
-        if self.is_open:
-            self.sent += data
-            self._unread += data
-        return self.is_open
-
-    def close(self):
-        self.is_open = self.is_connecting = False
-
-
-class _Call:
-    def __init__(self, server, method, arguments):
-        self.is_done = False
-        self._server, self._method, self._arguments = server, method, arguments
-
-    def result(self):
-        procedure = getattr(self._server, self._method, None)
-        if procedure is None:
-            raise RemoteCallError(f"no method {self._method}")
-        return procedure(*self._arguments)
-
-
-class _RemoteServer:
-    def __init__(self, server):
-        self._server = server
-        self._calls = []
-
-    def call(self, method, arguments):
-        self._calls.append(_Call(self._server, method, arguments))
-        return self._calls[-1]
-
-    def deliver(self):
-        for call in self._calls:
-            call.is_done = True
-        self._calls.clear()
-
-    def close(self):
-        self._calls.clear()
+        self._unread += data
+        return super().send(data)
 
 
 class PeerNetwork(FakeNetwork):
@@ -83,24 +45,21 @@ class PeerNetwork(FakeNetwork):
     def __init__(self, peers, servers):
         super().__init__()
         self.peers, self.servers = peers, servers
-        self.ends = []
 
-    def open(self, host, port):
-        self.ends.append(PeerSocket(self.peers.get(port)))
-        return self.ends[-1]
+    def make_socket(self, number, host, port):
+        return PeerSocket(number, self.peers.get(port))
 
-    def remote_server(self, url):
-        self.ends.append(_RemoteServer(self.servers.get(url)))
-        return self.ends[-1]
-
-    def deliver(self):
-        for end in self.ends:
-            end.deliver()
+    def call(self, request, method, arguments):
+        procedure = getattr(self.servers.get(request.url), method, None)
+        if procedure is None:
+            super().call(request, method, arguments)
+        else:
+            self._arrivals.append(CallEnded(request.call, procedure(*arguments), ""))
 
     def sent_to(self, port):
         """What scripts sent to a port, all connections in order."""
         peer = self.peers[port]
-        return b"".join(bytes(end.sent) for end in self.ends if getattr(end, "_peer", None) is peer)
+        return b"".join(bytes(sock.sent) for sock in self.sockets if sock.peer is peer)
 
 
 class Box(Bench):
@@ -111,13 +70,6 @@ class Box(Bench):
         self._channel = ScriptChannel()
         self._catalogue = catalogue_for(software)
         self.compile_errors = []
-
-    def tick(self, n=1, *commands):
-        for _ in range(n):
-            self.network.deliver()
-            super().tick(1, *commands)
-            commands = ()
-        return self.now
 
     def send(self, data):
         """Take bytes; each program in them starts in a cycle of its own."""

@@ -26,7 +26,7 @@ STATEMENTS = {"pause"}
 
 def offered():
     bench = Bench()
-    host = robot_hosts(bench.controller.state, bench.network)()
+    host = robot_hosts(bench.controller.state)()
     return (set(host.builtins()) | set(PURE) | FLOW) - STATEMENTS
 
 
@@ -36,7 +36,7 @@ VERSIONS = ("3.15", "5.0", "5.4", "5.9", "5.12", "5.15", "5.17", "5.18", "5.22",
 @pytest.mark.parametrize("version", VERSIONS)
 def test_every_function_takes_the_parameters_of_its_row(version):
     bench = Bench()
-    effects = robot_hosts(bench.controller.state, bench.network)().builtins()
+    effects = robot_hosts(bench.controller.state)().builtins()
     for row in catalogue_for(version):
         values = [None] * len(row.params)
         if row.name in effects:

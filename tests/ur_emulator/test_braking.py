@@ -5,6 +5,7 @@ ticks. An e-Series arm at rest gives way further than a moving one before it is 
 """
 
 from itertools import pairwise
+from math import inf
 
 import pytest
 from box_support import Bench
@@ -38,7 +39,7 @@ def turning(robot, joint, *, payload=0.0, stop="stopj(100)", limited=True):
     )
     bench.snapshots.clear()
     if not limited:
-        bench.controller.state.motion.braking = None
+        bench.controller.state.motion.braking = lambda target: inf
     bench.start(program(f"speedj({qd}, {ACCELERATION}, {speed / ACCELERATION})", stop, "sleep(0.1)"))
     while bench.now.target_qd[joint] < 0.999 * speed:
         bench.tick()

@@ -198,13 +198,16 @@ def test_the_free_speed_follows_one_law_in_seconds(robot, generation, damping):
 def test_down_and_up_again_ends_as_in_the_suite_of_ur_rtde(robot, generation, seconds):
     """1000 cycles of its loop each; that ended 1.3 mm below the start on a UR5e of the maker's simulator.
 
-    The suite allows 5 % of 1 m and the coordinate; its picture of the same motion shows 20 mm/s.
+    The suite allows 5 % of 1 m and the coordinate; its picture of the same motion shows 20 mm/s. A CB3 arm, of
+    which no run is known, feels its own inertia and turns later.
     """
     scaling = 0.5 if generation is E_SERIES else 1.0  # as ur_rtde's script sets it
     bench, start = free_bench(robot, generation, seconds, -10.0, 10.0, damping=0.025, scaling=scaling)
     speed = -bench.now.target_tcp_speed[2]
     bench.tick(generation.cycles(seconds + 0.5))
-    assert place(bench) - start == pytest.approx([0.0, 0.0, -0.0013], abs=1e-3)
+    assert place(bench) - start == pytest.approx(
+        [0.0, 0.0, -0.0013], abs=1e-3 if generation is E_SERIES else 2e-3
+    )
     assert speed == pytest.approx(0.020 if generation is E_SERIES else 0.022, rel=0.2)
     assert reported(bench) == []
 
@@ -244,6 +247,25 @@ def test_a_push_moves_a_compliant_arm_and_damping_lets_it_stop_sooner():
     assert 0.0 < way < 0.5 * far
     assert speed < 0.5 * fast
     assert abs(rest) < 0.005
+
+
+@pytest.mark.parametrize("robot", ["ur3", "ur5", "ur10"])
+@pytest.mark.parametrize("elbow", [14, 21, 45])
+def test_near_a_singularity_an_arm_that_feels_its_own_inertia_is_steady(robot, elbow):
+    """Elbow in degrees from stretched. Nothing brakes the arm after a push; one that swings has 30 rad/s² and more."""
+    bench = Bench(robot=robot)
+    bench.run(program(f"set_pos([-0.3, -1.4, {np.radians(elbow):.3f}, -0.9, -1.2, 0.3])", "sleep(0.2)"))
+    bench.start(
+        program(f"force_mode({BASE}, [1,1,1,0,0,1], [0,0,0,0,0,0], 2, [0.3,0.3,0.3,1,1,1])", "sleep(9)")
+    )
+    push(bench, 30.0, 30.0, -30.0)
+    bench.tick(60)
+    moved = np.abs(bench.now.target_qd).max()
+    push(bench, 0.0, 0.0, 0.0)
+    bench.tick(60)
+    assert moved > 0.01
+    assert max(np.abs(bench.tick().target_qdd).max() for _ in range(125)) < 5.0
+    assert reported(bench) == []
 
 
 def test_a_moment_is_regulated_too():

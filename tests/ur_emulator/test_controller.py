@@ -15,7 +15,6 @@ from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, Set
 from ur_emulator.machine.controller.safety.limit_checks import MAX_POSITION_DEVIATION
 from ur_emulator.machine.controller.settings import ErrorSettings
 from ur_emulator.machine.controller.snapshot import Snapshot
-from ur_emulator.machine.models.calibration import calibrated_dh
 from ur_emulator.machine.motion.generators import JointTarget
 from ur_emulator.machine.plant.arm_plant import PlantState
 from ur_emulator.machine.plant.sensors import Reading
@@ -51,7 +50,7 @@ def test_every_value_is_finite_in_motion(moved):
 
 def test_tcp_pose_is_the_forward_kinematics_of_the_same_frame(moved):
     arm = moved.controller.state.arm
-    rows = calibrated_dh(arm.robot, arm.calibration)
+    rows = arm.dh
     for snapshot in moved.snapshots[::20]:
         for q, pose in (
             (snapshot.actual_q, snapshot.actual_tcp_pose),
@@ -80,7 +79,7 @@ def test_target_velocity_is_the_derivative_of_the_target_position(moved):
 
 def test_elbow_lies_where_the_second_dh_frame_is(moved):
     arm = moved.controller.state.arm
-    rows = calibrated_dh(arm.robot, arm.calibration)
+    rows = arm.dh
     snapshot = moved.snapshots[100]
     assert np.allclose(snapshot.elbow_position, dh_frames(rows, snapshot.actual_q)[1, :3, 3], atol=1e-9)
 
@@ -112,7 +111,7 @@ def test_same_seed_same_numbers_other_seed_other_numbers():
 
 def test_momentum_is_mass_times_the_velocity_of_the_centres_of_mass(moved):
     arm = moved.controller.state.arm
-    rows = calibrated_dh(arm.robot, arm.calibration)
+    rows = arm.dh
     links = arm.robot.links
     snapshot = moved.snapshots[60]
     step = 1e-6

@@ -24,7 +24,6 @@ from ur_emulator.machine.commands.safety import UnlockProtectiveStop
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
 from ur_emulator.machine.controller.safety.limit_checks import clamping_gap
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import NOMINAL
 from ur_emulator.machine.models.e_series_arms import UR5E, UR10E
 from ur_emulator.machine.models.fidelity import REVERSAL_SPEED
 from ur_emulator.machine.models.generations import E_SERIES
@@ -205,7 +204,7 @@ TYPICAL, IDEAL = E_SERIES.fidelity("typical"), E_SERIES.fidelity("ideal")
 @pytest.mark.parametrize("robot", ARMS)
 def test_target_moment_is_that_of_another_library(robot):
     """At rest and in motion; UR3e and UR5e take their links for points, the larger arms do not."""
-    ours, (other, data) = InverseDynamics(robot, NOMINAL), pinocchio_arm(robot)
+    ours, (other, data) = InverseDynamics(robot, robot.dh), pinocchio_arm(robot)
     other.armature[:] = robot.armature
     rng = np.random.default_rng(3)
     for _ in range(20):
@@ -218,7 +217,7 @@ def test_target_moment_is_that_of_another_library(robot):
 
 
 def test_gravity_of_a_declared_payload_is_in_the_target_moment():
-    ours = InverseDynamics(UR10E, NOMINAL)
+    ours = InverseDynamics(UR10E, UR10E.dh)
     ours.set_payload(1.07, (0.0, 0.0, 0.058))
     other, data = pinocchio_arm(UR10E, (1.07, (0.0, 0.0, 0.058), np.zeros((3, 3))))
     q = np.array(UR10E.home_q)
@@ -230,7 +229,7 @@ def test_no_payload_of_an_arm_of_point_masses_needs_no_warning_of_the_library():
     warnings = []
     mujoco.set_mju_user_warning(warnings.append)
     try:
-        InverseDynamics(ROBOTS["ur3e"], NOMINAL).set_payload(0.0, (0.0, 0.0, 0.0))
+        InverseDynamics(ROBOTS["ur3e"], ROBOTS["ur3e"].dh).set_payload(0.0, (0.0, 0.0, 0.0))
     finally:
         mujoco.set_mju_user_warning(None)
     assert warnings == []

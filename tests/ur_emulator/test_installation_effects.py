@@ -18,7 +18,7 @@ from ur_emulator.host.ports.primary.robot_state import safety_checksum
 from ur_emulator.machine.commands.programs import SetUp, StartProgram
 from ur_emulator.machine.commands.surroundings import Push
 from ur_emulator.machine.controller.io.lines import RunState
-from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.controller.safety.inputs import SafetyInput
 from ur_emulator.machine.controller.safety.safety_state import SafetySettings, limits_of
 from ur_emulator.machine.models.cb3_arms import UR3

@@ -19,7 +19,7 @@ from installation_support import (
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.io.lines import RunState
-from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.controller.safety.boundaries import NO_BOUNDARIES, BoundaryMode, ToolDirection
 from ur_emulator.machine.models.safety_limits import ArmLimits
 from ur_emulator.program_files.folder import ProgramFolder

@@ -268,7 +268,7 @@ def test_so_many_lines_and_names_are_interpreted_until_they_are_cleared():
         queue.take()
     with pytest.raises(RefusedError, match=TOO_MANY):
         queue.append(LINE, queue.epoch)
-    queue.clear()
+    queue.is_clearing = True
     queue.cleared()
     many = " ".join(f"n{i} = 1" for i in range(BUDGETS.interpreter_names + 1))
     with pytest.raises(RefusedError, match=TOO_MANY):
@@ -282,7 +282,7 @@ LINE = compile_line("x = 1", 1, SCOPE, NO_NAMES, CATALOGUE)
 def test_a_line_that_was_compiled_for_other_names_is_not_taken():
     queue = in_mode()
     epoch = queue.epoch
-    queue.clear()
+    queue.is_clearing = True
     queue.cleared()
     assert queue.append(LINE, epoch) == 0
     assert queue.append(LINE, queue.epoch) == 1
@@ -315,12 +315,12 @@ def test_log_files_are_those_of_the_manual():
     queue.append(line(queue, "y = 2"), queue.epoch)
     lines = "interpreter log\ne: 0 c: 1 : x = 1\ne: 1 c: 2 : y = 2\n"
     assert queue.log.files == {"interpreter.log": lines}
-    queue.clear()
+    queue.is_clearing = True
     queue.cleared()
     assert queue.log.files == {"interpreter.0.log": lines}
     queue = in_mode(clear_on_end=False)
     queue.append(LINE, queue.epoch)
-    queue.end()
+    queue.is_ending = True
     queue.leave()
     assert queue.log.files == {"interpreter.saved.log": "interpreter log\ne: 0 c: 1 : x = 1\n"}
 

@@ -70,7 +70,7 @@ def test_addresses_without_anything(address):
 @given(st.integers(128, 255), st.integers(-32768, 65535))
 def test_general_purpose_words(address, value):
     state = BENCH.controller.state
-    assert port_map.write_register(state, address, value)
+    assert port_map.write(state, False, address, value)
     assert port_map.read_register(state, address) == value & 0xFFFF
 
 
@@ -100,16 +100,16 @@ def test_flags_of_a_protective_stop(bench):
 
 def test_outputs_by_word_mask_and_bit(bench):
     state = bench.controller.state
-    port_map.write_register(state, 1, 0b10_0000_0001)
+    port_map.write(state, False, 1, 0b10_0000_0001)
     assert state.io.digital_out == 1 | 1 << 17
-    port_map.write_register(state, 2, 0b110)
-    port_map.write_register(state, 3, 0b001)
-    port_map.write_register(state, 31, 0x80)
+    port_map.write(state, False, 2, 0b110)
+    port_map.write(state, False, 3, 0b001)
+    port_map.write(state, False, 31, 0x80)
     assert state.io.digital_out == 0b110 | 1 << 15 | 1 << 17
-    port_map.write_register(state, 33, 0x80)
-    port_map.write_coil(state, 48 + 9, True)
-    port_map.write_coil(state, 32 + 1, False)
-    port_map.write_coil(state, 136, True)
+    port_map.write(state, False, 33, 0x80)
+    port_map.write(state, True, 48 + 9, True)
+    port_map.write(state, True, 32 + 1, False)
+    port_map.write(state, True, 136, True)
     assert state.io.digital_out == 0b110 | 1 << 8
     assert read(bench, 1) == 0b110
     assert [port_map.read_coil(state, 16 + i) for i in range(4)] == [False, True, True, False]
@@ -121,15 +121,15 @@ def test_inputs_ignore_writes(bench):
     assert read(bench, 0) == 1 << 3 | 1 << 8
     assert [read(bench, 21), read(bench, 30)] == [1, 2]
     for address in (0, 4, 10):
-        assert not port_map.write_register(bench.controller.state, address, 1)
+        assert not port_map.write(bench.controller.state, False, address, 1)
     assert read(bench, 4) == 0
 
 
 def test_analogue_levels_are_parts_of_the_range(bench):
     texts(bench, "set_analog_outputdomain(0, 1)", "set_standard_analog_out(0, 1)")
     assert [read(bench, 16), read(bench, 17)] == [65535, 1]
-    port_map.write_register(bench.controller.state, 18, 0x8000)
-    port_map.write_register(bench.controller.state, 19, 0)
+    port_map.write(bench.controller.state, False, 18, 0x8000)
+    port_map.write(bench.controller.state, False, 19, 0)
     assert bench.controller.state.io.analog_out[1].value == pytest.approx(0.012, abs=1e-6)
 
 
@@ -146,7 +146,7 @@ def test_register_booleans_are_shared(bench):
 def test_the_clock_stands_until_it_is_latched_again(bench):
     assert [read(bench, address) for address in range(2049, 2054)] == [0, 0, 0, 0, 0]
     bench.tick(200)
-    port_map.write_register(bench.controller.state, 2048, 1)
+    port_map.write(bench.controller.state, False, 2048, 1)
     milliseconds = round(bench.now.timestamp * 1e3)
     bench.tick(5)
     ms, s, minutes, hours, days = (read(bench, address) for address in range(2049, 2054))

@@ -18,12 +18,12 @@ from ur_emulator.errors import EmulatorError
 from ur_emulator.host.journal import JournalError
 from ur_emulator.host.replay import replay
 from ur_emulator.machine.commands import client_writes, grippers, power, programs, safety, surroundings
+from ur_emulator.machine.controller.io import network
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.generations import CB3
 from ur_emulator.machine.models.robots import robot_by_name
 from ur_emulator.machine.plant.arm_plant import FlangePush
 from ur_emulator.machine.records import RECORDS, RecordError, to_input, to_plain
-from ur_emulator.machine.scripting import network
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
 

@@ -12,7 +12,7 @@ from protocol.pose import pose_to_T, pose_trans, rotvec_from_flat
 from ur_emulator.errors import KinematicsError
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.kinematics.closed_form import closed_form_inverse
-from ur_emulator.machine.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import TYPICAL
 from ur_emulator.machine.models.robots import ROBOTS
@@ -26,13 +26,12 @@ def random_angles(n, seed=0, reach=pi):
 
 @pytest.fixture(params=[None, 7], ids=["nominal", "calibrated"])
 def arm(request):
-    calibration = NOMINAL if request.param is None else draw_calibration(UR3, TYPICAL, request.param)
-    return ArmModel(UR3, calibration)
+    return ArmModel(UR3, None if request.param is None else draw_dh(UR3, TYPICAL, request.param))
 
 
 @pytest.mark.parametrize("tcp", [None, TCP])
 def test_forward_kinematics_is_the_product_of_dh_matrices(arm, tcp):
-    rows = calibrated_dh(UR3, arm.calibration)
+    rows = arm.dh
     for q in random_angles(50, reach=2 * pi):
         expected = dh_frames(rows, q)[-1] @ (np.eye(4) if tcp is None else pose_to_T(tcp))
         assert pose_to_T(arm.fk(q, tcp)) == pytest.approx(expected, abs=1e-12)
@@ -58,7 +57,7 @@ def test_jacobian_is_the_derivative_of_forward_kinematics(arm, tcp):
 
 @pytest.mark.parametrize("tcp", [None, TCP])
 def test_state_agrees_with_forward_kinematics_and_jacobian(arm, tcp):
-    rows = calibrated_dh(UR3, arm.calibration)
+    rows = arm.dh
     h = 1e-6
     for q, qd in zip(random_angles(20, seed=2), random_angles(20, seed=3), strict=True):
         pose, speed, elbow, elbow_velocity, *_ = arm.state(q.tolist(), qd.tolist(), tcp)
@@ -167,7 +166,7 @@ def test_calibrated_arms_differ_from_nominal_as_real_ones_do(name, distance, tur
     nominal = ArmModel(ROBOTS[name])
     distances, turns = [], []
     for seed in range(60):
-        arm = ArmModel(ROBOTS[name], draw_calibration(ROBOTS[name], TYPICAL, seed))
+        arm = ArmModel(ROBOTS[name], draw_dh(ROBOTS[name], TYPICAL, seed))
         for q in random_angles(10, seed=seed):
             theirs, ours = pose_to_T(nominal.fk(q)), pose_to_T(arm.fk(q))
             distances.append(np.linalg.norm(ours[:3, 3] - theirs[:3, 3]))

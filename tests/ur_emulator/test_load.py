@@ -185,7 +185,7 @@ def test_inputs_beyond_those_that_a_cycle_takes_wait_for_the_next_and_keep_their
     def counted(commands):
         commands = tuple(commands)
         taken.append(len(commands))
-        values.extend(value for submitted in commands for _, value in submitted.command.values)
+        values.extend(value for command in commands for _, value in command.values)
         return tick(commands)
 
     monkeypatch.setattr(controller, "tick", counted)

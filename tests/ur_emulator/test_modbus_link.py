@@ -17,7 +17,7 @@ from ur_emulator.host.script_network.modbus_units import (
     TOLERANCE,
     ModbusLink,
 )
-from ur_emulator.machine.controller.io.modbus_signals import (
+from ur_emulator.machine.controller.io.network import (
     DISCONNECTED,
     NO_ANSWER,
     ModbusSignal,
@@ -244,7 +244,7 @@ def test_a_forgotten_signal_takes_no_answer(wire):
 
 def test_own_requests_are_sent_as_they_are_and_their_answer_is_dropped(wire):
     wire.link.send(103, 6, bytes([17, 32, 2, 88]))
-    wire.link.release()
+    wire.link.is_released = True
     wire.advance()
     [(transaction, request)] = wire.asked()
     assert request == bytes([103, 6, 17, 32, 2, 88])
@@ -258,7 +258,7 @@ def test_own_requests_are_lost_when_nobody_is_there_and_bounded_before():
     for i in range(BUDGETS.modbus_requests + 5):
         wire.link.send(1, 6, bytes([i]))
     assert len(wire.link._own_requests) == BUDGETS.modbus_requests
-    wire.link.release()
+    wire.link.is_released = True
     wire.advance()
     assert wire.link.is_idle
 

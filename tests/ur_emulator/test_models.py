@@ -7,7 +7,6 @@ motion. `docs/fidelity.md` has the greatest differences and their reasons.
 from __future__ import annotations
 
 from dataclasses import fields
-from functools import partial
 from itertools import product
 from math import pi, radians
 
@@ -15,7 +14,6 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from box_support import FakeNetwork
 from dashboard_support import Dashboard
 from public_arms import ROS, Body, ros_model
 
@@ -28,9 +26,9 @@ from ur_emulator.errors import EmulatorError, ModelError
 from ur_emulator.machine.commands.programs import StartProgram
 from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
-from ur_emulator.machine.models.fidelity import FIDELITIES, IDEAL, POOR, TYPICAL, random_stream
+from ur_emulator.machine.models.fidelity import IDEAL, POOR, TYPICAL, random_stream
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.models.mjcf import GRAVITY, arm_spec
 from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
@@ -60,12 +58,12 @@ def test_unknown_names_are_refused_with_the_known_ones():
 
 
 def test_a_table_without_six_rows_makes_no_arm():
-    with pytest.raises(ModelError, match="5 DH rows"):
+    with pytest.raises(ValueError, match="longer"):
         arm_spec(UR3, UR3.dh[:5], (1.0,) * 6)
 
 
 def test_fidelities_are_ordered():
-    assert {it.name for it in FIDELITIES} == {"exact", "ideal", "typical", "poor"}
+    assert {it.name for it in CB3.fidelities} == {"exact", "ideal", "typical", "poor"}
     for better, worse in ((IDEAL, TYPICAL), (TYPICAL, POOR)):
         for field in fields(TYPICAL):
             if field.name in (
@@ -83,11 +81,18 @@ def test_fidelities_are_ordered():
 
 
 def test_calibration_comes_from_the_seed():
-    assert draw_calibration(UR3, TYPICAL, 7) == draw_calibration(UR3, TYPICAL, 7)
-    assert draw_calibration(UR3, TYPICAL, 7) != draw_calibration(UR3, TYPICAL, 8)
-    assert calibrated_dh(UR3, NOMINAL) == UR3.dh
-    for fidelity in (it for it in FIDELITIES if it.name in ("exact", "ideal")):
-        assert calibrated_dh(UR3, draw_calibration(UR3, fidelity, 7)) == UR3.dh
+    assert draw_dh(UR3, TYPICAL, 7) == draw_dh(UR3, TYPICAL, 7)
+    assert draw_dh(UR3, TYPICAL, 7) != draw_dh(UR3, TYPICAL, 8)
+    for fidelity in (it for it in CB3.fidelities if it.name in ("exact", "ideal")):
+        assert draw_dh(UR3, fidelity, 7) == UR3.dh
+
+
+def drawn_differences(name, field):
+    """Of 400 boxes with an arm, from its nominal table (400, 6)."""
+    robot = ROBOTS[name]
+    tables = [robot.dh, *(draw_dh(robot, TYPICAL, seed) for seed in range(400))]
+    nominal, *drawn = ([getattr(row, field) for row in rows] for rows in tables)
+    return np.subtract(drawn, nominal)
 
 
 @pytest.mark.parametrize(
@@ -101,8 +106,7 @@ def test_calibration_comes_from_the_seed():
 )
 def test_lengths_of_a_calibration_have_what_real_arms_of_the_type_have_in_common(name, a2, d6, scatter):
     """Differences in the mean [mm], and root of the sum of squares of what scatters about it."""
-    drawn = [draw_calibration(ROBOTS[name], TYPICAL, seed) for seed in range(400)]
-    a, d = (1e3 * np.array([getattr(c, field) for c in drawn]) for field in ("delta_a", "delta_d"))
+    a, d = (1e3 * drawn_differences(name, field) for field in ("a", "d"))
     assert (a[:, 1].mean(), d[:, 5].mean()) == pytest.approx((a2, d6), abs=0.03)
     about = np.hstack((a - a.mean(axis=0), d - d.mean(axis=0)))
     assert np.sqrt((about**2).sum(axis=1).mean()) == pytest.approx(scatter, rel=0.1)
@@ -111,9 +115,8 @@ def test_lengths_of_a_calibration_have_what_real_arms_of_the_type_have_in_common
 def test_angles_of_a_calibration_are_tilts_of_the_axes():
     """The zeros of the joints are right within .01 mrad on e-Series arms, within .05 mrad on CB3."""
     for name, zero in (("ur3", 5e-5), ("ur5e", 1e-5)):
-        drawn = [draw_calibration(ROBOTS[name], TYPICAL, seed) for seed in range(400)]
-        assert np.std([c.delta_theta for c in drawn]) == pytest.approx(zero, rel=0.1)
-        tilts = 1e3 * np.median(np.abs([c.delta_alpha for c in drawn]), axis=0)
+        assert np.std(drawn_differences(name, "theta")) == pytest.approx(zero, rel=0.1)
+        tilts = 1e3 * np.median(np.abs(drawn_differences(name, "alpha")), axis=0)
         assert 3.0 < tilts[2] < 5.4
         assert tilts[[0, 3, 4, 5]].max() < 1.3
 
@@ -190,9 +193,7 @@ def test_drives_can_carry_the_stretched_arm_with_its_payload(robot):
 )
 def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(name, fidelity):
     robot = ROBOTS[name]
-    controller = Controller(
-        robot, robot.generation.fidelity(fidelity), 7, partial(robot_hosts, network=FakeNetwork())
-    )
+    controller = Controller(robot, robot.generation.fidelity(fidelity), 7, robot_hosts)
     program = compile_program(f"""def prog():
       set_payload({robot.payload_max}, [0, 0, 0.03])
       q = get_target_joint_positions()

@@ -81,7 +81,7 @@ EVENTS = {
     "release": lambda motion: motion.release("me"),
     "begin program": lambda motion: motion.begin_program(),
     "overlay": lambda motion: motion.add_overlay(Swing()),
-    "no overlay": lambda motion: [motion.remove_overlay(overlay) for overlay in tuple(motion._overlays)],
+    "no overlay": lambda motion: [motion.remove_overlay(overlay) for overlay in tuple(motion.overlays)],
 }
 
 
@@ -120,7 +120,7 @@ def test_whatever_happens_set_points_go_on_without_a_step(seed):
         assert not motion.is_compliant or motion.state is ArmState.BY_TORQUE
         if not motion.is_compliant and not (is_move and motion.state is ArmState.MOVING):
             # Of the hardest stop; that of overlays adds to that of the path.
-            most = 48.0 if motion._overlays else 22.0
+            most = 48.0 if motion.overlays else 22.0
             assert change <= most, happened[-5:]
             assert jump <= most * DT**2, happened[-5:]
         if was_paused and motion.is_paused:

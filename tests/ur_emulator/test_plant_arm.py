@@ -18,7 +18,7 @@ from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import EmulatorError, ModelError, PlantError
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import draw_calibration
+from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.e_series_arms import UR3E, UR5E
 from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
@@ -104,7 +104,7 @@ def test_slow_signals_are_in_their_range(resting):
 def test_the_force_is_what_the_motors_give_beyond_the_target_current():
     """In each package, as on a real UR3 (correlation 1.000); so its noise at rest is that of the currents."""
     fidelity = TYPICAL
-    plant, arm = Plant(UR3, fidelity, 4), ArmModel(UR3, draw_calibration(UR3, fidelity, 4))
+    plant, arm = Plant(UR3, fidelity, 4), ArmModel(UR3, draw_dh(UR3, fidelity, 4))
     hold(plant, HOME, 100)
     for state in SpeedRamp(HOME, 2.0).run(plant, (0.5, 0.3, -0.4, 0.2, 0.0, 0.1), 120)[1]:
         beyond = np.subtract(state.actual_current, state.target_current) * UR3.torque_constant
@@ -186,7 +186,7 @@ def test_brakes_stop_a_moving_arm_where_it_is():
 
 def test_the_physical_flange_is_where_the_controller_computes_it():
     plant = Plant(UR3, TYPICAL, 9)
-    arm = ArmModel(UR3, plant.calibration)
+    arm = ArmModel(UR3, plant.dh)
     for q in np.random.default_rng(1).uniform(-2.0, 2.0, (10, 6)):
         plant.reset(q)
         # The gear's error of .3 mrad is in the encoders, not in the links.
@@ -386,7 +386,7 @@ def run(seed, n=300):
 
 def test_another_seed_is_another_arm_of_the_same_kind():
     (first, one), (second, other) = run(1), run(2)
-    assert first.calibration != second.calibration
+    assert first.dh != second.dh
     assert one != other
     gap = column(one, "actual_q")[-100:] - column(other, "actual_q")[-100:]
     assert np.abs(gap.mean(axis=0)).max() < 4e-4

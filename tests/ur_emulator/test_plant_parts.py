@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from plant_support import dh_frames
 
-from ur_emulator.machine.models.calibration import NOMINAL, calibrated_dh, draw_calibration
+from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import IDEAL, TYPICAL
 from ur_emulator.machine.models.generations import CB3, E_SERIES
@@ -48,12 +48,9 @@ def kinetic_energy(rows, q, qd, h=1e-5):
     return energy
 
 
-@pytest.mark.parametrize(
-    "calibration", [NOMINAL, draw_calibration(UR3, TYPICAL, 3)], ids=["nominal", "calibrated"]
-)
-def test_gravity_torque_is_the_slope_of_potential_energy(calibration):
-    rows = calibrated_dh(UR3, calibration)
-    torque = InverseDynamics(UR3, calibration).evaluate(Q, STILL, STILL)
+@pytest.mark.parametrize("rows", [UR3.dh, draw_dh(UR3, TYPICAL, 3)], ids=["nominal", "calibrated"])
+def test_gravity_torque_is_the_slope_of_potential_energy(rows):
+    torque = InverseDynamics(UR3, rows).evaluate(Q, STILL, STILL)
     h = 1e-6
     slope = [
         (potential_energy(rows, Q + h * e) - potential_energy(rows, Q - h * e)) / (2 * h) for e in np.eye(6)
@@ -62,7 +59,7 @@ def test_gravity_torque_is_the_slope_of_potential_energy(calibration):
 
 
 def test_power_of_the_torque_is_the_change_of_energy():
-    dynamics = InverseDynamics(replace(UR3, has_point_masses=False), NOMINAL)
+    dynamics = InverseDynamics(replace(UR3, has_point_masses=False), UR3.dh)
     rng = np.random.default_rng(0)
     h = 1e-5
     for _ in range(10):
@@ -77,7 +74,7 @@ def test_power_of_the_torque_is_the_change_of_energy():
 
 
 def test_a_declared_payload_is_in_the_model():
-    dynamics = InverseDynamics(UR3, NOMINAL)
+    dynamics = InverseDynamics(UR3, UR3.dh)
     alone = dynamics.evaluate(Q, STILL, STILL).copy()
     dynamics.set_payload(2.0, (0.0, 0.0, 0.1))
     loaded = dynamics.evaluate(Q, STILL, STILL).copy()

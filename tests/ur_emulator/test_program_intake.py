@@ -11,6 +11,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import WorkerError
 from ur_emulator.host.ports import script_intake as module
 from ur_emulator.host.ports.script_intake import ProgramIntake, Sender
+from ur_emulator.host.served_box import ServedBox
 from ur_emulator.machine.commands.power import PowerOff
 from ur_emulator.machine.commands.programs import PauseProgram, SetSpeedSlider, StartProgram, StopProgram
 from ur_emulator.machine.controller.events import ErrorReported, ScriptFailed
@@ -42,6 +43,8 @@ class Tasks:
 
 class Box:
     """Notes what it takes: names of programs that start, commands, texts."""
+
+    why_too_old = ServedBox.why_too_old
 
     def __init__(self):
         self.stops = 0

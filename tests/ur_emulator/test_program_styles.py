@@ -275,7 +275,7 @@ def test_a_gripper_preamble_talks_to_its_server():
         ("ACT", 0), ("ACT", 1), ("POS", 0), ("GTO", 1), ("POS", 255), ("GTO", 1),
     ]  # fmt: skip
     assert_clean(box)
-    assert not any(end.is_open for end in box.network.ends)
+    assert not any(sock.is_open for sock in box.network.sockets)
 
 
 def test_a_gripper_preamble_says_when_nobody_answers():

@@ -178,7 +178,7 @@ class WatchedBox(Box):
         self.finish(limit=3000)
         assert not self.controller.programs.is_running
         assert state.motion.owner is None
-        assert not any(getattr(end, "is_open", False) for end in self.network.ends)
+        assert not any(sock.is_open for sock in self.network.sockets)
         assert not [text for text in self.failures if "internal error" in text], self.failures
         assert not [error for error in self.compile_errors if "internal" in error.message]
 

@@ -13,60 +13,66 @@ from socketserver import ThreadingMixIn
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
-from box_support import TIMEOUT, Bench, MessageReader, connect, inside, listening_socket, program
+from box_support import TIMEOUT, Bench, FakeNetwork, MessageReader, connect, inside, listening_socket, program
 
 from protocol.primary.messages import KeyMessage, RuntimeExceptionMessage, TextMessage
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.emulator import ControlBox
 from ur_emulator.host.script_network import xmlrpc as module
 from ur_emulator.machine.commands.programs import StopProgram
+from ur_emulator.machine.controller.io import network
+from ur_emulator.machine.controller.io.network import CallEnded
 from ur_emulator.machine.models.generations import CB3, E_SERIES
-from ur_emulator.machine.scripting import network, rpc_builtins
+from ur_emulator.machine.scripting import rpc_builtins
 
 
 class FakeCall:
     """A call that ends when the test says so."""
 
-    def __init__(self, method, arguments):
+    def __init__(self, network, number, method, arguments):
+        self._network, self._number = network, number
         self.method = method
         self.arguments = arguments
-        self.is_done = False
-        self.value = None
-
-    def result(self):
-        return self.value
 
     def answer(self, value):
-        self.value, self.is_done = value, True
+        self._network.answer(CallEnded(self._number, value, ""))
 
 
 class FakeServer:
     """A server whose procedures are the test."""
 
-    def __init__(self, url):
-        self.url = url
+    def __init__(self):
         self.calls = []
         self.closed = 0
 
-    def call(self, method, arguments):
-        self.calls.append(FakeCall(method, arguments))
-        return self.calls[-1]
 
-    def close(self):
-        self.closed += 1
+class RpcNetwork(FakeNetwork):
+    """Knows servers, by their numbers."""
+
+    def __init__(self):
+        super().__init__()
+        self.servers = {}
+
+    def call(self, request, method, arguments):
+        server = self.servers.setdefault(request.server, FakeServer())
+        server.calls.append(FakeCall(self, request.call, method, arguments))
+
+    def close_server(self, server):
+        self.servers[server].closed += 1
+
+    def answer(self, arrival):
+        self._arrivals.append(arrival)
 
 
 class RpcBench(Bench):
     """A bench whose network knows servers."""
 
     def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.servers = []
-        self.network.remote_server = self._remote_server
+        super().__init__(network=RpcNetwork(), **kwargs)
 
-    def _remote_server(self, url):
-        self.servers.append(FakeServer(url))
-        return self.servers[-1]
+    @property
+    def servers(self):
+        return list(self.network.servers.values())
 
     def call(self, arguments=""):
         self.start(
@@ -124,8 +130,7 @@ def test_the_handle_closes_its_connection_itself():
         'def p():\n  h = rpc_factory("xmlrpc", "http://x:1")\n  h.closeXMLRPCClientConnection()\n  textmsg("on")\nend\n'
     )
     assert bench.texts == ["on"]
-    assert bench.servers[0].calls == []
-    assert bench.servers[0].closed == 0  # nothing was called: there is no connection
+    assert bench.servers == []  # nothing was called: there is no connection
 
 
 def test_a_program_that_is_stopped_closes_what_it_opened():
@@ -368,7 +373,7 @@ def test_an_answer_that_nobody_asked_for_is_not_taken_for_that_of_the_next_call(
 
 
 def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
-    monkeypatch.setattr(module, "BUDGETS", replace(BUDGETS, remote_connections=3))
+    monkeypatch.setattr(network, "BUDGETS", replace(BUDGETS, remote_connections=3))
     with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:
         most = 0
         loop = (
@@ -379,7 +384,7 @@ def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
         )
         send(sock, port, (*loop, "  i = i + 1", "end", 'textmsg("done")'))
         while not [entry for entry in box.log if entry.text == "done"]:
-            most = max(most, len(inside(box)._network._remotes._connected))
+            most = max(most, len(inside(box)._network._remotes._servers))
         MessageReader(sock).message(TextMessage)
         assert len(Handler.connections) == 30
     assert 1 <= most <= 3

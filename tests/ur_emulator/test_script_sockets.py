@@ -27,8 +27,10 @@ from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.script_network import addresses, loop_network, sockets
 from ur_emulator.host.script_network.addresses import LookUp, LookUps
-from ur_emulator.machine.scripting import network, socket_builtins
-from ur_emulator.machine.scripting.socket_builtins import SocketReader, TextSearch
+from ur_emulator.machine.controller.io import network
+from ur_emulator.machine.controller.io.network import ScriptSocket
+from ur_emulator.machine.scripting import socket_builtins
+from ur_emulator.machine.scripting.socket_builtins import TextSearch
 
 USERS = (addresses, loop_network, network, sockets, socket_builtins)
 
@@ -51,8 +53,8 @@ def log_lines(box, words):
 class OwnPorts(FakeNetwork):
     """Every connection leads to the box itself."""
 
-    def open(self, host, port):
-        sock = super().open(host, port)
+    def make_socket(self, number, host, port):
+        sock = super().make_socket(number, host, port)
         sock.is_own = True
         return sock
 
@@ -293,22 +295,23 @@ def test_a_search_finds_the_same_however_the_bytes_come(data, cuts, start, end):
     begin = data.find(start) + len(start) if start in data else -1
     stop = data.find(end, begin) if begin >= 0 else -1
     expected = stop + len(end) if stop >= 0 else 0
-    reader, search = SocketReader(SimpleNamespace(inbox=bytearray())), TextSearch(start, end)
+    sock, search = ScriptSocket(1), TextSearch(start, end)
     found = 0
     for before, after in zip([0, *sorted(cuts)], [*sorted(cuts), len(data)], strict=True):
-        reader.socket.inbox += data[before:after]
-        found = search.find(reader)
+        sock.inbox += data[before:after]
+        found = search.find(sock)
     assert found == expected
     assert search.n_searched <= len(data) + (len(cuts) + 2) * (len(start) + len(end))
 
 
 def test_a_search_begins_again_when_another_thread_has_read():
-    reader = SocketReader(SimpleNamespace(inbox=bytearray(b"abcdef")))
+    sock = ScriptSocket(1)
+    sock.inbox += b"abcdef"
     search = TextSearch(b"", b";")
-    assert not search.find(reader)
-    assert reader.take(5) == b"abcde"
-    reader.socket.inbox += b";rest of it"
-    assert search.find(reader) == 2
+    assert not search.find(sock)
+    assert sock.take(5) == b"abcde"
+    sock.inbox += b";rest of it"
+    assert search.find(sock) == 2
 
 
 class CountingInbox(bytearray):
@@ -330,7 +333,8 @@ def test_reads_that_find_no_end_in_a_full_inbox_go_on_in_later_cycles(is_open):
         '    socket_read_string(suffix="x", timeout=0.001)\n    socket_read_string(suffix="y", timeout=0.001)\n'
         "    socket_read_ascii_float(1, timeout=0.001)\n  end\nend\n"
     )
-    peer = bench.network.sockets[0]
+    bench.tick()
+    (peer,) = bench.controller.state.network._sockets.values()
     peer.inbox = CountingInbox(b"z" * (BUDGETS.inbox_bytes - 1))
     peer.is_open = is_open
     bench.tick(2)
@@ -345,7 +349,8 @@ def test_a_line_that_comes_byte_by_byte_is_looked_at_once():
     bench.start(
         'def f():\n  socket_open("10.0.0.1", 1)\n  textmsg(str_len(socket_read_line(timeout=0)))\nend\n'
     )
-    peer = bench.network.sockets[0]
+    bench.tick()
+    (peer,) = bench.controller.state.network._sockets.values()
     peer.inbox = CountingInbox()
     bench.tick()
     CountingInbox.searched = 0

@@ -289,7 +289,7 @@ def test_force_and_power_are_limited_in_recovery_mode(bench, wrench, moment, cod
     sensed = bench.controller.plant.sense()._replace(
         actual_qd=(0.2, 0.0, 0.0, 0.0, 0.0, 0.0), target_moment=(moment, 0.0, 0.0, 0.0, 0.0, 0.0)
     )
-    bench.now.space._wrench = wrench
+    bench.now.space.wrench_at_flange = wrench
     error = limiter.find_violation(sensed, bench.now.space, 0.6).error
     assert (error.code, text in error.text) == (code, True)
 

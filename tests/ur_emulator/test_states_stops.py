@@ -29,7 +29,6 @@ from ur_emulator.machine.commands.safety import (
     TriggerViolation,
     UnlockProtectiveStop,
 )
-from ur_emulator.machine.controller.command import Submitted
 from ur_emulator.machine.controller.events import ErrorReported, ProgramPaused, ProgramResumed
 from ur_emulator.machine.controller.safety.speed_scaling import TOLERANCE
 from ur_emulator.machine.models.generations import CB3
@@ -404,7 +403,7 @@ def test_a_requested_stop_is_one_whatever_the_robot_mode(mode):
     """A program may ask for it in the cycle in which the arm loses its power."""
     bench = Bench(mode=mode)
     bench.tick(20)
-    bench.controller.state.requests.protective_stop()
+    bench.controller.state.requests.protective_stop = True
     bench.tick(5)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
     assert [e.code for e in bench.events if isinstance(e, ErrorReported)] == [209]
@@ -482,9 +481,8 @@ def test_what_a_box_does_not_do_it_refuses(state):
         bench = Bench(mode=RobotMode.NO_CONTROLLER) if state == "boots" else moving(loaded=True)
         for step in way:
             bench.tick(BRAKING, step)
-        outcome = []
-        bench.tick(1, Submitted(command, lambda result, error, outcome=outcome: outcome.append(error)))
-        (error,) = outcome
+        bench.tick(1, command)
+        ((_, error),) = bench.controller.outcomes
         assert isinstance(error, RefusedError) is (type(command) in refused), f"{command}: {error}"
         if error is None:
             bench.tick(60)

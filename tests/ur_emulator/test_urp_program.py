@@ -31,7 +31,7 @@ from protocol.pose import pose_inv, pose_trans
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.events import ErrorReported, PopupShown, ScriptFailed
-from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.cb3_arms import UR5
 from ur_emulator.machine.models.robot_model import ZERO6

@@ -29,7 +29,6 @@ from ur_emulator.machine.commands.safety import (
 from ur_emulator.machine.controller import events
 from ur_emulator.machine.controller.safety.limit_checks import most_loaded_joint
 from ur_emulator.machine.controller.safety.safety_state import limits_of
-from ur_emulator.machine.models.calibration import calibrated_dh
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.models.robots import robot_by_name
 
@@ -269,7 +268,7 @@ def test_dexterity_is_the_squared_determinant_of_the_jacobian():
     """As in a state of the maker's simulator of a UR5e: 0.0035351144 at its joint angles."""
     bench = Bench()
     arm = bench.controller.state.arm
-    rows = calibrated_dh(arm.robot, arm.calibration)
+    rows = arm.dh
     expected = np.linalg.det(dh_jacobian(rows, bench.now.actual_q)) ** 2
     assert dexterity(arm, bench.now) == pytest.approx(expected, rel=1e-6)
 

@@ -139,8 +139,7 @@ class Rules:
             state == ProgramState.PAUSED
             or bool(controller.state.pendant.requests)
             or controller.state.interpreter.is_on
-            or controller.state.compliance.by_client
-            or controller.state.compliance.by_input
+            or controller.state.compliance.askers & {"client", "input"}
             or now.safety_status not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
             or now.robot_mode != RobotMode.RUNNING
         )

@@ -31,11 +31,11 @@ from ur_emulator.machine.commands.programs import StartProgram, StopProgram
 from ur_emulator.machine.commands.safety import PressEmergencyStop, UnlockProtectiveStop
 from ur_emulator.machine.controller.command import Command, Done, Result
 from ur_emulator.machine.controller.events import Event, LogAdded
+from ur_emulator.machine.controller.io.network import Arrival
 from ur_emulator.machine.controller.safety.modes import MOVING_MODES
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.machine import Answer, Input, Machine
 from ur_emulator.machine.models.robot_generation import Software
-from ur_emulator.machine.scripting.network import Arrival
 from urscript import CompiledProgram
 from urscript.run.waits import Outside
 
@@ -90,7 +90,6 @@ class ServedBox:
         backlog: the connections with bytes in their outbox; they enter and leave it themselves.
         watch: measures the memory of a process that only serves boxes; None in a process of the user.
         stops: how many commands so far stop the program and all that waits to be compiled.
-        newest: when the newest of the programs that were started was asked for, in monotonic time [s].
     """
 
     def __init__(
@@ -125,6 +124,7 @@ class ServedBox:
         self._n_scheduled = 0
         self._awake_until = 0
         self.stops = 0
+        # When the newest of the programs that were started was asked for, in monotonic time [s].
         self.newest = 0.0
         self.watch: MemoryWatch | None = None
         self.listeners: tuple[Listener, ...] = ()
@@ -282,10 +282,16 @@ class ServedBox:
         Raises:
             RefusedError: a program has begun that was asked for later, or no program may run now.
         """
-        if asked < self.newest:
-            raise RefusedError(f"program {program.name} does not begin: a newer one was compiled before it")
-        self.newest = asked
+        if why := self.why_too_old(program, asked):
+            raise RefusedError(why)
         yield from self.apply(StartProgram(program, loaded=loaded))
+
+    def why_too_old(self, program: CompiledProgram, asked: float) -> str:
+        """Return why a program does not begin that was asked for then; "": it is the newest from now on."""
+        if asked < self.newest:
+            return f"program {program.name} does not begin: a newer one was compiled before it"
+        self.newest = asked
+        return ""
 
     def in_worker(self, function: Callable[..., T], *arguments: Any) -> Steps[T]:
         """Do what takes longer than a cycle in the worker process; return its result."""
@@ -316,7 +322,7 @@ class ServedBox:
     @property
     def is_active(self) -> bool:
         """True while there is a reason for time to pass."""
-        return bool(self._commands) or self._is_awake or self.machine.is_active
+        return bool(self._commands) or self._is_awake or self.controller.is_active
 
     @property
     def _is_awake(self) -> bool:
@@ -329,7 +335,7 @@ class ServedBox:
 
         Who waits for a time does not wait for the operator.
         """
-        waits = self.machine.waits_outside
+        waits = self.controller.waits_outside
         return bool(waits and not self._is_urged and not (waits is Outside.OPERATOR and self._is_awake))
 
     @property

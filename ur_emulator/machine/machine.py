@@ -11,25 +11,21 @@ a journal holds and `ur-emulator replay` proves.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from ur_emulator.machine.controller.command import Command, Result, Submitted
+from ur_emulator.machine.controller.command import Command, Outcome
 from ur_emulator.machine.controller.controller import Controller
 from ur_emulator.machine.controller.events import Event
+from ur_emulator.machine.controller.io.network import Arrival, Request
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import RobotModel
-from ur_emulator.machine.scripting.network import Arrival, Network, Request
 from ur_emulator.machine.scripting.robot_host import robot_hosts
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
-from urscript.run.waits import Outside
 
 Input = Command | Arrival
-# The result of a command, or the error that has ended it: a `RefusedError` if it was refused.
-Outcome = tuple[Result, Exception | None]
 
 
 class Answer(NamedTuple):
@@ -66,28 +62,28 @@ class Machine:
             scene: what stands around the arm.
             remote_control: clients may command the box (e-Series).
         """
-        self.network = Network()
-        hosts = partial(robot_hosts, network=self.network)
-        self.controller = Controller(robot, fidelity, seed, hosts, version=version, tools=tools)
+        self.controller = Controller(robot, fidelity, seed, robot_hosts, version=version, tools=tools)
+        self.network = self.controller.state.network
         self.controller.state.pendant.set_remote_control(remote_control)
         if scene is not None:
             self.controller.plant.furnish(scene)
 
     def take(self, arrival: Arrival) -> None:
-        """Take an arrival before its cycle begins: `waits_outside` counts with it."""
+        """Take an arrival before its cycle begins: `Controller.waits_outside` counts with it."""
         self.network.take(arrival)
 
     def tick(self, inputs: Iterable[Input] = ()) -> Answer:
         """Advance one control cycle. Commands act in their order; arrivals come before them."""
-        outcomes: list[Outcome] = []
         commands: list[Command] = []
         for one in inputs:
             if isinstance(one, Command):
-                commands.append(Submitted(one, lambda *outcome: outcomes.append(outcome)))
+                commands.append(one)
             else:
                 self.network.take(one)
-        snapshot = self.controller.tick(commands)
-        return Answer(snapshot, self.controller.state.events.take(), self.network.take_requests(), outcomes)
+        controller = self.controller
+        snapshot = controller.tick(commands)
+        events, requests = controller.state.events.take(), self.network.take_requests()
+        return Answer(snapshot, events, requests, controller.outcomes)
 
     def use_idle_time(self) -> None:
         """Compute now what the last cycle has left for later; that changes no answer."""
@@ -96,15 +92,3 @@ class Machine:
     def forget_ended(self) -> None:
         """Drop the variables of the last program if it has ended; that changes no answer."""
         self.controller.programs.forget()
-
-    # --- what paces it
-
-    @property
-    def is_active(self) -> bool:
-        """True while the box is busy or the arm settles: in lockstep time passes only then."""
-        return self.controller.is_active
-
-    @property
-    def waits_outside(self) -> Outside | None:
-        """Who outside the box a script waits for; None while the arm or its surroundings need time."""
-        return self.controller.waits_outside

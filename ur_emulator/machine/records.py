@@ -1,4 +1,4 @@
-"""Inputs of the machine as plain values that JSON can hold, and back; and what a cycle gives, in short.
+"""Inputs of the machine as plain values that JSON can hold, and back; check sums of what a cycle gives.
 
 A record is written as `{"@": its name, field: value, ...}`. A program is written as its text and compiled
 again when it is read; no code is read from a file.
@@ -16,10 +16,10 @@ from zlib import crc32
 from ur_emulator.errors import EmulatorError
 from ur_emulator.machine.commands import client_writes, grippers, power, programs, safety, surroundings
 from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.controller.io import network
 from ur_emulator.machine.controller.safety import boundaries, inputs, safety_state
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.machine import Answer, Input, Machine
-from ur_emulator.machine.scripting import network
 from urscript import CompiledProgram, compile_program
 from urscript.catalogue import Catalogue
 from urscript.compile.interpreter_mode import CompiledStatements, compile_statements
@@ -52,7 +52,7 @@ class RecordError(EmulatorError):
 
 
 def to_plain(value: Any) -> Any:
-    """Return an input, or a part of one, as a value for JSON; RecordError if it is none of ours."""
+    """Return an input, or a part of one, as a value for JSON; RecordError if it is no record."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str):
         return value
@@ -129,12 +129,9 @@ def _from_plain(plain: Any, machine: Machine, catalogue: Catalogue) -> Any:
     return kind(values["value"]) if issubclass(kind, Enum) else kind(**values)
 
 
-# --- What a cycle gives, in short: a check sum of each field that has changed
-
 # Beside the fields of the snapshot.
 EXTRA: Final = ("wrench at the flange", "events", "requests", "outcomes")
 FIELDS: Final = (*Snapshot._fields, *EXTRA)
-_WRENCH, _EVENTS, _REQUESTS, _OUTCOMES = range(len(Snapshot._fields), len(FIELDS))
 _SPACE, _SUPPLY = Snapshot._fields.index("space"), Snapshot._fields.index("supply")
 # The first two, the cycle and its time, are in each line of a journal.
 _SAID: Final = 2

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from math import pi
 
 from ur_emulator.machine.controller.io.lines import RunState
-from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.controller.safety.safety_state import NO_SETTINGS, SafetySettings
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6
 

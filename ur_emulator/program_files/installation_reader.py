@@ -19,7 +19,7 @@ from protocol.pose import T_to_pose
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import FileMissingError, ProgramFileError, UndefinedError
 from ur_emulator.machine.controller.io.lines import RunState
-from ur_emulator.machine.controller.io.modbus_signals import SignalType
+from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
 from ur_emulator.program_files import installation, variables_file
 from ur_emulator.program_files.folder import WIRE_ROOTS, ProgramFolder

@@ -10,7 +10,7 @@ from protocol.script_channel import MAX_PROGRAM
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.io.lines import RunState
-from ur_emulator.machine.controller.io.modbus_signals import FREEDRIVE_ACTION
+from ur_emulator.machine.controller.io.network import FREEDRIVE_ACTION
 from ur_emulator.program_files.installation import ExternalControlPc, Installation, OutputRule
 from urscript.values import to_script_text
 

@@ -23,6 +23,7 @@ from ur_emulator.machine.commands.programs import (
     ResumeProgram,
     SetUp,
     StopProgram,
+    why_not_running,
 )
 from ur_emulator.machine.controller.events import ScriptFailed
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
@@ -302,11 +303,11 @@ class ProgramPlayer:
 
     def _must_be_able_to_play(self) -> None:
         """Refuse to play while something stands against it: the first of these."""
-        state, mode = self._box.controller.state, RobotMode(self._box.snapshot.robot_mode)
+        state = self._box.controller.state
+        obstacle = why_not_running(state)
         undefined = "" if self.loaded is None else self.loaded.undefined
         for stands, why in (
-            (not state.safety.lets_programs_run, "the robot is stopped for safety"),
-            (mode is not RobotMode.RUNNING, f"the robot is in {mode.name}, it must be RUNNING"),
+            (bool(obstacle), obstacle),
             (self.is_running and not self.is_paused, "a program plays already"),
             (bool(state.pendant.requests), "a popup waits to be closed, or a question for its answer"),
             (self.loaded is None and not self.is_paused, "no program is loaded"),

@@ -289,10 +289,9 @@ class ProgramIntake:
             self._box.submit(programs.StartProgram(outcome))
         elif program.stops != self._box.stops:
             self._warn(f"program {outcome.name} was stopped before it began")
-        elif program.ticket.arrived < self._box.newest:
-            self._warn(f"program {outcome.name} does not begin: a newer one was compiled before it")
+        elif why := self._box.why_too_old(outcome, program.ticket.arrived):
+            self._warn(why)
         else:
-            self._box.newest = program.ticket.arrived
             self._box.submit(programs.StartProgram(outcome, program.ticket.arrived < self._paused))
 
     def _drop_gone(self) -> None:

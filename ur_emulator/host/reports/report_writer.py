@@ -82,5 +82,5 @@ class ReportWriter:
                 "installation": player.installation.wire_path,
             },
             script=player.script,
-            interpreter=box.controller.state.interpreter.log.files,
+            interpreter=dict(box.controller.state.interpreter.log.files),
         )

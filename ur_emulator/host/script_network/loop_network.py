@@ -1,17 +1,15 @@
 """The network of one box: it carries out the requests of the machine and hands over what arrives."""
 
 from collections.abc import Callable, Iterable
-from functools import partial
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.modbus_units import ModbusClient
 from ur_emulator.host.script_network.sockets import Buffers, OutgoingConnection, ScriptConnection
-from ur_emulator.host.script_network.xmlrpc import XmlRpcClient, XmlRpcServer
-from ur_emulator.machine.scripting.network import (
+from ur_emulator.host.script_network.xmlrpc import XmlRpcClient
+from ur_emulator.machine.controller.io.network import (
     Arrival,
-    CallEnded,
     CallProcedure,
     CloseServer,
     CloseSocket,
@@ -47,22 +45,16 @@ class LoopNetwork:
             network: of the machine.
             arrive: takes what comes from outside.
             report: gets errors of ours and what they have ended.
-            own_address: a robot calls from the address at which it is called, and clients that listen for it
-                check that.
+            own_address: where to call from, if a peer can be reached from there; "" leaves it open. A robot
+                calls from the address at which it is called, and clients that listen for it check that.
         """
-        self._loop = loop
         self._network = network
         self._arrive = arrive
-        self._report = report
-        self._own_address = own_address
         self.own_ports: dict[int, tuple[str, int]] = {}
-        self._buffers = Buffers(loop, report)
+        self._buffers = Buffers(loop, report, own_address)
         self._sockets: dict[int, ScriptConnection] = {}
-        self._servers: dict[int, XmlRpcServer] = {}
-        # Those that do not read before scripts have read what has come.
-        self._full: set[OutgoingConnection] = set()
         self._modbus = ModbusClient(loop, self.open, period_s, arrive, report)
-        self._remotes = XmlRpcClient(loop, self.open, report)
+        self._remotes = XmlRpcClient(loop, self.open, arrive, report)
 
     def carry_out(self, requests: Iterable[Request]) -> None:
         """Do what the machine asks for after a cycle; read on where there is room again."""
@@ -71,38 +63,23 @@ class LoopNetwork:
                 case SendBytes(number, data):
                     self._sockets[number].send(data)
                 case OpenSocket(number, host, port):
-                    opened = self._sockets[number] = ScriptConnection(
-                        self._loop,
-                        self._buffers,
-                        self._report,
-                        self._own_address,
-                        number,
-                        self._network,
-                        self._arrive,
-                        self._full,
-                        is_own=self._is_own(host, port),
-                    )
+                    opened = ScriptConnection(self._buffers, number, self._network, self._arrive)
+                    self._sockets[number] = opened
                     self._connect(opened, host, port)
                 case CloseSocket(number):
                     self._sockets.pop(number).drop()
-                case CallProcedure(number, url, call, body):
-                    server = self._servers.get(number)
-                    if server is None:
-                        server = self._servers[number] = XmlRpcServer(self._remotes, url)
-                    server.call(body, partial(self._call_ended, call))
+                case CallProcedure():
+                    self._remotes.call(request)
                 case CloseServer(number):
-                    if (server := self._servers.pop(number, None)) is not None:
-                        server.close()
+                    self._remotes.close_server(number)
                 case _:
                     self._modbus.carry_out(request)
-        for connection in tuple(self._full):
+        for connection in tuple(self._buffers.full):
             connection.read_on()
 
     def open(self, host: str, port: int) -> OutgoingConnection:
         """Begin to connect to `host`:`port`, for the box itself."""
-        connection = OutgoingConnection(
-            self._loop, self._buffers, self._report, self._own_address, is_own=self._is_own(host, port)
-        )
+        connection = OutgoingConnection(self._buffers)
         self._connect(connection, host, port)
         return connection
 
@@ -114,18 +91,13 @@ class LoopNetwork:
         for connection in tuple(self._buffers.connections):
             connection.close()
 
-    def _is_own(self, host: str, port: int) -> bool:
-        return host in _LOCAL and port in self.own_ports
-
     def _connect(self, connection: OutgoingConnection, host: str, port: int) -> None:
         if len(host) > BUDGETS.host_length:
             connection.refuse(f"{len(host)} characters given: a host has up to {BUDGETS.host_length}")
         elif len(self._buffers.connections) >= BUDGETS.outgoing_connections:
             connection.refuse(f"the box has {BUDGETS.outgoing_connections} connections, close one first")
-        elif self._is_own(host, port):
+        elif host in _LOCAL and port in self.own_ports:
+            connection.is_own = True
             connection.begin(*self.own_ports[port])
         else:
             connection.begin(host, port)
-
-    def _call_ended(self, call: int, value: object, error: str) -> None:
-        self._arrive(CallEnded(call, value, error))

@@ -20,21 +20,20 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.sockets import OutgoingConnection
-from ur_emulator.machine.controller.io.modbus_signals import (
+from ur_emulator.machine.controller.io.network import (
     DISCONNECTED,
     NO_ANSWER,
-    ModbusSignal,
-    SignalType,
-    UnitAddress,
-)
-from ur_emulator.machine.scripting.network import (
     Arrival,
     ForgetSignal,
+    ModbusSignal,
     ReleaseUnit,
     ResetUnit,
     SendToUnit,
     ServeSignal,
     SignalServed,
+    SignalType,
+    UnitAddress,
+    UnitRequest,
 )
 
 _READ = {
@@ -108,7 +107,11 @@ class _Waiting:
 
 
 class ModbusLink:
-    """One unit's connection; its signals are the host's own records of those of the machine."""
+    """One unit's connection; its signals are the host's own records of those of the machine.
+
+    Attributes:
+        is_released: it is to be closed once what was sent is answered.
+    """
 
     def __init__(self, name: str, connect: Callable[[], OutgoingConnection], period_s: float) -> None:
         """Prepare; nothing is connected before something is wanted.
@@ -137,7 +140,6 @@ class ModbusLink:
 
     def want(self, signal: ModbusSignal) -> None:
         """Write or read a signal as soon as possible."""
-        self.is_released = False
         self._signals.add(signal)
         self._wanted[signal] = None
 
@@ -152,7 +154,6 @@ class ModbusLink:
 
     def send(self, slave: int, function_code: int, data: bytes) -> None:
         """Send a request whose answer is not used."""
-        self.is_released = False
         if len(self._own_requests) < BUDGETS.modbus_requests:
             self._own_requests.append((slave, bytes((function_code,)) + data))
 
@@ -161,10 +162,6 @@ class ModbusLink:
         self._drop(DISCONNECTED)
         self._retry_at = -math.inf
         self._pause = FIRST_RETRY
-
-    def release(self) -> None:
-        """Close once what was sent is answered."""
-        self.is_released = True
 
     @property
     def is_idle(self) -> bool:
@@ -189,8 +186,7 @@ class ModbusLink:
     def advance(self, now: float) -> float:
         """Do what can be done at monotonic time `now` [s]; return when to be called next at the latest."""
         for signal in self._wanted:
-            if signal not in self._waiting:
-                self._waiting[signal] = _Waiting(now)
+            self._waiting.setdefault(signal, _Waiting(now))
         if self._socket is not None:
             self._receive(self._socket.inbox, now)
         if self._is_connected(now):
@@ -344,7 +340,6 @@ class ModbusLink:
         return min(times)
 
 
-UnitRequest = ServeSignal | ForgetSignal | SendToUnit | ResetUnit | ReleaseUnit
 # What the machine takes for known of a signal before anything has arrived: see `SignalServed`.
 _AT_FIRST = ((), "", 0, 0)
 
@@ -391,7 +386,7 @@ class ModbusClient:
                 self._unit(unit).reset()
             case ReleaseUnit(unit):
                 if unit in self._links:
-                    self._links[unit].release()
+                    self._links[unit].is_released = True
         self._tell()
 
     def advance(self, now: float) -> float:
@@ -453,15 +448,7 @@ class ModbusClient:
 
 def _signal_of(request: ServeSignal) -> ModbusSignal:
     """Return the host's record of a signal; no values have been read."""
-    signal = ModbusSignal(
-        str(request.signal),
-        request.unit,
-        request.slave,
-        request.address,
-        request.type,
-        request.sequential,
-        count=request.count,
-        write_address=request.write_address,
-    )
-    signal.values = ()
+    r = request
+    signal = ModbusSignal("", r.unit, r.slave, r.address, r.type, r.sequential, count=r.count)
+    signal.number, signal.write_address, signal.values = r.signal, r.write_address, ()
     return signal

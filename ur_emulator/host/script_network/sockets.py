@@ -6,15 +6,15 @@ import socket
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Final
 from weakref import WeakSet
 
-from ur_emulator.budgets import BUDGETS, CYCLE, KIB
+from ur_emulator.budgets import BUDGETS, CYCLE
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.connection import BufferedSocket
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.addresses import LOOK_UPS, LookUp, is_closed
-from ur_emulator.machine.scripting.network import (
+from ur_emulator.machine.controller.io.network import (
+    SHARE,
     Arrival,
     BytesArrived,
     BytesUnsent,
@@ -23,20 +23,24 @@ from ur_emulator.machine.scripting.network import (
     SocketOpened,
 )
 
-# A connection with no more than this can always send: one that is stuck does not stop the others.
-_SHARE: Final = 4 * KIB
-
 
 class Buffers:
-    """Counts the connections of a box that somebody still has, also closed ones, and their unsent bytes."""
+    """Counts the connections of a box that somebody still has, also closed ones, and their unsent bytes.
 
-    def __init__(self, loop: EventLoop, report: Report) -> None:
-        self._loop = loop
-        self._report = report
+    Attributes:
+        loop, report, own_address: as in `LoopNetwork`.
+        full: connections of scripts that do not read before scripts have read what has come.
+    """
+
+    def __init__(self, loop: EventLoop, report: Report, own_address: str) -> None:
+        self.loop = loop
+        self.report = report
+        self.own_address = own_address
         self._window_end = 0.0
         self._in_window = 0
         self._has_read_enough = False
         self.connections: WeakSet[OutgoingConnection] = WeakSet()
+        self.full: set[OutgoingConnection] = set()
         self.unsent = 0
 
     def received(self, n_bytes: int) -> None:
@@ -47,7 +51,7 @@ class Buffers:
         self._in_window += n_bytes
         if self._in_window >= BUDGETS.received_bytes and not self._has_read_enough:
             self._has_read_enough = True
-            self._loop.add(self)
+            self.loop.add(self)
             self._tell()
 
     def advance(self, now: float) -> float:
@@ -60,7 +64,7 @@ class Buffers:
 
     def failed(self, error: Exception) -> None:
         """Close all connections after an error of ours."""
-        self._report("the connections of scripts are closed", error)
+        self.report("the connections of scripts are closed", error)
         self.close()
         for connection in tuple(self.connections):
             connection.close()
@@ -68,7 +72,7 @@ class Buffers:
     def close(self) -> None:
         """Do not look any more."""
         self._has_read_enough = False
-        self._loop.remove(self)
+        self.loop.remove(self)
 
     def may_receive(self, waiting: int) -> bool:
         """Whether a connection with so many bytes in its inbox may read on."""
@@ -76,7 +80,7 @@ class Buffers:
 
     def may_send(self, waiting: int, n_bytes: int) -> bool:
         """Whether a connection with so many unsent bytes may send as many more as given."""
-        return waiting + n_bytes <= _SHARE or self.unsent + n_bytes <= BUDGETS.all_unsent_bytes
+        return waiting + n_bytes <= SHARE or self.unsent + n_bytes <= BUDGETS.all_unsent_bytes
 
     def _tell(self) -> None:
         for connection in tuple(self.connections):
@@ -96,31 +100,16 @@ class OutgoingConnection(BufferedSocket):
         is_own: it leads to a port of the box itself.
     """
 
-    def __init__(
-        self,
-        loop: EventLoop,
-        buffers: Buffers,
-        report: Report,
-        own_address: str = "",
-        *,
-        is_own: bool = False,
-    ) -> None:
-        """Prepare; nothing is connected.
-
-        `report` gets an error of ours in what the peer has caused; it ends the connection. `own_address` is
-        where to call from, if the peer can be reached from there; "" leaves it open.
-        """
-        super().__init__(loop, BUDGETS.unsent_bytes, _READ_SIZE)
+    def __init__(self, buffers: Buffers) -> None:
+        """Prepare; nothing is connected."""
+        super().__init__(buffers.loop, BUDGETS.unsent_bytes, _READ_SIZE)
         self._buffers = buffers
-        self._report = report
         self._peer = ""
-        self._own_address = own_address
         self._look_up: LookUp | None = None
         self._inbox = bytearray()
         self._counted_unsent = 0
-        self.is_connecting = False
+        self.is_connecting = self.is_own = False
         self.problem = ""
-        self.is_own = is_own
 
     def begin(self, host: str, port: int) -> None:
         """Begin to connect; the loop never waits for the look-up of a name."""
@@ -177,7 +166,7 @@ class OutgoingConnection(BufferedSocket):
 
     def failed(self, error: Exception) -> None:
         """Close after an error of ours, and report it; the script sees a peer that has closed."""
-        self._report(f"the connection of a script to {self._peer} is closed", error)
+        self._buffers.report(f"the connection of a script to {self._peer} is closed", error)
         self.close()
 
     # --- connecting
@@ -208,8 +197,9 @@ class OutgoingConnection(BufferedSocket):
         try:
             self._sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             self._sock.setblocking(False)
-            if _can_call_from(self._own_address, address):
-                self._sock.bind((self._own_address, 0))
+            own = self._buffers.own_address
+            if _can_call_from(own, address):
+                self._sock.bind((own, 0))
             code = self._sock.connect_ex((address, port))
         except (OSError, OverflowError):  # descriptors are out, or that is no port
             code = errno.EINVAL
@@ -256,31 +246,13 @@ class ScriptConnection(OutgoingConnection):
     """A connection of a script: what comes of it arrives at the machine, which has the inbox."""
 
     def __init__(
-        self,
-        loop: EventLoop,
-        buffers: Buffers,
-        report: Report,
-        own_address: str,
-        number: int,
-        network: Network,
-        arrive: Callable[[Arrival], None],
-        full: set[OutgoingConnection],
-        *,
-        is_own: bool,
+        self, buffers: Buffers, number: int, network: Network, arrive: Callable[[Arrival], None]
     ) -> None:
-        """Prepare; nothing is connected.
-
-        Args:
-            number: of the socket in the machine.
-            network: of the machine.
-            arrive: takes what comes.
-            full: the connection is in this set while it does not read, for want of room.
-        """
-        super().__init__(loop, buffers, report, own_address, is_own=is_own)
+        """Prepare; nothing is connected. `number` is that of the machine; `arrive` takes what comes."""
+        super().__init__(buffers)
         self._number = number
         self._network = network
         self._arrive = arrive
-        self._full = full
         self._is_over = False
 
     @property
@@ -291,9 +263,9 @@ class ScriptConnection(OutgoingConnection):
         """Read from the peer, or stop reading, as the budgets say now."""
         super().read_on()
         if self.is_open and not self._wants_data:
-            self._full.add(self)
+            self._buffers.full.add(self)
         else:
-            self._full.discard(self)
+            self._buffers.full.discard(self)
 
     def drop(self) -> None:
         """Close, since the script has closed."""
@@ -303,7 +275,7 @@ class ScriptConnection(OutgoingConnection):
     def close(self) -> None:
         """Close; what has come can still be read."""
         super().close()
-        self._full.discard(self)
+        self._buffers.full.discard(self)
         if not self._is_over:
             self._is_over = True
             self._arrive(SocketClosed(self._number, self.problem))

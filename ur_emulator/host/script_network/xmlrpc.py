@@ -21,7 +21,7 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.runtime.barrier import Report
 from ur_emulator.host.runtime.event_loop import EventLoop
 from ur_emulator.host.script_network.sockets import OutgoingConnection
-from ur_emulator.machine.scripting.network import RemoteCallError
+from ur_emulator.machine.controller.io.network import Arrival, CallEnded, CallProcedure, RemoteCallError
 
 # A server that cannot be reached fails the call after this [s]; an answer may begin at any time.
 CONNECT_TIMEOUT: Final = 5.0
@@ -59,8 +59,9 @@ class ServerAddress:
 class HttpChannel:
     """A connection to a server, on which one call follows the other."""
 
-    def __init__(self, socket: OutgoingConnection) -> None:
+    def __init__(self, address: ServerAddress, socket: OutgoingConnection) -> None:
         self.socket = socket
+        self._address = address
         self._http = h11.Connection(h11.CLIENT)
 
     @property
@@ -73,18 +74,19 @@ class HttpChannel:
             and not self._http.trailing_data[0]
         )
 
-    def connect(self, address: ServerAddress, clock: Callable[[], float]) -> Exchange:
+    def connect(self) -> Exchange:
         """Wait until the connection stands."""
-        end = clock() + CONNECT_TIMEOUT
-        while self.socket.is_connecting and clock() < end:
+        end = time.monotonic() + CONNECT_TIMEOUT
+        while self.socket.is_connecting and time.monotonic() < end:
             yield False
         if not self.socket.is_open:
             late = f"no connection within {CONNECT_TIMEOUT:g} s" if self.socket.is_connecting else ""
             why = late or self.socket.problem or "Connection refused"
-            raise RemoteCallError(f"{address.netloc} does not answer: {why}")
+            raise RemoteCallError(f"{self._address.netloc} does not answer: {why}")
 
-    def call(self, address: ServerAddress, body: bytes, clock: Callable[[], float]) -> Exchange:
+    def call(self, body: bytes) -> Exchange:
         """Send a call and read its answer."""
+        address = self._address
         try:
             request = h11.Request(
                 method="POST",
@@ -103,7 +105,7 @@ class HttpChannel:
                 raise UnansweredError(_CLOSED)
             raise RemoteCallError("the call could not be sent: too many bytes wait to be sent")
         try:
-            value = yield from self._answer(clock)
+            value = yield from self._answer()
         except RemoteFaultError as fault:
             raise RemoteCallError(str(fault)) from None
         except (h11.RemoteProtocolError, RemoteProtocolError) as problem:
@@ -112,21 +114,21 @@ class HttpChannel:
             self._http.start_next_cycle()
         return value
 
-    def _answer(self, clock: Callable[[], float]) -> Exchange:
+    def _answer(self) -> Exchange:
         reader = AnswerReader(BUDGETS.remote_values)
         n_bytes, end = 0, 0.0
         while True:
             event = self._http.next_event()
             if event is h11.NEED_DATA:
                 while self.socket.is_open and not self.socket.inbox:
-                    if end and clock() > end:
+                    if end and time.monotonic() > end:
                         raise RemoteCallError(
                             f"the answer takes longer than {BUDGETS.remote_answer_time:g} s"
                         )
                     yield False
                 if not n_bytes and not self.socket.inbox:
                     raise UnansweredError(_CLOSED)
-                end = end or clock() + BUDGETS.remote_answer_time
+                end = end or time.monotonic() + BUDGETS.remote_answer_time
                 data = bytes(self.socket.inbox[:_PIECE])
                 del self.socket.inbox[:_PIECE]
                 n_bytes += len(data)
@@ -164,30 +166,46 @@ def _check_head(head: h11.Response) -> None:
 _LOOK_EVERY = 0.05
 
 
-# Called with the value that a procedure has returned, or with None and why the call has failed.
-CallDone = Callable[[Any, str], None]
-
-
 class XmlRpcClient:
-    """The servers that the scripts of one box call, and the connections to them."""
+    """The servers that the scripts of one box call, by their numbers."""
 
     def __init__(
-        self, loop: EventLoop, connect: Callable[[str, int], OutgoingConnection], report: Report
+        self,
+        loop: EventLoop,
+        connect: Callable[[str, int], OutgoingConnection],
+        arrive: Callable[[Arrival], None],
+        report: Report,
     ) -> None:
         """Prepare; nothing is connected before the first call. `report` gets errors of ours."""
         self._loop = loop
         self._report = report
         self.connect = connect
-        # Those with a connection; the one that was called last is last.
-        self._connected: dict[XmlRpcServer, None] = {}
+        self.arrive = arrive
+        self._servers: dict[int, XmlRpcServer] = {}
         self._busy: dict[XmlRpcServer, None] = {}
+
+    def call(self, request: CallProcedure) -> None:
+        """Begin a call; those of a server are made one after the other."""
+        server = self._servers.get(request.server)
+        if server is None:
+            server = self._servers[request.server] = XmlRpcServer(self, request.url)
+        if not self._busy:
+            self._loop.add(self)
+        self._busy[server] = None
+        server.call(request)
+
+    def close_server(self, number: int) -> None:
+        """Close the connection to a server and forget its calls; harmless if none was made."""
+        server = self._servers.pop(number, None)
+        if server is not None:
+            server.close()
 
     def advance(self, now: float) -> float:
         """Go on with all calls; after a piece of an answer, the other calls go on in the next turn."""
         for server in tuple(self._busy):
             has_read = server.advance()
             del self._busy[server]
-            if server.is_busy:
+            if server.calls:
                 self._busy[server] = None
             if has_read:
                 return now
@@ -198,108 +216,70 @@ class XmlRpcClient:
     def failed(self, error: Exception) -> None:
         """End all calls after an error of ours."""
         self._report("the remote procedure calls of scripts are ended", error)
-        for server in tuple(self._busy):
-            server.give_up(repr(error))
+        for server in self._busy:
+            for request in server.calls:
+                self.arrive(CallEnded(request.call, None, repr(error)))
         self.close()
 
     def close(self) -> None:
         """Close everything; calls may be made anew."""
-        for server in (*self._busy, *self._connected):
+        for server in self._servers.values():
             server.close()
         self._busy.clear()
         self._loop.remove(self)
 
-    # --- what the servers report
-
-    def begin(self, server: XmlRpcServer) -> None:
-        """A server has a call to make."""
-        if not self._busy:
-            self._loop.add(self)
-        self._busy[server] = None
-
-    def make_room(self, server: XmlRpcServer) -> None:
-        """A server is about to connect: one that is idle gives its connection up, if there are too many.
-
-        The machine has seen to it that not all are in use.
-        """
-        if len(self._connected) >= BUDGETS.remote_connections:
-            next(other for other in self._connected if not other.is_busy).close()
-        self._connected[server] = None
-
-    def disconnected(self, server: XmlRpcServer) -> None:
-        """A server has no connection any more."""
-        self._connected.pop(server, None)
-
-    def used(self, server: XmlRpcServer) -> None:
-        """A server that is connected was called."""
-        self._connected[server] = self._connected.pop(server)
-
 
 class XmlRpcServer:
-    """A server as one script handle knows it."""
+    """A server as one script handle knows it; of its calls the first is made, the others wait."""
 
     def __init__(self, client: XmlRpcClient, url: str) -> None:
         self._client = client
         self._url = url
         self._channel: HttpChannel | None = None
-        self._calls: deque[tuple[CallDone, bytes]] = deque()
+        self.calls: deque[CallProcedure] = deque()
         self._exchange: Exchange | None = None
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether a call is running."""
-        return bool(self._calls)
-
-    def call(self, body: bytes, done: CallDone) -> None:
-        """Begin with an encoded call; calls are made one after the other."""
-        self._calls.append((done, body))
-        self._client.begin(self)
-        if len(self._calls) == 1:
+    def call(self, request: CallProcedure) -> None:
+        """Begin a call, or let it wait for the one before it."""
+        self.calls.append(request)
+        if len(self.calls) == 1:
             self.advance()
 
     def close(self) -> None:
         """Close the connection and forget the running calls."""
-        self._calls.clear()
+        self.calls.clear()
         self._end_exchange()
         self._disconnect()
 
-    def give_up(self, why: str) -> None:
-        """Fail the running calls."""
-        for done, _ in self._calls:
-            done(None, why)
-        self.close()
-
     def advance(self) -> bool:
         """Go on with the call that is the first; return whether a piece of an answer was read."""
-        if not self._calls:
+        if not self.calls:
             return False
-        done, body = self._calls[0]
+        request = self.calls[0]
         if self._exchange is None:
-            self._exchange = self._make(body)
+            self._exchange = self._make(request.body)
         try:
             return next(self._exchange)
         except StopIteration as end:
-            done(end.value, "")
+            self._client.arrive(CallEnded(request.call, end.value, ""))
         except RemoteCallError as error:
             self._disconnect()
-            done(None, str(error))
+            self._client.arrive(CallEnded(request.call, None, str(error)))
         self._end_exchange()
-        self._calls.popleft()
+        self.calls.popleft()
         return True
 
     def _make(self, body: bytes) -> Exchange:
         """Make a call, on the connection that there is or on a new one."""
-        address = ServerAddress(self._url)
         if self._channel is not None and self._channel.is_reusable:
-            self._client.used(self)
             # The server may close a connection that was idle just when it is used again.
             with suppress(UnansweredError):
-                return (yield from self._channel.call(address, body, time.monotonic))
+                return (yield from self._channel.call(body))
         self._disconnect()
-        self._client.make_room(self)
-        self._channel = HttpChannel(self._client.connect(address.host, address.port))
-        yield from self._channel.connect(address, time.monotonic)
-        return (yield from self._channel.call(address, body, time.monotonic))
+        address = ServerAddress(self._url)
+        self._channel = HttpChannel(address, self._client.connect(address.host, address.port))
+        yield from self._channel.connect()
+        return (yield from self._channel.call(body))
 
     def _end_exchange(self) -> None:
         if self._exchange is not None:
@@ -310,4 +290,3 @@ class XmlRpcServer:
         if self._channel is not None:
             self._channel.socket.close()
             self._channel = None
-        self._client.disconnected(self)

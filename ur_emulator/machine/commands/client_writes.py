@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from protocol.rtde.types import RtdeValue
 from ur_emulator.machine.controller.command import BoxParts
-from ur_emulator.machine.controller.modbus_map import write_range
+from ur_emulator.machine.controller.modbus_map import can_write, write
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,4 +29,6 @@ class WriteModbus:
     values: tuple[int, ...]
 
     def apply(self, box: BoxParts) -> None:
-        write_range(box.state, self.is_coils, self.first, self.values)
+        for address, value in enumerate(self.values, self.first):
+            if can_write(self.is_coils, address):
+                write(box.state, self.is_coils, address, value)

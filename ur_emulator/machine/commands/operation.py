@@ -1,8 +1,9 @@
 """Operation: an operation of the control API, declared as a frozen dataclass.
 
-The first sentence of its docstring is its sentence; its fields are its parameters (`parameter`); they are
-checked when the record is made. Methods of `ControlBox`, the HTTP API, `ur-emulator ctl` and docs/control.md
-follow from that (`control_api.operations`). The command line imports all of them: nothing heavy here.
+The first sentence of its docstring is its sentence; its fields are its parameters: the annotation and
+`parameter` say what they may be; they are checked when the record is made. Methods of `ControlBox`, the
+HTTP API, `ur-emulator ctl` and docs/control.md follow from that (`control_api.operations`). The command line
+imports all of them: nothing heavy here.
 """
 
 from __future__ import annotations
@@ -31,11 +32,6 @@ from typing import (
 
 from ur_emulator.errors import ArgumentError
 from ur_emulator.machine.controller.command import BoxParts, Result
-
-# --- What an operation may be given: types, ranges, units, and one line for what does not fit
-#
-# Declared on the fields of the operation's dataclass with `parameter`; the type comes from the annotation.
-
 
 _WORDS = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
 

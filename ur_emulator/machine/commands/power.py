@@ -36,7 +36,7 @@ class ReleaseBrakes(CommandOperation):
     """Go to RUNNING, powering on first if need be."""
 
     def apply(self, box: BoxParts) -> None:
-        box.state.compliance.end_freedrive(by_client=True)
+        box.state.compliance.end_freedrive("client")
         _give_power(box, ModeCommand.BRAKE_RELEASE)
 
 
@@ -51,7 +51,7 @@ class StartFreedrive:
         if state.mode.mode is not RobotMode.RUNNING or state.safety.is_stopped:
             modes = f"{state.mode.mode.name}, {state.safety.mode.name}"
             refuse(state, f"freedrive refused: the robot must be RUNNING and not stopped, it is in {modes}")
-        state.compliance.start_freedrive(by_client=True)
+        state.compliance.start_freedrive("client")
 
 
 def _give_power(box: BoxParts, command: ModeCommand) -> None:
@@ -67,9 +67,6 @@ def change_mode(state: ControllerState, command: ModeCommand) -> None:
     if not state.mode.command(command):
         possible = " or ".join(mode.name for mode, given in TRANSITIONS if given is command)
         refuse(state, f"{command.value} refused: the robot is in {state.mode.mode.name}, not in {possible}")
-
-
-# --- An e-Series box: operational mode, enabling device, remote control
 
 
 class SetOperationalMode(CommandOperation):

@@ -37,7 +37,7 @@ class StartProgram:
     loaded: bool = False
 
     def apply(self, box: BoxParts) -> None:
-        obstacle = _why_not_running(box.state)
+        obstacle = why_not_running(box.state)
         if obstacle:
             text = f"program {self.program.name} not started: {obstacle}"
             box.state.events.append(ScriptFailed(1, 1, text))
@@ -109,7 +109,7 @@ class ResumeProgram(CommandOperation):
     def apply(self, box: BoxParts) -> None:
         if not box.programs.is_paused:
             raise RefusedError(f"there is no program to resume: the program state is {_program_state(box)}")
-        obstacle = _why_not_running(box.state)
+        obstacle = why_not_running(box.state)
         if obstacle:
             refuse(box.state, f"program {box.programs.name} stays paused: {obstacle}")
         box.programs.resume()
@@ -124,7 +124,7 @@ class SetSpeedSlider(CommandOperation):
         box.state.speed.slider = self.fraction
 
 
-def _why_not_running(state: ControllerState) -> str:
+def why_not_running(state: ControllerState) -> str:
     """Return why no program may move the arm now; "" if one may."""
     if not state.safety.lets_programs_run:
         safety = state.safety.status
@@ -135,9 +135,6 @@ def _why_not_running(state: ControllerState) -> str:
 
 def _program_state(box: BoxParts) -> str:
     return ProgramState(box.state.past.snapshot.runtime_state).name
-
-
-# --- Interpreter mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,9 +163,6 @@ class AbortMove:
 
     def apply(self, box: BoxParts) -> None:
         box.state.motion.abort()
-
-
-# --- The operator: questions and popups
 
 
 class AnswerRequest(CommandOperation):

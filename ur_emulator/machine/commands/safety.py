@@ -75,7 +75,7 @@ class TriggerProtectiveStop(CommandOperation):
         safety = box.state.safety
         if not (safety.is_watched or safety.has(SafetyMode.PROTECTIVE_STOP)):
             raise RefusedError(f"no protective stop: the arm is stopped already, by {safety.mode.name}")
-        box.state.requests.protective_stop()
+        box.state.requests.protective_stop = True
 
 
 class UnlockProtectiveStop(CommandOperation):
@@ -187,9 +187,6 @@ class PressButton(CommandOperation):
         box.state.pendant.press(BUTTON_BITS[self.button], self.pressed)
         if self.button == "teach":
             box.state.compliance.is_teach_pressed = self.pressed
-
-
-# --- Safety planes and the limit of the tool's direction, as the pendant sets them up
 
 
 _LEAST_LENGTH = 1e-6

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_emulator.machine.controller.settings import Payload, ToolSettings
-from ur_emulator.machine.models.calibration import Calibration
-from ur_emulator.machine.models.robot_model import VISCOUS_KINK, RobotModel
+from ur_emulator.machine.models.robot_model import VISCOUS_KINK, DhRow, RobotModel
 from ur_emulator.machine.motion.generators import REST_SPEED, JointTarget
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
 
@@ -29,9 +28,9 @@ _LEAST_DECELERATION = 1.0
 class ArmDynamics:
     """Answers about the arm's dynamics; the model is built at the first question."""
 
-    def __init__(self, robot: RobotModel, calibration: Calibration, tool: ToolSettings) -> None:
+    def __init__(self, robot: RobotModel, dh: Sequence[DhRow], tool: ToolSettings) -> None:
         self._robot = robot
-        self._calibration = calibration
+        self._dh = dh
         self._tool = tool
         self._payload: Payload | None = None
 
@@ -101,4 +100,4 @@ class ArmDynamics:
 
     @cached_property
     def _model(self) -> InverseDynamics:
-        return InverseDynamics(self._robot, self._calibration)
+        return InverseDynamics(self._robot, self._dh)

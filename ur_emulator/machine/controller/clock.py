@@ -31,14 +31,6 @@ class Clock:
         """Seconds since the controller started, at the end of the present cycle."""
         return self.generation.seconds(self.tick)
 
-    def advance(self) -> None:
-        """Begin the next cycle."""
-        self.tick += 1
-
-    def advance_program(self) -> None:
-        """Count a cycle of the primary program."""
-        self.program_tick += 1
-
 
 def clock_time(timestamp: float) -> datetime:
     """Return date and time of the controller, to the second, from the time of a cycle [s]."""

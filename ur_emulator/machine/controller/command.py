@@ -7,7 +7,6 @@ are in `ur_emulator.machine.commands`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol, runtime_checkable
 
 from protocol.primary.messages import ReportLevel
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
 
 # Values that a command returns; most return none.
 Result = Mapping[str, Any] | None
+# The result of a command, or the error that has ended it: a `RefusedError` if it was refused.
+Outcome = tuple[Result, Exception | None]
 # Called in the cycle in which a command was applied, with its result, or with its refusal or another error.
 Done = Callable[[Result, Exception | None], None]
 
@@ -45,22 +46,12 @@ class Command(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Submitted:
-    """A command whose sender gets the result."""
-
-    command: Command
-    done: Done
-
-    def apply(self, box: BoxParts) -> Result:
-        """Apply the command and call `done` with its result or its error, which ends only the command."""
-        try:
-            result = self.command.apply(box)
-        except Exception as error:
-            self.done(None, error)
-            return None
-        self.done(result, None)
-        return result
+def outcome_of(command: Command, box: BoxParts) -> Outcome:
+    """Apply a command; an error ends only the command."""
+    try:
+        return command.apply(box), None
+    except Exception as error:
+        return None, error
 
 
 def refuse(state: ControllerState, text: str) -> NoReturn:

@@ -7,6 +7,7 @@ an input acts once no move runs, with or without a program; freedrive replaces f
 """
 
 from math import hypot
+from typing import Literal
 
 from protocol.ur_types import JOINT_NAMES, ControlMode, RobotMode
 from ur_emulator.machine.controller.io.configuration import IoConfiguration
@@ -32,6 +33,9 @@ from ur_emulator.machine.plant.arm_plant import PlantState
 # motion up to 25 N on a UR3 and 56 N on a UR5: 13 N per kg of the rated payload.
 _OF_SENSOR, _OF_ESTIMATE = 20.0, 13.0  # N, N/kg
 
+# Who asks for freedrive; the teach button acts as an input.
+Asker = Literal["program", "client", "input"]
+
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -39,7 +43,7 @@ class Compliance:
     """Requests for freedrive and force mode; each acts on the motion of the arm when it comes.
 
     Attributes:
-        by_program, by_client, by_input: who has requested freedrive; an input or the teach button also acts.
+        askers: who has requested freedrive.
         force_damping: as programs have set it, for a force mode to come; 0..1.
         force_gain_scaling: likewise, 0..2.
         is_teach_pressed: the teach button acts as an input that is set up for freedrive.
@@ -68,7 +72,7 @@ class Compliance:
         self._inputs = inputs
         self._past = past
         self.force_damping, self.force_gain_scaling = 0.0, 1.0
-        self.by_program = self.by_client = self.by_input = False
+        self.askers: set[Asker] = set()
         self._force: ForceMode | None = None
         self._hold: AxisHold | None = None
         self._is_refused = False
@@ -83,7 +87,7 @@ class Compliance:
     def force_mode(self) -> ForceMode | None:
         """The overlay of force mode; None without it. Stops of the arm end it."""
         force = self._force
-        return force if force is not None and self._motion.has_overlay(force) else None
+        return force if force is not None and force in self._motion.overlays else None
 
     @property
     def mode(self) -> ControlMode:
@@ -96,45 +100,40 @@ class Compliance:
         return ControlMode.POSITION if self.force_mode is None else ControlMode.FORCE
 
     @property
-    def is_on(self) -> bool:
+    def is_active(self) -> bool:
         """True while `step` must be called in every cycle."""
-        return self._motion.is_compliant or self.is_teach_pressed or self.force_mode is not None
+        return (
+            self._motion.is_compliant
+            or self.is_teach_pressed
+            or self.force_mode is not None
+            or self._inputs.has_actions
+        )
 
     # --- requests
 
-    def start_freedrive(
-        self,
-        *,
-        by_program: bool = False,
-        by_client: bool = False,
-        hold: AxisHold | None = None,
-        wrench: Vector6 = ZERO6,
-    ) -> None:
+    def start_freedrive(self, asker: Asker, *, hold: AxisHold | None = None, wrench: Vector6 = ZERO6) -> None:
         """Start freedrive.
 
         Args:
-            by_program, by_client: who asks for it.
             hold: has the axes that the program blocks, None for none.
             wrench: from outside; if it is not expected, the arm is stopped when freedrive begins [N, Nm].
         """
-        if by_program:
+        if asker == "program":
             self._hold = hold
-        self.by_program = self.by_program or by_program
-        self.by_client = self.by_client or by_client
+        self.askers.add(asker)
         if not self.is_in_freedrive:
             self._is_refused = hypot(*wrench[:3]) > self._unexpected_force
         self._hand_over()
 
-    def end_freedrive(self, *, by_program: bool = False, by_client: bool = False) -> None:
+    def end_freedrive(self, asker: Asker) -> None:
         """End the freedrive that the program, or a client, has requested."""
-        self.by_program = self.by_program and not by_program
-        self.by_client = self.by_client and not by_client
+        self.askers.discard(asker)
         self._hand_over()
 
     def begin_force(self, force_mode: ForceMode) -> None:
         """Go into force mode; freedrive by the program ends."""
         self.end_force()
-        self.end_freedrive(by_program=True)
+        self.end_freedrive("program")
         if not self.is_in_freedrive:
             self._force = force_mode
             self._motion.add_overlay(force_mode)
@@ -147,14 +146,14 @@ class Compliance:
 
     def program_ended(self) -> None:
         """End freedrive and force mode of the program."""
-        self.end_freedrive(by_program=True)
+        self.end_freedrive("program")
         self.end_force()
 
     def _hand_over(self) -> None:
         """Let a hand guide the arm if anybody has requested it and nothing forbids it, else hold the arm."""
         if self._is_forbidden:
-            self.by_program = self.by_client = self.by_input = False
-        if self.by_program or self.by_client or self.by_input:
+            self.askers.clear()
+        if self.askers:
             self._motion.guide(self._past.measured)
         else:
             self._motion.let_go()
@@ -168,9 +167,12 @@ class Compliance:
     def step(self) -> None:
         """Follow inputs, and what forbids compliance, after the scripts have run."""
         may_guide = self._operational.allows.allows_freedrive
-        self.by_client = self.by_client and may_guide
-        wanted = may_guide and (self.is_teach_pressed or self._inputs.requests_freedrive())
-        self.by_input = wanted and (self.by_input or not self._motion.is_moving)
+        if not may_guide:
+            self.askers.discard("client")
+        if not (may_guide and (self.is_teach_pressed or self._inputs.requests_freedrive())):
+            self.askers.discard("input")
+        elif not self._motion.is_moving:
+            self.askers.add("input")
         self._hand_over()
         if self._is_forbidden:
             self.end_force()
@@ -182,7 +184,7 @@ class Compliance:
         """
         if not self.is_in_freedrive:
             return self._motion.torque
-        if self._hold is None or self.by_client or self.by_input:
+        if self._hold is None or self.askers & {"client", "input"}:
             return None
         sensed = self._past.sensed
         return TorqueCommand(self._hold.torque(sensed.actual_q, sensed.actual_qd), ZERO6, ZERO6)

@@ -6,31 +6,27 @@ time is the tick.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 
 from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ControlMode, RobotMode
-from ur_emulator.errors import ModelError, RefusedError
+from ur_emulator.errors import ModelError
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
-from ur_emulator.machine.controller.clock import Clock
-from ur_emulator.machine.controller.command import Command
+from ur_emulator.machine.controller.command import Command, Outcome, outcome_of
 from ur_emulator.machine.controller.events import RobotModeChanged
 from ur_emulator.machine.controller.force_sense import VARIABLE
 from ur_emulator.machine.controller.io.watchdogs import WatchdogAction
 from ur_emulator.machine.controller.program_runner import ProgramRunner
-from ur_emulator.machine.controller.robot_mode import JOINT_VECTORS, ModeCommand, RobotModeMachine
+from ur_emulator.machine.controller.robot_mode import JOINT_VECTORS, ModeCommand
 from ur_emulator.machine.controller.safety.inputs import ACTIVE
 from ur_emulator.machine.controller.safety.limit_checks import UNREACHABLE_PATH, Violation
 from ur_emulator.machine.controller.safety.modes import SafetyEvent
 from ur_emulator.machine.controller.safety.safety_state import UNLOCK_DELAY
 from ur_emulator.machine.controller.safety_system import SafetySystem
 from ur_emulator.machine.controller.snapshot import Snapshot
-from ur_emulator.machine.controller.state import ControllerState, make_state
+from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import draw_calibration
-from ur_emulator.machine.models.fidelity import Fidelity, dead_cycles
+from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
-from ur_emulator.machine.motion.arm_motion import ArmMotion
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.motion.tool import UnreachableError
 from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
@@ -42,11 +38,10 @@ from ur_hil.tools import ToolModel
 from urscript.run.host import Host
 from urscript.run.waits import Outside
 
-# --- The snapshot of a cycle: the records of target, sensors and box one after the other
-
-
 # Run time of a unit of work [ms]. Source: urscript.catalogue.costs.
 _UNIT_TIME = 50e-6
+# Looked up once.
+_BY_HAND = ControlMode.TEACH
 _ENABLING_BIT = int(SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE)
 
 
@@ -92,7 +87,7 @@ def make_snapshot(
         program_name=programs.name,
         script_control_line=programs.line if programs.reports_line else 0,
         control_mode=int(control),
-        is_guided_by_input=state.compliance.by_input,
+        is_guided_by_input="input" in state.compliance.askers,
         buttons=state.pendant.buttons,
         payload=payload.mass,
         payload_cog=payload.cog,
@@ -119,8 +114,6 @@ def make_snapshot(
     )
 
 
-# Controller time at start [s]: a public client library does not trust a controller clock below 40 s.
-BOOT_TIME = 60.0
 # Time after the last activity until the simulation may pause in lockstep, so that the arm comes to rest [s].
 # Joints of a CB3 creep for up to .9 s, below 1 mrad/s: more time would let clients begin in cycles that
 # depend on the speed of the machine.
@@ -128,7 +121,13 @@ SETTLE_TIME = 0.2
 
 
 class Controller:
-    """One control box without its ports; commands act on its public parts (`command.Box`)."""
+    """One control box without its ports; commands act on its public parts (`command.BoxParts`).
+
+    Attributes:
+        outcomes: of the commands of the last cycle, in their order.
+    """
+
+    outcomes: list[Outcome]
 
     def __init__(
         self,
@@ -165,31 +164,21 @@ class Controller:
         # Time must not pause before a protective stop can be unlocked. Two cycles more: the cycle of the stop
         # counts, and the delay must have passed.
         self._unlock_cycles = generation.cycles(UNLOCK_DELAY) + 2
-        motion = ArmMotion(
-            q,
-            robot.stop_deceleration,
-            generation.run_up_time,
-            dead_cycles(fidelity, seed, self.period_s),
-        )
-        self.state = make_state(
-            robot,
-            ArmModel(robot, draw_calibration(robot, fidelity, seed)),
+        self.state = state = ControllerState(
+            ArmModel(robot, self.plant.dh),
+            fidelity,
             seed,
-            Clock(generation, generation.cycles(BOOT_TIME)),
-            motion,
-            RobotModeMachine(mode, self.period_s),
-            self._place_arm,
+            mode,
             version or generation.parse_version(generation.default_version)[:2],
             tools,
+            self._place_arm,
         )
-        if generation.limits.brakes_within_torque:
-            motion.braking = self.state.dynamics.greatest_deceleration
-        self._payload = self.state.tool.payload
-        self.state.past.place(motion.target, self.plant.sense())
-        self.programs = ProgramRunner(self.state, make_robot(self.state))
-        self.safety = SafetySystem(self.state, self.programs, self.plant)
+        self._payload = state.tool.payload
+        state.past.place(state.motion.target, self.plant.sense())
+        self.programs = ProgramRunner(state, make_robot(state))
+        self.safety = SafetySystem(state, self.programs, self.plant)
         self.push = FlangePush(self.plant)
-        self.state.mode.command(ModeCommand.BOOT)
+        state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
 
@@ -219,7 +208,7 @@ class Controller:
         return (
             self.state.motion.is_moving
             or self.state.mode.is_changing
-            or self.safety.is_stopping
+            or self.safety.is_braking
             or self.push.will_end
             or any(gripper.is_busy for gripper in self.state.grippers)
         )
@@ -230,14 +219,14 @@ class Controller:
         The commands are those since the last cycle, in order of arrival.
         """
         state = self.state
-        state.clock.advance()
+        state.clock.tick += 1
         n_events = len(state.events)
         was_pushing = self.push.will_end
         if was_pushing:
             self.push.step()
+        self.outcomes = []
         for command in commands:
-            with suppress(RefusedError):  # `Submitted` has reported it
-                command.apply(self)
+            self.outcomes.append(outcome_of(command, self))
         self._step_modes()
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
@@ -271,8 +260,8 @@ class Controller:
             state.events.append(RobotModeChanged(int(self._mode)))
             if self._mode is RobotMode.RUNNING:
                 self.safety.check_range()
-        if self.safety.is_busy:
-            self.safety.step()
+        self.safety.step()
+        # Rare parts are asked whether they hold anything: a step that does nothing takes longer.
         if state.watchdogs and not self.programs.is_paused:
             self._check_watchdogs()
         if state.encoders.decoding:
@@ -284,9 +273,12 @@ class Controller:
         """All threads of all programs, and the effects of their requests."""
         state = self.state
         self.programs.step()
-        if state.requests.take_pause():
+        requests = state.requests
+        if requests.pause:
+            requests.pause = False
             self.programs.pause()
-        if state.requests.take_power_off():
+        if requests.power_off:
+            requests.power_off = False
             self.safety.cut_power()
         state.tool.step()
         payload = state.tool.payload
@@ -298,7 +290,7 @@ class Controller:
     def _step_motion(self, running: bool) -> tuple[ControlMode, JointTarget, TorqueCommand | None]:
         """How the arm is driven in this cycle, to where, and by which torque."""
         state, compliance = self.state, self.state.compliance
-        if compliance.is_on or state.io_configuration.input_actions or state.modbus.signals:
+        if compliance.is_active:
             compliance.step()
         target = self._next_target() if running else state.motion.step(self.period_s, state.speed.slider)
         return compliance.mode, target, compliance.torque()
@@ -325,14 +317,13 @@ class Controller:
             state.events.append(warning)
 
     def _check_watchdogs(self) -> None:
-        late = self.state.watchdogs.late(self.state.clock.tick)
-        if late is None:
-            return
-        self.state.events.append(late.report)
-        if late.action is WatchdogAction.PAUSE:
-            self.programs.pause()
-        else:
-            self.programs.stop()
+        if late := self.state.watchdogs.late(self.state.clock.tick):
+            report, action = late
+            self.state.events.append(report)
+            if action is WatchdogAction.PAUSE:
+                self.programs.pause()
+            else:
+                self.programs.stop()
 
     # --- stops
 
@@ -373,6 +364,3 @@ class Controller:
         state.motion.place(q)
         state.past.place(state.motion.target, plant.sense())
         return True
-
-
-_BY_HAND = ControlMode.TEACH

@@ -117,14 +117,10 @@ class ForceSense:
         if not self._is_to_zero:
             self.zero = self._present(still_cycles)
 
-    def program_started(self, still_cycles: int) -> None:
-        """Zero a built-in sensor; argument as in `set_zero`."""
-        if self._sensing.has_sensor and self.sensor is None:
+    def zero_built_in(self, still_cycles: int) -> None:
+        """Zero the sensor of an arm that has one, where it measures; argument as in `set_zero`."""
+        if self.refers_to_flange:
             self.set_zero(still_cycles)
-
-    def payload_declared(self) -> None:
-        """Zero a built-in sensor as soon as it measures with the new payload."""
-        self.program_started(0)
 
     @property
     def refers_to_flange(self) -> bool:

@@ -1,7 +1,9 @@
 """Interpreter mode: the statements that wait for the program, how far it is, and their log.
 
 The port appends what was compiled, the main thread of the program takes it; numbers are those that clients
-read. Source: script manual 5.11. Where ids begin anew, at the start of each program, is chosen.
+read. Source: script manual 5.11; also of the log: a line `e: <id_e> c: <id_a> : <statement>` for each
+acknowledged line, with the id of the last one that had begun and its own; the names of its files, and what
+moves them. Chosen: ids begin anew at the start of each program; the first line of a file.
 """
 
 from __future__ import annotations
@@ -14,12 +16,6 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import RefusedError
 from urscript.compile.interpreter_mode import NO_NAMES, CompiledStatements
 
-# --- the log of interpreter mode, as the files of a controller hold it
-#
-# Source: script manual 5.11: a line `e: <id_e> c: <id_a> : <statement>` for each acknowledged line, with the
-# id of the last one that had begun and its own; the names of the files, and what moves them. The first line
-# of a file is chosen.
-
 _CURRENT: Final = "interpreter.log"
 _BEFORE: Final = "interpreter.0.log"
 _SAVED: Final = "interpreter.saved.log"
@@ -29,15 +25,10 @@ _MOST: Final = 1 << 18
 
 
 class InterpreterLog:
-    """The three files."""
+    """The log as the files of a controller hold it: `files` has the text of each that there is."""
 
     def __init__(self) -> None:
-        self._text: dict[str, str] = {}
-
-    @property
-    def files(self) -> dict[str, str]:
-        """The text of each file that there is."""
-        return dict(self._text)
+        self.files: dict[str, str] = {}
 
     def add(self, last_executed: int, number: int, statements: str) -> None:
         """Append a line that was acknowledged."""
@@ -45,16 +36,16 @@ class InterpreterLog:
 
     def move(self) -> None:
         """All was cleared: the file takes the place of the one before."""
-        if _CURRENT in self._text:
-            self._text[_BEFORE] = self._text.pop(_CURRENT)
+        if _CURRENT in self.files:
+            self.files[_BEFORE] = self.files.pop(_CURRENT)
 
     def save(self) -> None:
         """The mode ended without clearing: the file is appended to what is saved."""
-        if _CURRENT in self._text:
-            self._append(_SAVED, self._text.pop(_CURRENT).removeprefix(_FIRST_LINE))
+        if _CURRENT in self.files:
+            self._append(_SAVED, self.files.pop(_CURRENT).removeprefix(_FIRST_LINE))
 
     def _append(self, name: str, text: str) -> None:
-        self._text[name] = (self._text.get(name, _FIRST_LINE) + text)[-_MOST:]
+        self.files[name] = (self.files.get(name, _FIRST_LINE) + text)[-_MOST:]
 
 
 # Until a line that calls one of these has ended, no further line is compiled: its names may be gone then.
@@ -73,7 +64,7 @@ class InterpreterQueue:
         last_executed: id of the last line that began to run; 0 for none, here and below.
         last_interpreted: id of the last line that was compiled.
         last_cleared: id of the last line that was cleared.
-        is_ending: the mode ends when the present line has ended.
+        is_ending: the mode ends when the present line has ended; programs set it, and the next.
         is_clearing: all is cleared when the present line has ended.
         clears_on_end: all is cleared when the mode ends.
     """
@@ -143,16 +134,6 @@ class InterpreterQueue:
         if any(number == self._held_by for number, _ in self._ready):
             self._held_by = 0
         self._ready.clear()
-
-    # --- what programs do
-
-    def end(self) -> None:
-        """Leave the mode when the present line has ended; no effect while it is off."""
-        self.is_ending = self.is_on
-
-    def clear(self) -> None:
-        """Clear all when the present line has ended."""
-        self.is_clearing = True
 
     # --- what the main thread does
 

@@ -8,12 +8,19 @@ the range of their domain, and the clock as the time since the controller starte
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from protocol.rtde.types import RobotStatusBits
 from protocol.ur_types import SafetyMode
-from ur_emulator.machine.controller.io.lines import CONFIGURABLE, N_EUROMAP, STANDARD, STANDARD_AND_TOOL, TOOL
+from ur_emulator.machine.controller.io.lines import (
+    CONFIGURABLE,
+    N_EUROMAP,
+    STANDARD,
+    STANDARD_AND_TOOL,
+    TOOL,
+    AnalogLine,
+)
 from ur_emulator.machine.controller.io.registers import FIRST_GENERAL, N_BOOLEAN, N_GENERAL
 from ur_emulator.machine.controller.robot_mode import POWERED
 from ur_emulator.machine.controller.safety.modes import EMERGENCY_MODES
@@ -40,12 +47,11 @@ def box_word(word: int) -> int:
 
 def write_bits(bits: Sequence[int], forced: bool | None = None) -> Writer:
     """Write outputs from a word; with `forced`, only those whose bit is set, to that value."""
+    write_one = write_bit(bits, forced)
 
     def write(state: ControllerState, offset: int, value: int) -> None:
-        for i, bit in enumerate(bits):
-            is_set = bool(value >> i & 1)
-            if forced is None or is_set:
-                state.io.write_digital_out(bit, is_set if forced is None else forced)
+        for i in range(len(bits)):
+            write_one(state, i, value >> i & 1)
 
     return write
 
@@ -58,29 +64,6 @@ def write_bit(bits: Sequence[int], forced: bool | None = None) -> Writer:
             state.io.write_digital_out(bits[offset], bool(value) if forced is None else forced)
 
     return write
-
-
-# --- analogue lines, by the name of their list
-
-
-def analog_level(lines: str, index: int) -> Reader:
-    """Read a line as a part of its range, 0 to 65535."""
-    return lambda state, offset: float(getattr(state.io, lines)[index].ratio) * WORD_MAX
-
-
-def set_analog_level(lines: str, index: int) -> Writer:
-    """Set a line to a part of its range, 0 to 65535."""
-    return lambda state, offset, value: getattr(state.io, lines)[index].set_ratio(value / WORD_MAX)
-
-
-def analog_domain(lines: str, index: int) -> Reader:
-    """Read the domain of a line: 0 current, 1 voltage."""
-    return lambda state, offset: int(getattr(state.io, lines)[index].domain)
-
-
-def set_analog_domain(lines: str, index: int) -> Writer:
-    """Set the domain of a line."""
-    return lambda state, offset, value: getattr(state.io, lines)[index].set_domain(value & 1)
 
 
 def write_tool_voltage(state: ControllerState, offset: int, value: int) -> None:
@@ -114,7 +97,7 @@ def flag(state: ControllerState, offset: int) -> int:
 
 def latch_clock(state: ControllerState, offset: int, value: int) -> None:
     """Remember the present time."""
-    state.modbus_map.latch_clock(state.clock.tick)
+    state.modbus_map.latched_tick = state.clock.tick
 
 
 def clock(state: ControllerState, offset: int) -> int:
@@ -156,27 +139,26 @@ class MapRow:
 
 
 def _analog_rows(first: int, what: str, lines: str, *, is_output: bool) -> tuple[MapRow, ...]:
-    """Two lines, each a level and then a domain."""
+    """Two lines, each a level as a part of its range and then a domain; `lines` names their list."""
     return tuple(
-        row
-        for i in (0, 1)
-        for row in (
-            MapRow(
-                first + 2 * i,
-                1,
-                f"{what} {i}, part of its range",
-                analog_level(lines, i),
-                set_analog_level(lines, i) if is_output else None,
-            ),
-            MapRow(
-                first + 2 * i + 1,
-                1,
-                f"its domain, {what} {i}: 0 current, 1 voltage",
-                analog_domain(lines, i),
-                set_analog_domain(lines, i),
-            ),
-        )
+        row for i in (0, 1) for row in _analog_line(first + 2 * i, f"{what} {i}", lines, i, is_output)
     )
+
+
+def _analog_line(first: int, what: str, lines: str, index: int, is_output: bool) -> tuple[MapRow, MapRow]:
+    def line(state: ControllerState) -> AnalogLine:
+        found: AnalogLine = getattr(state.io, lines)[index]
+        return found
+
+    def set_level(state: ControllerState, offset: int, value: int) -> None:
+        line(state).set_ratio(value / WORD_MAX)
+
+    return (
+        MapRow(first, 1, f"{what}, part of its range", lambda s, i: float(line(s).ratio) * WORD_MAX,
+            set_level if is_output else None),
+        MapRow(first + 1, 1, f"its domain, {what}: 0 current, 1 voltage", lambda s, i: int(line(s).domain),
+            lambda s, i, value: line(s).set_domain(value & 1)),
+    )  # fmt: skip
 
 
 REGISTERS: tuple[MapRow, ...] = (
@@ -198,8 +180,7 @@ REGISTERS: tuple[MapRow, ...] = (
     MapRow(31, 1, "configurable outputs", lambda s, i: CONFIGURABLE.levels(s.io.digital_out),
             write_bits(CONFIGURABLE.bits)),
     MapRow(32, 1, "configurable outputs to set", None, write_bits(CONFIGURABLE.bits, True)),
-    MapRow(33, 1, "configurable outputs to clear", None,
-            write_bits(CONFIGURABLE.bits, False)),
+    MapRow(33, 1, "configurable outputs to clear", None, write_bits(CONFIGURABLE.bits, False)),
     MapRow(34, 94, "reserved"),
     MapRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i],
             lambda s, i, word: s.modbus_map.write(i, word)),
@@ -242,8 +223,7 @@ COILS: tuple[MapRow, ...] = (
     MapRow(136, 8, "configurable outputs", lambda s, i: CONFIGURABLE.levels(s.io.digital_out) >> i & 1,
             write_bit(CONFIGURABLE.bits)),
     MapRow(144, 8, "configurable output to set", None, write_bit(CONFIGURABLE.bits, True)),
-    MapRow(152, 8, "configurable output to clear", None,
-            write_bit(CONFIGURABLE.bits, False)),
+    MapRow(152, 8, "configurable output to clear", None, write_bit(CONFIGURABLE.bits, False)),
     MapRow(260, 6, "power on, protective and emergency stop, teach and power button, any stop", flag),
     MapRow(300, N_BOOLEAN, "general purpose input booleans",
             lambda s, i: s.registers.inputs.booleans[i], write_gp_input),
@@ -255,57 +235,43 @@ def _by_address(rows: tuple[MapRow, ...]) -> dict[int, MapRow]:
     return {address: row for row in rows for address in range(row.first, row.first + row.count)}
 
 
-_REGISTER_AT = _by_address(REGISTERS)
-_COIL_AT = _by_address(COILS)
+_REGISTERS, _COILS = _by_address(REGISTERS), _by_address(COILS)
 
 
-def _row(rows: dict[int, MapRow], what: str, address: int) -> MapRow:
-    row = rows.get(address)
+def _row(is_coil: bool, address: int) -> MapRow:
+    row = (_COILS if is_coil else _REGISTERS).get(address)
     if row is None:
-        raise MapAddressError(f"there is no {what} {address} in the robot's Modbus map")
+        raise MapAddressError(
+            f"there is no {'bit' if is_coil else 'register'} {address} in the robot's Modbus map"
+        )
     return row
 
 
 def read_register(state: ControllerState, address: int) -> int:
     """Return a register, 0 to 65535; MapAddressError if there is none."""
-    row = _row(_REGISTER_AT, "register", address)
+    row = _row(False, address)
     return 0 if row.read is None else round(row.read(state, address - row.first)) & WORD_MAX
-
-
-def write_register(state: ControllerState, address: int, value: int) -> bool:
-    """Write a register, of which the low 16 bits count; False if it can only be read.
-
-    MapAddressError if there is none.
-    """
-    return _write(_row(_REGISTER_AT, "register", address), state, address, value & WORD_MAX)
 
 
 def read_coil(state: ControllerState, address: int) -> bool:
     """Return a coil; MapAddressError if there is none."""
-    row = _row(_COIL_AT, "bit", address)
+    row = _row(True, address)
     return row.read is not None and bool(row.read(state, address - row.first))
-
-
-def write_coil(state: ControllerState, address: int, value: bool) -> bool:
-    """Write a coil; False if it can only be read. MapAddressError if there is none."""
-    return _write(_row(_COIL_AT, "bit", address), state, address, value)
 
 
 def can_write(is_coil: bool, address: int) -> bool:
     """Whether something can be written at an address; False also where there is nothing."""
-    row = (_COIL_AT if is_coil else _REGISTER_AT).get(address)
+    row = (_COILS if is_coil else _REGISTERS).get(address)
     return row is not None and row.write is not None
 
 
-def write_range(state: ControllerState, is_coils: bool, first: int, values: Iterable[int]) -> None:
-    """Write neighbouring addresses; those that cannot be written are left out."""
-    for address, value in enumerate(values, first):
-        if can_write(is_coils, address):
-            _write((_COIL_AT if is_coils else _REGISTER_AT)[address], state, address, value & WORD_MAX)
+def write(state: ControllerState, is_coil: bool, address: int, value: int) -> bool:
+    """Write a coil, or a register, of which the low 16 bits count; False if it can only be read.
 
-
-def _write(row: MapRow, state: ControllerState, address: int, value: int) -> bool:
+    MapAddressError if there is none.
+    """
+    row = _row(is_coil, address)
     if row.write is None:
         return False
-    row.write(state, address - row.first, value)
+    row.write(state, address - row.first, value & WORD_MAX)
     return True

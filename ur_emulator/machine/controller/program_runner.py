@@ -128,15 +128,15 @@ class ProgramRunner:
         if loaded:
             self._state.planning.motion_version = 1
         self._state.motion.begin_program()
-        self._state.io_configuration.program_started()
+        self._state.io_configuration.follow(True)
         self._state.interpreter.program_started()
-        self._state.force_sense.program_started(self._state.past.steady_cycles)
+        self._state.force_sense.zero_built_in(self._state.past.steady_cycles)
         self._state.events.append(events.ProgramStarted(program.name, self._primary))
 
     def stop(self, *, unscheduled: bool = False) -> None:
         """End the primary program, if one runs, and stop the arm, also on its last segment to a waypoint.
 
-        `unscheduled`: nobody wanted it, which the outputs that follow the program show.
+        `unscheduled`: an error or the safety system did, which the outputs that follow the program show.
         """
         if self._primary is not None:
             self._primary.kill()
@@ -173,7 +173,7 @@ class ProgramRunner:
             state = self._state
             state.motion.resume()
             state.watchdogs.restart(state.clock.tick)
-            state.io_configuration.program_started()
+            state.io_configuration.follow(True)
             state.events.append(events.ProgramResumed(self.name))
             self._enter(ProgramState.RESUMING)
 
@@ -220,7 +220,7 @@ class ProgramRunner:
             else:
                 program.kill()  # a secondary program has one cycle
         if self._primary is not None and (self._phase is _PLAYING or self._may_run()):
-            self._state.clock.advance_program()
+            self._state.clock.program_tick += 1
             status = self._primary.step()
             if status is not ProgramStatus.RUNNING:
                 has_failed = status is ProgramStatus.FAILED
@@ -234,7 +234,7 @@ class ProgramRunner:
         is_new = self._phase_since == state.clock.tick
         if self._phase is ProgramState.PAUSING and not is_new and state.motion.is_paused:
             self._enter(ProgramState.PAUSED)
-            state.io_configuration.program_stopped(unscheduled=self._is_unscheduled)
+            state.io_configuration.follow(False, unscheduled=self._is_unscheduled)
             state.events.append(events.ProgramPaused(self.name))
         if self._phase in _STANDS_STILL or state.motion.is_returning:
             return False
@@ -257,7 +257,7 @@ class ProgramRunner:
         self._primary = None
         self._state.compliance.program_ended()
         self._state.interpreter.program_ended()
-        self._state.io_configuration.program_stopped(unscheduled=unscheduled)
+        self._state.io_configuration.follow(False, unscheduled=unscheduled)
         self._state.watchdogs.clear()
-        self._state.error_settings.program_ended()
+        self._state.error_settings.pause_codes.clear()
         self._state.events.append(events.ProgramStopped(self.name))

@@ -1,6 +1,6 @@
 """SafetySystem: applies safety events: the mode changes, and arm, program and power follow.
 
-The tables are in `safety/modes.py`. `is_busy` is false in cycles in which nothing has to be done here.
+The tables are in `safety/modes.py`.
 """
 
 from collections.abc import Mapping
@@ -31,10 +31,7 @@ _REQUESTED_STOP = protective_stop(209, 0, "Protective stop requested")
 
 
 class SafetySystem:
-    """Applies safety events to the safety state, and its effects to arm, program and power.
-
-    While it `is_busy`, `step` must be called in every cycle; `watch` always.
-    """
+    """Applies safety events to the safety state, and its effects to arm, program and power."""
 
     def __init__(self, state: ControllerState, programs: ProgramRunner, plant: ArmPlant) -> None:
         self._state = state
@@ -50,24 +47,9 @@ class SafetySystem:
         self._is_beyond_trigger = False
         self._setpoints = SetpointCheck(state.robot, state.clock.period_s)
         self._joints = JointWatch(state.robot)
-        # What watches the measured state of a stiff arm, and of one that yields, in this order: the first
-        # that finds something stops the arm.
-        self._watchers_of_stiff = (self._watch_joints, self._watch_limits)
-        self._watchers = (*self._watchers_of_stiff, self._watch_compliance)
 
     @property
-    def is_busy(self) -> bool:
-        """True while `step` must be called in every cycle."""
-        return (
-            self._cut_after is not None
-            or bool(self.inputs.assigned)
-            or self._state.speed.limiter is not None
-            or self._watches_space
-            or self._state.safety.has(SafetyMode.RECOVERY)
-        )
-
-    @property
-    def is_stopping(self) -> bool:
+    def is_braking(self) -> bool:
         """True until the power is cut after an emergency stop."""
         return self._cut_after is not None
 
@@ -93,12 +75,12 @@ class SafetySystem:
         """Apply an event."""
         state, safety = self._state, self._state.safety
         before = safety.mode
-        was_stopping = self.is_stopping
+        was_braking = self.is_braking
         safety.apply(event, state.clock.time)
         if safety.mode is not before:
             state.events.append(SafetyModeChanged(int(safety.mode)))
             self._react(before)
-        if event.value.cuts_power or (was_stopping and modes.ROW[safety.mode].may_have_power):
+        if event.value.cuts_power or (was_braking and modes.ROW[safety.mode].may_have_power):
             self.cut_power()  # an emergency stop ends without power, however soon it is released
 
     def cut_power(self) -> None:
@@ -124,7 +106,7 @@ class SafetySystem:
         state = self._state
         if self.inputs.assigned:
             self.inputs.step(state.io.digital_in)
-        if self._watches_space:
+        if self._is_beyond_trigger or state.safety.limits.boundaries:
             self._watch_space()
         if state.safety.has(SafetyMode.RECOVERY) and self._is_in_range():
             self.handle(modes.SafetyEvent.RANGE_KEPT)
@@ -156,37 +138,24 @@ class SafetySystem:
         `control` is how the arm was driven, `running` whether it had power and its brakes were open.
         """
         state = self._state
-        requested = _REQUESTED_STOP if state.requests.take_protective_stop() else None
+        is_requested = state.requests.protective_stop
+        state.requests.protective_stop = False
         self._joints.count_saturation(sensed)
         if not state.safety.is_watched:
             return None
+        found = None
         if running:
-            for find_violation in self._watchers if control else self._watchers_of_stiff:
-                if violation := find_violation(sensed):
-                    return violation
-        return requested
-
-    def _watch_joints(self, sensed: PlantState) -> Violation | None:
-        state = self._state
-        plays = self._programs.runtime_state is ProgramState.PLAYING
-        may_hold = plays and state.error_settings.holds_high
-        return self._joints.find_violation(sensed, state.motion.target.qd, may_hold=may_hold)
-
-    def _watch_limits(self, sensed: PlantState) -> Violation | None:
-        state = self._state
-        limiter = state.speed.limiter
-        if limiter is None:
-            return None
-        return limiter.find_violation(sensed, state.past.snapshot.space, state.clock.period_s)
-
-    def _watch_compliance(self, sensed: PlantState) -> Violation | None:
-        return self._state.compliance.find_violation(sensed)
+            plays = self._programs.runtime_state is ProgramState.PLAYING
+            may_hold = plays and state.error_settings.holds_high
+            found = self._joints.find_violation(sensed, state.motion.target.qd, may_hold=may_hold)
+            if found is None and (limiter := state.speed.limiter) is not None:
+                space, period_s = state.past.snapshot.space, state.clock.period_s
+                found = limiter.find_violation(sensed, space, period_s)
+            if found is None and control:
+                found = state.compliance.find_violation(sensed)
+        return found or (_REQUESTED_STOP if is_requested else None)
 
     # --- space
-
-    @property
-    def _watches_space(self) -> bool:
-        return self._is_beyond_trigger or bool(self._state.safety.limits.boundaries)
 
     def _watch_space(self) -> None:
         """Let planes trigger reduced mode, and a boundary that is crossed be a violation."""

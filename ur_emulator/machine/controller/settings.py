@@ -1,9 +1,13 @@
-"""What programs declare: tool and payload, how moves are planned, errors and limits."""
+"""What programs declare: tool and payload, how moves are planned, errors and limits.
+
+Sources: URScript manual CB3 3.15, module motion; e-Series 5.22, motion versions, 5.24,
+jerk_gain_scaling_set, and 5.19, tool_wrench_limit_set.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import JOINT_NAMES
@@ -16,8 +20,9 @@ from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
 class Payload:
     """What the controller assumes at the flange: mass [kg], centre of gravity [m] in the flange frame.
 
-    `at_tcp`: no centre of gravity was given; it is the TCP, also after a later change of the TCP.
-    `inertia`: as declared, Ixx Iyy Izz Ixy Ixz Iyz about the centre of gravity [kg m^2].
+    `at_tcp`: no centre of gravity was given; it is the TCP, also after a later change of the TCP. Source:
+    URScript manual, set_payload.
+    `inertia`: as declared, Ixx Iyy Izz Ixy Ixz Iyz about the centre of gravity [kg m^2]; zero: not known.
     """
 
     mass: float = 0.0
@@ -61,22 +66,6 @@ class ToolSettings:
             self.change_payload(Payload(self.payload.mass, offset[:3], at_tcp=True))
         self.tcp_offset = offset
 
-    def set_payload(self, mass: float, cog: Vector3 | None) -> None:
-        """Set mass [kg] and centre of gravity [m]; None: the TCP, also that of a later `set_tcp`.
-
-        Source: URScript manual, set_payload.
-        """
-        at_tcp = cog is None
-        self.change_payload(Payload(mass, self.tcp_offset[:3] if cog is None else cog, at_tcp))
-
-    def set_payload_mass(self, mass: float) -> None:
-        """Set the mass [kg]; the centre of gravity stays, the inertia is no longer known."""
-        self.change_payload(replace(self.payload, mass=mass, inertia=ZERO6))
-
-    def set_payload_cog(self, cog: Vector3) -> None:
-        """Set the centre of gravity [m]; the mass stays, the inertia is no longer known."""
-        self.change_payload(Payload(self.payload.mass, cog))
-
     def change_payload(self, payload: Payload, cycles: int = 0) -> None:
         """Change the payload, at once or on a straight line over so many cycles."""
         self._change = (self.payload, payload, 0, cycles) if cycles > 1 else None
@@ -100,11 +89,6 @@ class ToolSettings:
         else:
             self.change_payload(after)
 
-
-# --- PlanningSettings: how programs want their moves to be planned
-#
-# Source: URScript manual e-Series 5.22, motion versions, 5.24, jerk_gain_scaling_set, and 5.19,
-# tool_wrench_limit_set.
 
 # Accelerations of jerk-limited moves change within this time at a gain of 1 [s]. Chosen.
 JERK_TIME = 0.1
@@ -140,20 +124,16 @@ class PlanningSettings:
         return JERK_TIME / self.jerk_gain
 
 
-# --- what programs have set up about errors and limits. Some settings are only kept: they have no effect here
-#
-# Source: URScript manual CB3 3.15, module motion.
-
 # Code of the log entry; the real one is not known.
 DEVIATION_CODE = 174
 
 
 @dataclass(slots=True)
 class ErrorSettings:
-    """Settings of `pause_on_error_code` and related builtins.
+    """Settings of `pause_on_error_code` and related builtins. Some have no effect here: they are only kept.
 
     Attributes:
-        pause_codes: (code, argument or None for any) at which the program pauses.
+        pause_codes: (code, argument or None for any) at which the present program pauses.
         warns_of_deviation: whether joints that deviate from the path are reported.
         deviation_threshold: part of the deviation limit at which to warn.
         transition_hardness: of safeguard stops and reduced mode: 0 hard, 1 soft.
@@ -169,10 +149,6 @@ class ErrorSettings:
     holds_high: bool = True
     _has_warned: bool = False
 
-    def program_ended(self) -> None:
-        """Forget the errors at which the program was to be paused."""
-        self.pause_codes.clear()
-
     def must_pause(self, events: Iterable[Event]) -> bool:
         """True when one of the events is an error code at which the program is to be paused."""
         return any(
@@ -187,12 +163,9 @@ class ErrorSettings:
         `position_error` (6,) is the delayed target minus the true position [rad].
         """
         error, joint = max((abs(error), joint) for joint, error in enumerate(position_error))
-        was_warned, self._has_warned = (
-            self._has_warned,
-            error > self.deviation_threshold * MAX_POSITION_DEVIATION,
-        )
+        was_warned = self._has_warned
+        self._has_warned = error > self.deviation_threshold * MAX_POSITION_DEVIATION
         if was_warned or not self._has_warned:
             return None
-        return ErrorReported(
-            DEVIATION_CODE, joint, ReportLevel.INFO, f"Large position deviation: {JOINT_NAMES[joint]}"
-        )
+        text = f"Large position deviation: {JOINT_NAMES[joint]}"
+        return ErrorReported(DEVIATION_CODE, joint, ReportLevel.INFO, text)

@@ -10,7 +10,7 @@ import math
 from typing import Any, NamedTuple
 
 from protocol.realtime.layout import SNAPSHOT_FIELDS
-from protocol.rtde.types import TimeScaleSource
+from protocol.rtde.types import RobotStatusBits, TimeScaleSource
 from protocol.ur_types import JointMode
 from ur_emulator.machine.controller import electrics
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
@@ -18,7 +18,7 @@ from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL
 from ur_emulator.machine.controller.io.registers import RegisterValues
 from ur_emulator.machine.controller.robot_mode import POWERED
 from ur_emulator.machine.controller.safety.limit_checks import MAX_POSITION_DEVIATION, torque_shares
-from ur_emulator.machine.controller.status_words import RUNNING_STATES, robot_status_bits, safety_status_bits
+from ur_emulator.machine.controller.status_words import RUNNING_STATES, safety_status_bits
 from ur_emulator.machine.models.robot_generation import Electrics
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
 
@@ -181,7 +181,9 @@ class Snapshot(_Fields):
     @property
     def robot_status_bits(self) -> int:
         """Power, program and buttons, as RobotStatusBits."""
-        return robot_status_bits(self.robot_mode, self.runtime_state) | self.buttons
+        power = RobotStatusBits.POWER_ON if self.robot_mode in POWERED else 0
+        running = RobotStatusBits.PROGRAM_RUNNING if self.runtime_state in RUNNING_STATES else 0
+        return int(power | running) | self.buttons
 
     @property
     def safety_status_bits(self) -> int:
@@ -256,13 +258,13 @@ class Snapshot(_Fields):
     @property
     def actual_current_window(self) -> Vector6:
         """By how much the currents may differ from their targets [A]: here only torques are limited."""
-        robot = self.space.robot
+        robot = self.space.arm.robot
         return six([tau / k for tau, k in zip(robot.tau_max, robot.torque_constant, strict=True)])
 
     @property
     def actual_current_as_torque(self) -> Vector6:
         """The joints' currents as torques [Nm]."""
-        constants = self.space.robot.torque_constant
+        constants = self.space.arm.robot.torque_constant
         return six([k * current for k, current in zip(constants, self.actual_current, strict=True)])
 
     @property
@@ -273,7 +275,7 @@ class Snapshot(_Fields):
     @property
     def collision_detection_ratio(self) -> float:
         """Greatest torque that a drive is asked for, as a share of what it has."""
-        return max(torque_shares(self.space.robot, self.joint_control_output))
+        return max(torque_shares(self.space.arm.robot, self.joint_control_output))
 
     @property
     def time_scale_source(self) -> int:

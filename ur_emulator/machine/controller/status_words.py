@@ -1,8 +1,7 @@
-"""The two words of status bits that RTDE publishes, as functions of the modes."""
+"""The safety status as RTDE publishes it in bits; which program states count as running."""
 
-from protocol.rtde.types import RobotStatusBits, SafetyStatusBits
+from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ProgramState, SafetyMode
-from ur_emulator.machine.controller.robot_mode import POWERED
 
 # A program counts as running until it stands still; paused it does not, nor when it has ended. Inferred from
 # a client that waits for both flags of the robot mode data to fall.
@@ -28,13 +27,6 @@ SAFETY_BITS: dict[int, int] = {
     SafetyMode.VIOLATION: int(SafetyStatusBits.VIOLATION | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
     SafetyMode.FAULT: int(SafetyStatusBits.FAULT | SafetyStatusBits.STOPPED_DUE_TO_SAFETY),
 }
-
-
-def robot_status_bits(robot_mode: int, runtime_state: int) -> int:
-    """Return `robot_status_bits` without the buttons of the pendant."""
-    power = RobotStatusBits.POWER_ON if robot_mode in POWERED else RobotStatusBits(0)
-    running = RobotStatusBits.PROGRAM_RUNNING if runtime_state in RUNNING_STATES else RobotStatusBits(0)
-    return int(power | running)
 
 
 def safety_status_bits(safety_status: int) -> int:

@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 from protocol.pose import Pose, pose_inv, pose_trans, rotvec_from_flat, rotvec_to_flat
 from ur_emulator.errors import KinematicsError
 from ur_emulator.machine.kinematics.closed_form import closed_form_inverse
-from ur_emulator.machine.models.calibration import NOMINAL, Calibration, calibrated_dh
-from ur_emulator.machine.models.joint_range import JointRange
 from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec
-from ur_emulator.machine.models.robot_model import RobotModel, Vector3, Vector6, six
+from ur_emulator.machine.models.robot_model import DhRow, JointRange, RobotModel, Vector3, Vector6, six
 from ur_hil.arithmetic import add_up
 
-# --- wrenches at other points
+# Of the inverse of a Jacobian. Chosen: changes joint speeds away from singularities by 1e-9 relative at most.
+_DAMPING = 1e-12 * np.eye(6)
+_POSITION_TOLERANCE = 1e-11  # m and rad; a tenth of what `inverse` promises
+_MAX_ITERATIONS = 20
+_NEAR = 0.3  # rad; a result of Newton's method this close to its start is on the same branch
+_LONGEST_STEP = 0.5  # rad; greatest step of Newton's method, for convergence near singularities
 
 
 def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> Vector6:
@@ -34,25 +37,14 @@ def moved_wrench(wrench: Vector6, of: Sequence[float], to: Sequence[float]) -> V
     return (fx, fy, fz, mx - ry * fz + rz * fy, my - rz * fx + rx * fz, mz - rx * fy + ry * fx)
 
 
-# --- the damped inverse of a Jacobian: joint speeds for a twist, finite at singularities too
-
-# Chosen: changes joint speeds away from singularities by 1e-9 relative at most.
-_DAMPING = 1e-12 * np.eye(6)
-
-
 def joint_speeds(jacobian: NDArray[np.float64], twist: NDArray[np.float64]) -> NDArray[np.floating]:
     """Return the joint speeds (6,) [rad/s] whose twist, `jacobian @ qd`, is closest to the one given.
 
-    The twist (6,) is linear first [m/s, rad/s]; a small displacement [m, rad] gives joint steps [rad].
+    Finite at singularities, too. The twist (6,) is linear first [m/s, rad/s]; a small displacement [m, rad]
+    gives joint steps [rad].
     """
     transposed = jacobian.T
     return np.linalg.solve(transposed @ jacobian + _DAMPING, transposed @ twist)
-
-
-_POSITION_TOLERANCE = 1e-11  # m and rad; a tenth of what `inverse` promises
-_MAX_ITERATIONS = 20
-_NEAR = 0.3  # rad; a result of Newton's method this close to its start is on the same branch
-_LONGEST_STEP = 0.5  # rad; greatest step of Newton's method, for convergence near singularities
 
 
 class CartesianState(NamedTuple):
@@ -79,7 +71,7 @@ class ArmModel:
     Not to be shared between threads: evaluation uses one scratch state.
 
     Args:
-        calibration: differences of this arm from the nominal one.
+        dh: its six rows; None: the nominal ones.
 
     Attributes:
         range: the joint ranges that `inverse` keeps; at first those of the robot.
@@ -89,10 +81,10 @@ class ArmModel:
     `tcp` in all methods: pose of the tool centre point in the flange frame; None for the flange itself.
     """
 
-    def __init__(self, robot: RobotModel, calibration: Calibration = NOMINAL) -> None:
+    def __init__(self, robot: RobotModel, dh: tuple[DhRow, ...] | None = None) -> None:
         self.robot = robot
-        self.calibration = calibration
-        self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
+        self.dh = robot.dh if dh is None else dh
+        self._model = arm_spec(robot, self.dh, (1.0,) * 6).compile()
         self._data = mujoco.MjData(self._model)
         data = self._data
         self._flange_link: int = self._model.body(LINKS[5]).id

@@ -66,13 +66,8 @@ def closed_form_inverse(
             for q3 in (fold, -fold):
                 q2 = atan2(v, u) - atan2(a3 * sin(q3), a2 + a3 * cos(q3))
                 angles = (q1, q2, q3, q234 - q2 - q3, q5, q6)
-                solutions.append(six([_wrap(angle) for angle in angles]))
+                solutions.append(six([(angle + pi) % (2.0 * pi) - pi for angle in angles]))
     return solutions
-
-
-def _wrap(angle: float) -> float:
-    """Bring an angle [rad] into [-pi, pi)."""
-    return (angle + pi) % (2.0 * pi) - pi
 
 
 def _acos(numerator: float, denominator: float) -> float | None:

@@ -4,34 +4,34 @@ Links are rows of mass, centre of mass, inertia and products of inertia, see `Li
 (its housing stands along y of its frame), upper arm (from the elbow, its origin, back to the shoulder along
 +x), forearm (from wrist 1 back to the elbow along +x), wrist 1 (from the forearm along +y to the axis of
 wrist 2), wrist 2 (from wrist 1 along -y to the axis of wrist 3), wrist 3 (the tool flange at the origin,
-facing +z).
+facing +z). `home_q`: elbow up, tool forward and 45 degrees down (a UR3: over the middle of the recommended
+work box); beside it, about where the flange is then [m].
+
+Sources of all three, cited by letter:
+ A  Universal Robots article "DH parameters for calculations of kinematics and dynamics", table of the arm.
+ C  User manual 3.13 of the arm (CB3) and "max joint torques" article, as collected in joint_limits.yaml of
+    UniversalRobots/Universal_Robots_ROS2_Description, config/ of the arm.
+ G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 """
 
 from math import pi
 
 from ur_emulator.machine.models.generations import CB3
-from ur_emulator.machine.models.robot_model import (
-    FIRST_TURN,
-    LAST_TURN,
-    RANGE_END,
-    Link,
-    Outline,
-    RobotModel,
-    dh_table,
-)
+from ur_emulator.machine.models.robot_model import RANGE_END, Link, Outline, RobotModel, dh_table
 
-# The UR3 of the CB3 generation. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR3 table).
-# B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur3/physical_parameters.yaml: cylinder
-#    estimates, because the vendor publishes no inertia tensors for the UR3 and calls its sisters' negligible.
-# C  UR3/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
+# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
+_FIRST_TURN, _LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
+
+
+# The UR3 of the CB3 generation. Its own sources:
+# B  physical_parameters.yaml beside C: cylinder estimates, because the vendor publishes no inertia tensors
+#    for the UR3 and calls its sisters' negligible.
 # D  Record files of a real UR3, 125 Hz (mkrssg/UniversalRobots, 2019): fits of the controller's own drive
 #    model, `target_current` against `target_moment` and `target_qd`, residual below .005 A; rotors from
 #    `target_moment`. Inferred: the slopes beyond the kink of shoulder, wrists 1 and 3, which no move reaches:
 #    as much smaller as the base's. The arm itself: base and wrist 2 need .54 and .36 A at .8 and .88 rad/s,
 #    the model says .50 and .40.
 # E  UR3/CB3 user manual 3.10, stopping times and distances of category 0 (183 deg/s, arm stretched, 3 kg).
-# G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 # H  Safety blocks of six real installations (3.5, 3.13, 3.15.8, 5.11).
 UR3 = RobotModel(
     name="ur3",
@@ -56,8 +56,8 @@ UR3 = RobotModel(
     ),
     tau_max=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),  # C
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # C: 180 and 360 deg/s
-    q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # H: wrist 3 has no position limit
-    q_max=(*(RANGE_END,) * 5, LAST_TURN),
+    q_min=(*(-RANGE_END,) * 5, _FIRST_TURN),  # H: wrist 3 has no position limit
+    q_max=(*(RANGE_END,) * 5, _LAST_TURN),
     armature=(0.6121, 0.6121, 0.2118, 0.0714, 0.0714, 0.0714),  # D
     viscous=(4.5, 5.1, 3.3, 0.5, 1.3, 0.8),  # D
     viscous_fast=(2.4, 2.7, 1.9, 0.3, 0.7, 0.4),  # D
@@ -70,23 +70,18 @@ UR3 = RobotModel(
     has_point_masses=True,  # D
     robot_type=3,  # client interface sheet, configuration data
     box_type=6,
-    # Elbow-up branch over the middle of the recommended work box, flange at about (.35, 0, .25) m.
-    home_q=(0.3944, -1.7645, -2.0996, -0.1030, 1.2950, 1.8570),
+    home_q=(0.3944, -1.7645, -2.0996, -0.1030, 1.2950, 1.8570),  # (.35, 0, .25)
 )
 
 
-# The UR5 of the CB3 generation. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR5 table); the DH
-#    rows are those of "serie 3" in the CB3 manual's appendix.
-# B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur5/physical_parameters.yaml: cylinder
-#    estimates, and where the links lie along the joint axes.
-# C  UR5/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
+# The UR5 of the CB3 generation; its DH rows are those of "serie 3" in the CB3 manual's appendix. Its own
+# sources:
+# B  physical_parameters.yaml beside C: cylinder estimates, and where the links lie along the joint axes.
 # D  A public script that fits runs at constant speed of a real UR5's base, .02 to .2 rad/s: 8.7 to 9.1 Nm and
 #    30 to 32.5 Nm s/rad, 13.6 Nm/A (O). Inferred: the same for shoulder and elbow, which have the same size;
 #    beyond the kink the share of the UR3's.
 # E  UR5/CB3 user manual 3.4.5, stopping times of category 0 (183 deg/s, arm stretched, 5 kg).
 # F  Static currents of a real UR5 against gravity: 7.5 to 7.9 Nm/A of the wrists (O).
-# G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 # H  Inferred from the joint sizes (3 for base, shoulder, elbow; 1 for the wrists): rotors as in the e-Series,
 #    which the UR3's equal; the wrists' friction is that of the UR3's elbow.
 UR5 = RobotModel(
@@ -124,21 +119,16 @@ UR5 = RobotModel(
     has_point_masses=True,  # inferred, as the UR3 and the UR5e
     robot_type=1,  # client interface sheet, configuration data
     box_type=4,
-    # Elbow up, tool forward and 45 degrees down, flange at about (.55, 0, .35) m.
-    home_q=(0.2238, -1.7062, -1.8784, -0.3550, 1.4132, 1.7304),
+    home_q=(0.2238, -1.7062, -1.8784, -0.3550, 1.4132, 1.7304),  # (.55, 0, .35)
 )
 
 
-# The UR10 of the CB3 generation. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR10 table).
-# B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur10/physical_parameters.yaml: tensors that the
-#    vendor took from its own simulator (here without their small products of inertia), and where the links
-#    lie along the joint axes.
-# C  UR10/CB3 user manual 3.13 and "max joint torques" article, as collected in joint_limits.yaml beside B.
+# The UR10 of the CB3 generation. Its own sources:
+# B  physical_parameters.yaml beside C: tensors that the vendor took from its own simulator (here without
+#    their small products of inertia), and where the links lie along the joint axes.
 # D  Currents of a real UR10 at .2, .5 and 1 rad/s: base .87 1.53 2.11, wrist 2 .28 .35 .46 A (O). Inferred:
 #    the same for the other joints of the size.
 # F  Drive gains identified on a real UR10 (unisa-acg/inverse-dynamics-solver) (O).
-# G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 # H  Inferred from the joint sizes (4 for base and shoulder, 3 for the elbow, 2 for the wrists): rotors as in
 #    the e-Series, which the UR3's equal; the elbow's friction is that of the UR5.
 UR10 = RobotModel(
@@ -175,8 +165,7 @@ UR10 = RobotModel(
     reach=1.3,
     robot_type=2,  # client interface sheet, configuration data
     box_type=5,
-    # Elbow up, tool forward and 45 degrees down, flange at about (.8, 0, .45) m.
-    home_q=(0.2250, -1.8005, -1.8700, -0.2692, 1.4124, 1.7312),
+    home_q=(0.2250, -1.8005, -1.8700, -0.2692, 1.4124, 1.7312),  # (.8, 0, .45)
 )
 
 # The first runs the software of the generation where no arm is named.

@@ -1,13 +1,19 @@
 """The arms with the software of the e-Series, in numbers, as in `cb3_arms`; first the sizes of their joints.
 
-Sources of the joints, cited by letter there:
- A  Fits of the controller's own drive model to logs of a real UR10e (dynamic_calibration of S. Mamedov) and a
+Sources, cited by letter; what only one arm has stands above it:
+ A  Universal Robots article "DH parameters for calculations of kinematics and dynamics", table of the arm.
+ B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.0, config/ of the arm (UR3e: 3.1.1): measured
+    inertia tensors, joint_limits.yaml.
+ C  Fits of the controller's own drive model to logs of a real UR10e (dynamic_calibration of S. Mamedov) and a
     real UR3e (dsn-2022-rad-artifact): target torque against target current. Size 2 is in both and agrees
     within 1 %.
- B  UniversalRobots/Universal_Robots_ROS2_Description, config/*/joint_limits.yaml.
- C  Assumed for the joints of the UR8 Long, UR15, UR18, UR20 and UR30, of which no log is known: the other
+ D  Assumed for the joints of the UR8 Long, UR15, UR18, UR20 and UR30, of which no log is known: the other
     sizes extrapolated by the rated torque. Rotor inertia grows with its power of 1.26; friction is
     proportional to it.
+ E  ros-industrial/universal_robot, ur_description/config/ of the arm: default_kinematics.yaml, the
+    controller's own table with its hash; physical_parameters.yaml: masses, centres and tensors, turned back
+    into the DH frames, and the offsets of the links, from which the outline follows; joint_limits.yaml.
+ G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -16,30 +22,12 @@ from typing import Any
 
 from ur_emulator.machine.models.cb3_arms import UR3, UR5, UR10
 from ur_emulator.machine.models.generations import E_SERIES
-from ur_emulator.machine.models.robot_model import (
-    FIRST_TURN,
-    LAST_TURN,
-    RANGE_END,
-    Link,
-    Outline,
-    RobotModel,
-    dh_table,
-    six,
-)
+from ur_emulator.machine.models.robot_model import Link, Outline, RobotModel, dh_table, six
 
 
 @dataclass(frozen=True, slots=True)
 class JointSize:
-    """What all joints of a size have in common, by names of `RobotModel`.
-
-    Attributes:
-        tau_max: largest torque [Nm].
-        torque_constant: joint torque per motor current, gear included [Nm/A].
-        armature: rotor and gear inertia as felt at the joint [kg m²].
-        coulomb: Coulomb friction [Nm].
-        viscous: viscous friction up to the kink [Nm s/rad].
-        viscous_fast: its slope beyond the kink [Nm s/rad].
-    """
+    """What all joints of a size have in common, by names, and in units, of `RobotModel`."""
 
     tau_max: float
     torque_constant: float
@@ -51,12 +39,12 @@ class JointSize:
 
 # tau_max, torque_constant, armature, coulomb, viscous, viscous_fast. Base and shoulder of a UR3e have nearly
 # the numbers of size 2; those of a UR15 have the torque of a UR20's elbow.
-SIZE_0 = JointSize(9.0, 3.600, 0.0712, 0.69, 0.61, 0.63)  # A, B: wrists of a UR3e
-SIZE_1 = JointSize(28.0, 7.571, 0.2118, 1.52, 2.08, 1.26)  # A, B: elbow of a UR3e
-SIZE_2 = JointSize(54.0, 10.763, 0.61, 3.15, 3.8, 2.6)  # A, B: wrists of a UR10e
-SIZE_3 = JointSize(150.0, 9.839, 1.93, 6.43, 12.2, 7.2)  # A, B: elbow of a UR10e
-SIZE_4 = JointSize(330.0, 11.976, 5.95, 16.9, 24.4, 9.8)  # A, B: base, shoulder of a UR10e
-WRIST_OF_UR15 = JointSize(70.0, 10.8, 0.85, 4.1, 4.9, 3.4)  # these five: B torque, C the rest
+SIZE_0 = JointSize(9.0, 3.600, 0.0712, 0.69, 0.61, 0.63)  # B, C: wrists of a UR3e
+SIZE_1 = JointSize(28.0, 7.571, 0.2118, 1.52, 2.08, 1.26)  # B, C: elbow of a UR3e
+SIZE_2 = JointSize(54.0, 10.763, 0.61, 3.15, 3.8, 2.6)  # B, C: wrists of a UR10e
+SIZE_3 = JointSize(150.0, 9.839, 1.93, 6.43, 12.2, 7.2)  # B, C: elbow of a UR10e
+SIZE_4 = JointSize(330.0, 11.976, 5.95, 16.9, 24.4, 9.8)  # B, C: base, shoulder of a UR10e
+WRIST_OF_UR15 = JointSize(70.0, 10.8, 0.85, 4.1, 4.9, 3.4)  # these five: B torque, D the rest
 ELBOW_OF_UR15 = JointSize(204.0, 9.8, 2.84, 8.7, 16.6, 9.8)
 WRIST_OF_UR20 = JointSize(107.0, 10.8, 1.44, 5.5, 8.0, 4.0)
 ELBOW_OF_UR20 = JointSize(433.0, 12.0, 8.4, 22.0, 32.0, 15.0)
@@ -68,14 +56,11 @@ def drives(*sizes: JointSize) -> dict[str, Any]:
     return {one.name: six([getattr(size, one.name) for size in sizes]) for one in fields(JointSize)}
 
 
-# The UR5e. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR5e table).
-# B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.0, config/ur5e: measured inertia tensors.
-# C  Drives by joint size (3, 3, 3, 1, 1, 1), see above.
-# D  Its own viscous friction: joint self-calibration of a real UR5e, warm, no load (INTO-CPS-Association/
-#    aurt): base .62 to .82 A at .07, .94 at .5, 1.36 at 1.5, 1.77 at 3.2 rad/s; wrist 2 likewise (O).
-_SIZE_3 = replace(SIZE_3, viscous=5.6, viscous_fast=3.3)  # D
-_SIZE_1 = replace(SIZE_1, viscous=1.7, viscous_fast=1.0)  # D
+# The UR5e. Its own viscous friction: joint self-calibration of a real UR5e, warm, no load
+# (INTO-CPS-Association/aurt): base .62 to .82 A at .07, .94 at .5, 1.36 at 1.5, 1.77 at 3.2 rad/s; wrist 2
+# likewise (O).
+_SIZE_3 = replace(SIZE_3, viscous=5.6, viscous_fast=3.3)
+_SIZE_1 = replace(SIZE_1, viscous=1.7, viscous_fast=1.0)
 
 UR5E = RobotModel(
     name="ur5e",
@@ -92,7 +77,7 @@ UR5E = RobotModel(
     ),
     outline=UR5.outline,
     qd_max=(pi,) * 6,  # B: 180 deg/s
-    **drives(_SIZE_3, _SIZE_3, _SIZE_3, _SIZE_1, _SIZE_1, _SIZE_1),  # C, D
+    **drives(_SIZE_3, _SIZE_3, _SIZE_3, _SIZE_1, _SIZE_1, _SIZE_1),
     stop_deceleration=13.0,  # as for the UR5
     servo_inertia=(3, 3.88, 2.73, 0.235, 0.217, 0.212),  # A, B
     payload_max=5.0,  # UR5e data sheet
@@ -100,15 +85,11 @@ UR5E = RobotModel(
     has_point_masses=True,  # A calls the tensors of UR3e and UR5e negligible
     robot_type=1,  # client interface sheet, configuration data
     box_type=4,
-    # Elbow up, tool forward and 45 degrees down, flange at about (.55, 0, .35) m.
-    home_q=(0.2817, -1.7391, -2.0296, -0.1784, 1.3730, 1.7726),
+    home_q=(0.2817, -1.7391, -2.0296, -0.1784, 1.3730, 1.7726),  # (.55, 0, .35)
 )
 
 
-# The UR3e. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR3e table).
-# B  UniversalRobots/Universal_Robots_ROS2_Description 3.1.1, config/ur3e: measured inertia tensors.
-# C  Drives by joint size (2, 2, 1, 0, 0, 0).
+# The UR3e.
 _SIZE_2 = replace(SIZE_2, torque_constant=10.827)  # C, of this arm
 
 UR3E = RobotModel(
@@ -126,9 +107,9 @@ UR3E = RobotModel(
     ),
     outline=UR3.outline,
     qd_max=(pi, pi, pi, 2 * pi, 2 * pi, 2 * pi),  # B: 180 and 360 deg/s
-    q_min=(*(-RANGE_END,) * 5, FIRST_TURN),  # wrist 3 is endless
-    q_max=(*(RANGE_END,) * 5, LAST_TURN),
-    **drives(_SIZE_2, _SIZE_2, SIZE_1, SIZE_0, SIZE_0, SIZE_0),  # C
+    q_min=UR3.q_min,  # wrist 3 is endless
+    q_max=UR3.q_max,
+    **drives(_SIZE_2, _SIZE_2, SIZE_1, SIZE_0, SIZE_0, SIZE_0),
     stop_deceleration=20.0,  # as for the UR3
     servo_inertia=(0.852, 0.917, 0.377, 0.0817, 0.0733, 0.0713),  # A, B
     payload_max=3.0,  # UR3e data sheet
@@ -136,8 +117,7 @@ UR3E = RobotModel(
     has_point_masses=True,  # C: its own log
     robot_type=3,  # UR client library
     box_type=6,
-    # Elbow up, tool forward and 45 degrees down, flange at about (0.35, 0, 0.25) m.
-    home_q=(0.4780, -1.6723, -2.1592, -0.1548, 1.2395, 1.9220),
+    home_q=(0.4780, -1.6723, -2.1592, -0.1548, 1.2395, 1.9220),  # (0.35, 0, 0.25)
 )
 
 
@@ -146,11 +126,7 @@ UR3E = RobotModel(
 UR7E = replace(UR5E, name="ur7e", title="UR7e", payload_max=7.5, first_version="5.22.0")
 
 
-# The UR10e. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR10e table).
-# B  The same article and UniversalRobots/Universal_Robots_ROS2_Description, config/ur10e: inertia tensors.
-# C  Drives by joint size (4, 4, 3, 2, 2, 2).
-# G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
+# The UR10e. Its inertia tensors are also those of A.
 UR10E = RobotModel(
     name="ur10e",
     title="UR10e",
@@ -166,28 +142,22 @@ UR10E = RobotModel(
     ),
     outline=replace(UR10.outline, upper_arm=(0.1762, 0.075), forearm=(0.0393, 0.06)),  # G
     qd_max=(2 * pi / 3, 2 * pi / 3, pi, pi, pi, pi),  # B: 120 and 180 deg/s
-    **drives(SIZE_4, SIZE_4, SIZE_3, SIZE_2, SIZE_2, SIZE_2),  # C
+    **drives(SIZE_4, SIZE_4, SIZE_3, SIZE_2, SIZE_2, SIZE_2),
     stop_deceleration=6.0,  # as for the UR10
     servo_inertia=(8.95, 10.2, 4.26, 0.656, 0.618, 0.61),  # A, B
     payload_max=10.0,  # PolyScope X user manual; labels of newer arms say 12.5
     reach=1.3,
     robot_type=2,  # UR client library
     box_type=5,
-    # Elbow up, tool forward and 45 degrees down, flange at about (0.7, 0, 0.25) m.
-    home_q=(0.2859, -1.9532, -2.2524, 0.2579, 1.3701, 1.7757),
+    home_q=(0.2859, -1.9532, -2.2524, 0.2579, 1.3701, 1.7757),  # (0.7, 0, 0.25)
 )
 
 
-# The UR12e: a UR10e for a greater payload, which says on the wire that it is a UR10e.
-# Sources: UR client library (type, first version), data sheet (payload).
+# The UR12e: likewise a UR10e, with the same sources.
 UR12E = replace(UR10E, name="ur12e", title="UR12e", payload_max=12.5, first_version="5.22.0")
 
 
-# The UR16e. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR16e table).
-# B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur16e: masses, centres and inertia tensors,
-#    turned back into the DH frames.
-# C  Drives by joint size (4, 4, 3, 2, 2, 2).
+# The UR16e. Its masses and centres are those of B, too, turned back into the DH frames.
 UR16E = replace(
     UR10E,
     name="ur16e",
@@ -207,25 +177,18 @@ UR16E = replace(
     reach=0.9,
     robot_type=4,  # UR client library
     box_type=16,
-    # Elbow up, tool forward and 45 degrees down, flange at about (0.6, 0, 0.4) m.
-    home_q=(0.3432, -1.8505, -2.0218, -0.0847, 1.3306, 1.8183),
+    home_q=(0.3432, -1.8505, -2.0218, -0.0847, 1.3306, 1.8183),  # (0.6, 0, 0.4)
 )
 
 
-# The UR15. Sources:
-# A  ros-industrial/universal_robot, ur_description/config/ur15/default_kinematics.yaml: the controller's own
-#    table, with its hash.
-# B  physical_parameters.yaml beside it: masses, centres and tensors, turned back into the DH frames; the
-#    offsets of the links, from which the outline follows.
-# C  Drives: torques and speeds of joint_limits.yaml there; the rest assumed, see above.
-# G  Rough outline: radii by the bounding boxes of a UR8 Long's parts (public notes on their STL files); only
-#    collisions depend on it.
+# The UR15. Radii of its outline: by the bounding boxes of a UR8 Long's parts (public notes on their STL
+# files).
 UR15 = RobotModel(
     name="ur15",
     title="UR15",
     generation=E_SERIES,
-    dh=dh_table(d1=0.2186, a2=-0.6475, a3=-0.5164, d4=0.1824, d5=0.1361, d6=0.1434),  # A
-    links=(  # B: mass, centre of mass and inertia
+    dh=dh_table(d1=0.2186, a2=-0.6475, a3=-0.5164, d4=0.1824, d5=0.1361, d6=0.1434),  # E
+    links=(  # E: mass, centre of mass and inertia
         Link(
             9.9883, (2.4e-5, -0.033309, 0.025304), (0.051334, 0.047702, 0.034263), (2.5e-5, -1.6e-5, 0.008805)
         ),
@@ -248,32 +211,27 @@ UR15 = RobotModel(
         wrist=(0.055, 0.045),
         flange=(-0.05, -0.046, 0.045),
     ),
-    qd_max=(pi, pi, 4 * pi / 3, 5 * pi / 3, 5 * pi / 3, 5 * pi / 3),  # C: 180, 240, 300 deg/s
-    **drives(ELBOW_OF_UR20, ELBOW_OF_UR20, ELBOW_OF_UR15, WRIST_OF_UR15, WRIST_OF_UR15, WRIST_OF_UR15),  # C
+    qd_max=(pi, pi, 4 * pi / 3, 5 * pi / 3, 5 * pi / 3, 5 * pi / 3),  # E: 180, 240, 300 deg/s
+    **drives(ELBOW_OF_UR20, ELBOW_OF_UR20, ELBOW_OF_UR15, WRIST_OF_UR15, WRIST_OF_UR15, WRIST_OF_UR15),
     stop_deceleration=6.0,  # assumed: as for the UR10, of the same reach
-    servo_inertia=(12.1, 14.9, 4.99, 0.915, 0.863, 0.851),  # A, B
+    servo_inertia=(12.1, 14.9, 4.99, 0.915, 0.863, 0.851),  # E
     payload_max=15.0,  # UR15 data sheet
     reach=1.3,
     robot_type=9,  # UR client library
     box_type=15,  # assumed: like the 16 of the UR16e
-    # Elbow up, tool forward and 45 degrees down, flange at about (0.75, 0, 0.45) m.
-    home_q=(0.2851, -1.8504, -2.129, 0.0318, 1.3707, 1.7751),
+    home_q=(0.2851, -1.8504, -2.129, 0.0318, 1.3707, 1.7751),  # (0.75, 0, 0.45)
     first_version="5.22.0",  # script of the UR client library that starts the maker's simulator
 )
 
 
-# The UR8 Long. Sources:
-# A  ros-industrial/universal_robot, ur_description/config/ur8long/default_kinematics.yaml: the controller's
-#    own table, with its hash.
-# B  physical_parameters.yaml beside it, as for the UR15.
-# C  Assumed, no list of its limits is known: drives and speeds of the UR15, whose shoulder and wrists it has;
-#    base and shoulder turn no faster than a UR20's, of the same reach.
+# The UR8 Long. Assumed, no list of its limits is known: drives and speeds of the UR15, whose shoulder and
+# wrists it has; base and shoulder turn no faster than a UR20's, of the same reach.
 UR8LONG = replace(
     UR15,
     name="ur8long",
     title="UR8 Long",
-    dh=dh_table(d1=0.2186, a2=-0.8989, a3=-0.7149, d4=0.1824, d5=0.1361, d6=0.1434),  # A
-    links=(  # B: mass, centre of mass and inertia; shoulder and wrists are the UR15's
+    dh=dh_table(d1=0.2186, a2=-0.8989, a3=-0.7149, d4=0.1824, d5=0.1361, d6=0.1434),  # E
+    links=(  # E: mass, centre of mass and inertia; shoulder and wrists are the UR15's
         UR15.links[0],
         Link(
             17.0738,
@@ -284,30 +242,25 @@ UR8LONG = replace(
         Link(7.6393, (0.416102, 5.8e-5, 0.065663), (0.022148, 0.633274, 0.625889), (5.2e-5, 0.019779, 3e-6)),
         *UR15.links[3:],
     ),
-    qd_max=(2 * pi / 3, 2 * pi / 3, *UR15.qd_max[2:]),  # C
+    qd_max=(2 * pi / 3, 2 * pi / 3, *UR15.qd_max[2:]),
     stop_deceleration=5.0,  # assumed: the UR10's, scaled by the reach
-    servo_inertia=(16.6, 24.0, 7.13, 0.916, 0.863, 0.851),  # A, B
+    servo_inertia=(16.6, 24.0, 7.13, 0.916, 0.863, 0.851),  # E
     payload_max=8.0,  # the name; newer lists say 10, with the load below the flange
     reach=1.75,
     robot_type=6,  # UR client library
     box_type=8,  # assumed: like the 16 of the UR16e
-    # Elbow up, tool forward and 45 degrees down, flange at about (1.05, 0, 0.6) m.
-    home_q=(0.1935, -1.8987, -1.9484, -0.0894, 1.4345, 1.7084),
+    home_q=(0.1935, -1.8987, -1.9484, -0.0894, 1.4345, 1.7084),  # (1.05, 0, 0.6)
     first_version="5.23.0",  # script of the UR client library that starts the maker's simulator
 )
 
 
-# The UR18. Sources:
-# A  ros-industrial/universal_robot, ur_description/config/ur18/default_kinematics.yaml: the controller's own
-#    table, with its hash.
-# B  physical_parameters.yaml beside it, as for the UR15.
-# C  Drives and speeds of the UR15: Universal_Robots_ROS2_Description, config/ur18/joint_limits.yaml.
+# The UR18. B: it has drives and speeds of the UR15.
 UR18 = replace(
     UR15,
     name="ur18",
     title="UR18",
-    dh=dh_table(d1=0.2186, a2=-0.475, a3=-0.3389, d4=0.1824, d5=0.1361, d6=0.1434),  # A
-    links=(  # B: mass, centre of mass and inertia; shoulder and wrists are the UR15's
+    dh=dh_table(d1=0.2186, a2=-0.475, a3=-0.3389, d4=0.1824, d5=0.1361, d6=0.1434),  # E
+    links=(  # E: mass, centre of mass and inertia; shoulder and wrists are the UR15's
         UR15.links[0],
         Link(
             14.2009,
@@ -319,22 +272,17 @@ UR18 = replace(
         *UR15.links[3:],
     ),
     stop_deceleration=8.0,  # assumed: the UR10's, scaled by the reach
-    servo_inertia=(10.7, 11.8, 3.81, 0.915, 0.863, 0.851),  # A, B
+    servo_inertia=(10.7, 11.8, 3.81, 0.915, 0.863, 0.851),  # E
     payload_max=18.0,  # UR18 data sheet
     reach=0.95,
     robot_type=5,  # UR client library
     box_type=18,  # assumed: like the 16 of the UR16e
-    # Elbow up, tool forward and 45 degrees down, flange at about (0.6, 0, 0.4) m.
-    home_q=(0.3745, -1.8885, -2.1327, 0.0584, 1.3092, 1.8419),
+    home_q=(0.3745, -1.8885, -2.1327, 0.0584, 1.3092, 1.8419),  # (0.6, 0, 0.4)
     first_version="5.23.0",  # script of the UR client library that starts the maker's simulator
 )
 
 
-# The UR20. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR20 table).
-# B  The same article and UniversalRobots/Universal_Robots_ROS2_Description, config/ur20: inertia tensors.
-# C  Drives: assumed, see the joints above.
-# G  Rough outline (tube and housing radii), assumed; only collisions depend on it.
+# The UR20. Its inertia tensors are also those of A.
 UR20 = RobotModel(
     name="ur20",
     title="UR20",
@@ -357,31 +305,27 @@ UR20 = RobotModel(
         flange=(-0.056, -0.052, 0.05),
     ),
     qd_max=(2 * pi / 3, 2 * pi / 3, 5 * pi / 6, 7 * pi / 6, 7 * pi / 6, 7 * pi / 6),  # B: 120, 150, 210 deg/s
-    **drives(BASE_OF_UR20, BASE_OF_UR20, ELBOW_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20),  # C
+    **drives(BASE_OF_UR20, BASE_OF_UR20, ELBOW_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20, WRIST_OF_UR20),
     stop_deceleration=5.0,  # assumed: the UR10's, scaled by the reach
     servo_inertia=(27.6, 37.2, 14.7, 1.57, 1.46, 1.44),  # A, B
     payload_max=20.0,  # UR20 data sheet
     reach=1.75,
     robot_type=7,  # UR client library
     box_type=20,  # assumed: like the 16 of the UR16e
-    # Elbow up, tool forward and 45 degrees down, flange at about (1.05, 0, 0.6) m.
-    home_q=(0.2153, -1.8582, -1.9758, -0.1047, 1.4192, 1.7242),
+    home_q=(0.2153, -1.8582, -1.9758, -0.1047, 1.4192, 1.7242),  # (1.05, 0, 0.6)
     first_version="5.14.0",
 )
 
 
-# The UR30. Sources:
-# A  Universal Robots article "DH parameters for calculations of kinematics and dynamics" (UR30 table).
-# B  UniversalRobots/Universal_Robots_ROS2_Description, config/ur30: masses and centres, turned back into the
-#    DH frames. Its tensors are a copy of another arm's and not used.
-# D  Assumed: the tensors of the UR20; those of the arm's tubes scaled by mass and length, of wrist 3 by mass.
-# C  Drives: assumed, see the joints above.
+# The UR30. Its masses and centres are those of B, turned back into the DH frames. The tensors there are a
+# copy of another arm's and not used. Assumed: those of the UR20; of the arm's tubes scaled by mass and
+# length, of wrist 3 by mass.
 UR30 = replace(
     UR20,
     name="ur30",
     title="UR30",
     dh=dh_table(d1=0.2363, a2=-0.637, a3=-0.5037, d4=0.201, d5=0.1593, d6=0.1543),  # A
-    links=(  # B: mass, centre of mass. D: inertia
+    links=(  # B: mass, centre of mass; inertia assumed
         Link(16.343, (-0.0001, -0.06, 0.0069), (0.08866, 0.07632, 0.08418), (-0.00011, -0.00011, 0.0072)),
         Link(28.542, (0.3894, 0.0, 0.2103), (0.1413, 2.4543, 2.4379), (0.00014, -0.03675, 0.00003)),
         Link(7.156, (0.2257, 0.0, 0.0629), (0.02372, 0.3288, 0.3269), (-0.00003, -0.01819, -0.00001)),
@@ -395,8 +339,7 @@ UR30 = replace(
     reach=1.3,
     robot_type=8,  # UR client library
     box_type=30,  # assumed: like the 16 of the UR16e
-    # Elbow up, tool forward and 45 degrees down, flange at about (0.75, 0, 0.5) m.
-    home_q=(0.3190, -1.7911, -2.1424, -0.0193, 1.3472, 1.8002),
+    home_q=(0.3190, -1.7911, -2.1424, -0.0193, 1.3472, 1.8002),  # (0.75, 0, 0.5)
     first_version="5.15.0",
 )
 

@@ -282,5 +282,3 @@ POOR = replace(
     friction_error=0.30,
     mass_error=0.04,
 )
-
-FIDELITIES = (EXACT, IDEAL, TYPICAL, POOR)

@@ -11,27 +11,14 @@ Sources of the electrics and fidelities of the e-Series, cited by letter below:
 from dataclasses import replace
 from datetime import datetime
 from math import radians
-from types import MappingProxyType
 from typing import Any
 
-from protocol.dashboard.commands import COMMANDS
-from protocol.primary.layout import SUB_PACKAGES
-from protocol.realtime.layout import COLUMNS, VERSIONS
 from protocol.robot_api import CALLS
-from protocol.rtde.fields import INPUTS, OUTPUTS
 from protocol.ur_types import SoftwareVersion
-from ur_emulator.machine.models.fidelity import (
-    EXACT,
-    FIDELITIES,
-    IDEAL,
-    POOR,
-    REVERSAL_SPEED,
-    TYPICAL,
-    Ripple,
-)
+from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, REVERSAL_SPEED, TYPICAL, Ripple
 from ur_emulator.machine.models.robot_generation import Builds, Electrics, ForceSensing, RobotGeneration
-from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits, SafetyLimits
-from urscript.catalogue import ALL_ROWS, STEP_TIME, Generation
+from ur_emulator.machine.models.safety_limits import ArmLimits, SafetyLimits
+from urscript.catalogue import STEP_TIME, Generation
 
 _CB3_BUILDS: Builds = (
     (SoftwareVersion(3, 0), 15547, datetime(2014, 6, 1)),  # build: public issues name 3.0.15547; date chosen
@@ -54,11 +41,8 @@ CB3 = RobotGeneration(
         recovery_speed=radians(30.0),  # UR3 and UR5/CB3 user manuals
         speed_margin=0.2,  # safety blocks of real installations: 191.5 and 371.5 deg/s
         acceleration=40.0,  # not known; that of a UR5e capture
-        reduced=UNLIMITED,  # chosen: only joint speeds are limited
-        recovery=UNLIMITED,  # likewise
-        manual=UNLIMITED,
+        # Chosen: in reduced and recovery mode only joint speeds are limited.
         has_programs_in_recovery=True,  # chosen
-        brakes_within_torque=False,
     ),
     electrics=Electrics(
         main_voltage=48.13,  # recordings of a resting arm
@@ -83,19 +67,8 @@ CB3 = RobotGeneration(
     execution_time=0.0,  # chosen: the unit is not known
     run_up_time=0.16,  # recordings of a real UR3 and of the maker's simulator: .05 in each of 20 cycles
     gravity=9.82,  # recordings of a real UR3: `target_moment` at rest
-    reports_control_as_target=False,
-    has_operational_modes=False,
-    has_remote_control=False,
-    fidelities=FIDELITIES,
+    fidelities=(EXACT, IDEAL, TYPICAL, POOR),
     robot_subtype=2,
-    dashboard=COMMANDS,
-    realtime=COLUMNS,
-    frame_sizes=VERSIONS,
-    sub_packages=SUB_PACKAGES,
-    rtde_outputs=OUTPUTS,
-    rtde_inputs=INPUTS,
-    builtins=ALL_ROWS,
-    interpreter_since=None,
 )
 
 
@@ -140,15 +113,12 @@ _TYPICAL = replace(
     voltage_offset=0.15,  # A: 47.5-47.8
     **_SIGNALS,
 )
-_IDEAL = replace(
-    IDEAL, dead_time=0.0, drive_lag=0.0, feedback_age=0.002, force_sigma=0.01, speed_least=_SMALLEST_SPEED
-)
-_EXACT = replace(EXACT, dead_time=0.0, drive_lag=0.0, feedback_age=0.002)
+_IDEAL = replace(IDEAL, feedback_age=0.002, force_sigma=0.01, speed_least=_SMALLEST_SPEED)
+_EXACT = replace(EXACT, feedback_age=0.002)
 _POOR = replace(  # C
     POOR,
     dead_time=0.004,
     ripples=(Ripple(cycles=101.0, rms=0.016), Ripple(cycles=202.0, rms=0.012)),
-    drive_lag=0.002,
     feedback_age=0.004,
     force_offset=10.0,
     force_drift=0.012,
@@ -205,13 +175,6 @@ E_SERIES = RobotGeneration(
     has_remote_control=True,
     fidelities=(_EXACT, _IDEAL, _TYPICAL, _POOR),
     robot_subtype=3,
-    dashboard=COMMANDS,
-    realtime=COLUMNS,
-    frame_sizes=VERSIONS,
-    sub_packages=SUB_PACKAGES,
-    rtde_outputs=OUTPUTS,
-    rtde_inputs=INPUTS,
-    builtins=ALL_ROWS,
     interpreter_since=SoftwareVersion(5, 10),  # UR support page of interpreter mode: "SW 5.10 above"
 )
 
@@ -228,10 +191,8 @@ POLYSCOPE_X = replace(
     robot_api=CALLS,
     # Switched off until somebody enables them under Security, Services. To which 30002 and 30003 belong is
     # chosen.
-    services=MappingProxyType(
-        {
-            "primary": ("primary", "secondary", "realtime", "primary_ro", "secondary_ro", "realtime_ro"),
-            "rtde": ("rtde",),
-        }
-    ),
+    services={
+        "primary": ("primary", "secondary", "realtime", "primary_ro", "secondary_ro", "realtime_ro"),
+        "rtde": ("rtde",),
+    },
 )

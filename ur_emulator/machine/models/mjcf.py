@@ -14,7 +14,6 @@ from math import cos, sin
 import mujoco
 import numpy as np
 
-from ur_emulator.errors import ModelError
 from ur_emulator.machine.models.robot_model import DhRow, Link, RobotModel, Vector3
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
@@ -31,14 +30,7 @@ def arm_spec(robot: RobotModel, dh: Sequence[DhRow], mass_scale: Sequence[float]
     Returns:
         An editable specification with the joints JOINTS, the bodies LINKS and PAYLOAD (mass 0), and the
         site FLANGE at the tool flange.
-
-    Raises:
-        ModelError: when the number of rows or factors is not six.
     """
-    if len(dh) != 6 or len(mass_scale) != 6:
-        raise ModelError(
-            f"{len(dh)} DH rows and {len(mass_scale)} mass factors given: six of each are needed"
-        )
     spec = mujoco.MjSpec()
     spec.modelname = robot.name
     spec.option.gravity = [0.0, 0.0, -GRAVITY]

@@ -12,24 +12,20 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from protocol.dashboard.commands import DashboardCommand, commands_of
+from protocol.dashboard.commands import COMMANDS, DashboardCommand, commands_of
 from protocol.errors import LocalProtocolError
 from protocol.primary.framing import SubPackage
-from protocol.realtime.layout import RealtimeColumn, RealtimeLayout, frame_size
+from protocol.primary.layout import SUB_PACKAGES
+from protocol.realtime.layout import COLUMNS, VERSIONS, RealtimeColumn, RealtimeLayout, frame_size
 from protocol.robot_api import ApiCall, calls_of
-from protocol.rtde.fields import RtdeField, input_fields, output_fields
+from protocol.rtde.fields import INPUTS, OUTPUTS, RtdeField, input_fields, output_fields
 from protocol.ur_types import SoftwareVersion
 from ur_emulator.errors import ModelError
 from ur_emulator.machine.models.fidelity import Fidelity, read_fidelity
 from ur_emulator.machine.models.safety_limits import SafetyLimits
-from urscript.catalogue import Builtin, catalogue_for
+from urscript.catalogue import ALL_ROWS, Builtin, Catalogue, catalogue_for
 from urscript.catalogue.types import Version
-
-if TYPE_CHECKING:
-    from urscript.catalogue import Catalogue
-
 
 # First version, build and date of each row, the oldest first; software between two rows has the build and the
 # date of the earlier one.
@@ -46,9 +42,6 @@ class RobotGeneration:
         substep_us: physics step [us].
         major: first number of its software versions.
         default_version: what a box runs if the user names none.
-        builds: which version has which build.
-        electrics: of the box and its arms.
-        force_sensing: how its arms know the wrench at the flange.
         execution_time: run time of a control cycle without programs, as the box reports it [ms]; 0: it is
             always reported as 0.
         run_up_time: in which the time on the path of a program's first move runs up to its full rate [s].
@@ -57,7 +50,6 @@ class RobotGeneration:
         has_operational_modes: manual and automatic mode, enabling device, automatic-mode safeguard.
         has_remote_control: local control, in which clients may not command the box, and remote control.
         has_remote_in_manual: remote control is possible in manual mode.
-        fidelities: how far its arms are from perfect ones.
         robot_subtype: code in the primary interface's configuration data.
         dashboard: commands of the dashboard server; none: there is no such server.
         robot_api: calls of the Robot API; none: there is no such server.
@@ -65,8 +57,7 @@ class RobotGeneration:
         realtime: columns of the frames on port 30003.
         frame_sizes: first version of each size of these frames.
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
-        rtde_outputs: variables that a client can subscribe to.
-        rtde_inputs: variables that a client can write.
+        rtde_outputs, rtde_inputs: variables that a client can subscribe to, and write.
         interpreter_since: first version with the port for interpreter mode; None if there is none.
 
     Raises:
@@ -85,22 +76,22 @@ class RobotGeneration:
     execution_time: float
     run_up_time: float
     gravity: float
-    reports_control_as_target: bool
-    has_operational_modes: bool
-    has_remote_control: bool
+    reports_control_as_target: bool = False
+    has_operational_modes: bool = False
+    has_remote_control: bool = False
     has_remote_in_manual: bool = True
     fidelities: tuple[Fidelity, ...]
     robot_subtype: int
-    dashboard: tuple[DashboardCommand, ...]
+    dashboard: tuple[DashboardCommand, ...] = COMMANDS
     robot_api: tuple[ApiCall, ...] = ()
     services: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    realtime: tuple[RealtimeColumn, ...]
-    frame_sizes: tuple[tuple[SoftwareVersion, int], ...]
-    sub_packages: tuple[type[SubPackage], ...]
-    rtde_outputs: tuple[RtdeField, ...]
-    rtde_inputs: tuple[RtdeField, ...]
-    builtins: tuple[Builtin, ...]
-    interpreter_since: SoftwareVersion | None
+    realtime: tuple[RealtimeColumn, ...] = COLUMNS
+    frame_sizes: tuple[tuple[SoftwareVersion, int], ...] = VERSIONS
+    sub_packages: tuple[type[SubPackage], ...] = SUB_PACKAGES
+    rtde_outputs: tuple[RtdeField, ...] = OUTPUTS
+    rtde_inputs: tuple[RtdeField, ...] = INPUTS
+    builtins: tuple[Builtin, ...] = ALL_ROWS
+    interpreter_since: SoftwareVersion | None = None
 
     def __post_init__(self) -> None:
         if self.substep_us <= 0 or self.period_us <= 0 or self.period_us % self.substep_us:
@@ -235,8 +226,7 @@ class ForceSensing:
         bandwidth: pole of the measurement [Hz]; None: none shows.
         precision: force and moment that may be an error of a measurement that was not zeroed [N], [Nm].
         contact_force: a contact is a force that has risen by this [N].
-        least_averaging: time that is averaged at least to separate a zero from noise [s].
-        most_averaging: and at most [s].
+        least_averaging, most_averaging: time that is averaged to separate a zero from noise [s].
         filter_time: of force mode: time constant of its filter of the wrench [s].
         control_rate: of force mode: rate at which the force approaches the one asked for at gain scaling 1
             [1/s]. What the delay of the whole loop allows.

@@ -151,8 +151,13 @@ VISCOUS_KINK = 0.5
 RANGE_END = 2.0 * pi + radians(3.0)
 """[rad]"""
 
-# Ends where the installation sets no position limit: the least and the greatest number of revolutions [rad].
-FIRST_TURN, LAST_TURN = -(2**31) * 2.0 * pi, (2**31 - 1) * 2.0 * pi
+
+@dataclass(slots=True)
+class JointRange:
+    """Ends of the joint ranges in force [rad], for all who keep them: first of the arm, then as installed."""
+
+    q_min: Vector6
+    q_max: Vector6
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +172,7 @@ class RobotModel:
         links: six moving links.
         tau_max: largest joint torque [Nm].
         qd_max: rated joint speed, which moves are planned with [rad/s].
-        q_min: lower end of the joint range of the safety system [rad].
-        q_max: upper end of the joint range of the safety system [rad].
+        q_min, q_max: ends of the joint range of the safety system [rad].
         armature: rotor and gear inertia as felt at the joint [kg m²].
         viscous: viscous friction up to the kink [Nm s/rad].
         viscous_fast: its slope beyond the kink [Nm s/rad].
@@ -176,14 +180,11 @@ class RobotModel:
         torque_constant: joint torque per motor current, gear included [Nm/A].
         stop_deceleration: of the leading axis when the safety system or the end of a program stops the arm
             [rad/s²].
-        servo_frequency: natural frequency of the joint position loop [Hz].
-        servo_damping: damping ratio of that loop.
-        servo_inertia: inertia at the joint that the loop gains are laid out for: the diagonal of the arm's at
-            `home_q` with the armature [kg m²].
+        servo_inertia: inertia at the joint that the gains of its servo are laid out for: the diagonal of the
+            arm's at `home_q` with the armature [kg m²].
         payload_max: rated payload [kg].
         reach: rated reach [m].
-        robot_type: code in the primary interface's configuration data.
-        box_type: code of the control box, as above.
+        robot_type, box_type: codes of arm and control box in the primary interface's configuration data.
         home_q: a pose clear of the table, away from singularities [rad].
         first_version: oldest software that the maker has released for it; None: the generation's first.
         has_point_masses: the controller's model takes the links for points, without inertia tensors.
@@ -211,8 +212,6 @@ class RobotModel:
     home_q: Vector6
     q_min: Vector6 = (-RANGE_END,) * 6
     q_max: Vector6 = (RANGE_END,) * 6
-    servo_frequency: float = 25.0  # chosen: at 12 Hz an arm is further from its target than a real one
-    servo_damping: float = 0.9
     first_version: str | None = None
     has_point_masses: bool = False
 

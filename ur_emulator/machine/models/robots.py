@@ -13,14 +13,11 @@ import numpy as np
 from ur_emulator.errors import ModelError
 from ur_emulator.machine.models import cb3_arms, e_series_arms
 from ur_emulator.machine.models.generations import E_SERIES, POLYSCOPE_X
-from ur_emulator.machine.models.robot_model import RANGE_END, Link, RobotModel, Vector6, dh_table, six
+from ur_emulator.machine.models.robot_model import RANGE_END, RobotModel, Vector6, dh_table, six
 from ur_hil.input_files import MIB, FileKind
 from ur_hil.records import checked, number, record, text, word
 
 ROBOTS: dict[str, RobotModel] = {robot.name: robot for robot in (*cb3_arms.ARMS, *e_series_arms.ARMS)}
-
-# Software of another generation that the same arms run.
-_ALSO = {E_SERIES: POLYSCOPE_X}
 
 
 def robot_by_name(name: str, version: str | None = None) -> RobotModel:
@@ -32,9 +29,9 @@ def robot_by_name(name: str, version: str | None = None) -> RobotModel:
     robot = read_robot(Path(name)) if name.endswith(".toml") else ROBOTS.get(name.lower())
     if robot is None:
         raise ModelError(f"unknown robot {name!r}: choose one of {', '.join(ROBOTS)}, or give FILE.toml")
-    also = _ALSO.get(robot.generation)
-    if also is not None and version is not None and version.strip().startswith(f"{also.major}."):
-        return replace(robot, generation=also, first_version=None)
+    is_polyscope_x = version is not None and version.strip().startswith(f"{POLYSCOPE_X.major}.")
+    if is_polyscope_x and robot.generation is E_SERIES:
+        return replace(robot, generation=POLYSCOPE_X, first_version=None)
     return robot
 
 
@@ -141,18 +138,13 @@ def _problem(robot: RobotModel) -> str:
         if not low <= home <= high:
             return f"home_q: {home:g} of joint {joint} is not within {low:g} to {high:g}; give one that is"
     for field, link in zip(fields(LinkTables), robot.links, strict=True):
-        if not _is_body(link):
+        least, middle, greatest = np.linalg.eigvalsh(link.tensor)
+        if not (least > 0.0 and greatest <= (least + middle) * (1.0 + 1e-9)):
             return (
                 f"links.{field.name}.inertia: no body has these moments and products; each principal moment "
                 "is above 0 and at most the sum of the other two"
             )
     return ""
-
-
-def _is_body(link: Link) -> bool:
-    """Return whether a distribution of mass can have the inertia of a link."""
-    least, middle, greatest = np.linalg.eigvalsh(link.tensor)
-    return bool(least > 0.0 and greatest <= (least + middle) * (1.0 + 1e-9))
 
 
 def _servo_inertia(robot: RobotModel) -> Vector6:

@@ -57,9 +57,9 @@ class SafetyLimits:
     recovery_speed: float
     speed_margin: float
     acceleration: float
-    reduced: ArmLimits
-    recovery: ArmLimits
-    manual: ArmLimits
+    reduced: ArmLimits = UNLIMITED
+    recovery: ArmLimits = UNLIMITED
+    manual: ArmLimits = UNLIMITED
     has_programs_in_recovery: bool
     clamping_distance: float = 0.0
-    brakes_within_torque: bool
+    brakes_within_torque: bool = False

@@ -85,8 +85,7 @@ class Contact:
     """A point in which two bodies press on each other.
 
     Attributes:
-        first: name of a body: of a link, a tool, an obstacle, a thing, "table", "base" or "scene".
-        second: likewise.
+        first, second: names of bodies: a link, a tool, an obstacle, a thing, "table", "base" or "scene".
         position: in the base frame [m].
         force: on the second body, in the base frame [N].
     """

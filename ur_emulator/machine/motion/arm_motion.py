@@ -1,15 +1,8 @@
 """The motion of the arm: along the path of the program, displaced by overlays; its pauses and its stops.
 
-`ownership.TABLE` says who has the arm and what takes it from whom: here is what computes the set-point. The
-rules are the controller's behaviour as users report it:
-
-* only one script thread moves the arm at a time; a second one gets "Another thread is already controlling
-  the robot";
-* ownership ends when the motion has brought the arm to rest, or when the owner ends or is killed;
-* a velocity command must be renewed in every cycle: when the next `speedj` is late the arm begins to stop
-  (drivers that stream too slowly see a stutter), and when the program ends it stops.
-
-Must not know scripts or physics: an owner is any object, compared by identity.
+`ownership.TABLE` says who has the arm and what takes it from whom: here is what computes the set-point. Only
+one script thread moves the arm at a time. Must not know scripts or physics: an owner is any object, compared
+by identity.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -61,10 +54,11 @@ class ArmMotion:
         state: what the arm does along the path.
         path: target along the path of the program, which generators work on.
         target: of the joints; the same object as `path` unless overlays displace it or a hand guides the arm.
+        overlays: those that are active, to be asked only.
         scale: speed scaling of the last cycle, 0..1.
         scaling_rate: rate of change of the speed scaling [1/s].
         braking: gives the greatest deceleration of the leading axis [rad/s^2] that the drives can give in a
-            stop, in the direction of the path's velocity; None: a stop brakes as it was asked to.
+            stop, in the direction of the path's velocity; at first infinite.
     """
 
     def __init__(
@@ -82,7 +76,7 @@ class ArmMotion:
         """
         self.stop_deceleration = stop_deceleration
         self.path = self.target = JointTarget(q)
-        self.braking: Callable[[JointTarget], float] | None = None
+        self.braking: Callable[[JointTarget], float] = lambda target: inf
         self.scaling_rate = SCALING_RATE
         self.scale = 1.0
         self.state = ArmState.HOLDING
@@ -96,9 +90,7 @@ class ArmMotion:
         self._run_up_time = run_up_time
         self._begins_program = False
         self._chain = OverlayChain()
-        self._overlays = self._chain.overlays
-        # Overlays, or time that is not normal: a single test in the hot path.
-        self._is_special = False
+        self.overlays = self._chain.overlays
 
     # --- what others ask
 
@@ -124,7 +116,7 @@ class ArmMotion:
         """True while a command, a ramp or an overlay moves the arm, unless a pause has stopped it."""
         if self.state is _BY_HAND:
             return self._command is not None and not self._time.paused
-        return (self.state not in _AT_REST or bool(self._overlays)) and not self.is_paused
+        return (self.state not in _AT_REST or bool(self.overlays)) and not self.is_paused
 
     @property
     def is_paused(self) -> bool:
@@ -154,8 +146,8 @@ class ArmMotion:
 
     def way_to_rest(self, target: JointTarget) -> Iterator[Vector6]:
         """Yield the joint angles half way and at rest if the arm was stopped at a target [rad]."""
-        allowed = inf if self.braking is None else self.braking(target)
-        braking_time = max(map(abs, target.qd)) / (2.0 * min(self.stop_deceleration, allowed))
+        deceleration = min(self.stop_deceleration, self.braking(target))
+        braking_time = max(map(abs, target.qd)) / (2.0 * deceleration)
         for share in (0.5, 1.0):
             time = share * max(braking_time, _LEAST_LOOK_AHEAD)
             yield six([q + qd * time for q, qd in zip(target.q, target.qd, strict=True)])
@@ -190,7 +182,6 @@ class ArmMotion:
             self._begins_program = False
             if kind is Kind.MOVE:
                 self._time.begin(1.0 / self._run_up_time, runs_up=True)
-                self._is_special = True
         return command
 
     def release(self, owner: object) -> None:
@@ -219,7 +210,7 @@ class ArmMotion:
         time, generator = self._time, None if self._command is None else self._command.generator
         if time.paused:
             return
-        time.paused = self._is_special = True
+        time.paused = True
         self._delay.clear()
         speed = max(map(abs, self.target.qd))
         time.slowing = max(PAUSE_RATE, deceleration * time.factor / speed if speed > 0.0 else 0.0)
@@ -227,7 +218,7 @@ class ArmMotion:
             self._go(Event.PAUSE, StopJ(deceleration) if deceleration else generator.when_paused())
         else:
             self._go(Event.PAUSE)
-        if self.state not in _IN_TIME and not self._overlays:
+        if self.state not in _IN_TIME and not self.overlays:
             time.factor = 0.0
 
     def resume(self) -> None:
@@ -241,17 +232,14 @@ class ArmMotion:
         self._turn_back()
 
     def interrupt(self) -> None:
-        """Pause by a stop that leaves the path.
-
-        Overlays end, and with them a move that they displace.
-        """
+        """Pause by a stop that leaves the path. Overlays end, and with them a move that they displace."""
         self.let_go()
-        if self._overlays:
+        if self.overlays:
             if self.move is not None:
                 self._brake(Event.TAKEN)
             self._drop_overlays()
         self._brake(Event.INTERRUPT)
-        self._time.paused = self._is_special = True
+        self._time.paused = True
         self._time.factor = 0.0
 
     def abort(self) -> None:
@@ -330,18 +318,13 @@ class ArmMotion:
     def add_overlay(self, overlay: Overlay) -> None:
         """Add an overlay from the next cycle on, after those that are active already."""
         self._chain.add(overlay, self.target)
-        self._is_special = True
-
-    def has_overlay(self, overlay: Overlay) -> bool:
-        """True while an overlay is active."""
-        return overlay in self._overlays
 
     def remove_overlay(self, overlay: Overlay) -> None:
         """End an overlay, if it is active; the arm keeps its last displacement.
 
         A move or another overlay continues with that displacement.
         """
-        if overlay in self._overlays:
+        if overlay in self.overlays:
             self._chain.keep_last(overlay)
             if self._chain.all_ended and self.move is None:
                 self._drop_overlays()
@@ -349,7 +332,7 @@ class ArmMotion:
 
     def _drop_overlays(self) -> None:
         """End all overlays; the path continues from the displaced target."""
-        if self._overlays:
+        if self.overlays:
             self._chain.clear()
             self.path = self.target
 
@@ -379,7 +362,6 @@ class ArmMotion:
         if was is ArmState.RETURNING:
             self._ramp = StopJ(self.stop_deceleration)
             self._time.begin(PAUSE_RATE)
-            self._is_special = True
         self._turn_back()
         if is_paused:
             self._go(Event.PAUSE)
@@ -403,10 +385,10 @@ class ArmMotion:
         `scale` is the commanded speed scaling, 0..1; during a motion it is reached gradually.
         UnreachableError if the arm cannot reach the path there.
         """
+        path, before, time = self.path, self.target, self._time
         advance = rate = 1.0
-        if self._is_special:
-            advance, rate = self._time.step(dt), self._time.factor
-        path, before = self.path, self.target
+        if time.paused or time.factor < 1.0:
+            advance, rate = time.step(dt), time.factor
         if self.state in _AT_REST:
             self.scale = scale
             if any(path.qd) or any(path.qdd):
@@ -419,10 +401,11 @@ class ArmMotion:
                 self._follow_hand(dt, advance) if self.state is _BY_HAND else self._advance(dt, advance, rate)
             )
         self.path = path
-        if self._is_special:
-            self._displace(before, dt, advance, rate)
-        elif self.state is not _BY_HAND:
-            self.target = path
+        if self.state is not _BY_HAND:
+            if self.overlays:
+                self._displace(before, dt, advance, rate)
+            else:
+                self.target = path
         return self.target
 
     def _advance(self, dt: float, advance: float, rate: float) -> JointTarget:
@@ -447,7 +430,7 @@ class ArmMotion:
                 return self._delay.pass_on(stream, self._ramp).step(self.path, dt, scale)
             self._go(Event.LOST, stream.when_lost())
         ramp = self._delay.pass_on(self._ramp, self._ramp)
-        if self.braking is not None and isinstance(ramp, StopJ):
+        if isinstance(ramp, StopJ):
             ramp.allowed = self.braking(self.path)
         self.path = ramp.step(self.path, dt, scale)
         ramp = self._ramp
@@ -474,17 +457,13 @@ class ArmMotion:
         return path
 
     def _displace(self, before: JointTarget, dt: float, advance: float, rate: float) -> None:
-        """Compute the target beside overlays, or in time that is not normal."""
+        """Compute the target beside overlays; they stand still while the path's time does."""
         path = self.path
-        if self.state is not _BY_HAND:
-            if not self._overlays:
-                self.target = path
-            elif advance > 0.0 or rate > 0.0 or any(path.qd):
-                self.target = self._chain.displace(path, before, dt, rate)
-                # The move that ended overlays displaced has ended at rest.
-                has_settled = self.move is None and (self.state not in _AT_REST or not any(self.target.qd))
-                if has_settled and self._chain.all_ended:
-                    self._drop_overlays()
-            elif any(before.qd) or any(before.qdd):
-                self.target = JointTarget(before.q)
-        self._is_special = bool(self._overlays) or not self._time.is_normal
+        if advance > 0.0 or rate > 0.0 or any(path.qd):
+            self.target = self._chain.displace(path, before, dt, rate)
+            # The move that ended overlays displaced has ended at rest.
+            has_settled = self.move is None and (self.state not in _AT_REST or not any(self.target.qd))
+            if has_settled and self._chain.all_ended:
+                self._drop_overlays()
+        elif any(before.qd) or any(before.qdd):
+            self.target = JointTarget(before.q)

@@ -210,7 +210,7 @@ class PoseCorner:
     ) -> None:
         self._start = start
         self._u, self._w = u, w  # unit vectors: along the first line, and towards the centre
-        self._radius, self._angle = radius, angle
+        self._radius = radius
         self._turn = turn
         self._waypoint = waypoint
         self.length = radius * angle
@@ -227,7 +227,7 @@ class PoseCorner:
         value, slope = self._turn.at(s / self.length)
         turned = pose_add((0.0, 0.0, 0.0, *value), (0.0, 0.0, 0.0, *self._waypoint[3:]))
         rx, ry, rz = (k / self.length for k in _turn_rate(value, slope))
-        return (x, y, z, turned[3], turned[4], turned[5]), (vx, vy, vz, rx, ry, rz)
+        return (x, y, z, *turned[3:]), (vx, vy, vz, rx, ry, rz)
 
 
 def _fastest(path: PosePath) -> float:

@@ -11,6 +11,10 @@ servos give the tool at its present pose, so contact is equally fast and stable 
 the tool moves as a mass. The law is one in seconds: the control period does not change it. Along stiff axes
 the tool follows the program.
 
+An arm that knows forces by its currents takes accelerations of its own mass for forces, and that mass, at the
+tool, grows without bound towards a singularity. So `inertia` is at least the mass of the arm, and `gain` is
+limited by it.
+
 Source: URScript manual CB3 3.15, force_mode: compliant axes, limits; force_mode_set_damping: 1 "decelerates
 quickly if no force is present", 0 "maintains the speed"; force_mode_set_gain_scaling. What the program moves
 along compliant axes is not executed (documentation of the maker's ROS 2 driver, ForceModeController). The law
@@ -24,7 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import inf, log
+from math import inf, log, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -120,7 +124,11 @@ _FREE_SHARE = 1.3
 # Accelerations of the displacement [m/s^2, rad/s^2].
 _ACCELERATION = np.repeat([5.0, 20.0], 3)
 # Lower bound of the compliance, for stretched poses [m/N, rad/Nm].
-_STIFFEST = (5e-6, 2e-4)
+_STIFFEST = np.repeat([5e-6, 2e-4], 3)
+# Compliance beside that of the servos [m/N, rad/Nm]: far below theirs, it keeps the stiffness finite.
+_LEAST_COMPLIANCE = np.diag(np.repeat([1e-9, 1e-8], 3))
+# `pressing` answers an acceleration of the arm itself by at most the speed of this time [s].
+_OWN_TIME = 0.004
 # Stiff axes deviate by this much without any fault [m, rad]; lower limits count as these.
 _LEAST_DEVIATION = np.repeat([0.002, 0.01], 3)
 # No joint moves a tool further than this per radian [m/rad, rad/rad].
@@ -171,8 +179,8 @@ class Deviation(NamedTuple):
 class ForceMode:
     """The overlay of force mode; it begins without displacement and speed.
 
-    How the wrench is sensed says how fast the mode may act; `stiffness` is that of the joint servos (6,)
-    [Nm/rad].
+    How the wrench is sensed says how fast the mode may act. `stiffness` is that of the joint servos (6,)
+    [Nm/rad], `servo_frequency` the one that all of them have with the inertia of the arm [Hz].
     """
 
     def __init__(
@@ -182,12 +190,15 @@ class ForceMode:
         settings: ForceSettings,
         sensing: ForceSensing,
         stiffness: Sequence[float],
+        servo_frequency: float,
         measure: Callable[[], ArmMeasurement],
     ) -> None:
         self.tool = tool
         self._measure = measure
         self._sensing = sensing
         self._joint_compliance = 1.0 / np.array(stiffness)
+        # Mobility of the arm by the compliance of its servos [1/s²].
+        self._mobility_by_compliance = (2.0 * pi * servo_frequency) ** 2
         self._shift: Pose = ZERO6
         self._speed = np.zeros(6)  # of the displacement, beside what it cancels of the path; base axes
         self._cancelling = np.zeros((6, 6))
@@ -195,7 +206,7 @@ class ForceMode:
         self._wrench = np.array(measured.wrench)
         self._twist = np.array(measured.twist)
         self._path_pose: Pose | None = None
-        self._gain = np.zeros(6)
+        self._gain = self._mobility = np.zeros(6)
         self._gain_time_left = 0.0
         self._settings: ForceSettings | None = None
         self.set(frame, settings)
@@ -207,7 +218,6 @@ class ForceMode:
             return
         self._settings = settings
         self._rate = settings.gain_scaling * self._sensing.control_rate
-        self._mobility = self._rate / _INERTIA_RATE
         self._kept = 1.0 - settings.damping
         self._chosen = np.array(settings.selection)
         self._demanded = np.array(settings.wrench)
@@ -264,7 +274,7 @@ class ForceMode:
         if not chosen.any():
             return before - np.clip(before, -_ACCELERATION * dt, _ACCELERATION * dt)
         if self._gain_time_left < 0.5 * dt:
-            self._gain = self._rate * self._compliance(rotation, q)
+            self._set_gains(rotation, q)
             self._gain_time_left = _GAIN_TIME
         self._gain_time_left -= dt
         gain = self._gain
@@ -280,17 +290,30 @@ class ForceMode:
         wanted = np.where(chosen, np.clip(wanted, -self._limits, self._limits), 0.0)
         return np.clip(wanted, before - _ACCELERATION * dt, before + _ACCELERATION * dt)
 
-    def _compliance(self, rotation: NDArray[np.float64], q: Sequence[float]) -> NDArray[np.float64]:
-        """Return the least compliance of the tool along compliant axes (6,), for forces and for moments."""
+    def _set_gains(self, rotation: NDArray[np.float64], q: Sequence[float]) -> None:
+        """Set gain and mobility for a pose, each the same along all compliant axes of a kind."""
         jacobian = rotation.T @ self.tool.arm.jacobian(q, self.tool.tcp)
         compliance = (jacobian * self._joint_compliance) @ jacobian.T
+        least = self._of_kinds(compliance, lambda block: np.linalg.eigvalsh(block)[0])
+        self._gain = self._rate * np.maximum(least, _STIFFEST)
+        self._mobility = self._rate / _INERTIA_RATE
+        if not self._sensing.has_sensor:
+            # The tool moves along compliant axes only: a block of the stiffness is that with all others held.
+            stiffness = np.asarray(np.linalg.inv(compliance + _LEAST_COMPLIANCE), np.float64)
+            held = self._of_kinds(stiffness, lambda block: 1.0 / np.linalg.eigvalsh(block)[-1])
+            own_mobility = self._mobility_by_compliance * held
+            self._mobility = np.minimum(self._mobility, own_mobility)
+            self._gain = np.minimum(self._gain, _OWN_TIME * own_mobility)
+
+    def _of_kinds(
+        self, matrix: NDArray[np.float64], value: Callable[[NDArray[np.float64]], float]
+    ) -> NDArray[np.float64]:
+        """Return a value (6,) of the block of compliant axes of a matrix: of forces, then of moments."""
         values = np.zeros(6)
-        for part, stiffest in ((slice(0, 3), _STIFFEST[0]), (slice(3, 6), _STIFFEST[1])):
-            chosen = np.flatnonzero(self._chosen[part])
+        for kind in (slice(0, 3), slice(3, 6)):
+            chosen = np.flatnonzero(self._chosen[kind])
             if chosen.size:
-                block = compliance[part, part][np.ix_(chosen, chosen)]
-                least = block[0, 0] if chosen.size == 1 else np.linalg.eigvalsh(block)[0]
-                values[part] = max(float(least), stiffest)
+                values[kind] = value(matrix[kind, kind][np.ix_(chosen, chosen)])
         return values
 
 

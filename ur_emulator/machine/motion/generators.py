@@ -30,6 +30,11 @@ class JointTarget(NamedTuple):
             six([(w - v) / dt for v, w in zip(self.qd, qd, strict=True)]),
         )
 
+    @property
+    def is_at_rest(self) -> bool:
+        """True where all joints are so slow that it counts as standstill."""
+        return max(map(abs, self.qd)) <= REST_SPEED
+
 
 # A joint speed below this counts as standstill: one cycle of it moves a joint by less than an encoder step.
 REST_SPEED = 1e-6  # rad/s
@@ -183,7 +188,7 @@ class StopJ:
     def step(self, target: JointTarget, dt: float, scale: float) -> JointTarget:
         """Move the target velocity towards zero; the speed slider does not soften a stop."""
         after = ramp_towards(target, ZERO6, min(self.a, self.allowed), dt)
-        self.done = max(map(abs, after.qd)) <= REST_SPEED
+        self.done = after.is_at_rest
         return JointTarget(after.q) if self.done else after
 
 

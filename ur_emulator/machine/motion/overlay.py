@@ -4,6 +4,7 @@ A conveyor moves the tool along with a belt; force mode moves it until it meets 
 terms of the path; the joints get the displaced target. Without overlays none of this runs.
 """
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from protocol.pose import Pose, pose_add, pose_inv, pose_sub, pose_trans
@@ -30,28 +31,26 @@ class Overlay(Protocol):
         ...
 
 
+# Deceleration of a last displacement [m/s^2, rad/s^2]. Chosen: smooth for the conveyor, short for contact.
+_LINEAR, _ANGULAR = 1.0, 4.0
+
+
+@dataclass(slots=True, eq=False)
 class LastDisplacement:
     """Takes the place of an overlay that was removed during a move: keeps its last displacement.
 
-    The velocity that the displacement still has is ramped down.
+    The displacement is in base axes: added to the position, turned onto the rotation [m, rad]. The velocity
+    that it still has is ramped down [m/s, rad/s].
     """
 
-    # Deceleration of the displacement [m/s^2, rad/s^2]. Chosen: smooth for the conveyor, short for contact.
-    LINEAR, ANGULAR = 1.0, 4.0
-
-    def __init__(self, tool: Tool, shift: Pose, velocity: Vector6) -> None:
-        """Keep a displacement of a tool, and its rate of change [m/s, rad/s].
-
-        `shift` is in base axes: added to the position, turned onto the rotation [m, rad].
-        """
-        self.tool = tool
-        self._shift = shift
-        self._velocity = velocity
+    tool: Tool
+    _shift: Pose
+    _velocity: Vector6
 
     def displace(self, tool_pose: Pose, dt: float) -> Pose:
         """Return where the tool is with the displacement, which slows down to rest."""
         if self._velocity is not ZERO6:
-            after = twist_towards(self._velocity, ZERO6, self.LINEAR, self.ANGULAR, dt)
+            after = twist_towards(self._velocity, ZERO6, _LINEAR, _ANGULAR, dt)
             displacement = [0.5 * dt * (a + b) for a, b in zip(self._velocity, after, strict=True)]
             self._shift = pose_add(six(displacement), self._shift)
             self._velocity = after if any(after) else ZERO6

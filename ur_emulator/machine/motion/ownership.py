@@ -50,24 +50,22 @@ class Fate(Enum):
     TAKEN = "has lost the arm"
 
 
+@dataclass(slots=True, eq=False)
 class Command:
     """A motion that a thread has commanded.
 
     Attributes:
-        generator: computes it.
         owner: the thread; None when nobody waits for it any more.
-        is_renewed: its thread wants a stream to go on in this cycle; it sets it anew in each.
+        generator: computes it.
         left_at: where it was when it was suspended [rad].
+        is_renewed: its thread wants a stream to go on in this cycle; it sets it anew in each.
     """
 
-    __slots__ = ("fate", "generator", "is_renewed", "left_at", "owner")
-
-    def __init__(self, owner: object | None, generator: Generator, q: Vector6) -> None:
-        self.owner = owner
-        self.generator = generator
-        self.fate = Fate.ACTIVE
-        self.is_renewed = True
-        self.left_at = q
+    owner: object | None
+    generator: Generator
+    left_at: Vector6
+    fate: Fate = Fate.ACTIVE
+    is_renewed: bool = True
 
     @property
     def is_over(self) -> bool:

@@ -58,7 +58,10 @@ def times(k: float, values: Sequence[float]) -> Vector6:
 
 
 class PoseLine:
-    """Straight line from one pose to another."""
+    """Straight line from one pose to another.
+
+    `length_rate` is the path length of the tool per unit of s; below 1 where the line is mainly a rotation.
+    """
 
     rate = 1.0
     bend = 0.0
@@ -70,11 +73,7 @@ class PoseLine:
         length = measure(self._change)
         self.length = length if length > LEAST_LENGTH else 0.0
         self._twist = times(1.0 / self.length if self.length > 0.0 else 0.0, self._change)
-
-    @property
-    def length_rate(self) -> float:
-        """Path length of the tool per unit of s; below 1 where the line is mainly a rotation."""
-        return _norm(self._twist)
+        self.length_rate = _norm(self._twist)
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """Return the pose and the twist at s; the end is exactly the goal."""
@@ -105,25 +104,22 @@ class PoseArc:
         self._turn = turn
         self.length = max(angle * _norm(self._u), 0.0 if fixed else TURN_LEVER * _norm(turn))
         self.bend = _norm(self._u) * (angle / self.length) ** 2
-        self._goal = self._pose(1.0) if fixed else goal
+        self._goal = None if fixed else goal
 
     def at(self, s: float) -> tuple[Pose, Vector6]:
         """Return the pose and the twist at s; the end is exactly the goal, if that has an orientation."""
-        share = s / self.length
+        share = min(1.0, s / self.length)
         phi = share * self._angle
         sine, cosine = sin(phi), cos(phi)
         k = self._angle / self.length
         vx, vy, vz = (k * (cosine * w - sine * u) for u, w in zip(self._u, self._w, strict=True))
         rx, ry, rz = (value / self.length for value in self._turn)
-        return self._goal if share >= 1.0 else self._pose(share), (vx, vy, vz, rx, ry, rz)
-
-    def _pose(self, share: float) -> Pose:
-        phi = share * self._angle
-        sine, cosine = sin(phi), cos(phi)
+        twist = (vx, vy, vz, rx, ry, rz)
+        if share >= 1.0 and self._goal is not None:
+            return self._goal, twist
         x, y, z = (c + cosine * u + sine * w for c, u, w in zip(self._centre, self._u, self._w, strict=True))
-        rx, ry, rz = (share * value for value in self._turn)
-        turned = pose_add((0.0, 0.0, 0.0, rx, ry, rz), self._start)
-        return (x, y, z, turned[3], turned[4], turned[5])
+        turned = pose_add((0.0, 0.0, 0.0, *(share * value for value in self._turn)), self._start)
+        return (x, y, z, *turned[3:]), twist
 
 
 def arc_through(

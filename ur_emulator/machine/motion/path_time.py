@@ -25,11 +25,6 @@ class PathTime:
         self.factor = 1.0
         self.slowing = self.rising = PAUSE_RATE
 
-    @property
-    def is_normal(self) -> bool:
-        """True without a pause, at a factor of 1."""
-        return not self.paused and self.factor == 1.0
-
     def resume(self) -> None:
         """End a pause; the factor rises from where it is."""
         self.paused = self.runs_up = False

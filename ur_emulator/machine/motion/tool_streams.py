@@ -10,14 +10,7 @@ from typing import ClassVar
 
 from protocol.pose import Pose, pose_add, pose_sub
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
-from ur_emulator.machine.motion.generators import (
-    PAUSE_DECELERATION,
-    REST_SPEED,
-    Generator,
-    JointTarget,
-    Kind,
-    Streamed,
-)
+from ur_emulator.machine.motion.generators import PAUSE_DECELERATION, Generator, JointTarget, Kind, Streamed
 from ur_emulator.machine.motion.tool import Tool
 
 # Least deceleration of the tool when speedl is paused [m/s^2]. Chosen: the moves' default.
@@ -134,5 +127,5 @@ class StopL:
             return JointTarget(target.q)
         twist = twist_towards(self.course.twist_at(target), ZERO6, self._a, self._a_rot, dt)
         after = self.course.step(target, twist, dt)
-        self.done = max(map(abs, after.qd)) <= REST_SPEED
+        self.done = after.is_at_rest
         return JointTarget(after.q) if self.done else after

@@ -10,10 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.machine.models.calibration import Calibration, calibrated_dh
 from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.mjcf import FLANGE, LINKS
-from ur_emulator.machine.models.robot_model import RobotModel, Vector3
+from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3
 from ur_emulator.machine.models.things import BodyShape, Contact
 from ur_emulator.machine.plant.drives import Drives, ServoGains
 from ur_emulator.machine.plant.friction import Presliding
@@ -70,13 +69,12 @@ class ArmPhysics:
     def __init__(
         self,
         robot: RobotModel,
-        calibration: Calibration,
+        dh: Sequence[DhRow],
         fidelity: Fidelity,
         seed: int,
         tools: Sequence[ToolModel] = (),
     ) -> None:
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
-        dh = calibrated_dh(robot, calibration)
         self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), tools)
         model = compile_physics(spec, fidelity.friction_rise)
         presliding = fidelity.friction_presliding

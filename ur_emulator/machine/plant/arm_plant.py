@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from protocol.ur_types import ControlMode
 from ur_emulator.errors import PlantError
-from ur_emulator.machine.models.calibration import draw_calibration
+from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.fidelity import Fidelity
-from ur_emulator.machine.models.joint_range import JointRange
-from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
+from ur_emulator.machine.models.robot_model import ZERO6, JointRange, RobotModel, Vector3, Vector6
 from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
@@ -79,7 +78,7 @@ class ArmPlant(ABC):
         tools: on the flange, fingers half open.
 
     Attributes:
-        calibration: the factory calibration of this arm, for the controller's kinematics.
+        dh: six calibrated rows of this arm, for the controller's kinematics.
         range: the joint ranges, for all who keep them.
         cycle: number of the last cycle since the arm was put at rest.
     """
@@ -91,10 +90,10 @@ class ArmPlant(ABC):
         self.fidelity = fidelity
         self.seed = seed
         self.period_s = robot.generation.period_s
-        self.calibration = draw_calibration(robot, fidelity, seed)
+        self.dh = draw_dh(robot, fidelity, seed)
         self.range = JointRange(robot.q_min, robot.q_max)
-        self._dynamics = InverseDynamics(robot, self.calibration)
-        self._physics = ArmPhysics(robot, self.calibration, fidelity, seed, tools)
+        self._dynamics = InverseDynamics(robot, self.dh)
+        self._physics = ArmPhysics(robot, self.dh, fidelity, seed, tools)
         self._thermometers = Thermometers(robot.generation)
         self._finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
         self._set_up()

@@ -5,21 +5,22 @@ neither friction nor the true masses of the arm: the joint loops compensate its 
 it takes the links for points.
 """
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_emulator.machine.models.calibration import Calibration, calibrated_dh
 from ur_emulator.machine.models.mjcf import arm_spec
-from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, Vector6
+from ur_emulator.machine.models.robot_model import ZERO6, DhRow, RobotModel, Vector3, Vector6
 from ur_emulator.machine.plant.loads import set_payload_body
 
 
 class InverseDynamics:
     """tau = M(q) qdd + c(q, qd) + g(q), rotor inertia included."""
 
-    def __init__(self, robot: RobotModel, calibration: Calibration) -> None:
-        self._model = arm_spec(robot, calibrated_dh(robot, calibration), (1.0,) * 6).compile()
+    def __init__(self, robot: RobotModel, dh: Sequence[DhRow]) -> None:
+        self._model = arm_spec(robot, dh, (1.0,) * 6).compile()
         self._model.opt.gravity[2] = -robot.generation.gravity
         # Points alone would leave the last joint without inertia, which MuJoCo warns of; `evaluate` adds the
         # rotors by itself.

@@ -6,6 +6,7 @@ on. Signatures, versions and costs of builtins are in `urscript.catalogue`.
 
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from typing import Any, ClassVar, TypeVar
 
 from protocol.pose import Pose
@@ -90,6 +91,22 @@ class ScriptArm:
             return self.motion.command(thread, generator)
         except OwnershipError:
             raise ScriptRuntimeError("Another thread is already controlling the robot") from None
+
+
+def refusing(functions: Mapping[str, HostFunction], refusal: type[Exception]) -> dict[str, HostFunction]:
+    """Return builtins where an exception of this kind is a run-time error that begins with the name."""
+    return {name: _refusing(name, function, refusal) for name, function in functions.items()}
+
+
+def _refusing(name: str, function: HostFunction, refusal: type[Exception]) -> HostFunction:
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        try:
+            return function(*arguments)
+        except refusal as error:
+            raise ScriptRuntimeError(f"{name}: {error}") from None
+
+    return call
 
 
 def until_over(command: Command) -> Cycles:

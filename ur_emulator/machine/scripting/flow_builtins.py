@@ -3,7 +3,7 @@
 A client of the control API answers instead of an operator.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from functools import partial
 from typing import Any, NoReturn
 
@@ -21,13 +21,6 @@ from urscript.run.threads import ProgramHalted
 from urscript.run.waits import NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
-_KINDS = {
-    "boolean": RequestedType.BOOLEAN,
-    "integer": RequestedType.INTEGER,
-    "float": RequestedType.FLOAT,
-    "string": RequestedType.STRING,
-}
-
 
 class PendantBuiltins(BuiltinGroup):
     """Popups and requests for values."""
@@ -38,10 +31,11 @@ class PendantBuiltins(BuiltinGroup):
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
-        requests = {
-            f"request_{name}_from_primary_client": self._requester(kind) for name, kind in _KINDS.items()
+        kinds = (RequestedType.BOOLEAN, RequestedType.INTEGER, RequestedType.FLOAT, RequestedType.STRING)
+        return super().functions() | {
+            f"request_{kind.name.lower()}_from_primary_client": partial(self._request_value, kind)
+            for kind in kinds
         }
-        return super().functions() | requests
 
     @builtin("popup")
     def _popup(
@@ -56,13 +50,12 @@ class PendantBuiltins(BuiltinGroup):
         self._events.append(PopupShown(title, text, warning, error, blocking, request.request_id))
         yield from self._wait_for(request)
 
-    def _requester(self, kind: RequestedType) -> Callable[..., Generator[Blocked, None, Answer | None]]:
-        def request_value(thread: object, text: str) -> Generator[Blocked, None, Answer | None]:
-            request = self._pendant.ask(kind, text)
-            self._events.append(ValueRequested(request.request_id, kind, text))
-            return (yield from self._wait_for(request))
-
-        return request_value
+    def _request_value(
+        self, kind: RequestedType, thread: object, text: str
+    ) -> Generator[Blocked, None, Answer | None]:
+        request = self._pendant.ask(kind, text)
+        self._events.append(ValueRequested(request.request_id, kind, text))
+        return (yield from self._wait_for(request))
 
     def _wait_for(self, request: PendantRequest) -> Generator[Blocked, None, Answer | None]:
         try:
@@ -84,13 +77,13 @@ class InterpreterBuiltins(BuiltinGroup):
 
     @builtin("end_interpreter")
     def _end(self, thread: object) -> None:
-        self._queue.end()
+        self._queue.is_ending = self._queue.is_on
 
     @builtin("clear_interpreter")
     def _clear(self, thread: object) -> None:
         if not self._queue.is_on:
             raise ScriptRuntimeError("clear_interpreter can only be called in interpreter mode")
-        self._queue.clear()
+        self._queue.is_clearing = True
 
 
 class ErrorBuiltins(BuiltinGroup):
@@ -130,14 +123,14 @@ class ErrorBuiltins(BuiltinGroup):
 
     @builtin("protective_stop")
     def _protective_stop(self, thread: object) -> None:
-        self._requests.protective_stop()
+        self._requests.protective_stop = True
 
     @builtin("powerdown")
     def _powerdown(self, thread: object) -> NoReturn:
-        self._requests.power_off()
+        self._requests.power_off = True
         raise ProgramHalted
 
     @builtin("pause")
     def _pause(self, thread: object) -> Generator[Wait, None, None]:
-        self._requests.pause()
+        self._requests.pause = True
         yield NEXT_CYCLE

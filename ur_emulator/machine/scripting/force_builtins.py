@@ -10,7 +10,7 @@ from ur_emulator.machine.kinematics.arm_model import moved_wrench
 from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
 from ur_emulator.machine.motion import force_mode
 from ur_emulator.machine.motion.axis_hold import AxisHold, singularity_status
-from ur_emulator.machine.plant.drives import ServoGains
+from ur_emulator.machine.plant.drives import SERVO_FREQUENCY, ServoGains
 from ur_emulator.machine.scripting.builtin_group import (
     BuiltinGroup,
     ScriptArm,
@@ -75,15 +75,15 @@ class ForceBuiltins(BuiltinGroup):
         blocked = [x == 0 for x in free_axes]
         hold = AxisHold(self._arm.tool, turn, blocked, q) if any(blocked) else None
         wrench = self._force_sense.residual(self._past.steady_cycles)
-        self._compliance.start_freedrive(by_program=True, hold=hold, wrench=wrench)
+        self._compliance.start_freedrive("program", hold=hold, wrench=wrench)
 
     @builtin("freedrive_mode_no_incorrect_payload_check")
     def _begin_freedrive_unchecked(self, thread: object) -> None:
-        self._compliance.start_freedrive(by_program=True)
+        self._compliance.start_freedrive("program")
 
     @builtin("end_freedrive_mode", "end_teach_mode")
     def _end_freedrive(self, thread: object) -> None:
-        self._compliance.end_freedrive(by_program=True)
+        self._compliance.end_freedrive("program")
 
     # --- force mode
 
@@ -150,7 +150,9 @@ class ForceBuiltins(BuiltinGroup):
         offset = ZERO6 if force_sense.sensor is not None else force_sense.offset(self._past.steady_cycles)
         measure = partial(self._measure, offset)
         compliance.begin_force(
-            force_mode.ForceMode(tool, frame, settings, self._sensing, self._stiffness, measure)
+            force_mode.ForceMode(
+                tool, frame, settings, self._sensing, self._stiffness, SERVO_FREQUENCY, measure
+            )
         )
 
     def _measure(self, offset: Vector6) -> force_mode.ArmMeasurement:

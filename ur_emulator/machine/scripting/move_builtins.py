@@ -1,6 +1,7 @@
 """Moves from waypoint to waypoint: each moves the arm for its thread, or joins the move before it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from math import inf
 from typing import Any
@@ -40,33 +41,26 @@ OVERLAPPING_BLENDS = ErrorReported(0, 0, ReportLevel.WARNING, "Overlapping Blend
 # A program with waypoints close together may command so many moves in one cycle.
 MAX_PER_CYCLE = 4
 
+# Names of the limits of a wrench.
+_AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
 # Makes a move for joint angles and tool pose at its start.
 MakeLeg = Callable[[Vector6, ToolPose], Leg]
 
 
+@dataclass(frozen=True)
 class MoveBuiltins(BuiltinGroup):
-    """Moves from waypoint to waypoint."""
+    """Moves from waypoint to waypoint, and how they shall be planned.
 
-    def __init__(
-        self,
-        arm: ScriptArm,
-        place_arm: Callable[[Vector6], bool],
-        events: EventQueue,
-        planner: MovePlanner,
-        world: WorldModel,
-    ) -> None:
-        """Bind the builtins.
+    `_place_arm` puts the arm at joint angles [rad]; it is False where the arm would touch something.
+    """
 
-        Args:
-            place_arm: puts it at joint angles [rad]; False where it would touch something.
-            events: get warnings of overlapping blends.
-            world: has the frames that goals can be given in.
-        """
-        self._arm = arm
-        self._place_arm = place_arm
-        self._events = events
-        self._planner = planner
-        self._world = world
+    _arm: ScriptArm
+    _place_arm: Callable[[Vector6], bool]
+    _events: EventQueue
+    _planner: MovePlanner
+    _planning: PlanningSettings
+    _world: WorldModel
 
     # --- moves of the joints
 
@@ -108,35 +102,29 @@ class MoveBuiltins(BuiltinGroup):
 
     @builtin("movep")
     def _movep(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
-        return self._process("movep", thread, PoseLine, pose, a=a, v=v, r=r)
+        make = self._process_leg("movep", PoseLine, pose, a=a, v=v, r=r)
+        return self._travel(thread, make, self._planner.limited)
 
     @builtin("servoc")
     def _servoc(self, thread: object, pose: Any, a: float, v: float, r: float) -> Cycles:
+        make = self._process_leg("servoc", PoseLine, pose, a=a, v=v, r=r)
         # Drivers call it with the same pose again and again: nothing to warn of.
-        return self._process("servoc", thread, PoseLine, pose, a=a, v=v, r=r, may_overlap=True)
+        return self._travel(thread, make, self._planner.limited, may_overlap=True)
 
     @builtin("movec")
     def _movec(
         self, thread: object, pose_via: Any, pose_to: Any, a: float, v: float, r: float, mode: float
     ) -> Cycles:
         arc = partial(arc_through, fixed=mode == 1)
-        return self._process("movec", thread, arc, pose_via, pose_to, a=a, v=v, r=r)
+        make = self._process_leg("movec", arc, pose_via, pose_to, a=a, v=v, r=r)
+        return self._travel(thread, make, self._planner.limited)
 
-    def _process(
-        self,
-        function: str,
-        thread: object,
-        path: Callable[..., PosePath],
-        *goals: Any,
-        a: float,
-        v: float,
-        r: float,
-        may_overlap: bool = False,
-    ) -> Cycles:
-        """Follow a path at constant speed of the tool."""
+    def _process_leg(
+        self, function: str, path: Callable[..., PosePath], *goals: Any, a: float, v: float, r: float
+    ) -> MakeLeg:
+        """Return what makes a move along a path at constant speed of the tool."""
         _limits(function, a, v, 0.0, r)
-        make = self._tool_leg(path, *goals, a=a, v=v, r=r, process=True)
-        return self._travel(thread, make, self._planner.limited, may_overlap=may_overlap)
+        return self._tool_leg(path, *goals, a=a, v=v, r=r, process=True)
 
     def _tool_leg(self, path: Callable[..., PosePath], *goals: Any, **limits: Any) -> MakeLeg:
         """Return what makes a move of the tool along a path from where it is through the goals."""
@@ -220,6 +208,35 @@ class MoveBuiltins(BuiltinGroup):
                 "set_pos: the arm would touch itself or the table there, choose another place"
             )
 
+    # --- how moves shall be planned
+
+    @builtin("motion_version_set")
+    def _set_version(self, thread: object, version: int) -> None:
+        self._planning.motion_version = version
+
+    @builtin("motion_version_get")
+    def _version(self, thread: object) -> int:
+        return self._planning.motion_version
+
+    @builtin("jerk_gain_scaling_set")
+    def _set_jerk_gain(self, thread: object, gain: float) -> None:
+        self._planning.jerk_gain = float(gain)
+
+    @builtin("jerk_gain_scaling_get")
+    def _jerk_gain(self, thread: object) -> float:
+        return self._planning.jerk_gain
+
+    @builtin("tool_wrench_limit_disable")
+    def _remove_limit(self, thread: object) -> None:
+        self._planning.tool_wrench_limit = None
+
+    @builtin("tool_wrench_limit_set")
+    def _set_limit(self, thread: object, frame: Pose, *most: float | None) -> None:
+        given = {name: value for name, value in zip(_AXES, most, strict=True) if value is not None}
+        require_positive("tool_wrench_limit_set", **given)
+        limits = [inf if value is None else float(value) for value in most]
+        self._planning.tool_wrench_limit = ToolWrenchLimit(six(frame), six(limits))
+
 
 def _until_open(command: Command, move: Move) -> Cycles:
     """Wait until a move's instruction returns; with waypoints close together perhaps in this cycle."""
@@ -251,40 +268,3 @@ def _require_shares(function: str, a: float, v: float, r: float) -> None:
             raise ScriptRuntimeError(f"{function}: {name} must be above 0 and up to 1, got {share:g}")
     if r < 0.0:
         raise ScriptRuntimeError(f"{function}: r must not be below 0, got {r:g}")
-
-
-_AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-
-
-class PlanningBuiltins(BuiltinGroup):
-    """How moves shall be planned: motion version, jerk limit and wrench limit."""
-
-    def __init__(self, planning: PlanningSettings) -> None:
-        self._planning = planning
-
-    @builtin("motion_version_set")
-    def _set_version(self, thread: object, version: int) -> None:
-        self._planning.motion_version = version
-
-    @builtin("motion_version_get")
-    def _version(self, thread: object) -> int:
-        return self._planning.motion_version
-
-    @builtin("jerk_gain_scaling_set")
-    def _set_jerk_gain(self, thread: object, gain: float) -> None:
-        self._planning.jerk_gain = float(gain)
-
-    @builtin("jerk_gain_scaling_get")
-    def _jerk_gain(self, thread: object) -> float:
-        return self._planning.jerk_gain
-
-    @builtin("tool_wrench_limit_disable")
-    def _remove_limit(self, thread: object) -> None:
-        self._planning.tool_wrench_limit = None
-
-    @builtin("tool_wrench_limit_set")
-    def _set_limit(self, thread: object, frame: Pose, *most: float | None) -> None:
-        given = {name: value for name, value in zip(_AXES, most, strict=True) if value is not None}
-        require_positive("tool_wrench_limit_set", **given)
-        limits = [inf if value is None else float(value) for value in most]
-        self._planning.tool_wrench_limit = ToolWrenchLimit(six(frame), six(limits))

@@ -19,7 +19,7 @@ from ur_emulator.machine.scripting.builtin_group import (
     require_positive,
     until_over,
 )
-from urscript import ScriptRuntimeError
+from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, wrap_int
 
 # The encoder of the old builtins that give none.
@@ -44,7 +44,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     @builtin("path_offset_enable")
     def _enable(self, thread: object) -> None:
-        if not self._motion.has_overlay(self._offset):
+        if self._offset not in self._motion.overlays:
             self._offset.begin(self._arm.tool)
             self._motion.add_overlay(self._offset)
 
@@ -61,7 +61,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     @builtin("path_offset_get")
     def _get(self, thread: object, kind: float) -> Pose:
-        is_on = self._motion.has_overlay(self._offset)
+        is_on = self._offset in self._motion.overlays
         return Pose.of(self._offset.applied(OffsetType(int(kind))) if is_on else ZERO6)
 
     @builtin("path_offset_set_alpha_filter")
@@ -81,13 +81,18 @@ class EncoderBuiltins(BuiltinGroup):
         self._encoders = encoders
         self._io = io
 
+    def functions(self) -> dict[str, HostFunction]:
+        """Return the builtins."""
+        encoders, decode = self._encoders, self._decode
+        return super().functions() | {
+            "encoder_enable_set_tick_count": lambda thread, index, kind: encoders.feed(int(index), int(kind)),
+            "conveyor_pulse_decode": lambda thread, kind, a, b: decode(thread, _CONVEYOR, kind, a, b),
+            "get_conveyor_tick_count": lambda thread: encoders.encoders[_CONVEYOR].count,
+        }
+
     @builtin("encoder_enable_pulse_decode")
     def _decode(self, thread: object, index: float, decoder: float, a: float, b: float) -> None:
         self._encoders.decode(int(index), Decoder(int(decoder)), _bit(a), _bit(b), self._io.digital_in)
-
-    @builtin("encoder_enable_set_tick_count")
-    def _feed(self, thread: object, index: float, range_id: float) -> None:
-        self._encoders.feed(int(index), int(range_id))
 
     @builtin("encoder_set_tick_count")
     def _set_count(self, thread: object, index: float, count: float) -> None:
@@ -116,14 +121,6 @@ class EncoderBuiltins(BuiltinGroup):
     def _unwind(self, thread: object, index: float, delta: float) -> float | None:
         encoder = self._encoders.encoders[int(index)]
         return encoder.unwind(float(delta)) if encoder.is_enabled else None
-
-    @builtin("conveyor_pulse_decode")
-    def _decode_conveyor(self, thread: object, kind: float, a: float, b: float) -> None:
-        self._decode(thread, _CONVEYOR, kind, a, b)
-
-    @builtin("get_conveyor_tick_count")
-    def _get_conveyor_count(self, thread: object) -> float:
-        return self._encoders.encoders[_CONVEYOR].count
 
     @builtin("set_conveyor_tick_count")
     def _set_conveyor_count(self, thread: object, count: float, resolution: float) -> None:

@@ -9,11 +9,10 @@ from ur_emulator.machine.controller.state import ControllerState
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, ScriptArm
 from ur_emulator.machine.scripting.flow_builtins import ErrorBuiltins, InterpreterBuiltins, PendantBuiltins
 from ur_emulator.machine.scripting.force_builtins import ForceBuiltins
-from ur_emulator.machine.scripting.line_builtins import LineBuiltins, LineSetupBuiltins, RegisterBuiltins
+from ur_emulator.machine.scripting.line_builtins import LineBuiltins, RegisterBuiltins
 from ur_emulator.machine.scripting.modbus_builtins import MapBuiltins, ModbusBuiltins
-from ur_emulator.machine.scripting.move_builtins import MoveBuiltins, PlanningBuiltins
+from ur_emulator.machine.scripting.move_builtins import MoveBuiltins
 from ur_emulator.machine.scripting.move_planner import MovePlanner
-from ur_emulator.machine.scripting.network import Network
 from ur_emulator.machine.scripting.overlay_builtins import (
     ConveyorBuiltins,
     EncoderBuiltins,
@@ -23,41 +22,37 @@ from ur_emulator.machine.scripting.rpc_builtins import RpcBuiltins
 from ur_emulator.machine.scripting.rtde_builtins import RtdeBuiltins
 from ur_emulator.machine.scripting.setting_builtins import SettingBuiltins, WorldBuiltins
 from ur_emulator.machine.scripting.socket_builtins import SocketBuiltins
-from ur_emulator.machine.scripting.state_builtins import DynamicsBuiltins, StateBuiltins
+from ur_emulator.machine.scripting.state_builtins import StateBuiltins
 from ur_emulator.machine.scripting.stream_builtins import StreamBuiltins, TorqueBuiltins
 from urscript.builtins import pure_builtins
 from urscript.run.host import HostFunction
 
 
-def robot_hosts(state: ControllerState, network: Network) -> Callable[[], RobotHost]:
+def robot_hosts(state: ControllerState) -> Callable[[], RobotHost]:
     """Bind the builtins of a box, each group to its parts; return what makes the host of a program."""
     arm = ScriptArm(state.robot, state.arm, state.motion, state.tool, state.safety)
     step_time, past = state.clock.period_s, state.past
     settings = SettingBuiltins(state.robot, state.tool, state.force_sense, step_time)
     planner = MovePlanner(state.dynamics, state.planning, state.tool)
-    outputs = state.robot.generation.rtde_outputs
     groups = (
-        MoveBuiltins(arm, state.place_arm, state.events, planner, state.world),
-        PlanningBuiltins(state.planning),
+        MoveBuiltins(arm, state.place_arm, state.events, planner, state.planning, state.world),
         StreamBuiltins(arm, step_time),
-        StateBuiltins(arm, past, state.clock),
-        DynamicsBuiltins(arm, state.dynamics, past),
+        StateBuiltins(arm, state.dynamics, past, state.clock),
         ForceBuiltins(arm, state.compliance, state.force_sense, past),
         settings,
         WorldBuiltins(state.world, settings.set_target_payload),
-        LineBuiltins(state.io),
-        LineSetupBuiltins(state.io, state.io_configuration),
+        LineBuiltins(state.io, state.io_configuration),
         RegisterBuiltins(state.registers),
         MapBuiltins(state),
-        ModbusBuiltins(state.modbus, state.io_configuration, state.clock, network),
-        RtdeBuiltins(past, outputs, state.watchdogs, state.force_sense, state.clock),
+        ModbusBuiltins(state.modbus, state.io_configuration, state.clock),
+        RtdeBuiltins(past, state.clock, state.watchdogs, state.force_sense),
         EncoderBuiltins(state.encoders, state.io),
         PendantBuiltins(state.pendant, state.events),
         InterpreterBuiltins(state.interpreter),
         ErrorBuiltins(state.error_settings, past, state.requests),
     )
     shared = _functions(groups)
-    return lambda: RobotHost(state, network, arm, shared)
+    return lambda: RobotHost(state, arm, shared)
 
 
 def _functions(groups: Iterable[BuiltinGroup]) -> dict[str, HostFunction]:
@@ -67,17 +62,15 @@ def _functions(groups: Iterable[BuiltinGroup]) -> dict[str, HostFunction]:
 class RobotHost:
     """The host of one running program (see urscript.run.host.Host)."""
 
-    def __init__(
-        self, state: ControllerState, network: Network, arm: ScriptArm, shared: Mapping[str, HostFunction]
-    ) -> None:
+    def __init__(self, state: ControllerState, arm: ScriptArm, shared: Mapping[str, HostFunction]) -> None:
         """Bind the builtins that keep something for one program; those of all programs are `shared`."""
         random = pure_builtins(state.seed)["random"]
         self.step_time = state.clock.period_s
         self._state = state
         # What a program opens or displaces the arm by ends with it.
         self._ending = (
-            SocketBuiltins(state.clock, state.events, network),
-            RpcBuiltins(network, state.clock),
+            SocketBuiltins(state.clock, state.events, state.network),
+            RpcBuiltins(state.network, state.clock),
             ConveyorBuiltins(arm, state.encoders, state.clock),
             PathOffsetBuiltins(arm),
         )

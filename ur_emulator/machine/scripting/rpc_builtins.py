@@ -14,8 +14,8 @@ from typing import Any, Final
 
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.machine.controller.clock import Clock
+from ur_emulator.machine.controller.io.network import Network, RemoteCallError
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin
-from ur_emulator.machine.scripting.network import Network, RemoteCall, RemoteCallError, RemoteServer
 from urscript import ScriptRuntimeError, ScriptThread
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.run.variables import same_type
@@ -34,34 +34,16 @@ class RpcBuiltins(BuiltinGroup):
     """The remote-procedure handles of one program; `has_structs`: the controller's language has structs."""
 
     def __init__(self, network: Network, clock: Clock) -> None:
-        self._network = network
+        self.network = network
         self._clock = clock
         self.has_structs = clock.generation.major > 3
-        # Those that may be connected, the one that was called last is last.
-        self._called: dict[RemoteServer, None] = {}
+        self._servers: set[int] = set()
         # Values sent, since which cycle, and the cycle that counts anew.
         self._sent = self._since = self._renewed_at = 0
 
     def end(self) -> None:
         """Close every connection; the program has ended."""
-        for server in self._called:
-            server.close()
-        self._called.clear()
-
-    def call(self, server: RemoteServer, method: str, arguments: Sequence[Any]) -> RemoteCall:
-        """Begin a call; of more servers than may be connected, one that is idle is closed."""
-        self._called.pop(server, None)
-        self._called[server] = None
-        idle = (other for other in self._called if not other.is_busy)
-        if len(self._called) > BUDGETS.remote_connections and (oldest := next(idle, server)) is not server:
-            self.close(oldest)
-        return server.call(method, arguments)
-
-    def close(self, server: RemoteServer) -> None:
-        """Close the connection to a server and forget its calls; harmless if there is none."""
-        if server in self._called:
-            del self._called[server]
-            server.close()
+        self.network.close_servers(self._servers)
 
     def may_send(self, n_values: int) -> bool:
         """Count values that a call is about to send; False if the program has sent enough for now.
@@ -79,7 +61,9 @@ class RpcBuiltins(BuiltinGroup):
 
     @builtin("rpc_factory")
     def _make_handle(self, thread: object, kind: str, url: str) -> RemoteHandle:
-        return RemoteHandle(self, self._network.remote_server(url if "://" in url else f"http://{url}"))
+        server = self.network.new_server()
+        self._servers.add(server)
+        return RemoteHandle(self, server, url if "://" in url else f"http://{url}")
 
 
 class RemoteHandle:
@@ -87,16 +71,17 @@ class RemoteHandle:
 
     script_type: Final = "remote procedure handle"
 
-    def __init__(self, program: RpcBuiltins, server: RemoteServer) -> None:
+    def __init__(self, program: RpcBuiltins, server: int, url: str) -> None:
         self._program = program
         self._server = server
+        self._url = url
 
     def call_method(
         self, thread: ScriptThread, method: str, arguments: Sequence[Any], named: Mapping[str, Any]
     ) -> Generator[Wait, None, Any]:
         """Call a procedure and wait for its result."""
         if method == _CLOSE:
-            self._program.close(self._server)
+            self._program.network.close_server(self._server)
             return None
         if named:
             raise ScriptRuntimeError(f"{method}: arguments of a remote procedure have no names")
@@ -107,10 +92,13 @@ class RemoteHandle:
             )
         while not self._program.may_send(n_values):
             yield NEXT_CYCLE
-        call = self._program.call(self._server, method, [_to_wire(value) for value in arguments])
+        values = [_to_wire(value) for value in arguments]
+        call = self._program.network.call(self._server, self._url, method, values)
         yield Blocked(lambda: call.is_done, Outside.PEER)
         try:
-            return _from_wire(call.result(), self._program.has_structs)
+            if call.error:
+                raise RemoteCallError(call.error)
+            return _from_wire(call.value, self._program.has_structs)
         except RemoteCallError as error:
             text = to_script_text(" ".join(str(error).split())[:LONGEST_MESSAGE])
             raise ScriptRuntimeError(f"{method}: remote procedure call failed: {text}") from None

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from protocol.rtde.fields import INPUTS, RtdeField
+from protocol.rtde.fields import INPUTS
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.force_sense import VARIABLE, ExternalSensor, ForceSense
@@ -22,16 +22,9 @@ _INPUT_NAMES = frozenset(field.name for field in INPUTS)
 class RtdeBuiltins(BuiltinGroup):
     """RTDE outputs and inputs of one box."""
 
-    def __init__(
-        self,
-        past: PastCycles,
-        outputs: tuple[RtdeField, ...],
-        watchdogs: Watchdogs,
-        force_sense: ForceSense,
-        clock: Clock,
-    ) -> None:
-        """Bind the builtins."""
+    def __init__(self, past: PastCycles, clock: Clock, watchdogs: Watchdogs, force_sense: ForceSense) -> None:
         self._past = past
+        outputs = clock.generation.rtde_outputs
         self._outputs = {field.name: field for field in outputs if field.origin is not None}
         self._watchdogs = watchdogs
         self._force_sense = force_sense
@@ -60,18 +53,14 @@ class RtdeBuiltins(BuiltinGroup):
         self._watchdogs.set(variable, min_frequency, chosen, self._clock.tick)
 
     @builtin("ft_rtde_input_enable")
-    def _use_sensor(self, thread: object, enable: bool, mass: float, offset: Any, cog: Any) -> None:
-        self._use(enable, mass, offset, cog, lever_sign=1.0)
+    def _use_sensor(
+        self, thread: object, enable: bool, mass: float, offset: Any, cog: Any, lever_sign: float = 1.0
+    ) -> None:
+        sensor = ExternalSensor(float(mass), vector(offset), vector(cog), lever_sign) if enable else None
+        frequency, action = (SENSOR_FREQUENCY, SENSOR_ACTION) if enable else (0.0, WatchdogAction.IGNORE)
+        self._watchdogs.set(VARIABLE, frequency, action, self._clock.tick)
+        self._force_sense.use(sensor)
 
     @builtin("enable_external_ft_sensor")
     def _use_old_sensor(self, thread: object, enable: bool, mass: float, offset: Any, cog: Any) -> None:
-        self._use(enable, mass, offset, cog, lever_sign=-1.0)
-
-    def _use(self, enable: bool, mass: float, offset: Any, cog: Any, lever_sign: float) -> None:
-        if enable:
-            sensor = ExternalSensor(float(mass), vector(offset), vector(cog), lever_sign)
-            self._watchdogs.set(VARIABLE, SENSOR_FREQUENCY, SENSOR_ACTION, self._clock.tick)
-            self._force_sense.use(sensor)
-        else:
-            self._watchdogs.set(VARIABLE, 0.0, WatchdogAction.IGNORE, self._clock.tick)
-            self._force_sense.use(None)
+        self._use_sensor(thread, enable, mass, offset, cog, lever_sign=-1.0)

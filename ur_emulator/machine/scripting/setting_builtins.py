@@ -1,7 +1,7 @@
 """Builtins for TCP, payload and mounting, and the world model."""
 
-from collections.abc import Callable, Sequence
-from functools import wraps
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import hypot, pi
 from typing import Any
@@ -13,8 +13,8 @@ from protocol.pose import pose_inv, pose_sub, pose_trans, rotvec_to_matrix
 from ur_emulator.machine.controller.force_sense import ForceSense
 from ur_emulator.machine.controller.settings import Payload, ToolSettings
 from ur_emulator.machine.controller.world_model import WorldModel, WorldModelError
-from ur_emulator.machine.models.robot_model import RobotModel, Vector3, six
-from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin, floats, vector
+from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, six
+from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin, floats, refusing, vector
 from urscript import HostFunction, ScriptRuntimeError
 from urscript.values import Pose, Struct, log_form
 
@@ -27,17 +27,14 @@ MAX_COG = 1.0
 MAX_INERTIA = 133.0
 
 
+@dataclass(frozen=True)
 class SettingBuiltins(BuiltinGroup):
-    """TCP, payload and mounting."""
+    """TCP, payload and mounting; a payload zeroes a force sensor. A cycle takes `_step_time` [s]."""
 
-    def __init__(
-        self, robot: RobotModel, tool: ToolSettings, force_sense: ForceSense, step_time: float
-    ) -> None:
-        """Bind the builtins; a force sensor is zeroed with the payload. A cycle takes `step_time` [s]."""
-        self._robot = robot
-        self._tool = tool
-        self._force_sense = force_sense
-        self._step_time = step_time
+    _robot: RobotModel
+    _tool: ToolSettings
+    _force_sense: ForceSense
+    _step_time: float
 
     @builtin("set_tcp")
     def _set_tcp(self, thread: object, pose: Any, name: str = "") -> None:
@@ -53,16 +50,16 @@ class SettingBuiltins(BuiltinGroup):
     @builtin("set_payload")
     def _set_payload(self, thread: object, m: float, cog: Any) -> None:
         mass, place = self._mass(m), _cog(self._tool.tcp_offset[:3] if cog is None else cog)
-        self._tool.set_payload(mass, None if cog is None else place)
-        self._force_sense.payload_declared()
+        self._tool.change_payload(Payload(mass, place, at_tcp=cog is None))
+        self._force_sense.zero_built_in(0)
 
     @builtin("set_payload_mass")
     def _set_payload_mass(self, thread: object, m: float) -> None:
-        self._tool.set_payload_mass(self._mass(m))
+        self._tool.change_payload(replace(self._tool.payload, mass=self._mass(m), inertia=ZERO6))
 
     @builtin("set_payload_cog")
     def _set_payload_cog(self, thread: object, cog: Any) -> None:
-        self._tool.set_payload_cog(_cog(cog))
+        self._tool.change_payload(Payload(self._tool.payload.mass, _cog(cog)))
 
     @builtin("set_target_payload")
     def set_target_payload(
@@ -179,7 +176,7 @@ class WorldBuiltins(BuiltinGroup):
             "get_frame_parent": lambda thread, name: world.parent(name),
             "get_children": lambda thread, name: world.children(name),
         }
-        return {name: _refusing(name, function) for name, function in functions.items()}
+        return refusing(functions, WorldModelError)
 
     @builtin("get_pose")
     def _get_pose(self, thread: object, name: str, rel_name: str, ref_name: str | None) -> Pose:
@@ -194,14 +191,3 @@ class WorldBuiltins(BuiltinGroup):
     def _declare_attached(self, thread: object) -> None:
         payload = self._world.attached_payload()
         self._declare(thread, payload.mass, payload.cog, payload.inertia)
-
-
-def _refusing(name: str, function: Callable[..., Any]) -> HostFunction:
-    @wraps(function)
-    def call(*arguments: Any) -> Any:
-        try:
-            return function(*arguments)
-        except WorldModelError as error:
-            raise ScriptRuntimeError(f"{name}: {error}") from None
-
-    return call

@@ -7,42 +7,19 @@ socket_read_binary_integer and related builtins ([0, -1, -1, ...], [0, nan, nan,
 import math
 import struct
 from collections.abc import Callable, Generator
-from typing import Any
 
 from ur_emulator.budgets import BUDGETS, of_cycle
 from ur_emulator.machine.controller.clock import Clock
 from ur_emulator.machine.controller.events import EventQueue, LogAdded
+from ur_emulator.machine.controller.io.network import Network, ScriptSocket
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin
-from ur_emulator.machine.scripting.network import Network, ScriptSocket
 from urscript.dialect import LONGEST_NAME, LONGEST_STRING
 from urscript.errors import ScriptRuntimeError
+from urscript.run.host import HostFunction
 from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
 # --- how a program reads a socket: texts are found in the inbox without looking at a byte twice
-
-
-class SocketReader:
-    """A socket that a program has opened; it `has_asked` if an answer to what it sent may come."""
-
-    def __init__(self, socket: ScriptSocket) -> None:
-        self.socket = socket
-        self.n_taken = 0
-        self.has_asked = False
-
-    @property
-    def outside(self) -> Outside | None:
-        """Who time must wait for: a peer, also a port of the box itself that was asked."""
-        return Outside.PEER if self.has_asked or not self.socket.is_own else None
-
-    def take(self, size: int) -> bytes:
-        """Take bytes out of the inbox."""
-        inbox = self.socket.inbox
-        data = bytes(inbox[:size])
-        del inbox[:size]
-        self.n_taken += len(data)
-        self.has_asked = self.has_asked and bool(inbox)
-        return data
 
 
 class TextSearch:
@@ -62,12 +39,12 @@ class TextSearch:
         self._at = 0
         self._size = 0  # once the end is known
 
-    def find(self, reader: SocketReader) -> int:
+    def find(self, socket: ScriptSocket) -> int:
         """Return the number of bytes up to the end of the text; 0 while it is not complete."""
-        if reader.n_taken != self._n_taken:
+        if socket.n_taken != self._n_taken:
             # Another thread has read from this socket.
-            self._n_taken, self._begin, self._at, self._size = reader.n_taken, -1, 0, 0
-        inbox = reader.socket.inbox
+            self._n_taken, self._begin, self._at, self._size = socket.n_taken, -1, 0, 0
+        inbox = socket.inbox
         if self._begin < 0:
             self._begin = self._after(self._start, inbox)
             if self._begin < 0:
@@ -103,14 +80,29 @@ class SocketBuiltins(BuiltinGroup):
         self._clock = clock
         self._events = events
         self._network = network
-        self._sockets: dict[str, SocketReader] = {}
+        self._sockets: dict[str, ScriptSocket] = {}
         self._searched = 0
         self._searched_in = -1
 
+    def functions(self) -> dict[str, HostFunction]:
+        """Return the builtins."""
+        send, read = self._send, self._read_numbers
+        return super().functions() | {
+            "socket_send_byte": lambda thread, value, name: send(name, bytes([int(value) & 0xFF])),
+            "socket_send_string": lambda thread, text, name: send(name, _latin(log_form(text))),
+            "socket_send_line": lambda thread, text, name: send(name, _latin(log_form(text)) + b"\n"),
+            "socket_read_binary_integer": lambda thread, number, name, timeout: read(
+                name, timeout, number, "i", 4
+            ),
+            "socket_read_byte_list": lambda thread, number, name, timeout: read(
+                name, timeout, number, "B", 1
+            ),
+        }
+
     def end(self) -> None:
         """Close every socket; the program has ended."""
-        for reader in self._sockets.values():
-            reader.socket.close()
+        for socket in self._sockets.values():
+            self._network.close(socket)
         self._sockets.clear()
 
     # --- opening, closing, sending
@@ -123,15 +115,11 @@ class SocketBuiltins(BuiltinGroup):
                 f"socket_open: a socket name of {len(name)} characters; allowed: up to {LONGEST_NAME}"
             )
         self._close(thread, name)
-        socket = self._network.open(address, port)
         # Stored before it is open: a program that is killed meanwhile closes it.
-        reader = self._sockets[name] = SocketReader(socket)
+        socket = self._sockets[name] = self._network.open(address, port)
         expired = self._timer(OPEN_TIMEOUT)
-        if socket.is_connecting:
-            yield Blocked(lambda: not socket.is_connecting or expired(), Outside.PEER)
-        elif not socket.is_open:
-            yield NEXT_CYCLE  # a loop of opens that fail at once must not fill the log
-        if not socket.is_open or socket.is_connecting:
+        yield Blocked(lambda: not socket.is_connecting or expired(), Outside.PEER)
+        if not socket.is_open:
             # Source: log of a real controller; all others are ours.
             reason = (
                 "Connection timed out" if socket.is_connecting else socket.problem or "Connection refused"
@@ -139,31 +127,24 @@ class SocketBuiltins(BuiltinGroup):
             where = f"[{name[:80]}] to host: {address[:80]} at port: {port}"
             text = f"Not able to open socket {where}: {reason}"
             self._events.append(LogAdded("Program", text))
-            socket.close()
-            if self._sockets.get(name) is reader:
+            self._network.close(socket)
+            if self._sockets.get(name) is socket:
                 del self._sockets[name]
             return False
         return True
 
     @builtin("socket_close")
     def _close(self, thread: object, name: _Name) -> None:
-        reader = self._sockets.pop(log_form(name), None)
-        if reader is not None:
-            reader.socket.close()
+        socket = self._sockets.pop(log_form(name), None)
+        if socket is not None:
+            self._network.close(socket)
 
-    def _reader(self, name: _Name) -> SocketReader | None:
+    def _socket(self, name: _Name) -> ScriptSocket | None:
         return self._sockets.get(log_form(name))
 
     def _send(self, name: _Name, data: bytes) -> bool:
-        reader = self._reader(name)
-        if reader is None:
-            return False
-        reader.has_asked = True
-        return reader.socket.send(data)
-
-    @builtin("socket_send_byte")
-    def _send_byte(self, thread: object, value: int, name: _Name) -> bool:
-        return self._send(name, bytes([int(value) & 0xFF]))
+        socket = self._socket(name)
+        return socket is not None and self._network.send(socket, data)
 
     @builtin("socket_send_int")
     def _send_int(self, thread: object, value: float, name: _Name) -> bool:
@@ -171,17 +152,9 @@ class SocketBuiltins(BuiltinGroup):
             raise ScriptRuntimeError(f"socket_send_int: {value:g} does not fit into 32 bits")
         return self._send(name, struct.pack(">i", int(value)))
 
-    @builtin("socket_send_string")
-    def _send_string(self, thread: object, text: Any, name: _Name) -> bool:
-        return self._send(name, log_form(text).encode("latin-1", "replace"))
-
-    @builtin("socket_send_line")
-    def _send_line(self, thread: object, text: Any, name: _Name) -> bool:
-        return self._send(name, log_form(text).encode("latin-1", "replace") + b"\n")
-
     @builtin("socket_set_var")
     def _set_var(self, thread: object, variable: str, value: float, name: _Name) -> None:
-        self._send(name, f"SET {variable} {log_form(value)}\n".encode("latin-1", "replace"))
+        self._send(name, _latin(f"SET {variable} {log_form(value)}\n"))
 
     # --- reading
 
@@ -195,15 +168,14 @@ class SocketBuiltins(BuiltinGroup):
 
     def _take(self, name: _Name, timeout: float, search: TextSearch) -> Generator[Wait, None, bytes | None]:
         """Wait until a text is complete in the inbox and take it; None on failure."""
-        reader = self._reader(name)
-        if reader is None:
+        socket = self._socket(name)
+        if socket is None:
             return None
-        socket = reader.socket
         expired = self._timer(timeout)
 
         def is_over() -> bool:
             return (
-                self._find(search, reader) > 0
+                self._find(search, socket) > 0
                 or not socket.is_open
                 or len(socket.inbox) >= BUDGETS.inbox_bytes
                 or expired()
@@ -215,15 +187,15 @@ class SocketBuiltins(BuiltinGroup):
                 yield NEXT_CYCLE
             if is_over():
                 break
-            yield Blocked(lambda: not self._may_search() or is_over(), reader.outside)
+            yield Blocked(lambda: not self._may_search() or is_over(), socket.outside)
             has_waited = True
         if not has_waited:
             yield CHECKPOINT
-        size = self._find(search, reader)
+        size = self._find(search, socket)
         if size:
-            return reader.take(size)
+            return socket.take(size)
         if len(socket.inbox) >= BUDGETS.inbox_bytes:
-            reader.take(BUDGETS.inbox_bytes)
+            socket.take(BUDGETS.inbox_bytes)
         return None
 
     def _may_search(self) -> bool:
@@ -232,9 +204,9 @@ class SocketBuiltins(BuiltinGroup):
             self._searched_in, self._searched = self._clock.tick, 0
         return self._searched < of_cycle(BUDGETS.search_bytes, self._clock.period_s)
 
-    def _find(self, search: TextSearch, reader: SocketReader) -> int:
+    def _find(self, search: TextSearch, socket: ScriptSocket) -> int:
         before = search.n_searched
-        size = search.find(reader)
+        size = search.find(socket)
         self._searched += search.n_searched - before
         return size
 
@@ -246,11 +218,10 @@ class SocketBuiltins(BuiltinGroup):
         A time-out [s] that is not above 0 is none; `code` is that of a number for `struct`, `width` its
         bytes.
         """
-        reader, clock, size = self._reader(name), self._clock, width * number
+        socket, clock, size = self._socket(name), self._clock, width * number
         failed = [0] + [-1] * number
-        if reader is None:
+        if socket is None:
             return failed
-        socket = reader.socket
         inbox = socket.inbox
         # Nothing to read is nothing that could come: it ends with the time-out.
         enough = size if size > 0 else BUDGETS.inbox_bytes
@@ -260,7 +231,7 @@ class SocketBuiltins(BuiltinGroup):
             def has_come(n_bytes: int) -> bool:
                 return len(inbox) >= n_bytes or not socket.is_open or clock.program_tick >= end
 
-            if socket.is_own and reader.outside:
+            if socket.is_own and socket.outside:
                 # The box's own answer comes whole: what it lacks will not come.
                 yield Blocked(lambda: has_come(1), Outside.PEER)
             yield Blocked(lambda: has_come(enough), None if socket.is_own else Outside.PEER)
@@ -268,25 +239,13 @@ class SocketBuiltins(BuiltinGroup):
             yield CHECKPOINT
         if not 0 < size <= len(inbox):
             if len(inbox) >= BUDGETS.inbox_bytes:
-                reader.take(BUDGETS.inbox_bytes)
+                socket.take(BUDGETS.inbox_bytes)
             elif width == 1 and 0 < len(inbox) < size:
                 # Bytes that have come by the time-out count: programs ask for more than an answer may have.
-                came = reader.take(len(inbox))
+                came = socket.take(len(inbox))
                 return [len(came), *came, *failed[len(came) + 1 :]]
             return failed
-        return [number, *struct.unpack(f">{number}{code}", reader.take(size))]
-
-    @builtin("socket_read_binary_integer")
-    def _read_binary_integer(
-        self, thread: object, number: int, name: _Name, timeout: float
-    ) -> Generator[Blocked, None, list[int]]:
-        return self._read_numbers(name, timeout, number, "i", 4)
-
-    @builtin("socket_read_byte_list")
-    def _read_byte_list(
-        self, thread: object, number: int, name: _Name, timeout: float
-    ) -> Generator[Blocked, None, list[int]]:
-        return self._read_numbers(name, timeout, number, "B", 1)
+        return [number, *struct.unpack(f">{number}{code}", socket.take(size))]
 
     @builtin("socket_read_ascii_float")
     def _read_ascii_float(
@@ -322,7 +281,7 @@ class SocketBuiltins(BuiltinGroup):
 
     @builtin("socket_get_var")
     def _get_var(self, thread: object, variable: str, name: _Name) -> Generator[Wait, None, int]:
-        self._send(name, f"GET {variable}\n".encode("latin-1", "replace"))
+        self._send(name, _latin(f"GET {variable}\n"))
         data = yield from self._take(name, OPEN_TIMEOUT, TextSearch(b"", b"\n"))
         words = b"" if data is None or len(data) > MAX_STRING else data
         try:
@@ -337,4 +296,8 @@ def _delimiter(text: str, interpret_escape: bool) -> bytes:
     text = text.lstrip(" ")
     if interpret_escape:
         text = text.replace("\\n", "\n").replace("\\r", "\r").replace("\\t", "\t")
+    return _latin(text)
+
+
+def _latin(text: str) -> bytes:
     return text.encode("latin-1", "replace")

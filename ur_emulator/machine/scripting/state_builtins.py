@@ -2,6 +2,10 @@
 
 Actual and target values are those at the end of the last cycle, constant while the scripts of a cycle run. So
 the target that a script reads is the one that the packages of its cycle show.
+
+Jacobian, mass matrix and Coriolis torques are those of the controller's model. Source: URScript manual
+e-Series 5.23, module internals. Chosen: the model carries the declared payload; where a program gives no
+angles or speeds, the measured ones are taken.
 """
 
 import math
@@ -10,8 +14,8 @@ from typing import Any
 from ur_emulator.machine.controller.arm_dynamics import ArmDynamics
 from ur_emulator.machine.controller.clock import CLOCK_EPOCH, Clock
 from ur_emulator.machine.controller.past_cycles import PastCycles
-from ur_emulator.machine.models.robot_model import ZERO6, six
-from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, ScriptArm, builtin
+from ur_emulator.machine.models.robot_model import ZERO6, Vector6, six
+from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, ScriptArm, builtin, floats
 from urscript import HostFunction, ScriptRuntimeError, ScriptThread
 from urscript.values import Matrix, Pose, Struct
 
@@ -27,20 +31,19 @@ _INCLUDED = 5
 
 
 class StateBuiltins(BuiltinGroup):
-    """State and clock, and kinematics of the arm."""
+    """State and clock, kinematics and dynamics of the arm."""
 
-    def __init__(self, arm: ScriptArm, past: PastCycles, clock: Clock) -> None:
-        """Bind the builtins."""
+    def __init__(self, arm: ScriptArm, dynamics: ArmDynamics, past: PastCycles, clock: Clock) -> None:
         self._arm = arm
-        self._model = arm.model
-        self._settings = arm.settings
+        self._dynamics = dynamics
         self._past = past
         self._clock = clock
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
-        arm, past, settings, step_time = self._arm, self._past, self._settings, self._clock.period_s
-        model, motion = arm.model, arm.motion
+        arm, past, settings, step_time = self._arm, self._past, self._arm.settings, self._clock.period_s
+        model, motion, dynamics = arm.model, arm.motion, self._dynamics
+        joints, speeds, tool = self._joints, self._speeds, self._tool
         return super().functions() | {
             "get_actual_joint_positions": lambda thread: list(past.sensed.actual_q),
             "get_target_joint_positions": lambda thread: list(motion.target.q),
@@ -54,8 +57,13 @@ class StateBuiltins(BuiltinGroup):
             "get_joint_temp": lambda thread, j: past.sensed.joint_temperatures[j],
             "get_tool_temp": lambda thread: past.sensed.joint_temperatures[-1],
             "get_controller_temp": lambda thread: past.snapshot.masterboard_temperature,
+            "get_actual_tcp_pose": lambda thread: Pose.of(arm.tcp_pose(past.sensed.actual_q)),
+            "tool_pose": lambda thread: Pose.of(arm.tcp_pose(past.sensed.actual_q)),
             "get_target_tcp_pose": lambda thread: Pose.of(arm.tcp_pose(motion.target.q)),
             "get_actual_tool_flange_pose": lambda thread: Pose.of(model.fk(past.sensed.actual_q)),
+            "get_actual_tcp_speed": lambda thread: Pose.of(
+                arm.tcp_speed(past.sensed.actual_q, past.sensed.actual_qd)
+            ),
             "get_target_tcp_speed": lambda thread: Pose.of(arm.tcp_speed(motion.target.q, motion.target.qd)),
             "get_tcp_force": lambda thread: Pose.of(past.snapshot.actual_tcp_force),
             "force": lambda thread: math.hypot(*past.snapshot.actual_tcp_force[:3]),
@@ -69,6 +77,17 @@ class StateBuiltins(BuiltinGroup):
             "get_gravity": lambda thread: list(settings.gravity),
             "get_base_acceleration": lambda thread: list(settings.base_acceleration),
             "is_steady": lambda thread: past.steady_cycles * step_time >= STEADY_TIME,
+            "get_forward_kin": lambda thread, q, tcp: Pose.of(model.fk(joints(q), tool(tcp))),
+            "get_jacobian": lambda thread, q, tcp: Matrix(model.jacobian(joints(q), tool(tcp)).tolist()),
+            "get_jacobian_time_derivative": lambda thread, q, qd, tcp: Matrix(
+                model.jacobian_rate(joints(q), speeds(qd), tool(tcp)).tolist()
+            ),
+            "get_mass_matrix": lambda thread, q, with_rotors: Matrix(
+                dynamics.mass_matrix(joints(q), with_rotors=with_rotors).tolist()
+            ),
+            "get_coriolis_and_centrifugal_torques": lambda thread, q, qd: dynamics.velocity_torque(
+                joints(q), speeds(qd)
+            ).tolist(),
         }
 
     @builtin("time")
@@ -77,15 +96,6 @@ class StateBuiltins(BuiltinGroup):
         if mode == _SYSTEM_CLOCK:
             seconds += int(CLOCK_EPOCH.timestamp())
         return Struct({"sec": seconds, "nanosec": rest * 1000})
-
-    @builtin("get_actual_tcp_pose", "tool_pose")
-    def _actual_tcp_pose(self, thread: object) -> Pose:
-        return Pose.of(self._arm.tcp_pose(self._past.sensed.actual_q))
-
-    @builtin("get_actual_tcp_speed")
-    def _actual_tcp_speed(self, thread: object) -> Pose:
-        sensed = self._past.sensed
-        return Pose.of(self._arm.tcp_speed(sensed.actual_q, sensed.actual_qd))
 
     @builtin("get_actual_joint_positions_history")
     def _joint_positions_history(self, thread: object, steps: int) -> list[float]:
@@ -106,19 +116,9 @@ class StateBuiltins(BuiltinGroup):
             )
         ]
 
-    @builtin("get_forward_kin")
-    def _forward_kin(self, thread: object, q: Any, tcp: Any) -> Pose:
-        return Pose.of(self._model.fk(self._joints(q), self._tool(tcp)))
-
     @builtin("get_inverse_kin")
     def _inverse_kin(
-        self,
-        thread: ScriptThread,
-        x: Pose,
-        qnear: Any,
-        max_position_error: float,
-        max_orientation_error: float,
-        tcp: Any,
+        self, thread: ScriptThread, x: Pose, qnear: Any, position_error: float, turn_error: float, tcp: Any
     ) -> list[float]:
         solution = self._inverse(thread, x, qnear, tcp)
         if solution is None:
@@ -129,15 +129,9 @@ class StateBuiltins(BuiltinGroup):
 
     @builtin("get_inverse_kin_has_solution")
     def _has_inverse_kin(
-        self,
-        thread: ScriptThread,
-        pose: Pose,
-        qnear: Any,
-        max_position_error: float,
-        max_orientation_error: float,
-        tcp: Any,
+        self, thread: ScriptThread, x: Pose, qnear: Any, position_error: float, turn_error: float, tcp: Any
     ) -> bool:
-        return self._inverse(thread, pose, qnear, tcp) is not None
+        return self._inverse(thread, x, qnear, tcp) is not None
 
     @builtin("is_within_safety_limits")
     def _is_within_safety_limits(self, thread: ScriptThread, pose: Any, qnear: Any) -> bool:
@@ -147,59 +141,22 @@ class StateBuiltins(BuiltinGroup):
             low <= x <= high for x, low, high in zip(q, limits.q_min, limits.q_max, strict=True)
         ):
             return False
-        if not boundaries:
-            return True
-        return boundaries.find_crossed(self._model.state(q, ZERO6, self._settings.tcp_offset)) is None
+        return (
+            not boundaries
+            or boundaries.find_crossed(self._arm.model.state(q, ZERO6, self._arm.settings.tcp_offset)) is None
+        )
 
     def _inverse(self, thread: ScriptThread, pose: Pose, q_near: Any, tcp: Any) -> tuple[float, ...] | None:
-        solution = self._model.inverse(tuple(pose), self._joints(q_near), self._tool(tcp))
-        thread.charge(0, _ITERATION * max(0, self._model.n_iterations - _INCLUDED))
+        model = self._arm.model
+        solution = model.inverse(tuple(pose), self._joints(q_near), self._tool(tcp))
+        thread.charge(0, _ITERATION * max(0, model.n_iterations - _INCLUDED))
         return solution
 
-    def _joints(self, value: Any) -> tuple[float, ...]:
-        return self._past.sensed.actual_q if value is None else six([float(x) for x in value])
+    def _joints(self, q: Any) -> Vector6:
+        return self._past.sensed.actual_q if q is None else floats(q)
 
-    def _tool(self, value: Any) -> tuple[float, ...]:
-        return self._settings.tcp_offset if value is None else tuple(value)
+    def _speeds(self, qd: Any) -> Vector6:
+        return self._past.sensed.actual_qd if qd is None else floats(qd)
 
-
-class DynamicsBuiltins(BuiltinGroup):
-    """The controller's model of the arm: Jacobian, mass matrix, Coriolis torques.
-
-    Source: URScript manual e-Series 5.23, module internals. Chosen: the model carries the declared payload;
-    where a program gives no angles or speeds, the measured ones are taken.
-    """
-
-    def __init__(self, arm: ScriptArm, dynamics: ArmDynamics, past: PastCycles) -> None:
-        """Bind the builtins."""
-        self._arm = arm
-        self._dynamics = dynamics
-        self._past = past
-
-    @builtin("get_jacobian")
-    def _jacobian(self, thread: object, q: Any, tcp: Any) -> Matrix:
-        return Matrix(self._arm.model.jacobian(self._angles(q), self._tool(tcp)).tolist())
-
-    @builtin("get_jacobian_time_derivative")
-    def _jacobian_rate(self, thread: object, q: Any, qd: Any, tcp: Any) -> Matrix:
-        rate = self._arm.model.jacobian_rate(self._angles(q), self._speeds(qd), self._tool(tcp))
-        return Matrix(rate.tolist())
-
-    @builtin("get_mass_matrix")
-    def _mass_matrix(self, thread: object, q: Any, include_rotors_inertia: bool) -> Matrix:
-        matrix = self._dynamics.mass_matrix(self._angles(q), with_rotors=include_rotors_inertia)
-        return Matrix(matrix.tolist())
-
-    @builtin("get_coriolis_and_centrifugal_torques")
-    def _velocity_torques(self, thread: object, q: Any, qd: Any) -> list[float]:
-        torques: list[float] = self._dynamics.velocity_torque(self._angles(q), self._speeds(qd)).tolist()
-        return torques
-
-    def _angles(self, q: Any) -> Any:
-        return self._past.sensed.actual_q if q is None else q
-
-    def _speeds(self, qd: Any) -> Any:
-        return self._past.sensed.actual_qd if qd is None else qd
-
-    def _tool(self, tcp: Any) -> Any:
-        return self._arm.settings.tcp_offset if tcp is None else tuple(tcp)
+    def _tool(self, tcp: Any) -> Vector6:
+        return self._arm.settings.tcp_offset if tcp is None else six(tcp)

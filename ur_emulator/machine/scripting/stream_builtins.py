@@ -25,7 +25,7 @@ class StreamBuiltins(BuiltinGroup):
     """Streams of velocities and positions, and the stops."""
 
     def __init__(self, arm: ScriptArm, step_time: float) -> None:
-        """Bind the builtins; `step_time` is the duration of a cycle [s]."""
+        """`step_time` is the duration of a cycle [s]."""
         self._arm = arm
         self._motion = arm.motion
         self._step_time = step_time

@@ -191,7 +191,9 @@ class RobotiqGripper(Gripper):
                 self._fault = Fault.NOT_ACTIVATED if held.GTO else Fault.NONE
             return
         if not before.ACT:
-            self._activate()
+            self._reset()
+            self._status, self._objects = Status.ACTIVATING, Objects.MOVING
+            self._route = [self.tool.stroke, 0.0, self.tool.stroke]
         if held.ATR and not before.ATR:
             self._release()
         is_new = (held.GTO, held.POS) != (before.GTO, before.POS)
@@ -219,11 +221,6 @@ class RobotiqGripper(Gripper):
         if is_new:
             self._is_moving = True
             self._objects = Objects.MOVING
-
-    def _activate(self) -> None:
-        self._reset()
-        stroke = self.tool.stroke
-        self._status, self._objects, self._route = Status.ACTIVATING, Objects.MOVING, [stroke, 0.0, stroke]
 
     def _release(self) -> None:
         self._fault, self._is_moving, self._objects = Fault.RELEASING, True, Objects.MOVING

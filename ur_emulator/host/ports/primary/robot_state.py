@@ -16,7 +16,6 @@ from ur_emulator.machine.controller.safety.safety_state import ConfiguredLimits,
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.controller.status_words import RUNNING_STATES
 from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.calibration import calibrated_dh
 from ur_emulator.machine.models.robot_generation import Software
 from ur_emulator.machine.models.robot_model import DhRow, RobotModel
 
@@ -133,7 +132,6 @@ class StateEncoder:
         self._masterboard = masterboard
         self._limits: ConfiguredLimits | None = None
         self._checksum = 0
-        self._dh = calibrated_dh(arm.robot, arm.calibration)
         self._snapshot: Snapshot | None = None
         self._package = b""
 
@@ -146,7 +144,7 @@ class StateEncoder:
 
     def encode_first(self, snapshot: Snapshot) -> bytes:
         """Return the longer state, which also has kinematics and configuration."""
-        setup = setup_records(self._arm.robot, self._dh, self._safety.limits, self._masterboard)
+        setup = setup_records(self._arm.robot, self._arm.dh, self._safety.limits, self._masterboard)
         return self._encode((*self._records(snapshot), *setup))
 
     def _encode(self, records: Iterable[SubPackage]) -> bytes:

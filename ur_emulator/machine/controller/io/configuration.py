@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE, STANDARD, TOOL, InputOutput, RunState, level
-from ur_emulator.machine.controller.io.modbus_signals import DEFAULT_ACTION, FREEDRIVE_ACTION, ModbusSignals
+from ur_emulator.machine.controller.io.modbus_signals import ModbusSignals
+from ur_emulator.machine.controller.io.network import DEFAULT_ACTION, FREEDRIVE_ACTION
 from ur_emulator.machine.controller.io.registers import Registers
 
 
@@ -24,12 +25,8 @@ class OutputKind(IntEnum):
     EUROMAP = 7
 
 
-_OUTPUTS = {
-    OutputKind.STANDARD: STANDARD,
-    OutputKind.CONFIGURABLE: CONFIGURABLE,
-    OutputKind.TOOL: TOOL,
-}
-_INPUTS = {f"{group.name}_digital": group for group in (STANDARD, CONFIGURABLE, TOOL)}
+_OUTPUTS = (STANDARD, CONFIGURABLE, TOOL)  # as the first three kinds
+_INPUTS = {f"{group.name}_digital": group for group in _OUTPUTS}
 
 
 @dataclass(slots=True)
@@ -46,16 +43,17 @@ class IoConfiguration:
     program_runs: bool = False
     _rules: dict[tuple[OutputKind, int], RunState] = field(default_factory=dict)
 
+    @property
+    def has_actions(self) -> bool:
+        """True while an input may have an action: of the box, or of another unit."""
+        return bool(self.input_actions or self.modbus.signals)
+
     def set_input_action(self, group: str, index: int, action: str) -> None:
         """Set the action of an input."""
         if action == DEFAULT_ACTION:
             self.input_actions.pop((group, index), None)
         else:
             self.input_actions[group, index] = action
-
-    def clear_input_actions(self) -> None:
-        """Remove the actions of all inputs."""
-        self.input_actions.clear()
 
     def requests_freedrive(self) -> bool:
         """True while a line that is set up for it, or a signal of another unit, is high."""
@@ -70,10 +68,6 @@ class IoConfiguration:
             return self.registers.inputs.booleans[index]
         return self.io.read_digital_in(_INPUTS[group].bits[index])
 
-    def rule(self, kind: OutputKind, index: int) -> RunState:
-        """What an output does when programs start and stop."""
-        return self._rules.get((kind, index), RunState.KEEP)
-
     def set_rule(self, kind: OutputKind, index: int, rule: RunState) -> None:
         """Let an output follow the program; it takes its value for the present state at once."""
         if rule is RunState.KEEP:
@@ -82,15 +76,8 @@ class IoConfiguration:
             self._rules[kind, index] = rule
             self._set(kind, index, level(rule, self.program_runs))
 
-    def program_started(self) -> None:
-        """Set the outputs that follow the program."""
-        self._follow(program_runs=True)
-
-    def program_stopped(self, *, unscheduled: bool = False) -> None:
-        """Set the outputs that follow the program; `unscheduled` as in `lines.level`."""
-        self._follow(program_runs=False, unscheduled=unscheduled)
-
-    def _follow(self, *, program_runs: bool, unscheduled: bool = False) -> None:
+    def follow(self, program_runs: bool, *, unscheduled: bool = False) -> None:
+        """Set the outputs that follow the program, which has started or ended; see `lines.level`."""
         self.program_runs = program_runs
         self.modbus.follow(program_runs, unscheduled=unscheduled)
         for (kind, index), rule in self._rules.items():

@@ -1,10 +1,12 @@
 """Digital, analogue and Euromap67 lines of the box and the tool, and outputs that follow the program.
 
 Digital words carry bits 0-7 standard, 8-15 configurable, 16-17 tool (UR realtime sheet; RTDE guide).
-Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V).
+Analogue values are kept in the unit of their domain: ampere (4-20 mA) or volt (0-10 V). No injection
+moulding machine is connected to the Euromap67 interface. Source of outputs that follow the program: URScript
+manuals CB3 3.15 and e-Series 5.11, module ioconfiguration.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -38,6 +40,12 @@ TOOL = DigitalGroup("tool", 16, 2)
 DIGITAL_GROUPS = {group.name: group for group in (STANDARD, CONFIGURABLE, TOOL)}
 # Bits of the lines that old builtins and the Modbus map number from 0: 0-7 standard, 8-9 tool.
 STANDARD_AND_TOOL = (*STANDARD.bits, *TOOL.bits)
+
+
+def with_bit(word: int, bit: int, value: bool) -> int:
+    """Return a word with one of its bits set or cleared."""
+    return word | 1 << bit if value else word & ~(1 << bit)
+
 
 CURRENT, VOLTAGE = 0, 1
 # Full range of an analogue line by domain: (lowest, highest) value.
@@ -121,9 +129,7 @@ class ToolLine(NamedTuple):
     tx_idle_chars: float = 3.5
 
 
-# --- the Euromap67 interface to an injection moulding machine, as state: no machine is connected
-
-# Signals in each direction: two words of the Modbus map (docs/protocol/modbus.md).
+# Signals of Euromap67 in each direction: two words of the Modbus map (docs/protocol/modbus.md).
 N_EUROMAP = 32
 
 
@@ -144,18 +150,15 @@ class Euromap:
 
     def write_output(self, port: int, value: bool) -> None:
         """Switch a signal of the robot."""
-        mask = 1 << port
-        self.outputs = self.outputs | mask if value else self.outputs & ~mask
-
-
-# --- outputs that follow the program: the codes of set_runstate_*, and the level of each
-#
-# Source: URScript manuals CB3 3.15 and e-Series 5.11, module ioconfiguration. An unscheduled stop is one by a
-# protective stop, a fault, a violation or an error of the program; that an emergency stop is one: chosen.
+        self.outputs = with_bit(self.outputs, port, value)
 
 
 class RunState(IntEnum):
-    """What an output does when programs start and stop."""
+    """What an output does when programs start and stop: the codes of set_runstate_*.
+
+    An unscheduled stop is one by a protective stop, a fault, a violation or an error of the program; that an
+    emergency stop is one: chosen.
+    """
 
     KEEP = 0
     LOW_WHEN_STOPPED = 1
@@ -166,15 +169,14 @@ class RunState(IntEnum):
     HIGH_UNTIL_UNSCHEDULED = 5  # and high from the start on
 
 
-_WHEN_RUNNING = {RunState.HIGH_WHEN_RUNNING: True, RunState.HIGH_UNTIL_UNSCHEDULED: True}
-_WHEN_STOPPED = {
-    RunState.LOW_WHEN_STOPPED: False,
-    RunState.HIGH_WHEN_STOPPED: True,
-    RunState.HIGH_WHEN_RUNNING: False,
-}
-_WHEN_UNSCHEDULED = _WHEN_STOPPED | {
-    RunState.LOW_WHEN_UNSCHEDULED: False,
-    RunState.HIGH_UNTIL_UNSCHEDULED: False,
+# Level of an output when a program runs, has stopped, was stopped unscheduled; None does not change it.
+_LEVELS: dict[RunState, tuple[bool | None, bool | None, bool | None]] = {
+    RunState.KEEP: (None, None, None),
+    RunState.LOW_WHEN_STOPPED: (None, False, False),
+    RunState.HIGH_WHEN_STOPPED: (None, True, True),
+    RunState.HIGH_WHEN_RUNNING: (True, False, False),
+    RunState.LOW_WHEN_UNSCHEDULED: (None, None, False),
+    RunState.HIGH_UNTIL_UNSCHEDULED: (True, None, False),
 }
 
 
@@ -183,15 +185,12 @@ def level(rule: RunState, program_runs: bool, *, unscheduled: bool = False) -> b
 
     `unscheduled`: the program has just been stopped, and not by itself or by a user.
     """
+    running, stopped, stopped_unscheduled = _LEVELS[rule]
     if program_runs:
-        return _WHEN_RUNNING.get(rule)
-    return (_WHEN_UNSCHEDULED if unscheduled else _WHEN_STOPPED).get(rule)
+        return running
+    return stopped_unscheduled if unscheduled else stopped
 
 
-# --- all lines of one box
-
-
-@dataclass(slots=True)
 class InputOutput:
     """The lines of one box.
 
@@ -204,19 +203,13 @@ class InputOutput:
         euromap: signals to and from a moulding machine.
     """
 
-    digital_in: int = 0
-    digital_out: int = 0
-    analog: AnalogLines = field(default_factory=AnalogLines)
-    analog_in: list[AnalogLine] = field(init=False)
-    analog_out: list[AnalogLine] = field(init=False)
-    tool_analog_in: list[AnalogLine] = field(init=False)
-    tool_voltage: int = 0
-    tool_output_modes: tuple[int, int, int] = (0, 1, 1)
-    tool_line: ToolLine = field(default_factory=ToolLine)
-    flags: list[bool] = field(default_factory=lambda: [False] * 32)
-    euromap: Euromap = field(default_factory=Euromap)
-
-    def __post_init__(self) -> None:
+    def __init__(self) -> None:
+        self.digital_in = self.digital_out = self.tool_voltage = 0
+        self.tool_output_modes = (0, 1, 1)
+        self.tool_line = ToolLine()
+        self.flags = [False] * 32
+        self.euromap = Euromap()
+        self.analog = AnalogLines()
         self.analog_in = [AnalogLine(self.analog, i) for i in (0, 1)]
         self.analog_out = [AnalogLine(self.analog, i) for i in (2, 3)]
         self.tool_analog_in = [AnalogLine(self.analog, i) for i in (4, 5)]
@@ -231,13 +224,11 @@ class InputOutput:
 
     def write_digital_in(self, bit: int, value: bool) -> None:
         """Set input `bit` of the digital word."""
-        mask = 1 << bit
-        self.digital_in = self.digital_in | mask if value else self.digital_in & ~mask
+        self.digital_in = with_bit(self.digital_in, bit, value)
 
     def write_digital_out(self, bit: int, value: bool) -> None:
         """Set output `bit` of the digital word."""
-        mask = 1 << bit
-        self.digital_out = self.digital_out | mask if value else self.digital_out & ~mask
+        self.digital_out = with_bit(self.digital_out, bit, value)
 
     def write_digital_outputs(self, word: int, mask: int) -> None:
         """Set the outputs in `mask` to the bits of `word`."""

@@ -1,4 +1,4 @@
-"""General purpose registers of the controller: booleans, integers and floats; words of its Modbus map.
+"""General purpose registers of the controller: booleans, integers and floats; memory of its Modbus map.
 
 Ranges: 128 booleans, 48 integers, 48 floats in each direction; the lower part is meant for fieldbuses, the
 upper for RTDE clients. Registers keep their values when programs end. Source: UR RTDE guide; URScript manual
@@ -125,15 +125,13 @@ class Registers:
         )
 
 
-# --- MapMemory: the words of the robot's Modbus map that are not part of the state of the box
-
 # General purpose words, for scripts and Modbus clients. Source: UR "Modbus server" article.
 FIRST_GENERAL = 128
 N_GENERAL = 128
 
 
 class MapMemory:
-    """Words of the Modbus map that keep what is written, 0 to 65535, and the clock as it was latched."""
+    """What of the robot's Modbus map is no other part of the box: words 0 to 65535, the latched clock."""
 
     __slots__ = ("latched_tick", "version", "words")
 
@@ -145,7 +143,3 @@ class MapMemory:
     def write(self, offset: int, word: int) -> None:
         """Write a general purpose word."""
         self.words[offset] = word
-
-    def latch_clock(self, tick: int) -> None:
-        """Store a time, in cycles."""
-        self.latched_tick = tick

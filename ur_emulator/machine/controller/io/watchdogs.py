@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
 
 from protocol.primary.messages import ReportLevel
 from ur_emulator.machine.controller.events import ErrorReported
@@ -23,13 +22,6 @@ class WatchdogAction(Enum):
     IGNORE = "ignore"
     PAUSE = "pause"
     STOP = "stop"
-
-
-class LateInput(NamedTuple):
-    """A variable was not written in time; what its watchdog does: PAUSE or STOP."""
-
-    report: ErrorReported
-    action: WatchdogAction
 
 
 # State of the program, for the message.
@@ -76,9 +68,12 @@ class Watchdogs:
         for watch in self._watches.values():
             watch.last_tick = tick
 
-    def late(self, tick: int) -> LateInput | None:
-        """Return the first variable that is late, those that stop the program before others, or None."""
-        found: LateInput | None = None
+    def late(self, tick: int) -> tuple[ErrorReported, WatchdogAction] | None:
+        """Return what there is to report and to do of a variable that is late; None if none is.
+
+        It is the first one that stops the program, or else the first one.
+        """
+        found: tuple[ErrorReported, WatchdogAction] | None = None
         for variable, watch in self._watches.items():
             if tick - watch.last_tick <= watch.cycles or (found and watch.action is not WatchdogAction.STOP):
                 continue
@@ -90,7 +85,7 @@ class Watchdogs:
                 f"Fieldbus input disconnected: RTDE input {variable} was not written for {limit:g} s, "
                 f"watchdog action {watch.action.value}: the program is {_CONSEQUENCE[watch.action]}",
             )
-            found = LateInput(report, watch.action)
+            found = report, watch.action
             if watch.action is WatchdogAction.STOP:
                 break
         return found

@@ -12,15 +12,9 @@ from enum import Enum, IntEnum
 from ur_emulator.machine.controller.io.lines import CONFIGURABLE
 from ur_emulator.machine.controller.safety.modes import SafetyEvent
 
-# --- the three-position enabling device of an e-Series box as a table
-#
-# Source: UR5e hardware manual 2022: stop when fully released or fully pressed; from automatic to manual mode
-# it must be released and pressed again. That it enables from full pressure only after a release: IEC
-# 60947-5-8.
-
 
 class EnablingAct(Enum):
-    """What happens to the device; the values but the last are those of the control API."""
+    """What happens to the enabling device; the values but the last are those of the control API."""
 
     DISCONNECT = "none"
     RELEASE = "released"
@@ -30,7 +24,7 @@ class EnablingAct(Enum):
 
 
 class EnablingState(Enum):
-    """Where the device is."""
+    """Where the enabling device is."""
 
     NO_DEVICE = "no device"
     RELEASED = "released"
@@ -40,7 +34,9 @@ class EnablingState(Enum):
 
 
 _S, _A = EnablingState, EnablingAct
-# A pair that is not listed changes nothing.
+# A pair that is not listed changes nothing. Source: UR5e hardware manual 2022: stop when fully released or
+# fully pressed; from automatic to manual mode it must be released and pressed again. That it enables from
+# full pressure only after a release: IEC 60947-5-8.
 TRANSITIONS: dict[tuple[EnablingState, EnablingAct], EnablingState] = {
     **{(state, _A.DISCONNECT): _S.NO_DEVICE for state in _S},
     **{(state, _A.RELEASE): _S.RELEASED for state in _S},
@@ -57,7 +53,7 @@ ACTIVE = frozenset({_S.ENABLING, _S.TO_BE_RELEASED})
 
 @dataclass(slots=True)
 class EnablingDevice:
-    """The device of a box, or none."""
+    """The three-position enabling device of an e-Series box, or none."""
 
     state: EnablingState = EnablingState.NO_DEVICE
 
@@ -66,23 +62,19 @@ class EnablingDevice:
         self.state = TRANSITIONS.get((self.state, act), self.state)
 
 
-# --- the operational mode of an e-Series box as tables: who chooses it, what each mode allows
-#
-# Sources: UR5e hardware manual 2022, safety I/O (a wired selector overrides PolyScope and dashboard; what
-# acts in which mode); PolyScope X manual SW 10.6 (rights of each mode); UR dashboard server e-Series: NONE
-# without a password. What is chosen stands in docs/fidelity.md.
-
-
 class OperationalMode(Enum):
-    """An operational mode; the values are those of the control API and of the dashboard."""
+    """A mode of an e-Series box; the values are those of the control API and of the dashboard."""
 
-    NONE = "none"
+    NONE = "none"  # without a password. Source: UR dashboard server e-Series
     MANUAL = "manual"
     AUTOMATIC = "automatic"
 
 
 class ModeSource(IntEnum):
-    """Who may choose the operational mode; the first one that has chosen counts."""
+    """Who may choose the operational mode; the first one that has chosen counts.
+
+    Source: UR5e hardware manual 2022, safety I/O: a wired selector overrides PolyScope and dashboard.
+    """
 
     SELECTOR = 0  # configurable input: low automatic, high manual
     DASHBOARD = 1
@@ -106,6 +98,8 @@ class OperationalRow:
     heeds_safeguard: bool
 
 
+# Sources: UR5e hardware manual 2022, safety I/O (what acts in which mode); PolyScope X manual SW 10.6 (rights
+# of each mode). What is chosen stands in docs/fidelity.md.
 OPERATIONAL_MODES: dict[OperationalMode, OperationalRow] = {
     OperationalMode.NONE: OperationalRow(True, False, False, False),
     OperationalMode.MANUAL: OperationalRow(True, True, True, False),
@@ -136,30 +130,13 @@ class OperationalModeChoice:
         self.allows = OPERATIONAL_MODES[self.mode]
 
 
-# --- a safeguard of the cell: open or closed, with a reset button or without
-
-
 @dataclass(slots=True)
 class Safeguard:
-    """A safeguard; it stops the arm while it is open, or closed and not reset."""
+    """A safeguard of the cell; it stops the arm while it is open, or closed and not reset."""
 
     is_stopping: bool = False
-    _is_open: bool = False
-    _needs_reset: bool = False
-
-    def guard(self, is_open: bool) -> None:
-        """Open or close it."""
-        self._is_open = is_open
-        self.is_stopping = is_open or (self.is_stopping and self._needs_reset)
-
-    def require_reset(self, required: bool) -> None:
-        """Set up whether closing is enough."""
-        self._needs_reset = required
-        self.guard(self._is_open)
-
-    def reset(self) -> None:
-        """Press its reset button."""
-        self.is_stopping = self._is_open
+    is_open: bool = False
+    needs_reset: bool = False
 
 
 N_INPUT_PAIRS = CONFIGURABLE.count // 2
@@ -242,17 +219,19 @@ class SafetyInputs:
 
     def guard(self, guard: Guard, is_open: bool) -> None:
         """Open or close a safeguard."""
-        self._safeguards[guard].guard(is_open)
+        row = self._safeguards[guard]
+        row.is_open = is_open
+        row.is_stopping = is_open or (row.is_stopping and row.needs_reset)
         self._stop_or_go_on()
 
     def require_reset(self, guard: Guard, required: bool) -> None:
         """Set up whether closing a safeguard is enough."""
-        self._safeguards[guard].require_reset(required)
-        self._stop_or_go_on()
+        self._safeguards[guard].needs_reset = required
+        self.guard(guard, self._safeguards[guard].is_open)
 
     def reset(self, guard: Guard) -> None:
         """Press the reset button of a safeguard."""
-        self._safeguards[guard].reset()
+        self._safeguards[guard].is_stopping = self._safeguards[guard].is_open
         self._stop_or_go_on()
 
     def act_on_device(self, act: EnablingAct) -> None:

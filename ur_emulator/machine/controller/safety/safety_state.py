@@ -19,8 +19,6 @@ from ur_emulator.machine.controller.safety.modes import (
 from ur_emulator.machine.models.robot_model import RobotModel, Vector6, six
 from ur_emulator.machine.models.safety_limits import UNLIMITED, ArmLimits
 
-# --- ConfiguredLimits: what the safety system keeps the arm in, by the arm itself and by its installation
-
 
 @dataclass(frozen=True, slots=True)
 class SafetySettings:

@@ -79,10 +79,6 @@ class SpeedLimiter:
         self.scale = scale
         return scale
 
-    def share(self, slider: float) -> float:
-        """Return the part of the slider's speed that the limits allow, 0..1."""
-        return min(1.0, self.scale / slider) if slider > 0.0 else 1.0
-
     def find_violation(self, sensed: PlantState, space: ArmInSpace, dt: float) -> Violation | None:
         """Return the protective stop for what has exceeded a limit for too long, or None.
 
@@ -138,4 +134,6 @@ class SpeedScaling:
     @property
     def share(self) -> float:
         """Part of the slider's speed that the limits allow, 0..1."""
-        return 1.0 if self.limiter is None else self.limiter.share(self.slider)
+        if self.limiter is None or self.slider <= 0.0:
+            return 1.0
+        return min(1.0, self.limiter.scale / self.slider)
