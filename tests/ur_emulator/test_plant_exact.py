@@ -96,7 +96,7 @@ def test_a_refused_push_takes_no_time():
     before = bench.now.actual_q
     bench.tick(20, Push((50.0, 0.0, 0.0), duration=1.0))
     assert bench.now.actual_q == before
-    assert not bench.controller.push.will_end
+    assert not bench.controller.plant.push_left
 
 
 def test_an_arm_in_freedrive_stands_still():

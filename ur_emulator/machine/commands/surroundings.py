@@ -66,7 +66,7 @@ class Push(CommandOperation):
     )
 
     def apply(self, box: BoxParts) -> None:
-        box.push.begin(self.force, self.point, self.duration)
+        box.plant.push(self.force, self.point, self.duration)
 
 
 class AttachPayload(CommandOperation):

@@ -29,7 +29,7 @@ from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.motion.tool import UnreachableError
-from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
+from ur_emulator.machine.plant.arm_plant import ArmPlant, PlantState
 from ur_emulator.machine.plant.exact import ExactPlant
 from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.tools import SUPPLY
@@ -177,7 +177,6 @@ class Controller:
         state.past.place(state.motion.target, self.plant.sense())
         self.programs = ProgramRunner(state, make_robot(state))
         self.safety = SafetySystem(state, self.programs, self.plant)
-        self.push = FlangePush(self.plant)
         state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
@@ -209,7 +208,7 @@ class Controller:
             self.state.motion.is_moving
             or self.state.mode.is_changing
             or self.safety.is_braking
-            or self.push.will_end
+            or self.plant.push_left > 0
             or any(gripper.is_busy for gripper in self.state.grippers)
         )
 
@@ -221,9 +220,9 @@ class Controller:
         state = self.state
         state.clock.tick += 1
         n_events = len(state.events)
-        was_pushing = self.push.will_end
+        was_pushing = self.plant.push_left > 0
         if was_pushing:
-            self.push.step()
+            self.plant.count_push()
         self.outcomes = []
         for command in commands:
             self.outcomes.append(outcome_of(command, self))

@@ -7,7 +7,6 @@ from the seed: equal seeds and equal targets give bit-identical states.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -66,6 +65,9 @@ class PlantState(NamedTuple):
     position_error: Vector6
 
 
+_NOTHING: Vector3 = (0.0, 0.0, 0.0)
+
+
 class ArmPlant(ABC):
     """An arm on a table.
 
@@ -81,6 +83,7 @@ class ArmPlant(ABC):
         dh: six calibrated rows of this arm, for the controller's kinematics.
         range: the joint ranges, for all who keep them.
         cycle: number of the last cycle since the arm was put at rest.
+        push_left: cycles after which the present push ends; 0: none does by itself.
     """
 
     def __init__(
@@ -96,6 +99,7 @@ class ArmPlant(ABC):
         self._physics = ArmPhysics(robot, self.dh, fidelity, seed, tools)
         self._thermometers = Thermometers(robot.generation)
         self._finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
+        self.push_left = 0
         self._set_up()
         self.reset(robot.home_q)
 
@@ -199,14 +203,31 @@ class ArmPlant(ABC):
         """Set the true payload; from now on `set_payload` only declares. See `Loads.attach`."""
         self._acted_on("payload").loads.attach(mass, cog)
 
-    def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
-        """Push the flange from now on; a zero force ends it.
+    def push(
+        self, force: Sequence[float], point: Sequence[float] | None = None, duration: float | None = None
+    ) -> None:
+        """Push the flange from this cycle on; a zero force ends it.
 
-        The force (3,) is in base axes [N]; the point where it acts in the flange frame [m], None for its
-        origin. PlantError when a number is not finite.
+        Args:
+            force: in base axes (3,) [N].
+            point: where it acts, in the flange frame (3,) [m]; None for its origin.
+            duration: how long, in whole cycles [s]; None: until the next push.
+
+        Raises:
+            PlantError: a number is not finite.
         """
+        n_cycles = 0 if duration is None else round(duration / self.period_s)
+        if duration is not None and not n_cycles:
+            force = _NOTHING
         arm = self._acted_on("push") if any(force) else self.physics
         arm.loads.push(force, point)
+        self.push_left = n_cycles
+
+    def count_push(self) -> None:
+        """Count a cycle of a push with a duration; end it after the last."""
+        self.push_left -= 1
+        if not self.push_left:
+            self.push(_NOTHING)
 
     # --- what the controller sets up
 
@@ -238,35 +259,3 @@ class ArmPlant(ABC):
     def drive_fingers(self, commands: Sequence[FingerCommand | None]) -> None:
         """Set what the fingers of each tool do from the next cycle on; None: they hold."""
         self._finger_commands = commands
-
-
-_NOTHING: Vector3 = (0.0, 0.0, 0.0)
-
-
-@dataclass(slots=True)
-class FlangePush:
-    """Pushes the flange of a plant, for a time or until the next push."""
-
-    _plant: ArmPlant
-    _cycles_left: int = 0
-
-    @property
-    def will_end(self) -> bool:
-        """True during a push with a duration."""
-        return self._cycles_left > 0
-
-    def begin(self, force: Vector3, point: Vector3, duration: float | None) -> None:
-        """Push from this cycle on.
-
-        The force is in base axes [N], zero ends the push before; the point where it acts in the flange frame
-        [m]. Without a duration [s] it lasts until the next one.
-        """
-        n_cycles = 0 if duration is None else round(duration / self._plant.period_s)
-        self._plant.push(force if duration is None or n_cycles else _NOTHING, point)
-        self._cycles_left = n_cycles
-
-    def step(self) -> None:
-        """Count a cycle of a push with a duration; end it after the last."""
-        self._cycles_left -= 1
-        if not self._cycles_left:
-            self._plant.push(_NOTHING)

@@ -91,7 +91,7 @@ class Loads:
         set_payload_body(self._model, mass, cog)
 
     def push(self, force: Sequence[float], point: Sequence[float] | None) -> None:
-        """Push from now on; see `Plant.push`."""
+        """Push from now on; see `ArmPlant.push`."""
         force_base = np.array(force, dtype=np.float64)
         at = np.zeros(3) if point is None else np.array(point, dtype=np.float64)
         if force_base.shape != (3,) or at.shape != (3,) or not np.isfinite([force_base, at]).all():
