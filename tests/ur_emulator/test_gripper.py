@@ -218,7 +218,7 @@ class Bench:
         self.scene.put(Thing("block", "box", (0.04, 0.04, 0.06), mass, friction, self.place))
 
     def run(self, seconds, width, force=50.0, held=False):
-        self.plant.drive_fingers([FingerCommand(width, 0.15, force)])
+        self.plant.finger_commands = [FingerCommand(width, 0.15, force)]
         for _ in range(round(seconds / self._period)):
             self.plant.step(self._target)
             self.plant.sense()

@@ -298,12 +298,10 @@ class Controller:
         """Let the grippers see their fingers, and drive them in the next cycle."""
         state, plant = self.state, self.plant
         is_on, has_supply = state.mode.mode >= RobotMode.POWER_ON, state.io.tool_voltage == SUPPLY
-        plant.drive_fingers(
-            [
-                gripper.step(fingers, is_on and (has_supply or gripper.has_cable), state.io)
-                for gripper, fingers in zip(state.grippers, plant.fingers, strict=True)
-            ]
-        )
+        plant.finger_commands = [
+            gripper.step(fingers, is_on and (has_supply or gripper.has_cable), state.io)
+            for gripper, fingers in zip(state.grippers, plant.fingers, strict=True)
+        ]
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if the measured state violates a limit, or a stop was requested."""

@@ -83,6 +83,7 @@ class ArmPlant(ABC):
         dh: six calibrated rows of this arm, for the controller's kinematics.
         range: the joint ranges, for all who keep them.
         cycle: number of the last cycle since the arm was put at rest.
+        finger_commands: what the fingers of each tool do from the next cycle on; None: they hold.
         push_left: cycles after which the present push ends; 0: none does by itself.
     """
 
@@ -98,7 +99,7 @@ class ArmPlant(ABC):
         self._dynamics = InverseDynamics(robot, self.dh)
         self._physics = ArmPhysics(robot, self.dh, fidelity, seed, tools)
         self._thermometers = Thermometers(robot.generation)
-        self._finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
+        self.finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
         self.push_left = 0
         self._set_up()
         self.reset(robot.home_q)
@@ -255,7 +256,3 @@ class ArmPlant(ABC):
     def fingers(self) -> list[FingerState]:
         """The fingers of each tool as the last cycle that is computed left them."""
         return [hand.state for hand in self._physics.hands]
-
-    def drive_fingers(self, commands: Sequence[FingerCommand | None]) -> None:
-        """Set what the fingers of each tool do from the next cycle on; None: they hold."""
-        self._finger_commands = commands

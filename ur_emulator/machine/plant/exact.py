@@ -44,7 +44,7 @@ class ExactPlant(ArmPlant):
         else:
             check_target(target, self.cycle)
             self._follow(target.q, target.qd, target.qdd)
-        for hand, command in zip(self._physics.hands, self._finger_commands, strict=True):
+        for hand, command in zip(self._physics.hands, self.finger_commands, strict=True):
             hand.place(command, self.period_s)
         self._thermometers.step(self._current)
         self._physics.q[:] = self._q

@@ -83,7 +83,7 @@ class Plant(ArmPlant):
     def _begin_cycle(
         self, target: JointTarget | None, mode: ControlMode, torque: TorqueCommand | None
     ) -> None:
-        self._command = (target, mode, torque, self._finger_commands)
+        self._command = (target, mode, torque, self.finger_commands)
 
     def complete_cycle(self) -> None:
         """See `ArmPlant.complete_cycle`; raises what `step` raises."""
