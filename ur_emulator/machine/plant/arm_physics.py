@@ -119,7 +119,7 @@ class ArmPhysics:
         self.scene.bind(model, data)
         for hand in self.hands:
             hand.bind(model, data)
-        self._sort_shapes()
+        self._has_sorted = False
 
     def _recompile(self) -> None:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
@@ -198,6 +198,8 @@ class ArmPhysics:
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
         """Shapes around the arm and on its flange, at the start of the last sub-step."""
+        if not self._has_sorted:
+            self._sort_shapes()
         data, shapes = self.data, [*self._fixed_shapes]
         for shape, (dx, dy, dz), at in self._sliding_shapes:
             q, (x, y, z, rx, ry, rz) = float(data.qpos[at]), shape.pose
@@ -211,6 +213,7 @@ class ArmPhysics:
 
         Clients may ask for shapes as often as they like, so all that can be known before is.
         """
+        self._has_sorted = True
         model, data = self.model, mujoco.MjData(self.model)
         mujoco.mj_kinematics(model, data)  # with fingers at 0
         site = model.site(FLANGE).id

@@ -134,17 +134,16 @@ class Scene:
             raise RefusedError(f"{what}: there are {most} already, remove one first")
         # Beside the one that it replaces, which may have moved: that stays if this one is refused.
         self._n_added += 1
-        name, placed = f"{thing.kind} {self._n_added}", self._placed
-        self._placed = {one: placed[one] for one in placed if one != key} | {key: _Placed(name, thing)}
+        name = f"{thing.kind} {self._n_added}"
         _add_body(self._spec, name, thing)
         self._recompile()
         touching = self._touching(name)
         if self._arm in touching if thing.mass else touching:
-            self._placed = placed
             self._delete(name)
             raise RefusedError(f"{what}: the arm is where it should {_REFUSAL[thing.kind]}, move one of them")
         if before is not None:
-            self._delete(before.body)
+            self.remove(*key)
+        self._placed[key] = _Placed(name, thing)
 
     def remove(self, kind: str, name: str) -> None:
         """Take a thing or an obstacle away; RefusedError if there is none of this name."""
