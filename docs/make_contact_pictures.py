@@ -25,7 +25,7 @@ from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import TYPICAL
 from ur_emulator.machine.models.mjcf import LINKS, arm_spec, to_body
-from ur_emulator.machine.plant.arm_physics import TABLE_HEIGHT
+from ur_emulator.machine.plant.physics_model import TABLE_HEIGHT
 from urscript import compile_program
 
 mpl.use("agg")

@@ -19,18 +19,14 @@ from ur_hil.records import text as text_field
 Three = tuple[float, float, float]
 
 
-_NOUNS = {"boxes": "box", "cylinders": "cylinder", "spheres": "sphere", "capsules": "capsule"}
-"""The kinds of solids by the name of their table in a cell file. Cylinders and capsules lie along their own z
-axis; the length of a capsule is that of its straight part, without the two half spheres."""
-
-
 @dataclass(frozen=True, slots=True)
 class Solid:
     """A convex body.
 
     Attributes:
-        kind: a key of _NOUNS.
-        sizes: x, y, z of a box; the radius, and the length of a cylinder or capsule [m].
+        shape: "box", "cylinder" or "capsule" (along z), "sphere".
+        sizes: x, y, z of a box; the radius, and the length of a cylinder or capsule, without its half spheres
+            [m].
         centre: in `base`, or in the flange's frame for a part of a tool [m].
         rpy: roll, pitch, yaw: turns about the fixed x, y and z axis, in this order [rad].
         mass: of a thing that can be gripped and pushed [kg]; 0: it stands still.
@@ -38,17 +34,12 @@ class Solid:
     """
 
     name: str
-    kind: str
+    shape: str
     sizes: tuple[float, ...]
     centre: Three
     rpy: Three = (0.0, 0.0, 0.0)
     mass: float = 0.0
     friction: float = 0.5
-
-    @property
-    def shape(self) -> str:
-        """What it is, e.g. `box`."""
-        return _NOUNS[self.kind]
 
     @property
     def title(self) -> str:
@@ -200,6 +191,11 @@ class _Body:
     mass: Annotated[float, number(0.001, 100.0, "kg")] = 0.0
     friction: Annotated[float, number(0.0, 2.0)] = 0.5
 
+    def solid(self, shape: str) -> Solid:
+        """The body with the shape of its table in the file."""
+        name, centre, rpy, mass, friction, *sizes = astuple(self)
+        return Solid(name, shape, sizes[0] if shape == "box" else tuple(sizes), centre, rpy, mass, friction)
+
 
 @record
 class _Box(_Body):
@@ -228,13 +224,14 @@ class _Solids:
 
     @property
     def solids(self) -> tuple[Solid, ...]:
-        """All bodies, kind by kind."""
-        return tuple(_solid(kind, body) for kind in _NOUNS for body in getattr(self, kind))
-
-
-def _solid(kind: str, body: _Body) -> Solid:
-    name, centre, rpy, mass, friction, *sizes = astuple(body)
-    return Solid(name, kind, sizes[0] if kind == "boxes" else tuple(sizes), centre, rpy, mass, friction)
+        """All bodies, shape by shape."""
+        kinds = {
+            "box": self.boxes,
+            "cylinder": self.cylinders,
+            "sphere": self.spheres,
+            "capsule": self.capsules,
+        }
+        return tuple(body.solid(shape) for shape, bodies in kinds.items() for body in bodies)
 
 
 @record

@@ -36,10 +36,10 @@ _FREE_BY_DESIGN = {(3, 5), (4, 6)}
 
 _COAL_SHAPES = MappingProxyType(
     {
-        "boxes": pin.coal.Box,
-        "cylinders": pin.coal.Cylinder,
-        "spheres": pin.coal.Sphere,
-        "capsules": pin.coal.Capsule,
+        "box": pin.coal.Box,
+        "cylinder": pin.coal.Cylinder,
+        "sphere": pin.coal.Sphere,
+        "capsule": pin.coal.Capsule,
     }
 )
 
@@ -189,7 +189,7 @@ def _geometry(solid: Solid, carrier: RobotModel | None) -> Any:
     if carrier is not None:
         flange = carrier.pin_model.frames[carrier.flange_frame]
         joint, placement = flange.parentJoint, flange.placement * placement
-    shape = _COAL_SHAPES[solid.kind](*solid.sizes)
+    shape = _COAL_SHAPES[solid.shape](*solid.sizes)
     return pin.GeometryObject(solid.name, joint, 0, placement, shape)
 
 

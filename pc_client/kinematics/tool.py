@@ -37,7 +37,7 @@ def _carrying(cell: Cell, tool: ToolModel) -> Cell:
         raise CellError(f"cell {cell.name!r} has a tool, and {tool.name} is given: give only one of them")
     # A cylinder around housing and open fingers: a capsule that holds the tips would reach beyond them.
     radius, end = max(tool.body, 0.5 * tool.stroke + _FINGER), tool.length + tool.pad[1]
-    shape = Solid(tool.title, "cylinders", (radius, end), (0.0, 0.0, 0.5 * end))
+    shape = Solid(tool.title, "cylinder", (radius, end), (0.0, 0.0, 0.5 * end))
     name, text = cell.name or "no cell file", cell.text
     if cell == NO_CELL:
         text = f"format = 1\nname = {dumps(name)}\n"

@@ -48,7 +48,7 @@ def test_the_example_is_read_as_it_says():
     assert slanted.normal[1] / slanted.normal[0] == pytest.approx(-0.2)
     assert slanted.offset == pytest.approx(-0.7 / math.hypot(1.0, 0.2))
     assert cell.solids[1] == Solid(
-        "camera stand", "boxes", (0.06, 0.06, 0.6), (0.2, -0.42, 0.3), (0.0, 0.0, 0.785)
+        "camera stand", "box", (0.06, 0.06, 0.6), (0.2, -0.42, 0.3), (0.0, 0.0, 0.785)
     )
     assert cell.tool.mass == 0.4
     assert [solid.title for solid in cell.tool.solids] == ["cylinder 'pen holder'", "capsule 'pen'"]
@@ -179,7 +179,7 @@ PLAN = plan_movement(STROKES, model=robot_model("ur3"))
 START = PLAN.start_q
 # The tool points forward and 45 deg down, the flange stands at about (.35, 0, .25) m.
 POSTURE = np.radians((22.6, -101.1, -120.3, -5.9, 74.2, 106.4))
-BALL = Tool((Solid("ball", "spheres", (0.03,), (0.0, 0.0, 0.2)),))
+BALL = Tool((Solid("ball", "sphere", (0.03,), (0.0, 0.0, 0.2)),))
 
 
 def measure(cell, q=POSTURE):
@@ -210,7 +210,7 @@ def test_a_ball_at_the_flange_has_the_distance_that_the_dh_table_says(seed):
 
 @settings(max_examples=40)
 @given(
-    st.sampled_from(["boxes", "spheres", "cylinders", "capsules"]),
+    st.sampled_from(["box", "sphere", "cylinder", "capsule"]),
     st.floats(-3.0, 3.0),
     st.floats(-1.5, 1.5),
 )
@@ -219,7 +219,7 @@ def test_a_solid_of_any_shape_and_turn_has_the_distance_worked_out_by_hand(kind,
     centre = ball_centre(POSTURE)
     axis = dh_pose(POSTURE)[:3, 2]
     place = centre + 0.4 * axis
-    sizes = {"boxes": (0.1, 0.06, 0.2), "spheres": (0.05,), "cylinders": (0.04, 0.2), "capsules": (0.04, 0.2)}
+    sizes = {"box": (0.1, 0.06, 0.2), "sphere": (0.05,), "cylinder": (0.04, 0.2), "capsule": (0.04, 0.2)}
     solid = Solid("thing", kind, sizes[kind], tuple(place), (0.0, pitch, yaw))
     found = measure(Cell("c", solids=(solid,), tool=BALL)).cell
     assert found.nearest[0].first == "tool sphere 'ball'"
@@ -229,10 +229,10 @@ def test_a_solid_of_any_shape_and_turn_has_the_distance_worked_out_by_hand(kind,
     x, y, z = R.T @ (centre - place)
     beside, above = np.hypot(x, y), max(abs(z) - 0.1, 0.0)
     expected = {
-        "boxes": np.linalg.norm(np.maximum(np.abs((x, y, z)) - (0.05, 0.03, 0.1), 0.0)),
-        "spheres": 0.4 - 0.05,
-        "cylinders": np.hypot(max(beside - 0.04, 0.0), above),
-        "capsules": np.hypot(beside, above) - 0.04,
+        "box": np.linalg.norm(np.maximum(np.abs((x, y, z)) - (0.05, 0.03, 0.1), 0.0)),
+        "sphere": 0.4 - 0.05,
+        "cylinder": np.hypot(max(beside - 0.04, 0.0), above),
+        "capsule": np.hypot(beside, above) - 0.04,
     }
     assert found.least[0] == pytest.approx(expected[kind] - 0.03, abs=1e-5)
 
@@ -246,21 +246,21 @@ def test_a_tool_counts_above_the_floor():
 
 
 def test_a_tool_that_reaches_back_meets_the_forearm():
-    back = Tool((Solid("bracket", "boxes", (0.02, 0.02, 0.5), (0.06, 0.0, -0.2)),))
+    back = Tool((Solid("bracket", "box", (0.02, 0.02, 0.5), (0.06, 0.0, -0.2)),))
     with_tool = measure(Cell("c", tool=back), np.radians((0, -90, 90, -90, 0, 0)))
     assert with_tool.own.nearest[0].first == "tool box 'bracket'"
     assert with_tool.own.least[0] < measure(NO_CELL, np.radians((0, -90, 90, -90, 0, 0))).own.least[0]
 
 
 def test_a_tool_on_the_flange_does_not_count_against_the_link_that_carries_it():
-    plate = Tool((Solid("plate", "cylinders", (0.03, 0.02), (0.0, 0.0, 0.01)),))
+    plate = Tool((Solid("plate", "cylinder", (0.03, 0.02), (0.0, 0.0, 0.01)),))
     bare, plated = measure(NO_CELL).own, measure(Cell("c", tool=plate)).own
     assert plated.least[0] == pytest.approx(bare.least[0])
 
 
 @pytest.mark.parametrize("name", ["ur3", "ur5", "ur10"])
 def test_a_table_as_a_box_under_the_base_keeps_nobody_from_moving(name):
-    table = Cell("c", solids=(Solid("table", "boxes", (2.0, 2.0, 0.1), (0.0, 0.0, -0.05)),))
+    table = Cell("c", solids=(Solid("table", "box", (2.0, 2.0, 0.1), (0.0, 0.0, -0.05)),))
     model = robot_model(name, table)
     q = np.tile(model.description.q_branch, (20, 1))
     q[:, 0] = np.linspace(-3, 3, 20)
@@ -285,9 +285,7 @@ def middle_of_the_path():
 
 
 def test_a_box_in_the_way_refuses_the_plan_and_is_named():
-    error = plan_refused(
-        Cell("c", solids=(Solid("press", "boxes", (0.02, 0.02, 0.02), middle_of_the_path()),))
-    )
+    error = plan_refused(Cell("c", solids=(Solid("press", "box", (0.02, 0.02, 0.02), middle_of_the_path()),)))
     assert " comes within " in str(error)
     assert "of box 'press', at least 20 mm is asked" in str(error)
     assert error.joint is not None
@@ -305,14 +303,14 @@ def test_a_raised_floor_refuses_the_plan():
 
 
 def test_a_tool_that_reaches_the_floor_refuses_the_plan_of_a_bare_arm():
-    long = Tool((Solid("rod", "capsules", (0.005, 0.4), (0.0, 0.0, 0.2)),))
+    long = Tool((Solid("rod", "capsule", (0.005, 0.4), (0.0, 0.0, 0.2)),))
     error = plan_refused(Cell("c", tool=long))
     assert "tool capsule 'rod' comes within" in str(error)
     assert error.joint == 5
 
 
 def test_a_box_that_is_far_enough_is_reported_in_the_plan():
-    far = Solid("press", "boxes", (0.1, 0.1, 0.1), (0.8, 0.0, 0.25))
+    far = Solid("press", "box", (0.1, 0.1, 0.1), (0.8, 0.0, 0.25))
     cell = Cell("bench", floor_z=-0.3, solids=(far,), tool=BALL)
     plan = plan_movement(STROKES, model=robot_model("ur3", cell))
     text = plan_text(plan)
@@ -325,7 +323,7 @@ def test_a_box_that_is_far_enough_is_reported_in_the_plan():
 
 
 def test_a_larger_margin_is_kept_when_asked():
-    far = Cell("c", solids=(Solid("press", "boxes", (0.1, 0.1, 0.1), (0.8, 0.0, 0.25)),))
+    far = Cell("c", solids=(Solid("press", "box", (0.1, 0.1, 0.1), (0.8, 0.0, 0.25)),))
     limits = PLAN.report.limits
     limits = replace(limits, clearance_min=limits.clearance_min._replace(cell=1.0))
     with pytest.raises(PlanningError, match="at least 1000 mm is asked"):
@@ -338,7 +336,7 @@ def test_the_approach_goes_around_obstacles():
     direct = plan_approach(PLAN, q_now, model=robot_model("ur3"))
     assert len(direct.waypoints) == 1
     half_way = 0.5 * (q_now + START)
-    post = Solid("post", "cylinders", (0.02, 0.3), (*dh_pose(half_way)[:2, 3], 0.15))
+    post = Solid("post", "cylinder", (0.02, 0.3), (*dh_pose(half_way)[:2, 3], 0.15))
     model = robot_model("ur3", Cell("c", solids=(post,)))
     plan = plan_movement(STROKES, model=model)
     path = plan_approach(plan, q_now, model=model)
@@ -350,7 +348,7 @@ def test_the_approach_goes_around_obstacles():
 def test_an_approach_without_a_free_route_is_refused_with_both_bodies():
     q_now = START + np.array((2.8, 0, 0, 0, 0, 0))
     half_way = 0.5 * (q_now + START)
-    post = Solid("post", "cylinders", (0.02, 0.6), (*dh_pose(half_way)[:2, 3], 0.3))
+    post = Solid("post", "cylinder", (0.02, 0.6), (*dh_pose(half_way)[:2, 3], 0.3))
     ceiling = Wall("ceiling", (0, 0, -1), -0.6)
     model = robot_model("ur3", Cell("c", walls=(ceiling,), solids=(post,)))
     plan = plan_movement(STROKES, model=model)
@@ -359,7 +357,7 @@ def test_an_approach_without_a_free_route_is_refused_with_both_bodies():
 
 
 def test_an_experiment_is_planned_in_its_cell(tmp_path):
-    press = Cell("c", solids=(Solid("press", "spheres", (0.1,), (0.35, 0.0, 0.25)),), text="the file")
+    press = Cell("c", solids=(Solid("press", "sphere", (0.1,), (0.35, 0.0, 0.25)),), text="the file")
     movements = [load_movement("lognorm_4_1")]
     with pytest.raises(PlanningError, match="sphere 'press'"):
         prepare_experiment(movements, repeat=1, out=tmp_path, cell=press)

@@ -99,7 +99,7 @@ def test_other_tools_are_refused(name):
 
 
 def test_two_tools_are_refused_before_a_robot_is_asked():
-    pen = Tool((Solid("pen", "capsules", (0.01, 0.1), (0.0, 0.0, 0.06)),), 0.1)
+    pen = Tool((Solid("pen", "capsule", (0.01, 0.1), (0.0, 0.0, 0.06)),), 0.1)
     with pytest.raises(CellError, match="cell 'bench' has a tool, and robotiq-2f85 is given"):
         connect("robot.invalid", cell=Cell("bench", tool=pen), tool="robotiq-2f85")
     with pytest.raises(CellError, match="unknown tool 'hand'"):

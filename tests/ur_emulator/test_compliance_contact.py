@@ -18,8 +18,8 @@ from ur_emulator.machine.commands.surroundings import AddObstacle, RemoveObstacl
 from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import IDEAL, TYPICAL
-from ur_emulator.machine.plant.obstacles import SLOTS
 from ur_emulator.machine.plant.plant import Plant
+from ur_emulator.machine.plant.scene import MOST
 
 DEEP = DOWN.format(z=-0.15)
 
@@ -221,6 +221,10 @@ def bench():
     return bench
 
 
+def obstacles(bench):
+    return tuple(shape.name for shape in bench.controller.plant.physics.scene.obstacles)
+
+
 def y(bench):
     return bench.controller.plant.physics.flange_position[1]
 
@@ -228,7 +232,7 @@ def y(bench):
 @pytest.mark.parametrize("kind", OBSTACLES)
 def test_the_arm_is_stopped(bench, kind):
     bench.tick(1, OBSTACLES[kind])
-    assert bench.controller.plant.physics.obstacles.names == ("it",)
+    assert obstacles(bench) == ("it",)
     bench.start(PUSH_ON)
     reached = []
     for _ in range(400):
@@ -246,7 +250,7 @@ def test_after_the_obstacle_is_gone_the_path_is_free(bench):
     bench.start(PUSH_ON)
     bench.tick(400)
     bench.tick(1, RemoveObstacle("it"), UnlockProtectiveStop())
-    assert bench.controller.plant.physics.obstacles.names == ()
+    assert obstacles(bench) == ()
     bench.run(PUSH_ON)
     assert y(bench) == pytest.approx(0.3, abs=1e-3)
 
@@ -264,7 +268,7 @@ def test_the_touch_is_felt_as_a_force_that_pushes_back(bench):
 def test_an_obstacle_of_the_same_name_is_replaced(bench):
     bench.tick(1, OBSTACLES["box"])
     bench.tick(1, AddObstacle("it", "sphere", (0.05,), (0.3, -0.4, 0.15, *UPRIGHT)))
-    assert bench.controller.plant.physics.obstacles.names == ("it",)
+    assert obstacles(bench) == ("it",)
     bench.run(PUSH_ON)
     assert bench.now.safety_mode == SafetyMode.NORMAL
     assert y(bench) == pytest.approx(0.3, abs=1e-3)
@@ -274,22 +278,22 @@ def test_what_would_stand_in_the_arm_is_refused_and_nothing_moves(bench):
     before = bench.now.actual_q
     bench.tick(1, AddObstacle("it", "box", (0.2, 0.2, 0.2), (0.3, 0.0, 0.2, *UPRIGHT)))
     bench.tick(20)
-    assert bench.controller.plant.physics.obstacles.names == ()
+    assert obstacles(bench) == ()
     assert infos(bench) == ["obstacle it: the arm is where it should stand, move one of them"]
     assert bench.now.actual_q == pytest.approx(before, abs=1e-4)
     assert bench.now.safety_mode == SafetyMode.NORMAL
 
 
 def test_a_move_into_the_arm_leaves_the_old_one_where_it_was(bench):
-    for i in range(SLOTS):
+    for i in range(MOST["obstacle"]):
         bench.tick(1, AddObstacle(f"{i}", "sphere", (0.01,), (0.3, 0.4, 0.1 + 0.03 * i, *UPRIGHT)))
-    assert len(bench.controller.plant.physics.obstacles.names) == SLOTS
+    assert len(obstacles(bench)) == MOST["obstacle"]
     bench.tick(1, AddObstacle("more", "sphere", (0.01,), (0.5, 0.4, 0.1, *UPRIGHT)))
-    assert infos(bench) == [f"obstacle more: there are {SLOTS} already, remove one first"]
+    assert infos(bench) == [f"obstacle more: there are {MOST['obstacle']} already, remove one first"]
     bench.tick(1, AddObstacle("3", "box", (0.2, 0.2, 0.2), (0.3, 0.0, 0.2, *UPRIGHT)))
     assert "the arm is where it should stand" in infos(bench)[-1]
     bench.tick(1, AddObstacle("3", "box", (0.4, 0.1, 0.4), (0.3, 0.25, 0.15, *UPRIGHT)))
-    assert len(bench.controller.plant.physics.obstacles.names) == SLOTS
+    assert len(obstacles(bench)) == MOST["obstacle"]
     bench.start(PUSH_ON)
     bench.tick(400)
     assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP

@@ -29,10 +29,10 @@ from ur_emulator.machine.models.fidelity import REVERSAL_SPEED
 from ur_emulator.machine.models.generations import E_SERIES
 from ur_emulator.machine.models.mjcf import GRAVITY
 from ur_emulator.machine.models.robots import ROBOTS, robot_by_name
-from ur_emulator.machine.plant.arm_physics import compile_physics, physics_spec
 from ur_emulator.machine.plant.drives import ServoGains
 from ur_emulator.machine.plant.friction import Friction
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.machine.plant.physics_model import compile_physics, physics_spec
 from ur_emulator.machine.plant.plant import Plant
 
 Q = (0.3, -1.2, 1.9, -0.7, 1.1, 0.4)
@@ -318,7 +318,7 @@ def test_true_friction_rises_as_fast_as_the_compensation(robot, share):
     """Servos without gains press with a share of the dry friction: joints creep at that share of the speed."""
     no_gains = ServoGains(np.zeros(6), 0.0)
     model = compile_physics(
-        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, robot.generation.substep_us * 1e-6, ()),
+        physics_spec(robot, robot.dh, (1.0,) * 6, no_gains, ()),
         TYPICAL.friction_rise,
     )
     model.opt.gravity[:] = 0.0

@@ -22,7 +22,7 @@ from ur_emulator.machine.controller.io import network
 from ur_emulator.machine.machine import Machine
 from ur_emulator.machine.models.generations import CB3
 from ur_emulator.machine.models.robots import robot_by_name
-from ur_emulator.machine.plant.arm_plant import FlangePush
+from ur_emulator.machine.plant.arm_plant import ArmPlant
 from ur_emulator.machine.records import RECORDS, RecordError, to_input, to_plain
 from urscript import compile_program
 from urscript.catalogue import catalogue_for
@@ -238,7 +238,7 @@ def test_an_error_that_has_ended_a_box_is_met_again(file, monkeypatch):
             while box.failure is None:
                 pass
 
-    monkeypatch.setattr(FlangePush, "step", broken)
+    monkeypatch.setattr(ArmPlant, "count_push", broken)
     with pytest.raises(ZeroDivisionError):
         session()
     found = replay(file)

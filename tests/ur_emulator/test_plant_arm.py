@@ -23,6 +23,7 @@ from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.e_series_arms import UR3E, UR5E
 from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
 from ur_emulator.machine.models.generations import CB3, E_SERIES
+from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.plant.exact import ExactPlant
 from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.plant.sensors import Record, Sensors
@@ -510,7 +511,7 @@ def test_push_wants_three_numbers(force):
         Plant(UR3, IDEAL, 0).push(force)
 
 
-POSE = (0.0, 0.0, 1.5, 0.0, 0.0, 0.0)
+BALL = Thing("ball", "sphere", (0.1,), 0.0, 0.3, (0.0, 0.0, 1.5, 0.0, 0.0, 0.0))
 
 # What may happen to an arm between two cycles.
 EVENTS = {
@@ -519,8 +520,10 @@ EVENTS = {
     "hang": lambda plant: plant.attach_load(0.5),
     "push": lambda plant: plant.push((5.0, 0.0, -3.0)),
     "end of push": lambda plant: plant.push((0.0, 0.0, 0.0)),
-    "obstacle": lambda plant: plant.put_obstacle("ball", "sphere", (0.1,), POSE),
-    "no obstacle": lambda plant: plant.physics.obstacles.remove("ball"),
+    "obstacle": lambda plant: plant.put(BALL),
+    "no obstacle": lambda plant: (
+        plant.physics.scene.obstacles and plant.physics.scene.remove("obstacle", "ball")
+    ),
     "look": lambda plant: (
         plant.q_true,
         plant.qd_true,

@@ -14,6 +14,7 @@ from ur_emulator.machine.commands.programs import SetSpeedSlider
 from ur_emulator.machine.commands.surroundings import Push
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.fidelity import EXACT
+from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.motion.generators import JointTarget
 from ur_emulator.machine.plant.exact import ExactPlant
 
@@ -80,7 +81,7 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
     [
         lambda plant: plant.push((50.0, 0.0, 0.0)),
         lambda plant: plant.attach_load(3.0),
-        lambda plant: plant.put_obstacle("box", "sphere", (0.1,), (0.4, 0.0, 0.3, 0.0, 0.0, 0.0)),
+        lambda plant: plant.put(Thing("box", "sphere", (0.1,), 0.0, 0.3, (0.4, 0.0, 0.3, 0.0, 0.0, 0.0))),
     ],
 )
 def test_what_would_act_on_the_arm_is_refused_in_one_line(act):
@@ -95,7 +96,7 @@ def test_a_refused_push_takes_no_time():
     before = bench.now.actual_q
     bench.tick(20, Push((50.0, 0.0, 0.0), duration=1.0))
     assert bench.now.actual_q == before
-    assert not bench.controller.push.will_end
+    assert not bench.controller.plant.push_left
 
 
 def test_an_arm_in_freedrive_stands_still():

@@ -20,10 +20,10 @@ from protocol.pose import pose_to_T
 from protocol.ur_types import Ports, ProgramState, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator import ControlBox
 from ur_emulator.errors import ArgumentError
-from ur_emulator.host.control_api.box_state import BoxState, Question, ThingNow
+from ur_emulator.host.control_api.box_state import BoxState, Question
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.machine.commands.surroundings import MAX_FORCE
-from ur_emulator.machine.models.things import BodyShape
+from ur_emulator.machine.models.things import BodyShape, ThingNow
 from ur_pendant import hands
 from ur_pendant.drawing import RobotDrawing
 from ur_pendant.hands import HandError

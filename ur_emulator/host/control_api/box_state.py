@@ -10,7 +10,7 @@ from protocol.primary.messages import RequestedType
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.machine.controller.io.lines import DIGITAL_GROUPS
 from ur_emulator.machine.models.robot_model import Vector3, Vector6
-from ur_emulator.machine.models.things import BodyShape, Contact
+from ur_emulator.machine.models.things import BodyShape, Contact, ThingNow
 
 if TYPE_CHECKING:
     from ur_emulator.host.served_box import ServedBox
@@ -36,23 +36,6 @@ class Question:
     id: int
     kind: str
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class ThingNow:
-    """A thing around the arm.
-
-    Attributes:
-        name: by which it is moved and removed.
-        pose: of its middle [m, rotation vector in rad].
-        speed: [m/s, rad/s].
-        touches_tool: it touches the arm or its tool.
-    """
-
-    name: str
-    pose: Vector6
-    speed: Vector6
-    touches_tool: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,8 +154,8 @@ def take_state(box: ServedBox) -> BoxState:
         analog_outputs=now.analog_values[2:4],
         tool_analog_inputs=now.analog_values[4:],
         tool_voltage=now.tool_output_voltage,
-        obstacles=physics.obstacles.names,
-        things=_things(controller),
+        obstacles=tuple(shape.name for shape in physics.scene.obstacles),
+        things=tuple(map(physics.scene.state, physics.scene.names)),
         shapes=(*physics.shapes, *map(_shape_of, controller.state.safety.limits.boundaries.planes)),
         contacts=physics.contacts,
         grippers=tuple(gripper.summary() for gripper in controller.state.grippers),
@@ -184,12 +167,6 @@ def take_state(box: ServedBox) -> BoxState:
         ),
         clients=box.clients,
     )
-
-
-def _things(controller: Controller) -> tuple[ThingNow, ...]:
-    scene = controller.plant.physics.scene
-    states = ((name, scene.state(name)) for name in scene.names)
-    return tuple(ThingNow(name, now.pose, now.twist, now.touches_tool) for name, now in states)
 
 
 def _shape_of(plane: SafetyPlane) -> BodyShape:

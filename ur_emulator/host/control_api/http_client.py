@@ -16,10 +16,10 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ArgumentError, ControlError, RefusedError, WaitTimeoutError
 from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import ServedAt
-from ur_emulator.host.control_api.box_state import BoxState, Question, ThingNow
+from ur_emulator.host.control_api.box_state import BoxState, Question
 from ur_emulator.host.control_api.step_operations import ReadIdentity, ReadLog, ReadState, WaitUntil
 from ur_emulator.machine.commands.operation import Operation
-from ur_emulator.machine.models.things import BodyShape, Contact
+from ur_emulator.machine.models.things import BodyShape, Contact, ThingNow
 
 if TYPE_CHECKING:
     from ur_emulator.machine.controller.command import Command, Done

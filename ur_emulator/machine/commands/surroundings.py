@@ -3,7 +3,7 @@
 No client of a real box can send these; they are for tests and for people at the emulator.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import hypot
 from typing import Literal
 
@@ -12,9 +12,7 @@ from ur_emulator.machine.commands.operation import CommandOperation, parameter, 
 from ur_emulator.machine.controller.command import BoxParts, refuse
 from ur_emulator.machine.controller.io.lines import ANALOG_RANGE, DIGITAL_GROUPS
 from ur_emulator.machine.models.robot_model import Vector3, six
-from ur_emulator.machine.models.things import SIZES, Thing
-
-# --- What is wired to the inputs of the box and the tool
+from ur_emulator.machine.models.things import SIZES, SLIDING_FRICTION, Thing
 
 
 class SetDigitalInput(CommandOperation):
@@ -52,9 +50,6 @@ class SetAnalogInput(CommandOperation):
         line.value = value
 
 
-# --- Forces on the flange, and a payload that no program has declared
-
-
 # The largest force limit of the safety settings [N]; about the length of a tool [m].
 MAX_FORCE, MAX_LEVER = 250.0, 0.3
 
@@ -71,7 +66,7 @@ class Push(CommandOperation):
     )
 
     def apply(self, box: BoxParts) -> None:
-        box.push.begin(self.force, self.point, self.duration)
+        box.plant.push(self.force, self.point, self.duration)
 
 
 class AttachPayload(CommandOperation):
@@ -84,9 +79,6 @@ class AttachPayload(CommandOperation):
 
     def apply(self, box: BoxParts) -> None:
         box.plant.attach_load(self.mass, self.cog)
-
-
-# --- Obstacles: sizes and poses are checked before they reach the physics
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
@@ -111,7 +103,7 @@ class AddObstacle(CommandOperation):
         _check_body(f"obstacle {self.name}", self.shape, self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        _put(box, box.plant.put_obstacle, self.name, self.shape, self.size, six(self.pose))
+        _put(box, Thing(self.name, self.shape, tuple(self.size), 0.0, SLIDING_FRICTION, six(self.pose)))
 
 
 def _check_body(what: str, shape: str, size: Sequence[float], pose: Sequence[float]) -> None:
@@ -124,9 +116,9 @@ def _check_body(what: str, shape: str, size: Sequence[float], pose: Sequence[flo
     _check_distance(what, pose)
 
 
-def _put(box: BoxParts, put: Callable[..., None], *body: object) -> None:
+def _put(box: BoxParts, thing: Thing) -> None:
     try:
-        put(*body)
+        box.plant.put(thing)
     except RefusedError as refusal:
         refuse(box.state, str(refusal))
 
@@ -145,18 +137,7 @@ class RemoveObstacle(CommandOperation):
     name: str = parameter("of the obstacle")
 
     def apply(self, box: BoxParts) -> None:
-        obstacles = box.plant.physics.obstacles
-        _check_known("obstacle", self.name, obstacles.names)
-        obstacles.remove(self.name)
-
-
-def _check_known(what: str, name: str, known: Sequence[str]) -> None:
-    if name not in known:
-        there = f"are {', '.join(known)}" if known else "is none"
-        raise RefusedError(f"there is no {what} {name!r}: there {there}")
-
-
-# --- Things that can be moved: what an arm grips, pushes and drops
+        box.plant.physics.scene.remove("obstacle", self.name)
 
 
 ThingShape = Literal["box", "cylinder", "sphere"]
@@ -182,8 +163,8 @@ class AddThing(CommandOperation):
         _check_body(f"thing {self.name}", self.shape, self.size, self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        thing = Thing(self.name, self.shape, tuple(self.size), self.mass, self.friction, six(self.pose))
-        _put(box, box.plant.put_thing, thing)
+        size, pose = tuple(self.size), six(self.pose)
+        _put(box, Thing(self.name, self.shape, size, self.mass, self.friction, pose))
 
 
 class MoveThing(CommandOperation):
@@ -196,9 +177,7 @@ class MoveThing(CommandOperation):
         _check_distance(f"thing {self.name}", self.pose)
 
     def apply(self, box: BoxParts) -> None:
-        scene = box.plant.physics.scene
-        _check_known("thing", self.name, scene.names)
-        scene.move(self.name, six(self.pose))
+        box.plant.physics.scene.move(self.name, six(self.pose))
 
 
 class RemoveThing(CommandOperation):
@@ -207,6 +186,4 @@ class RemoveThing(CommandOperation):
     name: str = parameter("of the thing")
 
     def apply(self, box: BoxParts) -> None:
-        scene = box.plant.physics.scene
-        _check_known("thing", self.name, scene.names)
-        scene.remove(self.name)
+        box.plant.physics.scene.remove("thing", self.name)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ur_emulator.machine.controller.program_runner import ProgramRunner
     from ur_emulator.machine.controller.safety_system import SafetySystem
     from ur_emulator.machine.controller.state import ControllerState
-    from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush
+    from ur_emulator.machine.plant.arm_plant import ArmPlant
 
 # Values that a command returns; most return none.
 Result = Mapping[str, Any] | None
@@ -32,7 +32,6 @@ class BoxParts(Protocol):
 
     state: ControllerState
     plant: ArmPlant
-    push: FlangePush
     programs: ProgramRunner
     safety: SafetySystem
 

@@ -29,7 +29,7 @@ from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector6
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.motion.tool import UnreachableError
-from ur_emulator.machine.plant.arm_plant import ArmPlant, FlangePush, PlantState
+from ur_emulator.machine.plant.arm_plant import ArmPlant, PlantState
 from ur_emulator.machine.plant.exact import ExactPlant
 from ur_emulator.machine.plant.plant import Plant
 from ur_emulator.machine.tools import SUPPLY
@@ -177,7 +177,6 @@ class Controller:
         state.past.place(state.motion.target, self.plant.sense())
         self.programs = ProgramRunner(state, make_robot(state))
         self.safety = SafetySystem(state, self.programs, self.plant)
-        self.push = FlangePush(self.plant)
         state.mode.command(ModeCommand.BOOT)
         # The first cycle only makes the first snapshot; nothing moves in it.
         self.tick(())
@@ -209,7 +208,7 @@ class Controller:
             self.state.motion.is_moving
             or self.state.mode.is_changing
             or self.safety.is_braking
-            or self.push.will_end
+            or self.plant.push_left > 0
             or any(gripper.is_busy for gripper in self.state.grippers)
         )
 
@@ -221,9 +220,9 @@ class Controller:
         state = self.state
         state.clock.tick += 1
         n_events = len(state.events)
-        was_pushing = self.push.will_end
+        was_pushing = self.plant.push_left > 0
         if was_pushing:
-            self.push.step()
+            self.plant.count_push()
         self.outcomes = []
         for command in commands:
             self.outcomes.append(outcome_of(command, self))
@@ -299,12 +298,10 @@ class Controller:
         """Let the grippers see their fingers, and drive them in the next cycle."""
         state, plant = self.state, self.plant
         is_on, has_supply = state.mode.mode >= RobotMode.POWER_ON, state.io.tool_voltage == SUPPLY
-        plant.drive_fingers(
-            [
-                gripper.step(fingers, is_on and (has_supply or gripper.has_cable), state.io)
-                for gripper, fingers in zip(state.grippers, plant.fingers, strict=True)
-            ]
-        )
+        plant.finger_commands = [
+            gripper.step(fingers, is_on and (has_supply or gripper.has_cable), state.io)
+            for gripper, fingers in zip(state.grippers, plant.fingers, strict=True)
+        ]
 
     def _watch(self, sensed: PlantState, control: ControlMode, running: bool) -> None:
         """Stop the arm if the measured state violates a limit, or a stop was requested."""

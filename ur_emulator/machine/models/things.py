@@ -1,6 +1,7 @@
-"""Things around an arm that can be moved, as people put them there and as they are now; shapes; contacts."""
+"""Things around an arm, as people put them there and as they are now; shapes; contacts."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ur_emulator.machine.models.robot_model import Vector3, Vector6
 
@@ -13,15 +14,18 @@ SIZES: dict[str, tuple[str, ...]] = {
     "cylinder": ("radius", "length along z"),
 }
 
+# Of what has no friction of its own: arm, table, obstacles; assumed: a tool of metal or plastic on a table.
+SLIDING_FRICTION = 0.3
+
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """A body that can be moved.
+    """A body that can be moved, or an obstacle, which stands.
 
     Attributes:
-        shape: "box", "cylinder" (along z) or "sphere".
-        size: three edges; radius and length; radius [m].
-        mass: evenly distributed [kg].
+        shape: a key of SIZES; a thing that can be moved is no capsule and no plane.
+        size: see SIZES [m].
+        mass: evenly distributed [kg]; 0: it is an obstacle.
         friction: coefficient of its surface; of two surfaces the greater counts, of a tool's pads their own.
         pose: of its middle in the base frame [m, rad].
     """
@@ -33,13 +37,26 @@ class Thing:
     friction: float
     pose: Vector6
 
+    @property
+    def kind(self) -> Literal["thing", "obstacle"]:
+        """What it is called in messages."""
+        return "thing" if self.mass else "obstacle"
+
 
 @dataclass(frozen=True, slots=True)
-class ThingState:
-    """Where a thing is now: pose in the base frame [m, rad], linear and angular velocity [m/s, rad/s]."""
+class ThingNow:
+    """A thing around the arm, as it is now; in the base frame.
 
+    Attributes:
+        name: by which it is moved and removed.
+        pose: of its middle [m, rotation vector in rad].
+        speed: [m/s, rad/s].
+        touches_tool: it touches the arm or its tool.
+    """
+
+    name: str
     pose: Vector6
-    twist: Vector6
+    speed: Vector6
     touches_tool: bool
 
 

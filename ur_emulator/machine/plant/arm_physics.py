@@ -1,49 +1,52 @@
 """ArmPhysics: one arm in MuJoCo, the forces on it, and the state of one cycle before.
 
-The model is the mechanism with hulls, friction, drives, table and raw sensors. Its hinges are the motor side
-of the gears. The law of the joint servos is that of MuJoCo's actuators, force = kp (ctrl - q) - kv qd + bias,
-so that it acts within every sub-step, in C, and implicitly in speed. The drives give `ctrl` and `bias`.
+The model is that of `physics_model.py`; the drives give `ctrl` and `bias` of its servos.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_emulator.machine.models.fidelity import Fidelity, random_stream
-from ur_emulator.machine.models.mjcf import FLANGE, JOINTS, LINKS, arm_spec, to_body
+from ur_emulator.machine.models.mjcf import FLANGE, LINKS
 from ur_emulator.machine.models.robot_model import DhRow, RobotModel, Vector3
 from ur_emulator.machine.models.things import BodyShape, Contact
 from ur_emulator.machine.plant.drives import Drives, ServoGains
 from ur_emulator.machine.plant.friction import Presliding
-from ur_emulator.machine.plant.hand import add_tool, make_hand
+from ur_emulator.machine.plant.hand import Cup, Hand
 from ur_emulator.machine.plant.loads import Loads
-from ur_emulator.machine.plant.obstacles import OBSTACLES, Obstacles, add_slots
-from ur_emulator.machine.plant.scene import PREFIX, Scene
+from ur_emulator.machine.plant.physics_model import compile_physics, physics_spec
+from ur_emulator.machine.plant.scene import OBSTACLE, Scene
 from ur_emulator.machine.plant.sensors import REC_Q, REC_QD
-from ur_emulator.machine.plant.shapes import BY_GEOM, DrawnBox, contacts_at, pose_of
+from ur_emulator.machine.plant.shapes import BY_GEOM, SHAPES, DrawnBox, collide, pose_of
 from ur_hil.tools import ToolModel
-
-TABLE_HEIGHT = -0.02  # m; the arm stands on a plate two centimetres above the table
 
 # MuJoCo's Coulomb friction is a soft constraint, see `compile_physics`. In freedrive a joint would creep
 # with it. There the friction holds, up to its size.
 _STICTION_SOLIMP = (0.999, 0.999, 0.001, 0.5, 2.0)
 
-# Contacts give like a tool and a table of some elasticity: 0.1 mm under 20 N, 0.4 mm under 120 N. Harder ones
-# rattle under a tool that is drawn over them.
-_CONTACT_SOLREF = (0.010, 1.0)
-_CONTACT_SOLIMP = (0.3, 0.95, 0.0005, 0.5, 2.0)
-# Sliding friction of what touches; assumed: a tool of metal or plastic on a table.
-_SLIDING_FRICTION = 0.3
-
 # Chosen: bounds a wrench at a singularity, and changes it by 1 % where the least singular value of the
 # Jacobian is .047; recordings of a real UR3 go there and show no damping.
 _DAMPING = 0.005**2 * np.eye(6)
 _RUNAWAY = 100.0  # rad/s; no joint turns that fast, the simulation has diverged
+
+
+# What stays when the model is compiled anew, by the sizes of its arrays, in which the arm comes first: what
+# is set in the model, and of its state what `recompile` drops and the next step needs.
+_SET_LATER = {
+    "nbody": ("body_mass", "body_ipos", "body_inertia", "body_iquat"),
+    "nv": ("dof_solimp", "dof_solref", "dof_frictionloss"),
+    "nu": ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
+}
+_STATE = {
+    "nbody": ("xipos",),
+    "nsite": ("site_xpos", "site_xmat"),
+    "nv": ("qacc_warmstart",),
+    "nu": ("actuator_force",),
+}
 
 
 class ArmPhysics:
@@ -59,7 +62,7 @@ class ArmPhysics:
         flange_rotation: (3, 3), likewise.
         loads: payload and push at the flange.
         hands: fingers or cup of each tool.
-        scene: things that can be moved.
+        scene: what surrounds the arm.
         bias: torque of the servos beside their law (6,) [Nm].
     """
 
@@ -72,16 +75,14 @@ class ArmPhysics:
         tools: Sequence[ToolModel] = (),
     ) -> None:
         mass_scale = 1.0 + fidelity.mass_error * random_stream(seed, "masses").standard_normal(6)
-        substep = robot.generation.substep_us * 1e-6
-        self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), substep, tools)
+        self._spec = spec = physics_spec(robot, dh, mass_scale.tolist(), ServoGains.of(robot), tools)
         model = compile_physics(spec, fidelity.friction_rise)
         presliding = fidelity.friction_presliding
-        self._sizes = [getattr(model, size) for size in _SET_LATER]
+        self._sizes = {size: getattr(model, size) for size in (*_SET_LATER, *_STATE)}
         self._presliding = Presliding(presliding) if presliding else None
         self.loads = Loads(tools)
-        self.obstacles = Obstacles()
         self.scene = Scene(spec, self._recompile)
-        self.hands = tuple(make_hand(tool, i) for i, tool in enumerate(tools))
+        self.hands = tuple(Hand(tool, i) if tool.stroke else Cup(i) for i, tool in enumerate(tools))
         self._bind(model, mujoco.MjData(model))
         for hand in self.hands:
             hand.open_half()
@@ -115,19 +116,21 @@ class ArmPhysics:
         self._jacobian = (jacobian[:3], jacobian[3:], jacobian[:, :6], jacobian[:, :6].T)
         self._flange_site = site
         self.loads.bind(model, data)
-        self.obstacles.bind(model, data.qpos)
         self.scene.bind(model, data)
         for hand in self.hands:
             hand.bind(model, data)
-        self._sort_shapes()
+        self._has_sorted = False
 
     def _recompile(self) -> None:
         """Make the model anew after the scene has changed; what was set in the arm's part of it stays."""
         before = self.model
         model, data = self._spec.recompile(before, self.data)
-        for fields, n in zip(_SET_LATER.values(), self._sizes, strict=True):
-            for field in fields:
-                getattr(model, field)[:n] = getattr(before, field)[:n]
+        collide(model, data)
+        for kept, old, new in ((_SET_LATER, before, model), (_STATE, self.data, data)):
+            for size, fields in kept.items():
+                n = self._sizes[size]
+                for field in fields:
+                    getattr(new, field)[:n] = getattr(old, field)[:n]
         mujoco.mj_setConst(model, mujoco.MjData(model))
         self._bind(model, data)
 
@@ -135,11 +138,6 @@ class ArmPhysics:
     def n_contacts(self) -> int:
         """Number of contact points of the arm with itself, its base or the table."""
         return int(self.data.ncon)
-
-    @property
-    def has_company(self) -> bool:
-        """Fingers or things move beside the joints."""
-        return bool(self.model.nv > 6)
 
     @property
     def has_diverged(self) -> bool:
@@ -200,19 +198,22 @@ class ArmPhysics:
     @property
     def shapes(self) -> tuple[BodyShape, ...]:
         """Shapes around the arm and on its flange, at the start of the last sub-step."""
+        if not self._has_sorted:
+            self._sort_shapes()
         data, shapes = self.data, [*self._fixed_shapes]
         for shape, (dx, dy, dz), at in self._sliding_shapes:
             q, (x, y, z, rx, ry, rz) = float(data.qpos[at]), shape.pose
             shapes.append(replace(shape, pose=(x + dx * q, y + dy * q, z + dz * q, rx, ry, rz)))
         for shape, geom, box in self._moving_shapes:
             shapes.append(replace(shape, pose=pose_of(*box.place(data, geom))))
-        return (*shapes, *self.obstacles.shapes)
+        return (*shapes, *self.scene.obstacles)
 
     def _sort_shapes(self) -> None:
         """Look which shapes stay, which slide on the flange as fingers do, and which are free to move.
 
         Clients may ask for shapes as often as they like, so all that can be known before is.
         """
+        self._has_sorted = True
         model, data = self.model, mujoco.MjData(self.model)
         mujoco.mj_kinematics(model, data)  # with fingers at 0
         site = model.site(FLANGE).id
@@ -221,15 +222,15 @@ class ArmPhysics:
         self._sliding_shapes: list[tuple[BodyShape, Vector3, int]] = []
         self._moving_shapes: list[tuple[BodyShape, int, DrawnBox]] = []
         for geom in range(model.ngeom):
-            body, row = model.body(model.geom_bodyid[geom]), BY_GEOM.get(int(model.geom_type[geom]))
-            if row is None or body.name in (*LINKS, OBSTACLES) or (name := self._name_of(geom)) == "base":
+            body, shape = model.body(model.geom_bodyid[geom]), BY_GEOM.get(int(model.geom_type[geom]))
+            name = self._name_of(geom)
+            if shape is None or body.name in LINKS or body.name.startswith(OBSTACLE) or name == "base":
                 continue
-            (shape, from_mujoco), is_carried = row, bool(self._is_arm[body.id])
-            box = DrawnBox.of(model, geom)
+            is_carried, box = bool(self._is_arm[body.id]), DrawnBox.of(model, geom)
             position, rotation = box.place(data, geom)
             if is_carried:
                 position, rotation = to_flange @ (position - flange), to_flange @ rotation
-            size = from_mujoco(*box.size.tolist())
+            size = SHAPES[shape].from_mujoco(box.size)
             drawn = BodyShape(name, is_carried, shape, size, pose_of(position, rotation))
             carrier = model.body(model.body_weldid[body.id])
             joint = int(carrier.jntadr[0])
@@ -245,9 +246,7 @@ class ArmPhysics:
         """What people call the body of a shape: a link, a tool, an obstacle, a thing, the table."""
         model = self.model
         body: str = model.body(model.geom_bodyid[geom]).name
-        if body == OBSTACLES:
-            return self.obstacles.name_of(geom)
-        return model.geom(geom).name or "base" if body == "world" else body.removeprefix(PREFIX)
+        return model.geom(geom).name or "base" if body == "world" else self.scene.name_of(body)
 
     def set_free(self, free: bool) -> None:
         """Free the joints, or return them to servo control.
@@ -271,10 +270,6 @@ class ArmPhysics:
         """Stand still at once, wherever the arm is."""
         self.qd[:] = 0.0
         mujoco.mj_kinematics(self.model, self.data)
-
-    def touches(self, q: Sequence[float]) -> bool:
-        """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        return bool(contacts_at(self.model, np.array([*q, *self.data.qpos[6:]])).ncon)
 
     def run(self, drives: Drives, capture_at: int, captured: NDArray[np.float64]) -> None:
         """Advance by the sub-steps of a cycle.
@@ -305,142 +300,11 @@ class ArmPhysics:
             captured[REC_QD] = self.qd
 
     def run_beside(self, n_steps: int) -> None:
-        """Advance what moves beside the arm while the brakes hold it."""
+        """Advance fingers and things while the brakes hold the arm."""
+        if self.model.nv == 6:
+            return
         q = self.q.copy()
         for _ in range(n_steps):
             mujoco.mj_step(self.model, self.data)
             self.q[:] = q
             self.qd[:] = 0.0
-
-
-# --- the model
-
-
-# What is set in a compiled model, by the sizes of its arrays: those of the arm come before those of things.
-_SET_LATER = {
-    "nbody": ("body_mass", "body_ipos", "body_inertia", "body_iquat", "body_contype", "body_conaffinity"),
-    "ngeom": (
-        "geom_type",
-        "geom_size",
-        "geom_aabb",
-        "geom_rbound",
-        "geom_pos",
-        "geom_quat",
-        "geom_sameframe",
-        "geom_contype",
-        "geom_conaffinity",
-    ),
-    "nv": ("dof_solimp", "dof_solref", "dof_frictionloss"),
-    "nu": ("actuator_gainprm", "actuator_biasprm", "actuator_forcerange"),
-}
-
-
-def physics_spec(
-    robot: RobotModel,
-    dh: Sequence[DhRow],
-    mass_scale: Sequence[float],
-    gains: ServoGains,
-    substep: float,
-    tools: Sequence[ToolModel],
-) -> mujoco.MjSpec:
-    """Return the plant's model, not compiled; see `arm_spec` for the mechanism.
-
-    Args:
-        dh: its six true rows.
-        mass_scale: six factors on the link masses.
-        substep: physics time step [s].
-    """
-    spec = arm_spec(robot, dh, mass_scale)
-    option = spec.option
-    option.timestep = substep
-    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # Round friction cones: on a pyramid a drawn tool jumps from edge to edge.
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    # A diverged state must reach the caller instead of being reset silently. Islands and the midphase
-    # are for scenes with many bodies and only cost time here.
-    off = mujoco.mjtDisableBit
-    option.disableflags |= off.mjDSBL_AUTORESET | off.mjDSBL_ISLAND | off.mjDSBL_MIDPHASE
-    _add_joint_physics(spec, robot)
-    _add_drives(spec, robot, gains)
-    _add_hulls(spec, robot, dh)
-    _add_sensors(spec)
-    for i, tool in enumerate(tools):
-        add_tool(spec, tool, i)
-    return spec
-
-
-def compile_physics(spec: mujoco.MjSpec, speed: float) -> mujoco.MjModel:
-    """Compile the plant's model.
-
-    Dry friction grows from zero to its size over a speed [rad/s], by backward Euler.
-
-    With w a joint's inverse inertia, MuJoCo solves f (w + R) = -2 v / (d t) - a for the force f, where a is
-    the acceleration without it, R = w (1 - d) / d, and d, t are the impedance and time constant set here.
-    R = speed / (size step) and d t = 2 step make that f = -size / speed times the speed after the step.
-    """
-    model = spec.compile()
-    step = model.opt.timestep
-    slope = step * model.dof_invweight0[:6] * model.dof_frictionloss[:6] / speed
-    impedance = slope / (1.0 + slope)
-    model.dof_solimp[:6, :2] = impedance[:, None]
-    model.dof_solref[:6, 0] = 2.0 * step / impedance
-    return model
-
-
-def _add_joint_physics(spec: mujoco.MjSpec, robot: RobotModel) -> None:
-    for i, name in enumerate(JOINTS):
-        joint = spec.joint(name)
-        joint.armature = robot.armature[i]
-        joint.damping = [robot.viscous_fast[i], 0.0, 0.0]
-        joint.frictionloss = robot.coulomb[i]
-
-
-def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:
-    for i, name in enumerate(JOINTS):
-        drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        drive.gaintype = mujoco.mjtGain.mjGAIN_FIXED
-        drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-        drive.gainprm[0] = gains.kp[i]
-        drive.biasprm[1] = -gains.kp[i]
-        drive.biasprm[2] = -gains.kv[i]
-        drive.forcelimited = True
-        drive.forcerange = [-robot.tau_max[i], robot.tau_max[i]]
-
-
-def _add_hulls(spec: mujoco.MjSpec, robot: RobotModel, dh: Sequence[DhRow]) -> None:
-    world = spec.worldbody
-    world.add_geom(
-        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=[0.0, 0.0, TABLE_HEIGHT]
-    )
-    add_slots(spec)
-    base, *hulls = robot.outline.hulls(robot.dh)
-    _add_capsule(world, base.start, base.end, base.radius)
-    for name, hull, row in zip(LINKS, hulls, dh, strict=True):
-        _add_capsule(spec.body(name), to_body(row, hull.start), to_body(row, hull.end), hull.radius)
-    # Neighbours touch in their common joint by construction; in the wrist the next but one is out of reach.
-    neighbours = [*pairwise(("world", *LINKS)), (LINKS[2], LINKS[4]), (LINKS[3], LINKS[5])]
-    for geom in spec.geoms:
-        geom.solref = _CONTACT_SOLREF
-        geom.solimp = _CONTACT_SOLIMP
-        geom.friction[0] = _SLIDING_FRICTION
-    for one, other in neighbours:
-        spec.add_exclude(bodyname1=one, bodyname2=other)
-
-
-def _add_capsule(body: mujoco.MjsBody, start: Sequence[float], end: Sequence[float], radius: float) -> None:
-    body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[*start, *end], size=[radius, 0.0, 0.0], mass=0.0
-    )
-
-
-def _add_sensors(spec: mujoco.MjSpec) -> None:
-    """Add raw sensors in the order of `sensors.REC_SIMULATED`; they are taken at the start of a sub-step."""
-    kinds, objects = mujoco.mjtSensor, mujoco.mjtObj
-    for kind, of in (
-        (kinds.mjSENS_JOINTPOS, objects.mjOBJ_JOINT),
-        (kinds.mjSENS_JOINTVEL, objects.mjOBJ_JOINT),
-        (kinds.mjSENS_ACTUATORFRC, objects.mjOBJ_ACTUATOR),
-    ):
-        for name in JOINTS:
-            spec.add_sensor(type=kind, objtype=of, objname=name)
-    spec.add_sensor(type=kinds.mjSENS_ACCELEROMETER, objtype=objects.mjOBJ_SITE, objname=FLANGE)

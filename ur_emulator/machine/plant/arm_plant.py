@@ -7,10 +7,10 @@ from the seed: equal seeds and equal targets give bit-identical states.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +24,7 @@ from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
+from ur_emulator.machine.plant.shapes import collide
 from ur_emulator.machine.plant.thermometers import Thermometers
 from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
@@ -64,6 +65,9 @@ class PlantState(NamedTuple):
     position_error: Vector6
 
 
+_NOTHING: Vector3 = (0.0, 0.0, 0.0)
+
+
 class ArmPlant(ABC):
     """An arm on a table.
 
@@ -79,6 +83,8 @@ class ArmPlant(ABC):
         dh: six calibrated rows of this arm, for the controller's kinematics.
         range: the joint ranges, for all who keep them.
         cycle: number of the last cycle since the arm was put at rest.
+        finger_commands: what the fingers of each tool do from the next cycle on; None: they hold.
+        push_left: cycles after which the present push ends; 0: none does by itself.
     """
 
     def __init__(
@@ -93,7 +99,8 @@ class ArmPlant(ABC):
         self._dynamics = InverseDynamics(robot, self.dh)
         self._physics = ArmPhysics(robot, self.dh, fidelity, seed, tools)
         self._thermometers = Thermometers(robot.generation)
-        self._finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
+        self.finger_commands: Sequence[FingerCommand | None] = [None] * len(tools)
+        self.push_left = 0
         self._set_up()
         self.reset(robot.home_q)
 
@@ -132,9 +139,9 @@ class ArmPlant(ABC):
     ) -> None:
         """Take the command of a cycle; arguments as of `step`."""
 
-    @abstractmethod
     def complete_cycle(self) -> None:
-        """Let the arm move by the command that waits; the results are the same to the last bit."""
+        """Let the arm move by the command that waits, if one does; that changes no bit."""
+        return
 
     def sense(self) -> PlantState:
         """Return what the sensors say; it stays the same until the next step."""
@@ -179,36 +186,49 @@ class ArmPlant(ABC):
 
     def touches(self, q: Sequence[float]) -> bool:
         """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        return self._physics.touches(q)
+        model, now = self._physics.model, self._physics.data
+        there = mujoco.MjData(model)
+        there.qpos[:] = [*q, *now.qpos[6:]]
+        collide(model, there)
+        return bool(there.ncon)
 
     def furnish(self, surroundings: Cell | Path) -> None:
         """Put a scene around the arm, see `Scene.furnish`."""
         self._acted_on("scene").scene.furnish(surroundings)
 
-    def put_thing(self, thing: Thing) -> None:
-        """Add a thing at rest, see `Scene.put`."""
-        self._acted_on(f"thing {thing.name}").scene.put(thing)
-
-    def put_obstacle(self, name: str, shape: str, size: Sequence[float], pose: Vector6) -> None:
-        """Add an obstacle, see `Obstacles.put`."""
-        self._acted_on(f"obstacle {name}").obstacles.put(name, shape, size, pose)
+    def put(self, thing: Thing) -> None:
+        """Add a thing or an obstacle, see `Scene.put`."""
+        self._acted_on(f"{thing.kind} {thing.name}").scene.put(thing)
 
     def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
-        """Set the true payload at the flange, which the controller does not know.
-
-        From now on `set_payload` only declares. The mass is in kg, the centre of gravity in the flange frame
-        [m]. PlantError when the mass is negative or a number is not finite.
-        """
+        """Set the true payload; from now on `set_payload` only declares. See `Loads.attach`."""
         self._acted_on("payload").loads.attach(mass, cog)
 
-    def push(self, force: Sequence[float], point: Sequence[float] | None = None) -> None:
-        """Push the flange from now on; a zero force ends it.
+    def push(
+        self, force: Sequence[float], point: Sequence[float] | None = None, duration: float | None = None
+    ) -> None:
+        """Push the flange from this cycle on; a zero force ends it.
 
-        The force (3,) is in base axes [N]; the point where it acts in the flange frame [m], None for its
-        origin. PlantError when a number is not finite.
+        Args:
+            force: in base axes (3,) [N].
+            point: where it acts, in the flange frame (3,) [m]; None for its origin.
+            duration: how long, in whole cycles [s]; None: until the next push.
+
+        Raises:
+            PlantError: a number is not finite.
         """
+        n_cycles = 0 if duration is None else round(duration / self.period_s)
+        if duration is not None and not n_cycles:
+            force = _NOTHING
         arm = self._acted_on("push") if any(force) else self.physics
         arm.loads.push(force, point)
+        self.push_left = n_cycles
+
+    def count_push(self) -> None:
+        """Count a cycle of a push with a duration; end it after the last."""
+        self.push_left -= 1
+        if not self.push_left:
+            self.push(_NOTHING)
 
     # --- what the controller sets up
 
@@ -225,50 +245,14 @@ class ArmPlant(ABC):
         self.complete_cycle()
         self.range.q_min, self.range.q_max = q_min, q_max
 
-    @abstractmethod
     def hold_trim(self) -> None:
-        """Hold the trim of the servos until the target moves, if the arm presses against an obstacle.
+        """Hold the trim of the servos, if there are some, until the target moves, if the arm presses.
 
         Otherwise its integral would raise the contact force more and more.
         """
+        return
 
     @property
     def fingers(self) -> list[FingerState]:
         """The fingers of each tool as the last cycle that is computed left them."""
         return [hand.state for hand in self._physics.hands]
-
-    def drive_fingers(self, commands: Sequence[FingerCommand | None]) -> None:
-        """Set what the fingers of each tool do from the next cycle on; None: they hold."""
-        self._finger_commands = commands
-
-
-_NOTHING: Vector3 = (0.0, 0.0, 0.0)
-
-
-@dataclass(slots=True)
-class FlangePush:
-    """Pushes the flange of a plant, for a time or until the next push."""
-
-    _plant: ArmPlant
-    _cycles_left: int = 0
-
-    @property
-    def will_end(self) -> bool:
-        """True during a push with a duration."""
-        return self._cycles_left > 0
-
-    def begin(self, force: Vector3, point: Vector3, duration: float | None) -> None:
-        """Push from this cycle on.
-
-        The force is in base axes [N], zero ends the push before; the point where it acts in the flange frame
-        [m]. Without a duration [s] it lasts until the next one.
-        """
-        n_cycles = 0 if duration is None else round(duration / self._plant.period_s)
-        self._plant.push(force if duration is None or n_cycles else _NOTHING, point)
-        self._cycles_left = n_cycles
-
-    def step(self) -> None:
-        """Count a cycle of a push with a duration; end it after the last."""
-        self._cycles_left -= 1
-        if not self._cycles_left:
-            self._plant.push(_NOTHING)

@@ -5,13 +5,13 @@ gives
 
     tau = kp (control - q) - kv qd + bias,   control = q_set + lead qd_set + tau_set / kp + trim
 
-with lead = kv / kp. The law itself lives in MuJoCo's actuators (`arm_physics.py`); `control` comes from the
+with lead = kv / kp. The law itself lives in MuJoCo's actuators (`physics_model.py`); `control` comes from the
 command path, the bias compensates friction at qd_set. `trim` is the slow outer loop: it integrates the error
 at the joint's own encoder, so that gear error, wrong masses and remaining friction are compensated at rest.
 It counts errors in whole dead bands (`Fidelity.servo_dead_band`): a smaller one stays, where friction holds
 the joint.
 
-In freedrive there is no set-point: see `Freedrive`.
+In freedrive and in torque control there is no set-point.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class ServoGains:
         return cls(kp=omega**2 * inertia, lead=2.0 * _SERVO_DAMPING / omega)
 
 
-# --- freedrive: the torque of the drives while a person guides the arm by hand
+# Freedrive: the torque of the drives while a person guides the arm by hand
 #
 # No joint holds a position. The drives carry the arm against gravity, as the controller's model with the
 # declared payload knows it, take away a part of the friction, and push back near the limits of a joint's
@@ -81,47 +81,6 @@ LIMIT_SHARE = 0.6
 # The torque on a resting joint is only a part of that; it is full while the joint moves outwards at this
 # speed [rad/s]. A spring alone would throw the arm back.
 _REST_SHARE, _FULL_SPEED = 0.3, 0.1
-
-
-class Freedrive:
-    """Torque of the drives in freedrive.
-
-    Args:
-        robot: gives rated speeds and torques.
-        joint_range: at whose ends the drives push back.
-    """
-
-    def __init__(self, robot: RobotModel, joint_range: JointRange) -> None:
-        self._range = joint_range
-        self._strength = LIMIT_SHARE * np.array(robot.tau_max)
-        self._free_speed = SPEED_MARGIN * np.array(robot.qd_max)
-        self._braking_speed = (1.0 - SPEED_MARGIN) * np.array(robot.qd_max)
-
-    def torque(
-        self,
-        gravity: NDArray[np.float64],
-        dry_friction: NDArray[np.float64],
-        q: NDArray[np.float64],
-        qd: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
-        """Return the torque of the drives (6,) [Nm].
-
-        Args:
-            gravity: that the controller's model expects at q (6,) [Nm].
-            dry_friction: Coulomb friction that the controller expects at qd (6,) [Nm].
-            q: joint angles (6,) [rad].
-            qd: joint speeds (6,) [rad/s].
-        """
-        low, high = np.array(self._range.q_min) + RANGE_MARGIN, np.array(self._range.q_max) - RANGE_MARGIN
-        beyond = np.maximum(q - high, 0.0) + np.minimum(q - low, 0.0)
-        depth = np.clip(beyond / RANGE_MARGIN, -1.0, 1.0)
-        outwards = np.clip(qd * np.sign(depth) / _FULL_SPEED, 0.0, 1.0)
-        repelling = depth * np.abs(depth) * (_REST_SHARE + (1.0 - _REST_SHARE) * outwards)
-        excess = np.maximum(np.abs(qd) - self._free_speed, 0.0) / self._braking_speed
-        push_back = repelling + np.sign(qd) * excess
-        torque: NDArray[np.float64] = gravity + FRICTION_SHARE * dry_friction - self._strength * push_back
-        return torque
-
 
 _INTEGRAL_TIME = 0.12  # s; assumed: arms of this kind settle within a few tenths of a second
 _TARGET_MAX = 1e6  # rad, rad/s, rad/s²; far above any real target, small enough for arithmetic
@@ -165,7 +124,10 @@ class Drives:
         seed: int,
     ) -> None:
         self._dynamics, gains, generation = dynamics, ServoGains.of(robot), robot.generation
-        self._guiding = Freedrive(robot, joint_range)
+        self._range = joint_range
+        self._strength = LIMIT_SHARE * np.array(robot.tau_max)
+        self._free_speed = SPEED_MARGIN * np.array(robot.qd_max)
+        self._braking_speed = (1.0 - SPEED_MARGIN) * np.array(robot.qd_max)
         self._period = period = generation.period_s
         self._path = path = CommandPath(
             generation.n_substeps,
@@ -249,10 +211,21 @@ class Drives:
             extra: torque that holds blocked axes [Nm].
         """
         gravity = self._let_go(q, qd)
-        torque = self._guiding.torque(gravity, self._friction.dry_compensation, q, qd)
+        torque = gravity + FRICTION_SHARE * self._friction.dry_compensation - self._push_back(q, qd)
         if extra is not None:
             torque += extra
         self._give(torque, gravity)
+
+    def _push_back(self, q: NDArray[np.float64], qd: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the torque against motion near the limits of freedrive (6,) [Nm]."""
+        low, high = np.array(self._range.q_min) + RANGE_MARGIN, np.array(self._range.q_max) - RANGE_MARGIN
+        beyond = np.maximum(q - high, 0.0) + np.minimum(q - low, 0.0)
+        depth = np.clip(beyond / RANGE_MARGIN, -1.0, 1.0)
+        outwards = np.clip(qd * np.sign(depth) / _FULL_SPEED, 0.0, 1.0)
+        repelling = depth * np.abs(depth) * (_REST_SHARE + (1.0 - _REST_SHARE) * outwards)
+        excess = np.maximum(np.abs(qd) - self._free_speed, 0.0) / self._braking_speed
+        torque: NDArray[np.float64] = self._strength * (repelling + np.sign(qd) * excess)
+        return torque
 
     def drive_by_torque(
         self, q: NDArray[np.float64], qd: NDArray[np.float64], command: TorqueCommand

@@ -44,17 +44,11 @@ class ExactPlant(ArmPlant):
         else:
             check_target(target, self.cycle)
             self._follow(target.q, target.qd, target.qdd)
-        for hand, command in zip(self._physics.hands, self._finger_commands, strict=True):
+        for hand, command in zip(self._physics.hands, self.finger_commands, strict=True):
             hand.place(command, self.period_s)
         self._thermometers.step(self._current)
         self._physics.q[:] = self._q
         self._physics.qd[:] = self._qd
-
-    def complete_cycle(self) -> None:
-        """Do nothing: the position depends on the target alone."""
-
-    def hold_trim(self) -> None:
-        """Do nothing: this arm presses against nothing."""
 
     def _follow(self, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> None:
         moment = self._dynamics.evaluate(np.array(q), np.array(qd, dtype=np.float64), np.array(qdd))

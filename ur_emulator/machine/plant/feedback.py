@@ -14,24 +14,28 @@ from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.mjcf import GRAVITY
 from ur_emulator.machine.models.robot_model import RobotModel
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
+from ur_emulator.machine.plant.drives import Drives
 from ur_emulator.machine.plant.sensors import REC_ACCELERATION, Record, Sensors, WrenchFor
-
-# --- GearRipple: the kinematic transmission error of the strain wave gears; GearWithPlay: their backlash, too
-#
-# The ratio of a strain wave gear is not constant: the joint leads and lags the motor by up to a tenth of a
-# milliradian, in waves along the joint's angle. The motor is what the drive holds; the joint is what the
-# encoder at the output reports. The waves are those of the fidelity, their phases the box's own, by its seed.
-#
-# A motor's torque constant and cogging change with its angle, too: four waves a motor turn, which the current
-# compensates, also at rest. Of a real UR3's base 45 mA (O); that the servo lets none of it into the motion is
-# chosen.
 
 _GEAR_RATIO = 101.0  # of all sizes
 _CURRENT_CYCLES = 4.0 * _GEAR_RATIO
 
 
 class GearRipple:
-    """q_joint = q_motor + e(q_motor), both counted at the joint [rad]; and the ripple of the motors."""
+    """Strain wave gears: q_joint = q_motor + e(q_motor), both counted at the joint [rad]; ripple of motors.
+
+    The ratio of a strain wave gear is not constant: the joint leads and lags the motor by up to a tenth of a
+    milliradian, in waves along the joint's angle. The motor is what the drive holds; the joint is what the
+    encoder at the output reports. The waves are those of the fidelity, their phases the box's own.
+
+    A motor's torque constant and cogging change with its angle, too: four waves a motor turn, which the
+    current compensates, also at rest. Of a real UR3's base 45 mA (O); that the servo lets none of it into the
+    motion is chosen.
+
+    Attributes:
+        error: e (6,) [rad], after `evaluate`.
+        slope: de/dq (6,) [1], after `evaluate`.
+    """
 
     def __init__(self, robot: RobotModel, fidelity: Fidelity, seed: int) -> None:
         ripples = fidelity.ripples
@@ -70,7 +74,7 @@ class GearRipple:
         self.slope: NDArray[np.float64] = self._sum[6:12]
 
     def evaluate(self, q_motor: NDArray[np.float64]) -> None:
-        """Set `error` e [rad] and `slope` de/dq [1] for motor positions q_motor (6,)."""
+        """Set `error` and `slope` for motor positions q_motor (6,) [rad]."""
         waves = self._waves
         self._cycles.dot(q_motor, waves)
         np.add(waves, self._phases, waves)
@@ -130,11 +134,10 @@ class GearWithPlay(GearRipple):
 class Feedback:
     """Gears and sensors of one arm.
 
-    A cycle is `take` or `take_rest`.
+    A cycle is `follow` or `take_rest`.
 
     Attributes:
-        capture_at: number of the sub-step whose beginning is the measured moment; after the last sub-step:
-            its end.
+        q_rest: joint angles (6,) at which the brakes hold the arm [rad].
         reading: what the sensors say of the last cycle.
     """
 
@@ -143,36 +146,25 @@ class Feedback:
         n_substeps = generation.n_substeps
         # From the measured moment to the end of the plant's cycle, which comes a cycle later, see `Plant`.
         age_substeps = max(0, round(fidelity.feedback_age / (generation.substep_us * 1e-6)) - n_substeps)
-        self.capture_at = -age_substeps % n_substeps if age_substeps else n_substeps
+        # Number of the sub-step whose beginning is the measured moment; after the last sub-step: its end.
+        self._capture_at = -age_substeps % n_substeps if age_substeps else n_substeps
         self.gear = (GearWithPlay if fidelity.backlash else GearRipple)(robot, fidelity, seed)
         self._sensors = Sensors(robot, fidelity, seed, generation.period_s)
         # The first record is that of this cycle; the next one, which is the oldest, is read.
         self._records = deque(Record() for _ in range(1 + max(0, age_substeps - 1) // n_substeps))
         self._read_at = 1 % len(self._records)
         self._rest = Record()
+        self.q_rest = self._rest.q
         self._has_force_sensor = generation.force_sensing.has_sensor
         self.reading = self._sensors.read(self._rest)
 
-    @property
-    def q_rest(self) -> NDArray[np.float64]:
-        """Joint angles (6,) at which the brakes hold the arm [rad]."""
-        return self._rest.q
-
-    @property
-    def captured(self) -> NDArray[np.float64]:
-        """Takes what MuJoCo's sensors say at the measured moment, see `sensors.REC_SIMULATED`."""
-        return self._records[0].simulated
-
-    def take(self, physics: ArmPhysics, expected_current: NDArray[np.float64]) -> None:
-        """Read the sensors of an arm whose cycle has been computed.
-
-        Args:
-            expected_current: of the motors, by the controller's model (6,) [A].
-        """
+    def follow(self, physics: ArmPhysics, drives: Drives) -> None:
+        """Let the drives move the arm for a cycle, and read its sensors."""
         record, loads = self._records[0], physics.loads
+        physics.run(drives, self._capture_at, record.simulated)
         self.gear.apply(record)
         if not self._has_force_sensor:
-            record.expected_current[:] = expected_current
+            record.expected_current[:] = drives.expected_current
             self._read(physics.wrench_for)
             return
         record.wrench[:] = loads.wrench if loads.is_unexpected else 0.0

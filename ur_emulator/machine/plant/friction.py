@@ -86,25 +86,20 @@ class Friction:
         np.add(beliefs, viscous, beliefs)
 
 
-# --- presliding: joint friction with hysteresis, as the contacts of gears and seals have it
-#
-# The model is Dahl's, LuGre without its micro-damping: bristles of mean deflection z in [-1, 1] follow the
-# motion over the presliding angle,
-#
-#     dz/dq = (sign(dq) - z) / angle,    torque = -size z
-#
-# so that after a reversal friction changes its sign along the path, whatever the speed, and a joint at rest
-# is held by a spring. The equation is solved exactly for each sub-step: it is stable for all angles and
-# speeds.
-#
-# Source: C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for control of systems with
-# friction", IEEE Transactions on Automatic Control 40(3), 1995.
-
-
 class Presliding:
-    """The bristles of six joints.
+    """Friction of six joints with hysteresis, as the contacts of gears and seals have it.
 
-    They follow a reversal over an angle [rad], above 0.
+    The model is Dahl's, LuGre without its micro-damping: bristles of mean deflection z in [-1, 1] follow the
+    motion over the presliding angle [rad], which is above 0,
+
+        dz/dq = (sign(dq) - z) / angle,    torque = -size z
+
+    so that after a reversal friction changes its sign along the path, whatever the speed, and a joint at rest
+    is held by a spring. The equation is solved exactly for each sub-step: it is stable for all angles and
+    speeds.
+
+    Source: C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for control of systems
+    with friction", IEEE Transactions on Automatic Control 40(3), 1995.
     """
 
     def __init__(self, angle: float) -> None:

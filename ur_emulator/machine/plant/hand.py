@@ -164,13 +164,8 @@ def _add_fingers(spec: mujoco.MjSpec, hand: mujoco.MjsBody, tool: ToolModel, nam
     spec.add_exclude(bodyname1=fingers[0], bodyname2=fingers[1])
 
 
-def make_hand(tool: ToolModel, number: int) -> "Hand | Cup":
-    """Return what moves of a tool that `add_tool` has added."""
-    return Hand(tool, number) if tool.stroke else Cup(number)
-
-
 class Hand:
-    """The fingers of a tool in a compiled model."""
+    """The fingers of a tool that `add_tool` has added."""
 
     def __init__(self, tool: ToolModel, number: int) -> None:
         self._name = f"tool_{number}"
@@ -232,7 +227,7 @@ class Hand:
 
 
 class Cup:
-    """The suction cup of a tool in a compiled model; methods as of `Hand`."""
+    """The suction cup of a tool that `add_tool` has added; methods as of `Hand`."""
 
     def __init__(self, number: int) -> None:
         self._name = f"tool_{number}"

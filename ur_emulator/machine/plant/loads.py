@@ -13,8 +13,6 @@ from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6
 from ur_hil.arithmetic import add_up
 from ur_hil.tools import ToolModel
 
-# --- the payload body of a compiled MuJoCo arm
-
 _DENSITY = 2700.0  # kg/m³, aluminium: gives a payload without a stated inertia a plausible one
 
 
@@ -63,7 +61,6 @@ class Loads:
         # What hangs on the flange; empty: what is declared does.
         self._true: tuple[tuple[float, Vector3], ...] = self._tools
         self._declared: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
-        self._attached = False
         self._weigh()
 
     def bind(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -87,15 +84,14 @@ class Loads:
             set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
-        """Set the true payload, which the controller does not know; errors as in `check_payload`."""
+        """Set the true payload, which the controller does not know; see `declare`."""
         check_payload(mass, cog)
         self._true = (*self._tools, (mass, cog))
-        self._attached = True
         self._weigh()
         set_payload_body(self._model, mass, cog)
 
     def push(self, force: Sequence[float], point: Sequence[float] | None) -> None:
-        """Push from now on; see `Plant.push`."""
+        """Push from now on; see `ArmPlant.push`."""
         force_base = np.array(force, dtype=np.float64)
         at = np.zeros(3) if point is None else np.array(point, dtype=np.float64)
         if force_base.shape != (3,) or at.shape != (3,) or not np.isfinite([force_base, at]).all():
@@ -132,5 +128,5 @@ class Loads:
         loads = [*self._true, (-self._declared[0], self._declared[1])]
         self._excess_force = GRAVITY * add_up(mass for mass, _ in loads)
         self._excess_weight = sum((GRAVITY * mass * np.array(cog) for mass, cog in loads), np.zeros(3))
-        differs = bool(self._true) and (self._excess_force != 0.0 or self._excess_weight.any())
-        self.is_unexpected = self._push is not None or self._attached or bool(differs)
+        differs = bool(self._true) and (self._excess_force != 0.0 or bool(self._excess_weight.any()))
+        self.is_unexpected = self._push is not None or differs

@@ -83,7 +83,7 @@ class Plant(ArmPlant):
     def _begin_cycle(
         self, target: JointTarget | None, mode: ControlMode, torque: TorqueCommand | None
     ) -> None:
-        self._command = (target, mode, torque, self._finger_commands)
+        self._command = (target, mode, torque, self.finger_commands)
 
     def complete_cycle(self) -> None:
         """See `ArmPlant.complete_cycle`; raises what `step` raises."""
@@ -143,10 +143,9 @@ class Plant(ArmPlant):
         if not is_free:
             drives.actual_speed[:] = physics.qd
             drives.advance()
-        physics.run(drives, feedback.capture_at, feedback.captured)
+        feedback.follow(physics, drives)
         np.multiply(physics.torque, self._per_torque, self._currents)
         self._control_current = currents = six(self._currents.tolist())
-        feedback.take(physics, drives.expected_current)
         if physics.has_diverged:
             raise PlantError(
                 f"the simulation diverged in cycle {self.cycle}: joint speeds {physics.qd.tolist()} rad/s; "
@@ -190,8 +189,7 @@ class Plant(ArmPlant):
         """Advance by a cycle with the brakes on."""
         if not self._is_braked:
             self._engage_brakes()
-        if self._physics.has_company:
-            self._physics.run_beside(self.robot.generation.n_substeps)
+        self._physics.run_beside(self.robot.generation.n_substeps)
         self._feedback.take_rest()
 
     def _engage_brakes(self) -> None:

@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 from ur_emulator.machine.models.fidelity import Fidelity, random_stream
 from ur_emulator.machine.models.robot_model import ZERO6, RobotModel, Vector3, Vector6, six
 
-# --- ForceDrift: the slow error of the measured force
-#
-# The sensor of an e-Series arm has an offset that the first zero takes away, and drifts steadily. A CB3 arm
-# has none: what it estimates follows from its currents, also at rest, where dry friction holds the joints.
-# Source: see `models/generations.py`.
-
 
 class ForceDrift:
-    """Offset and steady drift of all six components.
+    """The slow error of the measured force: offset and steady drift of all six components.
+
+    The sensor of an e-Series arm has an offset that the first zero takes away, and drifts steadily. A CB3 arm
+    has none: what it estimates follows from its currents, also at rest, where dry friction holds the joints.
+    Source: see `models/generations.py`.
 
     Args:
         fidelity: gives their sizes.

@@ -1,6 +1,6 @@
 """Shapes of bodies: their names and sizes as people give them, and as MuJoCo has them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import cos, hypot, sin
 from typing import NamedTuple
 
@@ -19,46 +19,35 @@ class Shape(NamedTuple):
 
     Attributes:
         geom: MuJoCo's type.
-        to_mujoco: its sizes, as in `things.SIZES`, as MuJoCo's sizes.
-        from_mujoco: the inverse.
-        half_extent: half edges of the smallest box around it, of MuJoCo's sizes [m]; 0 for a plane.
+        scale: MuJoCo's sizes over those of `things.SIZES`.
+        rest: MuJoCo's sizes in place of those that people do not give [m].
     """
 
     geom: mujoco.mjtGeom
-    to_mujoco: Callable[..., Vector3]
-    from_mujoco: Callable[..., tuple[float, ...]]
-    half_extent: Callable[[float, float, float], Vector3]
+    scale: tuple[float, ...]
+    rest: Vector3 = (0.0, 0.0, 0.0)
 
+    def to_mujoco(self, size: Sequence[float]) -> list[float]:
+        """Return MuJoCo's three sizes."""
+        scaled = [scale * value for scale, value in zip(self.scale, size, strict=True)]
+        return [*scaled, *self.rest[len(scaled) :]]
 
-def _half(x: float, y: float, z: float) -> Vector3:
-    return (x / 2, y / 2, z / 2)
-
-
-def _double(x: float, y: float, z: float) -> Vector3:
-    return (2 * x, 2 * y, 2 * z)
-
-
-def _rod(r: float, length: float) -> Vector3:
-    return (r, length / 2, 0.0)
-
-
-def _of_rod(r: float, half: float, _: float) -> tuple[float, float]:
-    return (r, 2 * half)
+    def from_mujoco(self, size: NDArray[np.float64]) -> tuple[float, ...]:
+        """Return the sizes that people give."""
+        return tuple(value / scale for scale, value in zip(self.scale, size.tolist(), strict=False))
 
 
 SHAPES = {
-    "box": Shape(_GEOM.mjGEOM_BOX, _half, _double, lambda x, y, z: (x, y, z)),
-    "sphere": Shape(
-        _GEOM.mjGEOM_SPHERE, lambda r: (r, 0.0, 0.0), lambda r, *_: (r,), lambda r, *_: (r, r, r)
-    ),
-    "capsule": Shape(_GEOM.mjGEOM_CAPSULE, _rod, _of_rod, lambda r, half, _: (r, r, half + r)),
+    "box": Shape(_GEOM.mjGEOM_BOX, (0.5, 0.5, 0.5)),
+    "sphere": Shape(_GEOM.mjGEOM_SPHERE, (1.0,)),
+    "capsule": Shape(_GEOM.mjGEOM_CAPSULE, (1.0, 0.5)),
     # A wall without end, of which a part is drawn; what is on the side of negative z is inside it.
-    "plane": Shape(_GEOM.mjGEOM_PLANE, lambda: (5.0, 5.0, 0.1), lambda *_: (), lambda *_: (0.0, 0.0, 0.0)),
-    "cylinder": Shape(_GEOM.mjGEOM_CYLINDER, _rod, _of_rod, lambda r, half, _: (r, r, half)),
+    "plane": Shape(_GEOM.mjGEOM_PLANE, (), (5.0, 5.0, 0.1)),
+    "cylinder": Shape(_GEOM.mjGEOM_CYLINDER, (1.0, 0.5)),
 }
 # By MuJoCo's types; what people do not give is drawn as the box around it.
-BY_GEOM = {int(shape.geom): (name, shape.from_mujoco) for name, shape in SHAPES.items()} | {
-    int(geom): ("box", _double) for geom in (_GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_MESH)
+BY_GEOM = {int(shape.geom): name for name, shape in SHAPES.items()} | {
+    int(geom): "box" for geom in (_GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_MESH)
 }
 
 
@@ -106,11 +95,3 @@ def collide(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_collision(model, data)
-
-
-def contacts_at(model: mujoco.MjModel, q: NDArray[np.float64]) -> mujoco.MjData:
-    """Return a state with the contacts at positions q of all joints."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = q
-    collide(model, data)
-    return data
