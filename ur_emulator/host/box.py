@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Collection
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.served_box import BoxIdentity, ServedBox
-from ur_emulator.host.steps import Finished, Steps, settle
+from ur_emulator.host.steps import Finished, Steps, result_of, settle
 from ur_emulator.machine.commands.operation import CommandOperation, Operation
 from ur_emulator.machine.controller.command import Command, Done
 from ur_emulator.machine.controller.events import LogAdded
@@ -239,8 +239,7 @@ class Box:
         if operation.is_logged and not operation.only_reads:
             self._box.announce(LogAdded("Control", _shown(operation)))
         if isinstance(operation, StepOperation):
-            result = operation.steps(self._context)
-            return (yield from result) if isinstance(result, Generator) else result
+            return (yield from result_of(operation.steps(self._context)))
         assert isinstance(operation, CommandOperation)
         result = yield from self._box.apply(operation)
         return {**(result or {}), "tick": self._box.snapshot.tick}
