@@ -186,7 +186,8 @@ class ArmPlant(ABC):
 
     def touches(self, q: Sequence[float]) -> bool:
         """Return whether the arm would touch itself, its base, the table or an obstacle at q (6,) [rad]."""
-        model, now = self._physics.model, self._physics.data
+        physics = self.physics
+        model, now = physics.model, physics.data
         there = mujoco.MjData(model)
         there.qpos[:] = [*q, *now.qpos[6:]]
         collide(model, there)
