@@ -138,7 +138,8 @@ class Scene:
         _add_body(self._spec, name, thing)
         self._recompile()
         touching = self._touching(name)
-        if self._arm in touching if thing.mass else touching:
+        # An obstacle, which cannot give way, must not touch anything.
+        if touching and (self._arm in touching or not thing.mass):
             self._delete(name)
             raise RefusedError(f"{what}: the arm is where it should {_REFUSAL[thing.kind]}, move one of them")
         if before is not None:
