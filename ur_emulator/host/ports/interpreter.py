@@ -160,9 +160,8 @@ class InterpreterPort:
         """Interpret or discard lines until none is left."""
         n_refused = 0
         while self._waiting:
-            next_lines = [
-                lines[0] for lines in self._waiting.values()
-            ]  # of the client whose turn it is first
+            # The first is that of the client whose turn it is.
+            next_lines = [lines[0] for lines in self._waiting.values()]
             refused = next(filter(self._why_not, next_lines), None)
             if refused is not None:
                 self._take_out(refused)
