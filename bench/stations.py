@@ -11,9 +11,10 @@ without it for some time of the robot. Noted are the calls of functions of `ur_e
   texts, bytes, arrays, fields of a frozen record; and who stands above such a call on the stack.
 
 Each run is made twice; what only one of the two has does not count, such as values of the clock. The way is
-more than one has to read: who only watches a changed value is on it. What happens to an object that no changed
-value is passed to is missing. Lambdas and comprehensions count as what is around them. Not seen: methods that
-dataclasses generate, scripts, the worker process (it compiles and reads program files).
+more than one has to read: who only watches a changed value is on it. What happens to an object that no
+changed value is passed to is missing. Lambdas and comprehensions count as what is around them. Not seen:
+methods that dataclasses generate, scripts, the worker process (it compiles and reads program files).
+The loop has real seconds, too (repeated frames, polls): the way of `velocity` differs by some between runs.
 """
 
 import inspect
