@@ -75,7 +75,7 @@ class Run:
         threading.setprofile(self.note)
         sys.setprofile(self.note)
         with ControlBox(pace="lockstep", port_base=None, seed=7, in_process=True, **options) as box:
-            threading.setprofile(None)  # type: ignore[arg-type]
+            threading.setprofile(None)
             yield box
         sys.setprofile(None)
 
@@ -116,7 +116,8 @@ def _plain(value: Any, deep: int = 3) -> object:
         return value[:LONGEST].tobytes()
     if deep and isinstance(value, tuple | list) and len(value) <= LONGEST:
         return type(value), *(_plain(item, deep - 1) for item in value)
-    if deep and is_dataclass(value) and len(fields(value)) <= LONGEST and value.__dataclass_params__.frozen:
+    is_frozen = is_dataclass(value) and inspect.getattr_static(value, "__dataclass_params__").frozen
+    if deep and is_frozen and len(fields(value)) <= LONGEST:
         return type(value), *(_plain(getattr(value, field.name, None), 1) for field in fields(value))
     return value if isinstance(value, int | float | str | bytes) else type(value)
 
