@@ -11,9 +11,10 @@ without it for some time of the robot. Noted are the calls of functions of `ur_e
   texts, bytes, arrays, fields of a frozen record; and who stands above such a call on the stack.
 
 Each run is made twice; what only one of the two has does not count, such as values of the clock. The way is
-more than one has to read: who only watches a changed value is on it. What happens to an object that no changed
-value is passed to is missing. Lambdas and comprehensions count as what is around them. Not seen: methods that
-dataclasses generate, scripts, the worker process (it compiles and reads program files).
+more than one has to read: who only watches a changed value is on it. What happens to an object that no
+changed value is passed to is missing. Lambdas and comprehensions count as what is around them. Not seen:
+methods that dataclasses generate, scripts, the worker process (it compiles and reads program files).
+The loop has real seconds, too (repeated frames, polls): the way of `velocity` differs by some between runs.
 """
 
 import inspect
@@ -74,7 +75,7 @@ class Run:
         threading.setprofile(self.note)
         sys.setprofile(self.note)
         with ControlBox(pace="lockstep", port_base=None, seed=7, in_process=True, **options) as box:
-            threading.setprofile(None)  # type: ignore[arg-type]
+            threading.setprofile(None)
             yield box
         sys.setprofile(None)
 
@@ -115,7 +116,8 @@ def _plain(value: Any, deep: int = 3) -> object:
         return value[:LONGEST].tobytes()
     if deep and isinstance(value, tuple | list) and len(value) <= LONGEST:
         return type(value), *(_plain(item, deep - 1) for item in value)
-    if deep and is_dataclass(value) and len(fields(value)) <= LONGEST and value.__dataclass_params__.frozen:
+    is_frozen = is_dataclass(value) and inspect.getattr_static(value, "__dataclass_params__").frozen
+    if deep and is_frozen and len(fields(value)) <= LONGEST:
         return type(value), *(_plain(getattr(value, field.name, None), 1) for field in fields(value))
     return value if isinstance(value, int | float | str | bytes) else type(value)
 
