@@ -301,6 +301,31 @@ def test_a_journal_that_cannot_be_written_is_refused(tmp_path):
         ControlBox.many(2, journal=tmp_path / "one")
 
 
+def test_when_a_journal_cannot_go_on_the_box_does(file):
+    """As when the disk is full: here who reads the file goes away."""
+    os.mkfifo(file)
+    reader = os.open(file, os.O_RDONLY | os.O_NONBLOCK)
+    with ControlBox(journal=file, port_base=None, pace="lockstep", in_process=True) as box:
+        os.close(reader)
+        box.wait_until(time=box.state.time + 1.0)
+        ends = [entry.text for entry in box.log if "the journal" in entry.text]
+        box.set_digital_input("standard", 3, True)
+    assert ends == [f"the journal {file} ends here: [Errno 32] Broken pipe"]
+
+
+def test_the_journal_of_the_box_before_is_kept(file):
+    for n in (1, 2):
+        with ControlBox(journal=file, port_base=None, pace="lockstep", in_process=True) as box:
+            box.set_digital_input("standard", n, True)
+    kept = file.with_name(f"{file.name}.old")
+    assert [f'"n":{n}' in path.read_text() for path in (kept, file) for n in (1, 2)] == [
+        True,
+        False,
+        False,
+        True,
+    ]
+
+
 # --- records
 
 

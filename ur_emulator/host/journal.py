@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -43,7 +44,7 @@ class Journal:
     """Writes the journal of one box, in a thread of its own: a slow disk delays no cycle."""
 
     def __init__(self, path: Path, options: BoxOptions, report: Callable[[str], None]) -> None:
-        """Open the file and write the first line.
+        """Open the file and write the first line; one that is there gets `.old` behind its name.
 
         In lockstep a cycle waits when too many others are not written yet; in real time it is lost.
 
@@ -54,6 +55,8 @@ class Journal:
             JournalError: the file cannot be written.
         """
         try:
+            if path.is_file():  # perhaps of a box that has failed and was started again
+                path.replace(f"{path}.old")
             self._file: IO[str] = path.open("w", encoding="utf-8")
             self._file.write(json.dumps(_header(options)) + "\n")
             self._file.flush()
@@ -87,7 +90,8 @@ class Journal:
         """Write what waits, and close the file; harmless if that was done."""
         self._cycles.put(None)
         self._thread.join()
-        self._file.close()
+        with suppress(OSError):  # of what a full disk did not take, which is said already
+            self._file.close()
 
     def _run(self) -> None:
         can_write = True
