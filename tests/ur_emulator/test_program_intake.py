@@ -44,8 +44,6 @@ class Tasks:
 class Box:
     """Notes what it takes: names of programs that start, commands, texts."""
 
-    why_too_old = ServedBox.why_too_old
-
     def __init__(self):
         self.stops = 0
         self.remote_period = 1

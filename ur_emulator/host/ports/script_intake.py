@@ -309,6 +309,7 @@ class ProgramIntake:
         sender.programs.remove(program)
         if program.task is not None:
             self._tasks.drop(program.task)
+            program.task = None  # it holds the program: nothing is left to the garbage collector
         self._ready.pop(program, None)
         self._hold(sender, -program.cost)
         if not sender.programs:
