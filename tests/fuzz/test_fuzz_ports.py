@@ -14,7 +14,6 @@ from fuzz_box import CB3, E_SERIES, POLYSCOPE_X, FuzzBox, run
 from fuzz_corpus import MESSAGES
 
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.host.ports.rtde import RtdePort
 
 KINDS = {"cb3": CB3, "e-series": E_SERIES, "polyscope-x": POLYSCOPE_X}
 # Ports that a box does not have.
@@ -58,8 +57,8 @@ def test_the_harness_notices_an_arm_that_moves(folder):
 
 
 def test_the_harness_notices_an_error_of_a_port(folder, monkeypatch):
-    monkeypatch.setattr(RtdePort, "_answer", lambda *args: 1 / 0)
     fuzz = FuzzBox(random.Random(1), folder, lively=False)
+    monkeypatch.setattr(inside(fuzz.box)._port_set._ports["rtde"], "_find_streams", lambda: 1 / 0)
     with pytest.raises(AssertionError, match="ZeroDivisionError"):
         repeat(lambda: fuzz.attack("rtde"), 2000)
     fuzz.close()
