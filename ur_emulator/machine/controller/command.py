@@ -42,7 +42,6 @@ class Command(Protocol):
 
     def apply(self, box: BoxParts) -> Result:
         """Apply the command; RefusedError if the state of the box does not allow it."""
-        ...
 
 
 def outcome_of(command: Command, box: BoxParts) -> Outcome:

@@ -140,14 +140,6 @@ class Euromap:
     inputs: int = 0
     outputs: int = 0
 
-    def read_input(self, port: int) -> bool:
-        """Return a signal of the machine."""
-        return bool(self.inputs >> port & 1)
-
-    def read_output(self, port: int) -> bool:
-        """Return a signal of the robot."""
-        return bool(self.outputs >> port & 1)
-
     def write_output(self, port: int, value: bool) -> None:
         """Switch a signal of the robot."""
         self.outputs = with_bit(self.outputs, port, value)
