@@ -11,7 +11,7 @@ from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.errors import ModelError
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
-from ur_emulator.machine.controller.command import Command, Outcome, outcome_of
+from ur_emulator.machine.controller.command import Command, Outcome
 from ur_emulator.machine.controller.events import RobotModeChanged
 from ur_emulator.machine.controller.force_sense import VARIABLE
 from ur_emulator.machine.controller.io.watchdogs import WatchdogAction
@@ -71,7 +71,7 @@ def make_snapshot(
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io = state.speed, state.tool, state.io
     payload, own_time = tool.payload, clock.generation.execution_time
-    analog, euromap = io.analog, io.euromap
+    analog = io.analog
     return Snapshot(
         clock.tick,
         clock.time,
@@ -101,8 +101,8 @@ def make_snapshot(
         gripper_current=add_up(g.supply_current for g in state.grippers) if state.grippers else 0.0,
         tool_output_modes=io.tool_output_modes,
         tool_line=io.tool_line,
-        euromap_inputs=euromap.inputs,
-        euromap_outputs=euromap.outputs,
+        euromap_inputs=io.euromap_inputs,
+        euromap_outputs=io.euromap_outputs,
         registers=state.registers.values(),
         encoder_counts=state.encoders.counts,
         gravity=tool.gravity,
@@ -225,7 +225,10 @@ class Controller:
             self.plant.count_push()
         self.outcomes = []
         for command in commands:
-            self.outcomes.append(outcome_of(command, self))
+            try:
+                self.outcomes.append((command.apply(self), None))
+            except Exception as error:  # it ends only the command
+                self.outcomes.append((None, error))
         self._step_modes()
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
@@ -353,7 +356,6 @@ class Controller:
             self.plant.hold_trim()
 
     def _place_arm(self, q: Vector6) -> bool:
-        """Put the resting arm at joint angles [rad]; False where it would touch itself or something."""
         plant, state = self.plant, self.state
         if plant.touches(q):
             return False

@@ -173,7 +173,6 @@ class InterpreterQueue:
         self._turn_off()
 
     def _forget(self) -> None:
-        """Begin with nothing interpreted."""
         self.added = NO_NAMES
         self._n_lines = self._n_bytes = 0
         self._empty()

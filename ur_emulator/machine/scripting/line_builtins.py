@@ -55,7 +55,7 @@ class LineBuiltins(BuiltinGroup):
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
-        io, euromap = self._io, self._io.euromap
+        io = self._io
         functions = super().functions() | {
             "get_standard_analog_in": lambda thread, n: io.analog_in[n].value,
             "get_tool_analog_in": lambda thread, n: io.tool_analog_in[n].value,
@@ -71,9 +71,9 @@ class LineBuiltins(BuiltinGroup):
             "set_tool_output_mode": lambda thread, mode: io.set_tool_output_mode(0, mode),
             "set_tool_digital_output_mode": lambda thread, n, mode: io.set_tool_output_mode(1 + n, mode),
             "set_input_actions_to_default": lambda thread: self._configuration.input_actions.clear(),
-            "get_euromap_input": lambda thread, n: bool(euromap.inputs >> _euromap_port(n) & 1),
-            "get_euromap_output": lambda thread, n: bool(euromap.outputs >> _euromap_port(n) & 1),
-            "set_euromap_output": lambda thread, n, value: euromap.write_output(_euromap_port(n), value),
+            "get_euromap_input": lambda thread, n: bool(io.euromap_inputs >> _euromap_port(n) & 1),
+            "get_euromap_output": lambda thread, n: bool(io.euromap_outputs >> _euromap_port(n) & 1),
+            "set_euromap_output": lambda thread, n, value: io.write_euromap_output(_euromap_port(n), value),
         }
         groups = {f"{name}_": group.bits for name, group in lines.DIGITAL_GROUPS.items()}
         for name, bits in (groups | {"": lines.STANDARD_AND_TOOL}).items():

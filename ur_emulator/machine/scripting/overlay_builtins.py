@@ -135,7 +135,6 @@ class EncoderBuiltins(BuiltinGroup):
 
 
 def _bit(pin: float) -> int:
-    """Return the bit of the digital input that a program names."""
     bit = PULSE_INPUTS.get(int(pin))
     if bit is None:
         allowed = ", ".join(map(str, PULSE_INPUTS))
