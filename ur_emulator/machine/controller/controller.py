@@ -71,7 +71,7 @@ def make_snapshot(
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io = state.speed, state.tool, state.io
     payload, own_time = tool.payload, clock.generation.execution_time
-    analog = io.analog
+    analog, (encoder_0, encoder_1) = io.analog, state.encoders
     return Snapshot(
         clock.tick,
         clock.time,
@@ -104,7 +104,7 @@ def make_snapshot(
         euromap_inputs=io.euromap_inputs,
         euromap_outputs=io.euromap_outputs,
         registers=state.registers.values(),
-        encoder_counts=state.encoders.counts,
+        encoder_counts=(int(encoder_0.count), int(encoder_1.count)),
         gravity=tool.gravity,
         base_acceleration=tool.base_acceleration,
         energy_consumed=state.energy.consumed,
@@ -266,8 +266,9 @@ class Controller:
         # Rare parts are asked whether they hold anything: a step that does nothing takes longer.
         if state.watchdogs and not self.programs.is_paused:
             self._check_watchdogs()
-        if state.encoders.decoding:
-            state.encoders.step(state.io.digital_in)
+        for encoder in state.encoders:
+            if encoder.decoder:
+                encoder.step(state.io.digital_in)
         if state.modbus.signals:
             state.modbus.step(state.clock.tick)
 
