@@ -270,8 +270,10 @@ def test_settings_are_kept(bench):
     settings = bench.controller.state.error_settings
     assert settings.pause_codes == {(153, None), (204, 3)}
     assert settings.transition_hardness == 1
+    assert settings.revolution_reference == (0, 0, 0, 0, 0, 1)
     bench.start("def q():\n  reset_revolution_counter()\nend\n")
     assert settings.pause_codes == set()
+    assert settings.revolution_reference == bench.snapshots[-2].actual_q
 
 
 def test_a_deviation_is_reported_once_until_it_is_over():

@@ -130,13 +130,14 @@ DEVIATION_CODE = 174
 
 @dataclass(slots=True)
 class ErrorSettings:
-    """Settings of `pause_on_error_code` and related builtins.
+    """Settings of `pause_on_error_code` and related builtins. Some have no effect here: they are only kept.
 
     Attributes:
         pause_codes: (code, argument or None for any) at which the present program pauses.
         warns_of_deviation: whether joints that deviate from the path are reported.
         deviation_threshold: part of the deviation limit at which to warn.
         transition_hardness: of safeguard stops and reduced mode: 0 hard, 1 soft.
+        revolution_reference: joint positions of the last `reset_revolution_counter` [rad]; kept only.
         holds_high: a resting arm of the e-Series may give way further before it is stopped.
     """
 
@@ -144,6 +145,7 @@ class ErrorSettings:
     warns_of_deviation: bool = False
     deviation_threshold: float = 0.8
     transition_hardness: int = 0
+    revolution_reference: Vector6 | None = None
     holds_high: bool = True
     _has_warned: bool = False
 

@@ -10,8 +10,10 @@ from typing import Any, NoReturn
 from protocol.primary.messages import RequestedType
 from ur_emulator.machine.controller.events import EventQueue, PopupShown, ProgramRequests, ValueRequested
 from ur_emulator.machine.controller.interpreter_queue import InterpreterQueue
+from ur_emulator.machine.controller.past_cycles import PastCycles
 from ur_emulator.machine.controller.pendant import Answer, Pendant, PendantRequest
 from ur_emulator.machine.controller.settings import ErrorSettings
+from ur_emulator.machine.models.robot_model import six
 from ur_emulator.machine.scripting.builtin_group import BuiltinGroup, builtin
 from urscript.errors import ScriptRuntimeError
 from urscript.run.host import EnterMode, HostFunction
@@ -85,10 +87,11 @@ class InterpreterBuiltins(BuiltinGroup):
 
 
 class ErrorBuiltins(BuiltinGroup):
-    """Errors and limits, `powerdown`, and the statement `pause`."""
+    """Errors and limits (most only keep a setting), `powerdown`, and the statement `pause`."""
 
-    def __init__(self, settings: ErrorSettings, requests: ProgramRequests) -> None:
+    def __init__(self, settings: ErrorSettings, past: PastCycles, requests: ProgramRequests) -> None:
         self._settings = settings
+        self._past = past
         self._requests = requests
 
     @builtin("pause_on_error_code")
@@ -106,7 +109,9 @@ class ErrorBuiltins(BuiltinGroup):
 
     @builtin("reset_revolution_counter")
     def _reset_revolution_counter(self, thread: object, q_near: Any) -> None:
-        """A real box uses it when new safety settings limit a joint that had no limits: not here."""
+        # A real box uses it when new safety settings limit a joint that had no limits: not here.
+        given = None if q_near is None else six([float(x) for x in q_near])
+        self._settings.revolution_reference = given or self._past.sensed.actual_q
 
     @builtin("high_holding_torque_enable")
     def _enable_high_holding_torque(self, thread: object) -> None:

@@ -49,7 +49,7 @@ def robot_hosts(state: ControllerState) -> Callable[[], RobotHost]:
         EncoderBuiltins(state.encoders, state.io),
         PendantBuiltins(state.pendant, state.events),
         InterpreterBuiltins(state.interpreter),
-        ErrorBuiltins(state.error_settings, state.requests),
+        ErrorBuiltins(state.error_settings, past, state.requests),
     )
     shared = _functions(groups)
     return lambda: RobotHost(state, arm, shared)
