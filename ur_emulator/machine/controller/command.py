@@ -44,6 +44,14 @@ class Command(Protocol):
         """Apply the command; RefusedError if the state of the box does not allow it."""
 
 
+def outcome_of(command: Command, box: BoxParts) -> Outcome:
+    """Apply a command; an error ends only the command, and its traceback holds nothing of the cycle."""
+    try:
+        return command.apply(box), None
+    except Exception as error:
+        return None, error
+
+
 def refuse(state: ControllerState, text: str) -> NoReturn:
     """Refuse a command, and report to clients and log why it is not done."""
     state.events.append(ErrorReported(0, 0, ReportLevel.INFO, text))

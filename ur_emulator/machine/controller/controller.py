@@ -11,7 +11,7 @@ from protocol.rtde.types import SafetyStatusBits
 from protocol.ur_types import ControlMode, RobotMode
 from ur_emulator.errors import ModelError
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
-from ur_emulator.machine.controller.command import Command, Outcome
+from ur_emulator.machine.controller.command import Command, Outcome, outcome_of
 from ur_emulator.machine.controller.events import RobotModeChanged
 from ur_emulator.machine.controller.force_sense import VARIABLE
 from ur_emulator.machine.controller.io.watchdogs import WatchdogAction
@@ -225,10 +225,7 @@ class Controller:
             self.plant.count_push()
         self.outcomes = []
         for command in commands:
-            try:
-                self.outcomes.append((command.apply(self), None))
-            except Exception as error:  # it ends only the command
-                self.outcomes.append((None, error))
+            self.outcomes.append(outcome_of(command, self))
         self._step_modes()
         self._step_scripts()
         was_active = was_pushing or self.programs.has_work or state.motion.is_moving or state.mode.is_changing
