@@ -64,7 +64,7 @@ def act(bench, catalogue, action):
         case "euromap":
             index, level = rest.split()
             mask = 1 << int(index)
-            state.io.euromap.inputs = state.io.euromap.inputs & ~mask | mask * (level == "high")
+            state.io.euromap_inputs = state.io.euromap_inputs & ~mask | mask * (level == "high")
         case "write":
             name, value = rest.split(" ", 1)
             return [WriteInputs(((name, literal_eval(value)),))]

@@ -228,7 +228,7 @@ def pulses(decoder, steps, pins=(0, 1)):
     for a, b in steps:
         bench.controller.state.io.digital_in = a << (pins[0] % 8) | b << (pins[1] % 8)
         bench.tick()
-    return bench.controller.state.encoders.encoders[0].count
+    return bench.controller.state.encoders[0].count
 
 
 def test_quadrature_counts_in_both_directions():

@@ -148,7 +148,7 @@ class Story(Bench):
     def work(self):
         io = self.controller.state.io
         self.run(REGISTERS)
-        io.digital_in, io.euromap.inputs = 0b11_1010_1010_0101_0101, 5
+        io.digital_in, io.euromap_inputs = 0b11_1010_1010_0101_0101, 5
         self.run(OUTPUTS)
         for line, ratio in zip((*io.analog_in, *io.tool_analog_in), (0.1, 0.2, 0.3, 0.4), strict=True):
             line.set_ratio(ratio)

@@ -55,7 +55,6 @@ class StartFreedrive:
 
 
 def _give_power(box: BoxParts, command: ModeCommand) -> None:
-    """Power the joints or open their brakes, if the safety mode allows it."""
     mode = box.state.safety.mode
     if not ROW[mode].may_have_power:
         refuse(box.state, f"{command.value} refused: the robot is in {mode.name}: {ROW[mode].remedy}")

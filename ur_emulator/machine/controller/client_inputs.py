@@ -91,10 +91,6 @@ def _set_speed_slider(inputs: ClientInputs) -> None:
         inputs.speed.slider = min(1.0, max(0.0, fraction))
 
 
-def _keep(inputs: ClientInputs) -> None:
-    """Only keep the value: a script can enable its use."""
-
-
 # What a write to a variable that is not a register does.
 _ACTS: dict[str, Callable[[ClientInputs], None]] = {
     "speed_slider_mask": _set_speed_slider,
@@ -103,7 +99,7 @@ _ACTS: dict[str, Callable[[ClientInputs], None]] = {
     "standard_analog_output_type": _set_analog_outputs,
     "standard_analog_output_0": _set_analog_outputs,
     "standard_analog_output_1": _set_analog_outputs,
-    "external_force_torque": _keep,
+    "external_force_torque": lambda inputs: None,  # only kept: a script can enable its use
 }
 for _name, _group in DIGITAL_GROUPS.items():
     _ACTS[f"{_name}_digital_output_mask"] = _ACTS[f"{_name}_digital_output"] = _digital_outputs(_group)

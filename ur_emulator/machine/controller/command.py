@@ -42,11 +42,10 @@ class Command(Protocol):
 
     def apply(self, box: BoxParts) -> Result:
         """Apply the command; RefusedError if the state of the box does not allow it."""
-        ...
 
 
 def outcome_of(command: Command, box: BoxParts) -> Outcome:
-    """Apply a command; an error ends only the command."""
+    """Apply a command; an error ends only the command, and its traceback holds nothing of the cycle."""
     try:
         return command.apply(box), None
     except Exception as error:

@@ -71,7 +71,7 @@ def make_snapshot(
     mode, safety_mode = state.mode.mode, state.safety.mode
     speed, tool, io = state.speed, state.tool, state.io
     payload, own_time = tool.payload, clock.generation.execution_time
-    analog, euromap = io.analog, io.euromap
+    analog, (encoder_0, encoder_1) = io.analog, state.encoders
     return Snapshot(
         clock.tick,
         clock.time,
@@ -101,10 +101,10 @@ def make_snapshot(
         gripper_current=add_up(g.supply_current for g in state.grippers) if state.grippers else 0.0,
         tool_output_modes=io.tool_output_modes,
         tool_line=io.tool_line,
-        euromap_inputs=euromap.inputs,
-        euromap_outputs=euromap.outputs,
+        euromap_inputs=io.euromap_inputs,
+        euromap_outputs=io.euromap_outputs,
         registers=state.registers.values(),
-        encoder_counts=state.encoders.counts,
+        encoder_counts=(int(encoder_0.count), int(encoder_1.count)),
         gravity=tool.gravity,
         base_acceleration=tool.base_acceleration,
         energy_consumed=state.energy.consumed,
@@ -263,8 +263,9 @@ class Controller:
         # Rare parts are asked whether they hold anything: a step that does nothing takes longer.
         if state.watchdogs and not self.programs.is_paused:
             self._check_watchdogs()
-        if state.encoders.decoding:
-            state.encoders.step(state.io.digital_in)
+        for encoder in state.encoders:
+            if encoder.decoder:
+                encoder.step(state.io.digital_in)
         if state.modbus.signals:
             state.modbus.step(state.clock.tick)
 
@@ -353,7 +354,6 @@ class Controller:
             self.plant.hold_trim()
 
     def _place_arm(self, q: Vector6) -> bool:
-        """Put the resting arm at joint angles [rad]; False where it would touch itself or something."""
         plant, state = self.plant, self.state
         if plant.touches(q):
             return False

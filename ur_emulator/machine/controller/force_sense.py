@@ -20,12 +20,9 @@ from ur_emulator.machine.models.robot_generation import RobotGeneration
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6, six
 from ur_hil.arithmetic import add_up
 
-# --- a force sensor at the flange whose readings come through the RTDE input `external_force_torque`
-#
-# Source: URScript manual CB3 3.15, ft_rtde_input_enable: the reading is a wrench at the sensor's measuring
-# point, in the axes of the flange. Chosen: the reading is the external wrench; mass and centre of
-# gravity of the sensor are kept, but its weight is not subtracted.
-
+# The RTDE input of an external sensor. Source: URScript manual CB3 3.15, ft_rtde_input_enable: the reading is
+# a wrench at the sensor's measuring point, in the axes of the flange. Chosen: the reading is the external
+# wrench; mass and centre of gravity of the sensor are kept, but its weight is not subtracted.
 VARIABLE = "external_force_torque"
 
 

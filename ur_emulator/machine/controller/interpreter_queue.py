@@ -78,9 +78,8 @@ class InterpreterQueue:
     def program_started(self) -> None:
         """Begin anew: no line was interpreted."""
         self.run += 1
-        self.last_executed = self.last_interpreted = self.last_cleared = 0
-        self._forget()
-        self._turn_off()
+        self.last_executed = self.last_interpreted = 0
+        self.program_ended()
 
     def program_ended(self) -> None:
         """Leave the mode; ids stay readable."""
@@ -173,7 +172,6 @@ class InterpreterQueue:
         self._turn_off()
 
     def _forget(self) -> None:
-        """Begin with nothing interpreted."""
         self.added = NO_NAMES
         self._n_lines = self._n_bytes = 0
         self._empty()

@@ -27,17 +27,12 @@ from ur_emulator.machine.controller.safety.modes import EMERGENCY_MODES
 from ur_emulator.machine.controller.snapshot import Snapshot
 from ur_emulator.machine.controller.state import ControllerState
 
-# --- how single addresses of the robot's Modbus map are read from the controller's state and written to it
-
 WORD_MAX = 0xFFFF
 
 Reader = Callable[[ControllerState, int], float]
 """Returns the value at an offset within a row."""
 Writer = Callable[[ControllerState, int, int], None]
 """Takes a value at an offset within a row."""
-
-
-# --- digital lines
 
 
 def box_word(word: int) -> int:
@@ -70,9 +65,6 @@ def write_tool_voltage(state: ControllerState, offset: int, value: int) -> None:
     """Set the supply of the tool [V]; other values than the allowed ones change nothing."""
     if value in (0, 12, 24):
         state.io.tool_voltage = value
-
-
-# --- state of the robot
 
 
 def of_snapshot(values: Callable[[Snapshot], tuple[float, ...]], scale: float = 1.0) -> Reader:
@@ -112,6 +104,11 @@ def clock(state: ControllerState, offset: int) -> int:
 def write_gp_input(state: ControllerState, offset: int, value: int) -> None:
     """Write an input boolean."""
     state.registers.inputs.booleans[offset] = bool(value)
+
+
+def write_word(state: ControllerState, offset: int, word: int) -> None:
+    """Write a general purpose word."""
+    state.modbus_map.words[offset] = word
 
 
 TURN = 2.0 * math.pi
@@ -173,8 +170,8 @@ REGISTERS: tuple[MapRow, ...] = (
     MapRow(20, 1, "tool supply, V", lambda s, i: s.io.tool_voltage, write_tool_voltage),
     MapRow(21, 1, "tool inputs", lambda s, i: TOOL.levels(s.io.digital_in)),
     MapRow(22, 1, "tool outputs", lambda s, i: TOOL.levels(s.io.digital_out), write_bits(TOOL.bits)),
-    MapRow(24, 2, "Euromap67 inputs", lambda s, i: s.io.euromap.inputs >> 16 * i),
-    MapRow(26, 2, "Euromap67 outputs", lambda s, i: s.io.euromap.outputs >> 16 * i),
+    MapRow(24, 2, "Euromap67 inputs", lambda s, i: s.io.euromap_inputs >> 16 * i),
+    MapRow(26, 2, "Euromap67 outputs", lambda s, i: s.io.euromap_outputs >> 16 * i),
     MapRow(28, 2, "Euromap67 supply, V and mA; none connected"),
     MapRow(30, 1, "configurable inputs", lambda s, i: CONFIGURABLE.levels(s.io.digital_in)),
     MapRow(31, 1, "configurable outputs", lambda s, i: CONFIGURABLE.levels(s.io.digital_out),
@@ -183,7 +180,7 @@ REGISTERS: tuple[MapRow, ...] = (
     MapRow(33, 1, "configurable outputs to clear", None, write_bits(CONFIGURABLE.bits, False)),
     MapRow(34, 94, "reserved"),
     MapRow(FIRST_GENERAL, N_GENERAL, "general purpose", lambda s, i: s.modbus_map.words[i],
-            lambda s, i, word: s.modbus_map.write(i, word)),
+            write_word),
     MapRow(256, 2, "software version, major and minor", lambda s, i: s.modbus_map.version[i]),
     MapRow(258, 1, "robot mode", lambda s, i: s.past.snapshot.robot_mode),
     MapRow(260, 6, "flags, see the coils", flag),
@@ -217,8 +214,8 @@ COILS: tuple[MapRow, ...] = (
             lambda s, i: box_word(s.io.digital_out) >> i & 1, write_bit(STANDARD_AND_TOOL)),
     MapRow(32, 16, "output to set", None, write_bit(STANDARD_AND_TOOL, True)),
     MapRow(48, 16, "output to clear", None, write_bit(STANDARD_AND_TOOL, False)),
-    MapRow(64, N_EUROMAP, "Euromap67 inputs", lambda s, i: s.io.euromap.read_input(i)),
-    MapRow(96, N_EUROMAP, "Euromap67 outputs", lambda s, i: s.io.euromap.read_output(i)),
+    MapRow(64, N_EUROMAP, "Euromap67 inputs", lambda s, i: s.io.euromap_inputs >> i & 1),
+    MapRow(96, N_EUROMAP, "Euromap67 outputs", lambda s, i: s.io.euromap_outputs >> i & 1),
     MapRow(128, 8, "configurable inputs", lambda s, i: CONFIGURABLE.levels(s.io.digital_in) >> i & 1),
     MapRow(136, 8, "configurable outputs", lambda s, i: CONFIGURABLE.levels(s.io.digital_out) >> i & 1,
             write_bit(CONFIGURABLE.bits)),

@@ -1,8 +1,6 @@
 """What programs ask of the operator: values, popups to be closed; and what the operator does at the pendant.
 
-There is no person at the box: a client answers.
-
-Answers come as `AnswerRequest` and `ClosePopup` of `ur_emulator.machine.commands.programs`.
+There is no person at the box: a client answers, by `AnswerRequest` and `ClosePopup`.
 """
 
 from collections import deque

@@ -1,7 +1,4 @@
-"""SafetySystem: applies safety events: the mode changes, and arm, program and power follow.
-
-The tables are in `safety/modes.py`.
-"""
+"""SafetySystem: the safety mode changes with its events, and arm, program and power follow."""
 
 from collections.abc import Mapping
 
@@ -31,7 +28,7 @@ _REQUESTED_STOP = protective_stop(209, 0, "Protective stop requested")
 
 
 class SafetySystem:
-    """Applies safety events to the safety state, and its effects to arm, program and power."""
+    """Applies safety events by the tables of `safety/modes.py`, and their effects."""
 
     def __init__(self, state: ControllerState, programs: ProgramRunner, plant: ArmPlant) -> None:
         self._state = state
@@ -223,8 +220,6 @@ class SafetySystem:
 
     def _is_in_range(self) -> bool:
         safety, past = self._state.safety, self._state.past
-        limits, in_space = safety.limits, safety.limits_in_space()
-        return all(
-            low <= q <= high
-            for low, q, high in zip(limits.q_min, past.sensed.actual_q, limits.q_max, strict=True)
-        ) and not (in_space and in_space.find_crossed(past.snapshot.space.actual))
+        in_space = safety.limits_in_space()
+        crossed = in_space and in_space.find_crossed(past.snapshot.space.actual)
+        return safety.limits.allow(past.sensed.actual_q) and not crossed

@@ -16,7 +16,7 @@ from ur_emulator.machine.controller.events import EventQueue, ProgramRequests
 from ur_emulator.machine.controller.force_sense import ForceSense
 from ur_emulator.machine.controller.interpreter_queue import InterpreterQueue
 from ur_emulator.machine.controller.io.configuration import IoConfiguration
-from ur_emulator.machine.controller.io.encoders import Encoders
+from ur_emulator.machine.controller.io.encoders import Encoder
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.controller.io.modbus_signals import ModbusSignals
 from ur_emulator.machine.controller.io.network import Network
@@ -102,7 +102,7 @@ class ControllerState:
         self.client_inputs: Final = ClientInputs(
             self.io, self.registers, self.speed, self.watchdogs, self.clock
         )
-        self.encoders: Final = Encoders()
+        self.encoders: Final = (Encoder(), Encoder())
         self.network: Final = Network()
         self.modbus: Final = ModbusSignals(period_s, self.network)
         self.modbus_map: Final = MapMemory(version)

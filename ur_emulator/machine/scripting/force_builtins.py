@@ -34,7 +34,6 @@ class ForceBuiltins(BuiltinGroup):
     def __init__(
         self, arm: ScriptArm, compliance: Compliance, force_sense: ForceSense, past: PastCycles
     ) -> None:
-        """Bind the builtins."""
         self._arm = arm
         self._compliance = compliance
         self._force_sense = force_sense

@@ -16,7 +16,6 @@ from urscript import HostFunction, ScriptRuntimeError
 # Bits per second of the tool's serial line. Source: URScript manual e-Series, set_tool_communication.
 BAUD_RATES: Final = (9600, 19200, 38400, 57600, 115200, 1_000_000, 2_000_000, 5_000_000)
 
-
 _INPUT_GROUPS = ("standard_digital", "configurable_digital", "tool_digital", "gp_boolean")
 # Builtins that let an output follow the program, by group.
 _RUNSTATE_NAMES = {
@@ -56,7 +55,7 @@ class LineBuiltins(BuiltinGroup):
 
     def functions(self) -> dict[str, HostFunction]:
         """Return the builtins."""
-        io, euromap = self._io, self._io.euromap
+        io = self._io
         functions = super().functions() | {
             "get_standard_analog_in": lambda thread, n: io.analog_in[n].value,
             "get_tool_analog_in": lambda thread, n: io.tool_analog_in[n].value,
@@ -72,9 +71,9 @@ class LineBuiltins(BuiltinGroup):
             "set_tool_output_mode": lambda thread, mode: io.set_tool_output_mode(0, mode),
             "set_tool_digital_output_mode": lambda thread, n, mode: io.set_tool_output_mode(1 + n, mode),
             "set_input_actions_to_default": lambda thread: self._configuration.input_actions.clear(),
-            "get_euromap_input": lambda thread, n: euromap.read_input(_euromap_port(n)),
-            "get_euromap_output": lambda thread, n: euromap.read_output(_euromap_port(n)),
-            "set_euromap_output": lambda thread, n, value: euromap.write_output(_euromap_port(n), value),
+            "get_euromap_input": lambda thread, n: bool(io.euromap_inputs >> _euromap_port(n) & 1),
+            "get_euromap_output": lambda thread, n: bool(io.euromap_outputs >> _euromap_port(n) & 1),
+            "set_euromap_output": lambda thread, n, value: io.write_euromap_output(_euromap_port(n), value),
         }
         groups = {f"{name}_": group.bits for name, group in lines.DIGITAL_GROUPS.items()}
         for name, bits in (groups | {"": lines.STANDARD_AND_TOOL}).items():

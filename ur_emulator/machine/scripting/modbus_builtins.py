@@ -191,7 +191,6 @@ class ModbusBuiltins(BuiltinGroup):
         return [waits] if is_blocking else []
 
     def _signal(self, name: str, wanted: SignalType | None = None) -> ModbusSignal:
-        """Return a signal, which must be of the wanted type."""
         signal = self._modbus.signals.get(name)
         if signal is None:
             raise SignalError(f'there is no Modbus signal "{name}", add it with modbus_add_signal')

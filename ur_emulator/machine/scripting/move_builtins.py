@@ -77,8 +77,6 @@ class MoveBuiltins(BuiltinGroup):
         return self._travel(thread, make, partial(self._planner.optimal, a_share=a, v_share=v))
 
     def _joint_leg(self, function: str, target: Any, **limits: float) -> MakeLeg:
-        """Return what makes a move of the joints from where they are."""
-
         def make(start: Vector6, _: ToolPose) -> Leg:
             goal = self._joints_of(target, start)
             require_range(function, goal, self._arm.safety.limits)

@@ -1,10 +1,11 @@
 """Builtins that displace the arm from its path: path offset, conveyor tracking and its encoders."""
 
+from collections.abc import Sequence
 from math import hypot
 from typing import Any
 
 from ur_emulator.machine.controller.clock import Clock
-from ur_emulator.machine.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, Encoders
+from ur_emulator.machine.controller.io.encoders import PULSE_INPUTS, RANGES, Decoder, Encoder
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.machine.motion.conveyor import Belt, CircularBelt, Conveyor, LinearBelt
@@ -77,7 +78,7 @@ class PathOffsetBuiltins(BuiltinGroup):
 class EncoderBuiltins(BuiltinGroup):
     """The conveyor encoders, and the old builtins for the first one."""
 
-    def __init__(self, encoders: Encoders, io: InputOutput) -> None:
+    def __init__(self, encoders: Sequence[Encoder], io: InputOutput) -> None:
         self._encoders = encoders
         self._io = io
 
@@ -85,18 +86,19 @@ class EncoderBuiltins(BuiltinGroup):
         """Return the builtins."""
         encoders, decode = self._encoders, self._decode
         return super().functions() | {
-            "encoder_enable_set_tick_count": lambda thread, index, kind: encoders.feed(int(index), int(kind)),
+            "encoder_enable_set_tick_count": lambda thread, index, kind: encoders[int(index)].feed(int(kind)),
             "conveyor_pulse_decode": lambda thread, kind, a, b: decode(thread, _CONVEYOR, kind, a, b),
-            "get_conveyor_tick_count": lambda thread: encoders.encoders[_CONVEYOR].count,
+            "get_conveyor_tick_count": lambda thread: encoders[_CONVEYOR].count,
         }
 
     @builtin("encoder_enable_pulse_decode")
     def _decode(self, thread: object, index: float, decoder: float, a: float, b: float) -> None:
-        self._encoders.decode(int(index), Decoder(int(decoder)), _bit(a), _bit(b), self._io.digital_in)
+        encoder = self._encoders[int(index)]
+        encoder.decode(Decoder(int(decoder)), _bit(a), _bit(b), self._io.digital_in)
 
     @builtin("encoder_set_tick_count")
     def _set_count(self, thread: object, index: float, count: float) -> None:
-        encoder = self._encoders.encoders[int(index)]
+        encoder = self._encoders[int(index)]
         if not encoder.is_fed:
             raise ScriptRuntimeError(
                 f"encoder {index:g} does not take counts, call encoder_enable_set_tick_count first"
@@ -110,7 +112,7 @@ class EncoderBuiltins(BuiltinGroup):
 
     @builtin("encoder_get_tick_count")
     def _get_count(self, thread: object, index: float, opt: str = "") -> float:
-        count = self._encoders.encoders[int(index)].count
+        count = self._encoders[int(index)].count
         if opt not in ("", "raw"):
             raise ScriptRuntimeError(
                 f'encoder_get_tick_count: opt "{opt}" does not exist; allowed: "" and "raw"'
@@ -119,7 +121,7 @@ class EncoderBuiltins(BuiltinGroup):
 
     @builtin("encoder_unwind_delta_tick_count")
     def _unwind(self, thread: object, index: float, delta: float) -> float | None:
-        encoder = self._encoders.encoders[int(index)]
+        encoder = self._encoders[int(index)]
         return encoder.unwind(float(delta)) if encoder.is_enabled else None
 
     @builtin("set_conveyor_tick_count")
@@ -128,14 +130,13 @@ class EncoderBuiltins(BuiltinGroup):
             raise ScriptRuntimeError(
                 f"set_conveyor_tick_count: resolution {resolution:g} does not exist; allowed: 0 to 4"
             )
-        encoder = self._encoders.encoders[_CONVEYOR]
+        encoder = self._encoders[_CONVEYOR]
         if not encoder.is_fed or encoder.range_id != resolution:
-            self._encoders.feed(_CONVEYOR, int(resolution))
+            encoder.feed(int(resolution))
         self._set_count(thread, _CONVEYOR, count)
 
 
 def _bit(pin: float) -> int:
-    """Return the bit of the digital input that a program names."""
     bit = PULSE_INPUTS.get(int(pin))
     if bit is None:
         allowed = ", ".join(map(str, PULSE_INPUTS))
@@ -146,7 +147,7 @@ def _bit(pin: float) -> int:
 class ConveyorBuiltins(BuiltinGroup):
     """The conveyor that one program tracks: moves follow it; the path without it can be read."""
 
-    def __init__(self, arm: ScriptArm, encoders: Encoders, clock: Clock) -> None:
+    def __init__(self, arm: ScriptArm, encoders: Sequence[Encoder], clock: Clock) -> None:
         self._arm = arm
         self._motion = arm.motion
         self._encoders = encoders
@@ -204,7 +205,7 @@ class ConveyorBuiltins(BuiltinGroup):
 
     def _track(self, belt: Belt, encoder_index: float) -> None:
         self.end()
-        encoder, clock = self._encoders.encoders[int(encoder_index)], self._clock
+        encoder, clock = self._encoders[int(encoder_index)], self._clock
         self._tracked = Conveyor(belt, self._arm.tool, lambda: encoder.travel, lambda: clock.time)
         self._motion.add_overlay(self._tracked)
 

@@ -105,7 +105,6 @@ class RemoteHandle:
 
 
 def _n_values(argument: Any) -> int:
-    """Return how many values travel for an argument."""
     if isinstance(argument, Matrix):
         rows, columns = argument.shape
         return 1 + rows * (1 + columns)

@@ -19,11 +19,9 @@ from urscript.run.host import HostFunction
 from urscript.run.waits import CHECKPOINT, NEXT_CYCLE, Blocked, Outside, Wait
 from urscript.values import log_form
 
-# --- how a program reads a socket: texts are found in the inbox without looking at a byte twice
-
 
 class TextSearch:
-    """A search for one text in an inbox that grows; it has looked at `n_searched` bytes."""
+    """A search for one text in an inbox that grows, at no byte twice; it has looked at `n_searched` bytes."""
 
     def __init__(self, start: bytes, end: bytes, most: int = 0) -> None:
         """Begin a search.

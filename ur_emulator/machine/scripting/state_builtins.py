@@ -136,10 +136,8 @@ class StateBuiltins(BuiltinGroup):
     @builtin("is_within_safety_limits")
     def _is_within_safety_limits(self, thread: ScriptThread, pose: Any, qnear: Any) -> bool:
         q = self._inverse(thread, pose, qnear, None) if isinstance(pose, Pose) else tuple(pose)
-        limits, boundaries = self._arm.safety.limits, self._arm.safety.boundaries
-        if q is None or not all(
-            low <= x <= high for x, low, high in zip(q, limits.q_min, limits.q_max, strict=True)
-        ):
+        boundaries = self._arm.safety.boundaries
+        if q is None or not self._arm.safety.limits.allow(q):
             return False
         return (
             not boundaries

@@ -96,6 +96,6 @@ class IoConfiguration:
             case OutputKind.GP_FLOAT:
                 self.registers.outputs.floats[index] = float(is_high)
             case OutputKind.EUROMAP:
-                self.io.euromap.write_output(index, is_high)
+                self.io.write_euromap_output(index, is_high)
             case _:
                 self.io.write_digital_out(_OUTPUTS[kind].bits[index], is_high)

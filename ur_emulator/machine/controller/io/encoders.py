@@ -9,7 +9,6 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-N_ENCODERS = 2
 # Inputs that can take pulses: 0 to 3, which later manuals number 8 to 11.
 PULSE_INPUTS = {pin: pin % 8 for pin in (0, 1, 2, 3, 8, 9, 10, 11)}
 # Lowest count and number of counts by range code.
@@ -102,35 +101,3 @@ class Encoder:
     def _read(self, digital_in: int) -> tuple[bool, bool]:
         a, b = self._pins
         return bool(digital_in >> a & 1), bool(digital_in >> b & 1)
-
-
-class Encoders:
-    """The encoders of a box."""
-
-    def __init__(self) -> None:
-        self.encoders = tuple(Encoder() for _ in range(N_ENCODERS))
-        self.decoding: tuple[Encoder, ...] = ()
-
-    def decode(self, index: int, decoder: Decoder, pin_a: int, pin_b: int, digital_in: int) -> None:
-        """Count pulses with an encoder, or stop counting."""
-        self.encoders[index].decode(decoder, pin_a, pin_b, digital_in)
-        self._find_decoding()
-
-    def feed(self, index: int, range_id: int) -> None:
-        """Let the program set the count of an encoder."""
-        self.encoders[index].feed(range_id)
-        self._find_decoding()
-
-    def step(self, digital_in: int) -> None:
-        """Count the pulses of this cycle."""
-        for encoder in self.decoding:
-            encoder.step(digital_in)
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """The present counts [ticks]."""
-        first, second = self.encoders
-        return int(first.count), int(second.count)
-
-    def _find_decoding(self) -> None:
-        self.decoding = tuple(e for e in self.encoders if e.decoder is not Decoder.OFF)

@@ -133,26 +133,6 @@ class ToolLine(NamedTuple):
 N_EUROMAP = 32
 
 
-@dataclass(slots=True)
-class Euromap:
-    """Words of the machine's and the robot's signals, signal 0 in the lowest bit."""
-
-    inputs: int = 0
-    outputs: int = 0
-
-    def read_input(self, port: int) -> bool:
-        """Return a signal of the machine."""
-        return bool(self.inputs >> port & 1)
-
-    def read_output(self, port: int) -> bool:
-        """Return a signal of the robot."""
-        return bool(self.outputs >> port & 1)
-
-    def write_output(self, port: int, value: bool) -> None:
-        """Switch a signal of the robot."""
-        self.outputs = with_bit(self.outputs, port, value)
-
-
 class RunState(IntEnum):
     """What an output does when programs start and stop: the codes of set_runstate_*.
 
@@ -200,15 +180,16 @@ class InputOutput:
         tool_output_modes: how the tool outputs drive: 0 each by itself, 1 both as power; then of each output
             1 sinking, 2 sourcing, 3 push-pull. It is only reported.
         tool_line: settings of the tool's serial line, which are only reported.
-        euromap: signals to and from a moulding machine.
+        euromap_inputs, euromap_outputs: words of the signals from and to a moulding machine, signal 0 in the
+            lowest bit.
     """
 
     def __init__(self) -> None:
         self.digital_in = self.digital_out = self.tool_voltage = 0
+        self.euromap_inputs = self.euromap_outputs = 0
         self.tool_output_modes = (0, 1, 1)
         self.tool_line = ToolLine()
         self.flags = [False] * 32
-        self.euromap = Euromap()
         self.analog = AnalogLines()
         self.analog_in = [AnalogLine(self.analog, i) for i in (0, 1)]
         self.analog_out = [AnalogLine(self.analog, i) for i in (2, 3)]
@@ -233,6 +214,10 @@ class InputOutput:
     def write_digital_outputs(self, word: int, mask: int) -> None:
         """Set the outputs in `mask` to the bits of `word`."""
         self.digital_out = self.digital_out & ~mask | word & mask
+
+    def write_euromap_output(self, port: int, value: bool) -> None:
+        """Switch a signal to the moulding machine."""
+        self.euromap_outputs = with_bit(self.euromap_outputs, port, value)
 
     def set_tool_output_mode(self, index: int, mode: int) -> None:
         """Set one of `tool_output_modes`."""

@@ -332,7 +332,6 @@ class ModbusSignal:
     number: int = 0
 
     def __post_init__(self) -> None:
-        """Begin with zeros."""
         self.values = self.values or (0,) * self.count
 
     @property

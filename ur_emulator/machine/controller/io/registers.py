@@ -139,7 +139,3 @@ class MapMemory:
         self.version = version
         self.words = [0] * N_GENERAL
         self.latched_tick = 0
-
-    def write(self, offset: int, word: int) -> None:
-        """Write a general purpose word."""
-        self.words[offset] = word

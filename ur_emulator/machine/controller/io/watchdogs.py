@@ -73,22 +73,16 @@ class Watchdogs:
 
         It is the first one that stops the program, or else the first one.
         """
-        found: tuple[ErrorReported, WatchdogAction] | None = None
-        for variable, watch in self._watches.items():
-            if tick - watch.last_tick <= watch.cycles or (found and watch.action is not WatchdogAction.STOP):
-                continue
-            limit = watch.cycles * self._period_s
-            report = ErrorReported(
-                DISCONNECTED_CODE,
-                0,
-                ReportLevel.WARNING,
-                f"Fieldbus input disconnected: RTDE input {variable} was not written for {limit:g} s, "
-                f"watchdog action {watch.action.value}: the program is {_CONSEQUENCE[watch.action]}",
-            )
-            found = report, watch.action
-            if watch.action is WatchdogAction.STOP:
-                break
-        return found
+        late = [row for row in self._watches.items() if tick - row[1].last_tick > row[1].cycles]
+        if not late:
+            return None
+        variable, watch = next((row for row in late if row[1].action is WatchdogAction.STOP), late[0])
+        text = (
+            f"Fieldbus input disconnected: RTDE input {variable} was not written for "
+            f"{watch.cycles * self._period_s:g} s, "
+            f"watchdog action {watch.action.value}: the program is {_CONSEQUENCE[watch.action]}"
+        )
+        return ErrorReported(DISCONNECTED_CODE, 0, ReportLevel.WARNING, text), watch.action
 
     def clear(self) -> None:
         """Remove all watchdogs: the program has ended."""

@@ -303,18 +303,16 @@ class SafetyInputs:
                     self.release("input")
             case SafetyInput.REDUCED:
                 self.reduce(high is False, "input")
-            case SafetyInput.SAFEGUARD_RESET:
-                if rises:
-                    self.reset(Guard.PERMANENT)
+            case SafetyInput.SAFEGUARD_RESET if rises:
+                self.reset(Guard.PERMANENT)
             case SafetyInput.OPERATIONAL_MODE:
                 self.choose_mode(ModeSource.SELECTOR, _SELECTED.get(high))
             case SafetyInput.ENABLING_DEVICE:
                 self.act_on_device(_ENABLING[high])
             case SafetyInput.AUTOMATIC_SAFEGUARD:
                 self.guard(Guard.AUTOMATIC, high is False)
-            case SafetyInput.AUTOMATIC_RESET:
-                if rises:
-                    self.reset(Guard.AUTOMATIC)
+            case SafetyInput.AUTOMATIC_RESET if rises:
+                self.reset(Guard.AUTOMATIC)
 
 
 _SELECTED: dict[bool | None, OperationalMode] = {

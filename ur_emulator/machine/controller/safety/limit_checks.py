@@ -50,9 +50,8 @@ class SetpointCheck:
 
     def __init__(self, robot: RobotModel, period_s: float) -> None:
         self._robot = robot
-        self._stop_deceleration = stop_deceleration = robot.stop_deceleration
         self._period_s = period_s
-        self._braking = 0.5 / stop_deceleration
+        self._braking = 0.5 / robot.stop_deceleration
         self._limits: ConfiguredLimits | None = None
         self._safe_speed = self._safe_reach = 0.0
 
@@ -76,7 +75,7 @@ class SetpointCheck:
         reach = max(map(abs, target.q)) + fastest * fastest * self._braking
         if fastest <= self._safe_speed >= steepest and reach <= self._safe_reach:
             return None
-        braking_time = max(map(abs, target.qd)) / (2.0 * self._stop_deceleration)
+        braking_time = max(map(abs, target.qd)) / (2.0 * self._robot.stop_deceleration)
         for i, (q_before, q, qd, limit, low, high) in enumerate(
             zip(before.q, target.q, target.qd, limits.speed, limits.q_min, limits.q_max, strict=True)
         ):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from protocol.ur_types import SafetyMode
@@ -65,6 +65,10 @@ class ConfiguredLimits:
     arm: ArmLimits
     reduced_arm: ArmLimits
     boundaries: Boundaries = NO_BOUNDARIES
+
+    def allow(self, q: Sequence[float]) -> bool:
+        """Whether all joints are within their ranges; angles (6,) [rad]."""
+        return all(low <= x <= high for low, x, high in zip(self.q_min, q, self.q_max, strict=True))
 
     def within(self, settings: SafetySettings) -> ConfiguredLimits:
         """Return the limits with those of an installation, which cannot widen those of the joints."""
