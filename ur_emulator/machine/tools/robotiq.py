@@ -37,23 +37,14 @@ from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
+# s; between two exchanges over the serial line. Source: PYR (16 ms), a measured mean of 32 ms.
 EXCHANGE = 0.016
-"""Time between two exchanges over the serial line [s]. Source: PYR (16 ms), a measured mean of 32 ms."""
-
-_RELEASE_SPEED = 0.02
-"""Of the automatic release [m/s]: the slowest; assumed."""
-
-_LONGEST_ACTIVATION = 6.0
-"""An activation that takes longer has failed [s]; clients wait 4 to 10 s."""
-
-_PAUSE = 0.2
-"""At each end of the stroke during the activation [s]; assumed, so that it takes 1.5 to 3 s."""
-
-_MORE_REGISTERS = 13
-"""Registers behind the status, all 0: drivers read six."""
-
+_RELEASE_SPEED = 0.02  # m/s; of the automatic release: the slowest; assumed
+_LONGEST_ACTIVATION = 6.0  # s; one that takes longer has failed; clients wait 4 to 10 s
+_PAUSE = 0.2  # s; at each end of the stroke during the activation; assumed, so that it takes 1.5 to 3 s
+_MORE_REGISTERS = 13  # behind the status, all 0: drivers read six
+# COU while the fingers move; 0 while they stand, since the screw holds by itself. Source: example frames.
 _MOVING_CURRENT = 10
-"""COU while the fingers move; 0 while they stand, since the screw holds by itself. Source: example frames."""
 
 
 class Settings(NamedTuple):
