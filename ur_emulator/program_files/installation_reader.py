@@ -38,8 +38,7 @@ from ur_emulator.program_files.safety_text import safety_settings
 
 SUFFIX = ".installation"
 DEFAULT_NAME = "default" + SUFFIX
-NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))
-"""The installation of a box that nobody has set up."""
+NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))  # of a box that nobody has set up
 
 
 def load_installation(folder: ProgramFolder, name: str) -> Installation:
@@ -161,8 +160,6 @@ _NOTHING = Element("nothing")
 
 
 class _Reader:
-    """Looks up the parts of one file."""
-
     def __init__(self, tree: XmlTree) -> None:
         self.tree = tree
         self._first: dict[str, Element] = {}
