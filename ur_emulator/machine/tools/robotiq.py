@@ -159,7 +159,6 @@ class RobotiqGripper(Gripper):
         return self._command if has_power else None
 
     def _exchange(self) -> None:
-        """Take what clients have set."""
         before, self._held = self._held, self._wanted
         held = self._held
         if not held["ACT"]:
@@ -182,7 +181,6 @@ class RobotiqGripper(Gripper):
             self._follow(is_new, before)
 
     def _follow(self, is_new: bool, before: dict[str, int]) -> None:
-        """Go to the target, or stop."""
         held, tool = self._held, self.tool
         if not held["GTO"]:
             if before["GTO"]:
@@ -206,7 +204,6 @@ class RobotiqGripper(Gripper):
         self._command = FingerCommand(end, _RELEASE_SPEED, self.tool.force_of(0))
 
     def _move(self) -> None:
-        """Look at where the fingers are."""
         if self._status is Status.ACTIVATING:
             self._step_activation()
             return
