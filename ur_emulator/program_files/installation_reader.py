@@ -89,7 +89,6 @@ _RUN_STATES = {
     "PROGRAM_RUNNING": RunState.HIGH_WHEN_RUNNING,
 }
 _VOLTAGES = {"ZERO": 0, "TWELVE": 12, "TWENTY_FOUR": 24}
-_SIGNAL_TYPES = {kind.name: kind for kind in SignalType}
 
 
 def _read_tree(tree: XmlTree) -> Installation:
@@ -253,7 +252,7 @@ class _Reader:
     def signals(self) -> Iterator[DeclaredSignal]:
         for unit in self.tree.root.iter("Unit"):
             for signal in unit.iter("ModbusSignal"):
-                kind = _SIGNAL_TYPES.get(signal.get("type", ""))
+                kind = SignalType.__members__.get(signal.get("type", ""))
                 if kind is None:
                     continue
                 frequency = self.tree.number(signal.get("updateFrequency", "-1"), "frequency of a signal")
