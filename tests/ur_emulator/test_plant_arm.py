@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
 from protocol.ur_types import ControlMode
-from ur_emulator.errors import EmulatorError, PlantError
+from ur_emulator.errors import ArgumentError, EmulatorError, PlantError
+from ur_emulator.machine.commands.surroundings import Push
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
@@ -502,8 +503,8 @@ def test_payload_wants_sense(mass, cog):
 
 @pytest.mark.parametrize("force", [(0.0, 0.0), (float("nan"), 0.0, 0.0)])
 def test_push_wants_three_numbers(force):
-    with pytest.raises(PlantError, match="three finite numbers"):
-        Plant(UR3, IDEAL, 0).push(force)
+    with pytest.raises(ArgumentError, match="allowed is three numbers"):
+        Push(force)
 
 
 BALL = Thing("ball", "sphere", (0.1,), 0.0, 0.3, (0.0, 0.0, 1.5, 0.0, 0.0, 0.0))

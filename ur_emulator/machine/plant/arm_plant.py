@@ -191,17 +191,14 @@ class ArmPlant(ABC):
         return bool(there.ncon)
 
     def push(
-        self, force: Sequence[float], point: Sequence[float] | None = None, duration: float | None = None
+        self, force: Sequence[float], point: Sequence[float] = _NOTHING, duration: float | None = None
     ) -> None:
         """Push the flange from this cycle on; a zero force ends it.
 
         Args:
             force: in base axes (3,) [N].
-            point: where it acts, in the flange frame (3,) [m]; None for its origin.
+            point: where it acts, in the flange frame (3,) [m].
             duration: how long, in whole cycles [s]; None: until the next push.
-
-        Raises:
-            PlantError: a number is not finite.
         """
         n_cycles = 0 if duration is None else round(duration / self.period_s)
         if duration is not None and not n_cycles:
