@@ -212,7 +212,7 @@ def test_moves_with_the_rated_payload_and_comes_to_rest_on_target(name, fidelity
     assert not [event for event in events if type(event).__name__ in ("ErrorReported", "ScriptFailed")]
     snapshot = controller.snapshot
     assert snapshot.actual_q == pytest.approx(snapshot.target_q, abs=2e-4)
-    assert controller.plant.physics.n_contacts == 0
+    assert controller.plant.physics.data.ncon == 0
 
 
 @pytest.mark.parametrize("name", ["ur3", "ur5e", "ur20"])

@@ -188,7 +188,6 @@ class ProgramFolder:
 
 @contextmanager
 def _folder_below(root: Path, inside: PurePosixPath) -> Iterator[int]:
-    """Open a folder below the root."""
     descriptor = os.open(root, _FOLDER)
     try:
         for part in inside.parts:

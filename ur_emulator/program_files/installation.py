@@ -14,11 +14,9 @@ from ur_emulator.machine.controller.io.network import SignalType
 from ur_emulator.machine.controller.safety.safety_state import NO_SETTINGS, SafetySettings
 from ur_emulator.machine.models.robot_model import ZERO6, Vector3, Vector6
 
-STANDARD_GRAVITY = 9.82
-"""Acceleration of gravity that PolyScope writes [m/s^2]."""
-
+STANDARD_GRAVITY = 9.82  # m/s^2; as PolyScope writes it
+# Home position of an e-Series box that nobody has set up [rad]. Source: users of real arms and of URSim.
 NEW_HOME: Vector6 = (0.0, -pi / 2.0, 0.0, -pi / 2.0, 0.0, 0.0)
-"""Home position of an e-Series box that nobody has set up [rad]. Source: users of real arms and of URSim."""
 
 
 @dataclass(frozen=True, slots=True)

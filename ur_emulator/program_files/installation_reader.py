@@ -38,8 +38,7 @@ from ur_emulator.program_files.safety_text import safety_settings
 
 SUFFIX = ".installation"
 DEFAULT_NAME = "default" + SUFFIX
-NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))
-"""The installation of a box that nobody has set up."""
+NEW_BOX = Installation(str(WIRE_ROOTS[0] / DEFAULT_NAME))  # of a box that nobody has set up
 
 
 def load_installation(folder: ProgramFolder, name: str) -> Installation:
@@ -90,7 +89,6 @@ _RUN_STATES = {
     "PROGRAM_RUNNING": RunState.HIGH_WHEN_RUNNING,
 }
 _VOLTAGES = {"ZERO": 0, "TWELVE": 12, "TWENTY_FOUR": 24}
-_SIGNAL_TYPES = {kind.name: kind for kind in SignalType}
 
 
 def _read_tree(tree: XmlTree) -> Installation:
@@ -161,8 +159,6 @@ _NOTHING = Element("nothing")
 
 
 class _Reader:
-    """Looks up the parts of one file."""
-
     def __init__(self, tree: XmlTree) -> None:
         self.tree = tree
         self._first: dict[str, Element] = {}
@@ -256,7 +252,7 @@ class _Reader:
     def signals(self) -> Iterator[DeclaredSignal]:
         for unit in self.tree.root.iter("Unit"):
             for signal in unit.iter("ModbusSignal"):
-                kind = _SIGNAL_TYPES.get(signal.get("type", ""))
+                kind = SignalType.__members__.get(signal.get("type", ""))
                 if kind is None:
                     continue
                 frequency = self.tree.number(signal.get("updateFrequency", "-1"), "frequency of a signal")

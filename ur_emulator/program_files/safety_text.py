@@ -131,7 +131,6 @@ class _SafetyText:
                 yield f"{section} with the unknown mode {self._values[section, 'mode'][:40]} is"
 
     def planes(self) -> Iterator[SafetyPlane]:
-        """Yield the safety planes that are set up."""
         for section in self._planes:
             mode = self._mode(section)
             if mode is None or mode is BoundaryMode.DISABLED:
@@ -197,7 +196,6 @@ class _SafetyText:
 
 
 def _values(text: str) -> dict[tuple[str, str], str]:
-    """Return the values by section and key."""
     values: dict[tuple[str, str], str] = {}
     section = ""
     for line in map(str.strip, text.splitlines()):

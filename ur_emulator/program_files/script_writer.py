@@ -37,8 +37,7 @@ class NodeKind:
     becomes: str
 
 
-KINDS: dict[str, NodeKind] = {}
-"""By the tag of their elements."""
+KINDS: dict[str, NodeKind] = {}  # by the tag of their elements
 
 
 def writes(tag: str, becomes: str) -> Callable[[NodeWriter], NodeWriter]:

@@ -15,8 +15,7 @@ from ur_emulator.program_files.names import Names
 from ur_emulator.program_files.reader import ProgramReader, XmlTree
 
 ROOT = "URProgram"
-OLD_ROOT = "gui.program.ProgramRootNode"
-"""Of programs of PolyScope 1.8: a dump of its objects."""
+OLD_ROOT = "gui.program.ProgramRootNode"  # of programs of PolyScope 1.8: a dump of its objects
 
 
 @dataclass(slots=True, eq=False)

@@ -19,8 +19,7 @@ from ur_emulator.program_files.reader import XmlTree
 from ur_emulator.program_files.script_writer import ScriptWriter
 from ur_emulator.program_files.urp_nodes import Node
 
-BASE, TOOL = "Joint_0_name", "Joint_6_name"
-"""Names of the base and the tool as features."""
+BASE, TOOL = "Joint_0_name", "Joint_6_name"  # names of the base and the tool as features
 _ZERO_POSE = "p[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"
 _GREATEST = 1e6
 _ZERO_BEFORE_POINT = re.compile(r"\b0\.")

@@ -110,7 +110,6 @@ def _joined(parts: list[Part]) -> Iterator[Part]:
 
 
 def _write_section(writer: ScriptWriter, node: Node, name: str, *, mark: str = "") -> None:
-    """Write the nodes of the main program, of BeforeStart or of a sub-program."""
     writer.put(node, name, mark=mark)
     writer.write_children(node)
 
@@ -129,7 +128,6 @@ def _write_first_values(writer: ScriptWriter) -> None:
 
 
 def _write_timers(writer: ScriptWriter) -> None:
-    """Write the thread that counts all timers up."""
     if not writer.timers:
         return
     writer.add(*(f"global {timer}_is_counting=False" for timer in writer.timers))

@@ -11,9 +11,7 @@ from ur_emulator.program_files.installation import GripperCalibration
 from ur_emulator.program_files.script_writer import ScriptWriter
 from ur_emulator.program_files.urp_nodes import Node
 
-ROBOTIQ = "Robotiq_Grippers"
-"""Name of the software that the nodes are of."""
-
+ROBOTIQ = "Robotiq_Grippers"  # name of the software that the nodes are of
 # Number of a gripper in programs <- its number on the serial line, and the number itself.
 _NUMBERS = {"9": 1, "1": 1, "2": 2, "3": 3, "4": 4}
 

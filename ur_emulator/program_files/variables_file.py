@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
 from typing import Any
+from xml.etree import ElementTree
 
 from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
@@ -101,8 +102,6 @@ def _unescaped(text: str) -> str:
 
 
 def _new_xml(tree: XmlTree, values: Mapping[str, str]) -> bytes:
-    from xml.etree import ElementTree  # a slow import, which few boxes need
-
     for variable in tree.root.iter("variable"):
         variable.set("value", values.get(variable.get("name", ""), variable.get("value", "")))
     data: bytes = ElementTree.tostring(tree.root, encoding="utf-8")

@@ -40,12 +40,11 @@ def random_stream(seed: int, name: str) -> np.random.Generator:
 
 
 _FILE = FileKind(MIB, ModelError, "all fields have less than 0.01 MiB")
+# Of all waves of a gear together: beyond it the joint might turn back while its motor goes on.
 _LARGEST_SLOPE = 0.5
-"""Of all waves of a gear together: beyond it the joint might turn back while its motor goes on."""
-
-# Logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
+# Friction changes its sign over about this in the controller's model, fully by .01 to .015 [rad/s]. Source:
+# logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
 REVERSAL_SPEED = 0.006
-"""Friction changes its sign over about this in the controller's model, fully by .01 to .015 [rad/s]."""
 
 Share = Annotated[float, number(0.0, 1.0)]
 Angle = Annotated[float, number(0.0, 0.1, "rad")]

@@ -143,13 +143,11 @@ class Link:
         return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
-# Of every arm: logs of a real UR3 (CB3), UR3e and UR10e, target current against target speed (O).
+# Joint speed beyond which viscous friction has another slope [rad/s]. Of every arm: logs of a real UR3 (CB3),
+# UR3e and UR10e, target current against target speed (O).
 VISCOUS_KINK = 0.5
-"""Joint speed beyond which viscous friction has another slope [rad/s]."""
-
-# Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees.
+# Ends of joint ranges: safety blocks of real CB3 installations and the data of a UR5e, ±363 degrees [rad].
 RANGE_END = 2.0 * pi + radians(3.0)
-"""[rad]"""
 
 
 @dataclass(slots=True)

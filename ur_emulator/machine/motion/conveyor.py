@@ -121,7 +121,6 @@ class Conveyor:
         return self._belt.carry(tool_pose, self._carried)
 
     def _follow(self, ticks_per_metre: float, dt: float) -> None:
-        """Move the tool's displacement towards the belt's."""
         a = CATCH_UP_ACCELERATION * ticks_per_metre
         deceleration = _APPROACH * a
         error = self._estimate.position - self._carried

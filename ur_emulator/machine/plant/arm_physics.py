@@ -135,11 +135,6 @@ class ArmPhysics:
         self._bind(model, data)
 
     @property
-    def n_contacts(self) -> int:
-        """Number of contact points of the arm with itself, its base or the table."""
-        return int(self.data.ncon)
-
-    @property
     def has_diverged(self) -> bool:
         """Whether the simulation has diverged."""
         return not self.qd.dot(self.qd) < _RUNAWAY**2

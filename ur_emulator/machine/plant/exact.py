@@ -85,5 +85,6 @@ class ExactPlant(ArmPlant):
         """Return the state of the cycle before; see `ArmPlant.report`."""
         return before
 
-    def _acted_on(self, what: str) -> ArmPhysics:
+    def acted_on(self, what: str) -> ArmPhysics:
+        """Raise RefusedError; see `ArmPlant.acted_on`."""
         raise RefusedError(f"{what}: nothing acts on an arm of fidelity exact, use ideal, typical or poor")

@@ -168,7 +168,7 @@ class Feedback:
             self._read(physics.wrench_for)
             return
         record.wrench[:] = loads.wrench if loads.is_unexpected else 0.0
-        if physics.n_contacts:
+        if physics.data.ncon:
             record.wrench += physics.contact_wrench
         self._read()
 

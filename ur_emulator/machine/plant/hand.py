@@ -21,17 +21,10 @@ _SIDES = ("left", "right")
 _FINGER_MASS = 0.05  # kg, of each finger; part of the tool's mass
 _THICKNESS = 0.004  # m, of a pad
 
-_GEAR_INERTIA = 1.0
-"""Mass of the drive as a finger feels it [kg]; assumed, a screw makes it large."""
-
-_SERVO = 500.0
-"""Force of the drive for an error of its speed [N s/m]."""
-
-_SERVO_RATE = 60.0
-"""Rate at which a lasting error of the speed raises the force [1/s]; to its limit in .25 s."""
-
-_APPROACH = 0.02
-"""Time constant with which the drive slows down before its target [s]; assumed."""
+_GEAR_INERTIA = 1.0  # kg; mass of the drive as a finger feels it; assumed, a screw makes it large
+_SERVO = 500.0  # N s/m; force of the drive for an error of its speed
+_SERVO_RATE = 60.0  # 1/s; rate at which a lasting error of the speed raises the force; to its limit in .25 s
+_APPROACH = 0.02  # s; time constant with which the drive slows down before its target; assumed
 
 # Hard enough that a pad gives .2 mm where 200 N squeeze a body of 200 g: at the coarser contacts of the arm
 # the body would sink in by centimetres, since MuJoCo's contacts give by mass.
@@ -42,11 +35,9 @@ _PAD_CONTACT: dict[str, Any] = {
     "condim": 4,
 }
 
-_LIP = 0.003
-"""Distance over which the lip of a cup seals [m]; assumed."""
-
+_LIP = 0.003  # m; distance over which the lip of a cup seals; assumed
+# Friction over normal impedance: with 1 what is held creeps out of the pads. Source: MuJoCo's own hands.
 _IMPEDANCE_RATIO = 10.0
-"""Friction over normal impedance: with 1 what is held creeps out of the pads. Source: MuJoCo's own hands."""
 
 
 class FingerState(NamedTuple):

@@ -84,22 +84,16 @@ class Loads:
             set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
-        """Set the true payload, which the controller does not know; see `declare`."""
+        """Set the true payload; from now on `declare` sets only that of the controller. Errors as there."""
         check_payload(mass, cog)
         self._true = (*self._tools, (mass, cog))
         self._weigh()
         set_payload_body(self._model, mass, cog)
 
-    def push(self, force: Sequence[float], point: Sequence[float] | None) -> None:
+    def push(self, force: Sequence[float], point: Sequence[float]) -> None:
         """Push from now on; see `ArmPlant.push`."""
-        force_base = np.array(force, dtype=np.float64)
-        at = np.zeros(3) if point is None else np.array(point, dtype=np.float64)
-        if force_base.shape != (3,) or at.shape != (3,) or not np.isfinite([force_base, at]).all():
-            raise PlantError(
-                f"push of {list(force)} N given: three finite numbers are needed, point likewise"
-            )
-        self._push = force_base if force_base.any() else None
-        self._push_point = at
+        self._push = np.array(force) if any(force) else None
+        self._push_point = np.array(point)
         self._data.xfrc_applied[self._flange_link] = 0.0
         self._weigh()
 

@@ -74,7 +74,6 @@ def compile_physics(spec: mujoco.MjSpec, speed: float) -> mujoco.MjModel:
 
 
 def _add_drives(spec: mujoco.MjSpec, robot: RobotModel, gains: ServoGains) -> None:
-    """Add rotors, friction and servos of the joints."""
     for i, name in enumerate(JOINTS):
         joint = spec.joint(name)
         joint.armature = robot.armature[i]

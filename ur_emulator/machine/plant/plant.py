@@ -118,7 +118,6 @@ class Plant(ArmPlant):
         return self._state._replace(joint_control_output=self._state.target_current)
 
     def _drive(self, target: JointTarget, mode: ControlMode, torque: TorqueCommand | None) -> None:
-        """Give the drives what they have to do in this cycle."""
         drives, physics = self._drives, self._physics
         if self._is_braked:
             # At the pose in which the brakes hold the arm.
@@ -137,7 +136,6 @@ class Plant(ArmPlant):
             drives.command(target)
 
     def _move(self) -> None:
-        """Advance the arm by a cycle and read its sensors."""
         physics, drives, feedback = self._physics, self._drives, self._feedback
         is_free = self._mode in _FREE
         if not is_free:
@@ -186,7 +184,6 @@ class Plant(ArmPlant):
         self._feedback.reset()
 
     def _stand_still(self) -> None:
-        """Advance by a cycle with the brakes on."""
         if not self._is_braked:
             self._engage_brakes()
         self._physics.run_beside(self.robot.generation.n_substeps)

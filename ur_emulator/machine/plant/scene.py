@@ -156,7 +156,6 @@ class Scene:
         self._recompile()
 
     def _find(self, kind: str, name: str) -> str:
-        """The body of a thing or an obstacle."""
         if (kind, name) not in self._placed:
             known = [other for one, other in self._placed if one == kind]
             there = f"are {', '.join(known)}" if known else "is none"
@@ -212,7 +211,6 @@ def load_scene(path: Path) -> Cell | Path:
 
 
 def _add_cell(body: mujoco.MjsBody, cell: Cell) -> None:
-    """Add walls and solids of a cell."""
     for wall in cell.walls:
         wide = body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2.0, 2.0, 0.1], pos=np.multiply(wall.normal, wall.offset)

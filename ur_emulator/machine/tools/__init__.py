@@ -9,11 +9,9 @@ from ur_emulator.machine.tools.robotiq import RobotiqGripper
 from ur_emulator.machine.tools.vacuum import VacuumGripper
 from ur_hil.tools import ToolModel
 
-SUPPLY = 24
-"""Voltage at the tool connector that grippers need [V]."""
-
+SUPPLY = 24  # V; at the tool connector, that grippers need
+# Addresses of the grippers 1 to 4 of programs. Source: reference `grippers.md` 1.1 (O).
 _UNITS = (9, 2, 3, 4)
-"""Addresses of the grippers 1 to 4 of programs. Source: reference `grippers.md` 1.1 (O)."""
 
 
 def make_grippers(tools: Sequence[ToolModel], period: float, has_tool_line: bool) -> tuple[Gripper, ...]:

@@ -8,11 +8,8 @@ from ur_emulator.machine.controller.io.lines import InputOutput, ToolLine
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_hil.tools import ToolModel
 
-_REACHED = 0.0003
-"""A target this near is reached [m]: less than a count of the finest gripper."""
-
-_RESTS = 0.002
-"""Slower than this the fingers stand [m/s]."""
+_REACHED = 0.0003  # m; a target this near is reached: less than a count of the finest gripper
+_RESTS = 0.002  # m/s; slower than this the fingers stand
 
 
 class Gripper(ABC):

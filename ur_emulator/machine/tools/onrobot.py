@@ -161,7 +161,6 @@ class OnRobotGripper(Gripper):
                 self.grip(width, steps * self.linkage.force_step, 0.0)
 
     def _look(self, target: float) -> None:
-        """Look at where the fingers are."""
         self._since += self._period
         stands, reached = self._stands, self._is_at(target)
         presses = abs(self._fingers.share) > 0.95 and not reached

@@ -9,11 +9,8 @@ from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
-BUILD_UP = 0.15
-"""Time to the full vacuum [s]; programs wait .1 to .3 s for it (reference `grippers.md` 4)."""
-
-_REACHED = 0.8
-"""Share of the full vacuum from which the input is on; chosen."""
+BUILD_UP = 0.15  # s; to the full vacuum; programs wait .1 to .3 s for it (reference `grippers.md` 4)
+_REACHED = 0.8  # share of the full vacuum from which the input is on; chosen
 
 
 class VacuumGripper(Gripper):
