@@ -174,7 +174,7 @@ def test_brakes_end_the_freedom_of_the_joints():
 
 def test_a_hung_load_stays_when_another_one_is_declared():
     plant = Plant(UR3, IDEAL, 5)
-    plant.acted_on("payload").loads.attach(1.0, (0.0, 0.0, 0.0))
+    plant.attach_load(1.0)
     plant.set_payload(1.0, (0.0, 0.0, 0.0))
     states = hold(plant, HOME, 100)
     assert states[-1].estimated_force[2] == pytest.approx(0.0, abs=0.3)

@@ -34,7 +34,7 @@ def test_with_the_right_payload_the_arm_stays_where_it_is(fidelity):
 @pytest.mark.parametrize(("load", "declared", "sign"), [(1.0, 0.0, -1), (0.0, 1.0, +1)])
 def test_with_a_wrong_payload_it_drifts_down_or_up(load, declared, sign):
     bench = above_table(f"  set_payload({declared}, [0, 0, 0])\n  sleep(1)\n" + FREE, z=0.25)
-    bench.controller.plant.acted_on("payload").loads.attach(load, (0.0, 0.0, 0.0))
+    bench.controller.plant.attach_load(load)
     bench.tick(200)
     before = place(bench)
     bench.tick(400)

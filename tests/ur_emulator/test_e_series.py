@@ -448,7 +448,7 @@ def test_zeroing_takes_away_whatever_pushes():
 def test_declaring_a_payload_zeroes_the_sensor_too(declared):
     bench = bench_of(fidelity="ideal")
     bench.start(f"def p():\n  sleep(0.2)\n  {declared}\n  sleep(100)\nend\n")
-    bench.controller.plant.acted_on("payload").loads.attach(2.0, (0.0, 0.0, 0.0))
+    bench.controller.plant.attach_load(2.0)
     bench.tick(80)
     assert bench.now.actual_tcp_force[2] == pytest.approx(-2.0 * GRAVITY, abs=0.2)
     bench.tick(100)
@@ -474,7 +474,7 @@ TARGET_CHANGES = [
 )
 def test_the_zero_is_a_mean_over_measurements_with_the_present_payload(make_bench, changed, delay):
     bench = make_bench(fidelity="ideal")
-    bench.controller.plant.acted_on("payload").loads.attach(2.0, (0.0, 0.0, 0.0))
+    bench.controller.plant.attach_load(2.0)
     bench.start(
         f"def p():\n  set_payload(1.0)\n  sleep(0.4)\n  {changed}\n  {delay}\n  zero_ftsensor()\n"
         "  sleep(100)\nend\n"

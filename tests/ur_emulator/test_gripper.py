@@ -611,7 +611,7 @@ MJCF = """<mujoco>
 def furnished(scene):
     robot = robot_by_name("ur5e")
     plant = Plant(robot, robot.generation.fidelity("typical"), 7)
-    plant.acted_on("scene").scene.furnish(scene)
+    plant.furnish(scene)
     home = JointTarget(robot.home_q, (0.0,) * 6, (0.0,) * 6)
     for _ in range(500):
         plant.step(home)

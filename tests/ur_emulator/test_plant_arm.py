@@ -513,10 +513,10 @@ BALL = Thing("ball", "sphere", (0.1,), 0.0, 0.3, (0.0, 0.0, 1.5, 0.0, 0.0, 0.0))
 EVENTS = {
     "nothing": lambda plant: None,
     "payload": lambda plant: plant.set_payload(1.0, (0.0, 0.0, 0.05)),
-    "hang": lambda plant: plant.acted_on("payload").loads.attach(0.5, (0.0, 0.0, 0.0)),
+    "hang": lambda plant: plant.attach_load(0.5),
     "push": lambda plant: plant.push((5.0, 0.0, -3.0)),
     "end of push": lambda plant: plant.push((0.0, 0.0, 0.0)),
-    "obstacle": lambda plant: plant.acted_on("obstacle ball").scene.put(BALL),
+    "obstacle": lambda plant: plant.put(BALL),
     "no obstacle": lambda plant: (
         plant.physics.scene.obstacles and plant.physics.scene.remove("obstacle", "ball")
     ),

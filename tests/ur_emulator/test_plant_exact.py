@@ -80,10 +80,8 @@ def test_moments_are_those_of_the_model_and_know_the_payload():
     "act",
     [
         lambda plant: plant.push((50.0, 0.0, 0.0)),
-        lambda plant: plant.acted_on("payload").loads.attach(3.0, (0.0, 0.0, 0.0)),
-        lambda plant: plant.acted_on("obstacle box").scene.put(
-            Thing("box", "sphere", (0.1,), 0.0, 0.3, (0.4, 0.0, 0.3, 0.0, 0.0, 0.0))
-        ),
+        lambda plant: plant.attach_load(3.0),
+        lambda plant: plant.put(Thing("box", "sphere", (0.1,), 0.0, 0.3, (0.4, 0.0, 0.3, 0.0, 0.0, 0.0))),
     ],
 )
 def test_what_would_act_on_the_arm_is_refused_in_one_line(act):

@@ -366,7 +366,7 @@ def test_a_motion_right_after_freedrive_is_executed(lines, begin, generation):
 def test_a_freedrive_for_no_time_leaves_nothing_for_the_next():
     """A wrong payload that it began with."""
     bench = Bench()
-    bench.controller.plant.acted_on("payload").loads.attach(3.0, (0.0, 0.0, 0.0))
+    bench.controller.plant.attach_load(3.0)
     bench.run(
         "def p():\n  sleep(1)\n  freedrive_mode()\n  end_freedrive_mode()\n  set_payload(3, [0,0,0])\nend\n"
     )

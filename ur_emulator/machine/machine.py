@@ -66,7 +66,7 @@ class Machine:
         self.network = self.controller.state.network
         self.controller.state.pendant.set_remote_control(remote_control)
         if scene is not None:
-            self.controller.plant.acted_on("scene").scene.furnish(scene)
+            self.controller.plant.furnish(scene)
 
     def take(self, arrival: Arrival) -> None:
         """Take an arrival before its cycle begins: `Controller.waits_outside` counts with it."""

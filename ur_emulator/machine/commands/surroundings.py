@@ -78,7 +78,7 @@ class AttachPayload(CommandOperation):
     )
 
     def apply(self, box: BoxParts) -> None:
-        box.plant.acted_on("payload").loads.attach(self.mass, self.cog)
+        box.plant.attach_load(self.mass, self.cog)
 
 
 Shape = Literal["box", "sphere", "capsule", "plane"]
@@ -118,7 +118,7 @@ def _check_body(what: str, shape: str, size: Sequence[float], pose: Sequence[flo
 
 def _put(box: BoxParts, thing: Thing) -> None:
     try:
-        box.plant.acted_on(f"{thing.kind} {thing.name}").scene.put(thing)
+        box.plant.put(thing)
     except RefusedError as refusal:
         refuse(box.state, str(refusal))
 

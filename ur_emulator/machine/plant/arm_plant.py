@@ -7,6 +7,7 @@ from the seed: equal seeds and equal targets give bit-identical states.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -18,12 +19,14 @@ from ur_emulator.errors import PlantError
 from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.fidelity import Fidelity
 from ur_emulator.machine.models.robot_model import ZERO6, JointRange, RobotModel, Vector3, Vector6
+from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.motion.generators import JointTarget, TorqueCommand
 from ur_emulator.machine.plant.arm_physics import ArmPhysics
 from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_emulator.machine.plant.inverse_dynamics import InverseDynamics
 from ur_emulator.machine.plant.shapes import collide
 from ur_emulator.machine.plant.thermometers import Thermometers
+from ur_hil.cell import Cell
 from ur_hil.tools import ToolModel
 
 
@@ -177,7 +180,7 @@ class ArmPlant(ABC):
         self.complete_cycle()
         return self._physics
 
-    def acted_on(self, what: str) -> ArmPhysics:
+    def _acted_on(self, what: str) -> ArmPhysics:
         """The arm on which something acts now; RefusedError, which says what, if nothing can."""
         return self.physics
 
@@ -189,6 +192,18 @@ class ArmPlant(ABC):
         there.qpos[:] = [*q, *now.qpos[6:]]
         collide(model, there)
         return bool(there.ncon)
+
+    def furnish(self, surroundings: Cell | Path) -> None:
+        """Put a scene around the arm, see `Scene.furnish`."""
+        self._acted_on("scene").scene.furnish(surroundings)
+
+    def put(self, thing: Thing) -> None:
+        """Add a thing or an obstacle, see `Scene.put`."""
+        self._acted_on(f"{thing.kind} {thing.name}").scene.put(thing)
+
+    def attach_load(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> None:
+        """Set the true payload; from now on `set_payload` only declares. See `Loads.attach`."""
+        self._acted_on("payload").loads.attach(mass, cog)
 
     def push(
         self, force: Sequence[float], point: Sequence[float] = _NOTHING, duration: float | None = None
@@ -203,7 +218,7 @@ class ArmPlant(ABC):
         n_cycles = 0 if duration is None else round(duration / self.period_s)
         if duration is not None and not n_cycles:
             force = _NOTHING
-        arm = self.acted_on("push") if any(force) else self.physics
+        arm = self._acted_on("push") if any(force) else self.physics
         arm.loads.push(force, point)
         self.push_left = n_cycles
 
@@ -216,7 +231,7 @@ class ArmPlant(ABC):
     # --- what the controller sets up
 
     def set_payload(self, mass: float, cog: Vector3, inertia: Vector6 = ZERO6) -> None:
-        """Set the payload that the controller assumes, and the true one unless `Loads.attach` has set it.
+        """Set the payload that the controller assumes, and the true one unless `attach_load` has set it.
 
         Arguments as in `set_payload_body`; PlantError when the mass is negative or a number is not finite.
         """

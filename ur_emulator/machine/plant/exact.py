@@ -85,6 +85,5 @@ class ExactPlant(ArmPlant):
         """Return the state of the cycle before; see `ArmPlant.report`."""
         return before
 
-    def acted_on(self, what: str) -> ArmPhysics:
-        """Raise RefusedError; see `ArmPlant.acted_on`."""
+    def _acted_on(self, what: str) -> ArmPhysics:
         raise RefusedError(f"{what}: nothing acts on an arm of fidelity exact, use ideal, typical or poor")

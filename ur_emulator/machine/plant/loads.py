@@ -84,7 +84,7 @@ class Loads:
             set_payload_body(self._model, mass, cog, inertia)
 
     def attach(self, mass: float, cog: Vector3) -> None:
-        """Set the true payload; from now on `declare` sets only that of the controller. Errors as there."""
+        """Set the true payload, which the controller does not know; see `declare`."""
         check_payload(mass, cog)
         self._true = (*self._tools, (mass, cog))
         self._weigh()
