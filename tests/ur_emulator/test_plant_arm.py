@@ -7,6 +7,8 @@ one that does not.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,14 +16,14 @@ from hypothesis import strategies as st
 from plant_support import HOME, PERIOD, SpeedRamp, column, hold, target
 
 from protocol.ur_types import ControlMode
-from ur_emulator.errors import ArgumentError, EmulatorError, PlantError
+from ur_emulator.errors import ArgumentError, EmulatorError, ModelError, PlantError
 from ur_emulator.machine.commands.surroundings import Push
 from ur_emulator.machine.kinematics.arm_model import ArmModel
 from ur_emulator.machine.models.calibration import draw_dh
 from ur_emulator.machine.models.cb3_arms import UR3
 from ur_emulator.machine.models.e_series_arms import UR3E, UR5E
 from ur_emulator.machine.models.fidelity import EXACT, IDEAL, POOR, TYPICAL
-from ur_emulator.machine.models.generations import CB3, E_SERIES, POLYSCOPE_X
+from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.models.things import Thing
 from ur_emulator.machine.plant.exact import ExactPlant
 from ur_emulator.machine.plant.plant import Plant
@@ -479,12 +481,15 @@ def test_divergence_is_an_error_in_its_cycle_and_a_reset_heals():
     assert np.abs(plant.q_true - HOME).max() < 1e-4
 
 
-@pytest.mark.parametrize("generation", [CB3, E_SERIES, POLYSCOPE_X], ids=lambda it: it.name)
-def test_the_physics_fills_a_cycle_and_cycles_fill_a_second(generation):
-    assert generation.period_us > 0
-    assert generation.substep_us > 0
-    assert generation.period_us % generation.substep_us == 0
-    assert 1_000_000 % generation.period_us == 0
+@pytest.mark.parametrize("period", [0, 3_000, -8_000])
+def test_a_cycle_that_the_physics_cannot_fill_is_refused(period):
+    with pytest.raises(ModelError, match="whole multiple of the physics step of 2000"):
+        replace(CB3, period_us=period)
+
+
+def test_a_cycle_that_does_not_divide_a_second_is_refused():
+    with pytest.raises(ModelError, match="whole number of cycles a second"):
+        replace(CB3, period_us=6_000)
 
 
 @pytest.mark.parametrize("q", [(0.0,) * 5, (float("nan"),) * 6])

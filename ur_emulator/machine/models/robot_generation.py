@@ -38,7 +38,7 @@ class RobotGeneration:
 
     Attributes:
         name: as people write it, "CB3".
-        period_us: control cycle [us], a whole multiple of the physics step and part of a second.
+        period_us: control cycle [us], a whole multiple of the physics step.
         substep_us: physics step [us].
         major: first number of its software versions.
         default_version: what a box runs if the user names none.
@@ -59,6 +59,9 @@ class RobotGeneration:
         sub_packages: of the robot state on ports 30001 and 30002, in the order of the wire.
         rtde_outputs, rtde_inputs: variables that a client can subscribe to, and write.
         interpreter_since: first version with the port for interpreter mode; None if there is none.
+
+    Raises:
+        ModelError: the control cycle is no whole multiple of the physics step, or no part of a second.
     """
 
     name: str
@@ -89,6 +92,17 @@ class RobotGeneration:
     rtde_inputs: tuple[RtdeField, ...] = INPUTS
     builtins: tuple[Builtin, ...] = ALL_ROWS
     interpreter_since: SoftwareVersion | None = None
+
+    def __post_init__(self) -> None:
+        if self.substep_us <= 0 or self.period_us <= 0 or self.period_us % self.substep_us:
+            raise ModelError(
+                f"control cycle of {self.period_us} us given: a whole multiple of the physics step of "
+                f"{self.substep_us} us is needed"
+            )
+        if 1_000_000 % self.period_us:
+            raise ModelError(
+                f"control cycle of {self.period_us} us given: a whole number of cycles a second is needed"
+            )
 
     @property
     def period_s(self) -> float:
