@@ -20,13 +20,12 @@ after the activation is chosen.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from protocol.robotiq import (
     DEFAULT_SID,
     INPUTS,
     OUTPUTS,
-    VARIABLES,
-    Access,
     Fault,
     Objects,
     Status,
@@ -38,18 +37,41 @@ from ur_emulator.machine.plant.hand import FingerCommand, FingerState
 from ur_emulator.machine.tools.gripper import Gripper
 from ur_hil.tools import ToolModel
 
-# s; between two exchanges over the serial line. Source: PYR (16 ms), a measured mean of 32 ms.
 EXCHANGE = 0.016
-_RELEASE_SPEED = 0.02  # m/s; of the automatic release: the slowest; assumed
-_LONGEST_ACTIVATION = 6.0  # s; one that takes longer has failed; clients wait 4 to 10 s
-_PAUSE = 0.2  # s; at each end of the stroke during the activation; assumed, so that it takes 1.5 to 3 s
-_MORE_REGISTERS = 13  # behind the status, all 0: drivers read six
-# COU while the fingers move; 0 while they stand, since the screw holds by itself. Source: example frames.
+"""Time between two exchanges over the serial line [s]. Source: PYR (16 ms), a measured mean of 32 ms."""
+
+_RELEASE_SPEED = 0.02
+"""Of the automatic release [m/s]: the slowest; assumed."""
+
+_LONGEST_ACTIVATION = 6.0
+"""An activation that takes longer has failed [s]; clients wait 4 to 10 s."""
+
+_PAUSE = 0.2
+"""At each end of the stroke during the activation [s]; assumed, so that it takes 1.5 to 3 s."""
+
+_MORE_REGISTERS = 13
+"""Registers behind the status, all 0: drivers read six."""
+
 _MOVING_CURRENT = 10
+"""COU while the fingers move; 0 while they stand, since the screw holds by itself. Source: example frames."""
 
 
-# What clients write and read back, by name, before they do.
-_INITIAL = {name: 0 for name, it in VARIABLES.items() if it.access is Access.BOTH} | {"SPE": 255}
+class Settings(NamedTuple):
+    """What clients write; names and values as in `protocol.robotiq.VARIABLES`."""
+
+    ACT: int = 0
+    GTO: int = 0
+    ATR: int = 0
+    ARD: int = 0
+    MOD: int = 0
+    POS: int = 0
+    SPE: int = 255
+    FOR: int = 0
+    MSC: int = 0
+    LBP: int = 0
+    LRD: int = 0
+    LBL: int = 0
+    LGN: int = 0
 
 
 class RobotiqGripper(Gripper):
@@ -60,7 +82,7 @@ class RobotiqGripper(Gripper):
     ) -> None:
         super().__init__(tool, period, unit, has_cable=has_cable)
         self._every = self._wait = max(1, round(EXCHANGE / period))
-        self._wanted = self._held = _INITIAL
+        self._wanted = self._held = Settings()
         self._reset()
 
     def _reset(self) -> None:
@@ -73,8 +95,8 @@ class RobotiqGripper(Gripper):
 
     def set(self, *values: tuple[str, int]) -> None:
         """Write variables, pairs of name and value; the gripper has them after the next exchange."""
-        kept = {name: value for name, value in values if name in _INITIAL}
-        self._wanted = {**self._wanted, **kept}
+        kept = {name: value for name, value in values if name in Settings._fields}
+        self._wanted = self._wanted._replace(**kept)
 
     def get(self, name: str) -> int | None:
         """Read a number; None without power, and for a variable that is none."""
@@ -87,9 +109,9 @@ class RobotiqGripper(Gripper):
 
     @property
     def _values(self) -> dict[str, int]:
-        return self._held | {
+        return self._held._asdict() | {
             "POS": self.tool.count_of(self._fingers.width),
-            "PRE": self._held["POS"],
+            "PRE": self._held.POS,
             "STA": int(self._status),
             "OBJ": int(self._objects),
             "FLT": int(self._fault),
@@ -117,22 +139,22 @@ class RobotiqGripper(Gripper):
         if not 0 <= at <= at + len(values) <= len(registers):
             raise LookupError
         registers[at : at + len(values)] = values
-        self._wanted = {**self._wanted, **decode_request(registers)}
+        self._wanted = self._wanted._replace(**decode_request(registers))
         self._exchange()
 
     def _inputs(self) -> list[int]:
         held = self._wanted
-        action = held["ACT"] | held["MOD"] << 1 | held["GTO"] << 3 | held["ATR"] << 4 | held["ARD"] << 5
-        return [action << 8, held["POS"], held["SPE"] << 8 | held["FOR"]]
+        action = held.ACT | held.MOD << 1 | held.GTO << 3 | held.ATR << 4 | held.ARD << 5
+        return [action << 8, held.POS, held.SPE << 8 | held.FOR]
 
     def _outputs(self) -> tuple[int, ...]:
         status = encode_status(
-            active=bool(self._held["ACT"]),
-            going=bool(self._held["GTO"]),
+            active=bool(self._held.ACT),
+            going=bool(self._held.GTO),
             status=self._status,
-            objects=self._objects if self._held["GTO"] or self._held["ATR"] else Objects.MOVING,
+            objects=self._objects if self._held.GTO or self._held.ATR else Objects.MOVING,
             fault=self._fault,
-            requested=self._held["POS"],
+            requested=self._held.POS,
             position=self.tool.count_of(self._fingers.width),
             current=self._current,
         )
@@ -145,7 +167,7 @@ class RobotiqGripper(Gripper):
         self._fingers = fingers
         if has_power is not self.has_power:
             self.has_power = has_power
-            self._wanted = self._held = _INITIAL
+            self._wanted = self._held = Settings()
             self._reset()
         if has_power:
             self._wait -= 1
@@ -159,40 +181,42 @@ class RobotiqGripper(Gripper):
         return self._command if has_power else None
 
     def _exchange(self) -> None:
+        """Take what clients have set."""
         before, self._held = self._held, self._wanted
         held = self._held
-        if not held["ACT"]:
-            if before["ACT"]:
+        if not held.ACT:
+            if before.ACT:
                 self._reset()
-            if held["GTO"] != before["GTO"]:
-                self._fault = Fault.NOT_ACTIVATED if held["GTO"] else Fault.NONE
+            if held.GTO != before.GTO:
+                self._fault = Fault.NOT_ACTIVATED if held.GTO else Fault.NONE
             return
-        if not before["ACT"]:
+        if not before.ACT:
             self._reset()
             self._status, self._objects = Status.ACTIVATING, Objects.MOVING
             self._route = [self.tool.stroke, 0.0, self.tool.stroke]
-        if held["ATR"] and not before["ATR"]:
+        if held.ATR and not before.ATR:
             self._release()
-        is_new = (held["GTO"], held["POS"]) != (before["GTO"], before["POS"])
+        is_new = (held.GTO, held.POS) != (before.GTO, before.POS)
         if self._status is Status.ACTIVATING:
-            if is_new and held["GTO"]:
+            if is_new and held.GTO:
                 self._fault = Fault.ACTION_DELAYED
         elif self._status is Status.ACTIVE and self._fault not in (Fault.RELEASING, Fault.RELEASED):
             self._follow(is_new, before)
 
-    def _follow(self, is_new: bool, before: dict[str, int]) -> None:
+    def _follow(self, is_new: bool, before: Settings) -> None:
+        """Go to the target, or stop."""
         held, tool = self._held, self.tool
-        if not held["GTO"]:
-            if before["GTO"]:
+        if not held.GTO:
+            if before.GTO:
                 self._command = None
                 self._is_moving = False
-            if held["POS"] != before["POS"]:
+            if held.POS != before.POS:
                 self._objects = Objects.MOVING  # whoever then sets GTO and waits must not find the end before
             return
-        changed = is_new or (held["SPE"], held["FOR"]) != (before["SPE"], before["FOR"])
+        changed = is_new or (held.SPE, held.FOR) != (before.SPE, before.FOR)
         if changed or self._command is None:
             self._command = FingerCommand(
-                tool.width_of(held["POS"]), tool.speed_of(held["SPE"]), tool.force_of(held["FOR"])
+                tool.width_of(held.POS), tool.speed_of(held.SPE), tool.force_of(held.FOR)
             )
         if is_new:
             self._is_moving = True
@@ -200,10 +224,11 @@ class RobotiqGripper(Gripper):
 
     def _release(self) -> None:
         self._fault, self._is_moving, self._objects = Fault.RELEASING, True, Objects.MOVING
-        end = 0.0 if self._held["ARD"] else self.tool.stroke
+        end = 0.0 if self._held.ARD else self.tool.stroke
         self._command = FingerCommand(end, _RELEASE_SPEED, self.tool.force_of(0))
 
     def _move(self) -> None:
+        """Look at where the fingers are."""
         if self._status is Status.ACTIVATING:
             self._step_activation()
             return
@@ -248,4 +273,4 @@ class RobotiqGripper(Gripper):
             self._status, self._objects, self._command = Status.ACTIVE, Objects.AT_TARGET, None
             if self._fault is Fault.ACTION_DELAYED:
                 self._fault = Fault.NONE
-            self._follow(bool(self._held["GTO"]), _INITIAL)
+            self._follow(bool(self._held.GTO), Settings())
