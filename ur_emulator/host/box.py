@@ -6,6 +6,7 @@ import dataclasses
 import threading
 from collections.abc import Callable, Collection
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import Any
 from weakref import WeakSet
@@ -19,6 +20,7 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.journal import Journal
+from ur_emulator.host.memory import MemoryWatch
 from ur_emulator.host.pacing import LockstepPacer, Pace, RealtimePacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
 from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, answering_ports, sending_ports
@@ -27,7 +29,6 @@ from ur_emulator.host.ports.script_intake import ProgramIntake
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import WAKE_UP
 from ur_emulator.host.runtime.listener import Port
-from ur_emulator.host.runtime.memory import MemoryWatch
 from ur_emulator.host.runtime.processes import prepare_workers
 from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
@@ -248,7 +249,7 @@ class Box:
 
     def watch_memory(self, watch: MemoryWatch) -> None:
         """Have the memory of the process measured after each cycle; before the box runs."""
-        self._box.watch = watch
+        self._box.watch = partial(watch.look, self._box)
 
     def _open_journal(self) -> Journal | None:
         options = self._options

@@ -13,9 +13,9 @@ from ur_emulator.errors import ControlError, EmulatorError
 from ur_emulator.host.box import Box
 from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt
+from ur_emulator.host.memory import MemoryWatch, own_process
 from ur_emulator.host.pacing import Pace
 from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
-from ur_emulator.host.runtime.memory import MemoryWatch, own_process
 from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.controller.command import Command, Done

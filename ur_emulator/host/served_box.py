@@ -21,7 +21,6 @@ from ur_emulator.host.pacing import Pacer, RealtimePacer, reader_limit
 from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.runtime.listener import Listener
-from ur_emulator.host.runtime.memory import MemoryWatch
 from ur_emulator.host.runtime.worker import TaskQueue, Ticket
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.steps import StepRunner, Steps, settle
@@ -87,7 +86,8 @@ class ServedBox:
         log: programs, errors, modes, text messages, clients.
         listeners: those of the open ports, without that of the control API.
         backlog: the connections with bytes in their outbox; they enter and leave it themselves.
-        watch: measures the memory of a process that only serves boxes; None in a process of the user.
+        watch: called with the time [s] after each cycle, to measure the memory of a process that only serves
+            boxes; None in a process of the user.
         stops: how many commands so far stop the program and all that waits to be compiled.
     """
 
@@ -125,7 +125,7 @@ class ServedBox:
         self.stops = 0
         # When the newest of the programs that were started was asked for, in monotonic time [s].
         self.newest = 0.0
-        self.watch: MemoryWatch | None = None
+        self.watch: Callable[[float], None] | None = None
         self.listeners: tuple[Listener, ...] = ()
         self.backlog: set[Connection] = set()
         self._on_failure = on_failure
@@ -366,7 +366,7 @@ class ServedBox:
             answer = self._tick()
             snapshot = answer.snapshot
             if self.watch is not None:
-                self.watch.look(self, now)
+                self.watch(now)
             # Events first, also before a cycle that is held: an error must have arrived before any state or
             # answer that shows its effect.
             for event in answer.events:
