@@ -333,7 +333,6 @@ class Box:
         self._loop.call_soon_threadsafe(lambda: self.on_end(), self._fail)
 
     def _fail(self, error: Exception) -> None:
-        """End the box because of an error in a cycle."""
         self.failure = error
         text = f"the box has ended: {type(error).__name__}: {error}"
         self._box.log.write(self._box.snapshot.tick, "Controller", text, ReportLevel.FAULT)

@@ -388,7 +388,6 @@ class ServedBox:
         return self._pacer.next_call(now)
 
     def _tick(self) -> Answer:
-        """Advance the machine by a cycle, and do what it asks for."""
         commands = [*self._quiet, *self._commands.values()] if self._quiet or self._commands else []
         inputs: list[Input] = [command for command, _ in commands]
         if commands:

@@ -170,7 +170,6 @@ def take_state(box: ServedBox) -> BoxState:
 
 
 def _shape_of(plane: SafetyPlane) -> BodyShape:
-    """A safety plane to be drawn."""
     x, y, z = plane.normal
     across = hypot(x, y)
     angle = atan2(across, z) / across if across else pi * (z < 0.0)

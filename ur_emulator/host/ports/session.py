@@ -29,7 +29,6 @@ class Session(ABC):
     allows_half_close: ClassVar[bool] = False
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
-        """Prepare; nothing has arrived yet."""
         self.connection = connection
         self.is_busy = False
         self._box = box
