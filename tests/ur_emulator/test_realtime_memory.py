@@ -50,9 +50,8 @@ class Programs:
 
     def __init__(self, system, *needs):
         self.system, self.needs, self.ended, self.kept = system, list(needs), [], 0
-        self.machine = SimpleNamespace(
-            controller=SimpleNamespace(programs=self), forget_ended=lambda: self.forget()
-        )
+        self.controller = SimpleNamespace(programs=self)
+        self.machine = SimpleNamespace(forget_ended=lambda: self.forget())
         self.commands = []
         system.append(self)
 

@@ -23,7 +23,6 @@ from ur_emulator.machine.commands.programs import EndPrograms
 if TYPE_CHECKING:
     from ur_emulator.host.runtime.worker import TaskQueue
     from ur_emulator.host.served_box import ServedBox
-    from ur_emulator.machine.controller.program_runner import ProgramRunner
 
 # Objects that are new when the collector looks at them [1]: so many take a fifth of a millisecond.
 _NEW = 2_000
@@ -71,7 +70,7 @@ class MemoryWatch:
         if gc.get_count()[0] > _NEW or self._now - self._collected > _GROWN:
             gc.collect(1)
             self._collected = self._now
-        if now < self._next_look or any(_programs(one).is_releasing for one in (box, *self._grown)):
+        if now < self._next_look or any(one.controller.programs.is_releasing for one in (box, *self._grown)):
             return
         if self._ended is not None:
             if self._ended is not box:
@@ -84,7 +83,7 @@ class MemoryWatch:
         if 2 * held < BUDGETS.memory:
             self._next_look = now + _PERIOD
             self._grown.clear()
-            if held - self._floor > _WORTH_IT and not _programs(box).is_any_running:
+            if held - self._floor > _WORTH_IT and not box.controller.programs.is_any_running:
                 self._give_back(box)
             held = max(0, held)
         else:
@@ -97,7 +96,7 @@ class MemoryWatch:
         if tasks > held:
             self._tasks.end_for_memory()
             return
-        box = max(self._grown, key=lambda one: (_programs(one).is_any_running, self._grown[one]))
+        box = max(self._grown, key=lambda one: (one.controller.programs.is_any_running, self._grown[one]))
         text = f"the program was ended: box and programs hold more than {BUDGETS.memory // MIB} MiB of memory"
         box.submit_quietly(EndPrograms(text))
         self._ended = box
@@ -111,7 +110,3 @@ class MemoryWatch:
         self._grown.clear()
         self._now = resident()
         self._floor = self._now - self._at_rest
-
-
-def _programs(box: ServedBox) -> ProgramRunner:
-    return box.machine.controller.programs
