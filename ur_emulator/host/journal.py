@@ -143,8 +143,6 @@ def versions() -> dict[str, str]:
     """Return the versions of what a box computes with."""
     found = {"python": python_version()}
     for name in _COMPUTES:
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found
