@@ -196,7 +196,7 @@ class Box:
         }
         self._port_set = PortSet(loop, options.host, self._box, ports)
         self._box.attach(
-            (*sending.values(), self._intake, self._box.steps),
+            (*(port.publish for port in sending.values()), self._intake.publish, self._box.steps.publish),
             [port.send_message for port in sending.values() if isinstance(port, PrimaryPort)],
         )
         self.served_at = choice.served_at(options, ports)
