@@ -105,15 +105,12 @@ class Port(Protocol):
 
     def opened(self, connection: Connection) -> None:
         """A client has connected."""
-        ...
 
     def received(self, connection: Connection, data: bytes) -> None:
         """A client has sent something."""
-        ...
 
     def closed(self, connection: Connection) -> None:
         """A client is gone, also one with which `opened` has failed."""
-        ...
 
 
 class Listener:
