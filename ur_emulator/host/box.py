@@ -58,7 +58,6 @@ class Choice:
     model: RobotModel
     version: SoftwareVersion
     fidelity: Fidelity
-    pace: Pace
     closed: Collection[str]
     identity: BoxIdentity
     tools: tuple[ToolModel, ...]
@@ -76,7 +75,6 @@ class Choice:
         fidelity = generation.fidelity(options.fidelity)
         closed = generation.closed_ports(options.services)
         options.check()
-        pace = Pace(options.pace)
         if not (options.remote_control or generation.has_remote_control):
             raise EmulatorError(
                 f"local control given: a box of the {generation.name} has none, "
@@ -87,11 +85,11 @@ class Choice:
             model=model.title,
             wire_model=RobotType(model.robot_type).name,
             serial_number=simulated_serial(model.robot_type, options.seed),
-            masterboard=LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
+            masterboard=LOCKSTEP_MASTERBOARD if options.pace == Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
         )
         tools = tools_by_name(str(options.tool), ModelError)
         scene = None if options.scene is None else load_scene(Path(options.scene))
-        return cls(model, version, fidelity, pace, closed, identity, tools, scene)
+        return cls(model, version, fidelity, closed, identity, tools, scene)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -169,7 +167,7 @@ class Box:
             machine,
             choice.identity,
             LockstepPacer(period)
-            if choice.pace is Pace.LOCKSTEP
+            if options.pace == Pace.LOCKSTEP
             else RealtimePacer(period, options.speed, phase, lead),
             tasks,
             self._fail,
@@ -183,7 +181,10 @@ class Box:
             self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
         )
         self._reports = ReportWriter(self._box, self._player)
-        self._journal = self._open_journal()
+        self._journal: Journal | None = None
+        if options.journal is not None:
+            self._journal = Journal(Path(options.journal), options, self._box.notice)
+            self._box.keep = self._journal.write
         self._context = Context(self._box, self._player, self._identity_now, make)
         self._lock = threading.Lock()
         self._awaited: WeakSet[Future[Any]] = WeakSet()
@@ -251,14 +252,6 @@ class Box:
         """Have the memory of the process measured after each cycle; before the box runs."""
         self._box.watch = partial(watch.look, self._box)
 
-    def _open_journal(self) -> Journal | None:
-        options = self._options
-        if options.journal is None:
-            return None
-        journal = Journal(Path(options.journal), options, self._box.notice)
-        self._box.keep = journal.write
-        return journal
-
     def _identity_now(self) -> dict[str, Any]:
         options, identity, at = self._options, self._choice.identity, self.served_at
         ports = {**dataclasses.asdict(at.ports), "control": at.control_port}
@@ -266,7 +259,7 @@ class Box:
             "software": str(self._choice.version),
             "robot": identity.model,
             "serial_number": identity.serial_number,
-            "pace": self._choice.pace.value,
+            "pace": str(options.pace),
             "speed": options.speed,
             "seed": options.seed,
             "fidelity": options.fidelity,

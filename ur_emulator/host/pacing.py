@@ -7,7 +7,7 @@
 """
 
 import math
-from enum import Enum
+from enum import StrEnum
 from typing import Protocol
 
 from ur_hil.patience import Patience
@@ -31,7 +31,7 @@ def reader_limit(client_has_read: bool) -> float:
     return READER_LIMIT if client_has_read else FIRST_READ_LIMIT
 
 
-class Pace(Enum):
+class Pace(StrEnum):
     """Names of the pacers on the command line."""
 
     REALTIME = "realtime"

@@ -20,7 +20,6 @@ from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.controller.command import Command, Done
 
-_LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
 _JOIN_TIMEOUT = 10.0  # s
 
 
@@ -33,7 +32,7 @@ class LoopRack:
 
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Assemble the boxes; nothing listens yet. Two boxes need two addresses, or a `port_base` each."""
-        self.loop = EventLoop(precise=any(one.pace not in _LOCKSTEP for one in options))
+        self.loop = EventLoop(precise=any(one.pace != Pace.LOCKSTEP for one in options))
         self.tasks = TaskQueue(self.loop)
         # Several boxes would compute at each other's deadlines.
         lead = WAKE_UP if len(options) == 1 else 0.0
