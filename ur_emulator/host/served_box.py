@@ -144,11 +144,6 @@ class ServedBox:
         return self.controller.snapshot
 
     @property
-    def clients(self) -> tuple[str, ...]:
-        """Address and port of each client, for people."""
-        return tuple(client for listener in self.listeners for client in listener.clients)
-
-    @property
     def takes_commands(self) -> bool:
         """Whether the next cycle takes further commands; for clients that can wait."""
         return len(self._commands) < of_cycle(BUDGETS.commands, self.controller.generation.period_s)

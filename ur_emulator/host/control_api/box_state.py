@@ -165,7 +165,7 @@ def take_state(box: ServedBox) -> BoxState:
             for r in pendant.requests
             if r.kind is not RequestedType.NONE
         ),
-        clients=box.clients,
+        clients=tuple(client for listener in box.listeners for client in listener.clients),
     )
 
 
