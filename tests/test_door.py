@@ -23,7 +23,7 @@ DOOR = {
     "tick": {"served_box.py", "replay.py"},
     "take": {"served_box.py"},
     "use_idle_time": {"served_box.py"},
-    "forget_ended": {"runtime/memory.py"},
+    "forget_ended": {"memory.py"},
 }
 # Records and tables of the machine are no part of its state.
 PLAIN = {

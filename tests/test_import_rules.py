@@ -66,6 +66,7 @@ HOST_ORDER = (
     {"runtime"},
     {"script_network"},
     {"pacing", "served_box", "steps"},
+    {"memory"},
     {"player", "reports"},
     {"ports"},
     {"box_options"},

@@ -5,8 +5,7 @@ line in the log, or gets slower itself; others do not notice it. Limits that bel
 the format (`protocol`), limits of the language with the language (`urscript.dialect`).
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 CYCLE: Final = 0.008
@@ -15,29 +14,13 @@ KIB: Final = 1 << 10
 MIB: Final = 1 << 20
 
 
-@dataclass(frozen=True, slots=True)
-class BudgetRow:
-    """A row of the table.
-
-    Attributes:
-        name: of the field of `Budgets`.
-        scope: what it bounds: a client, a port, a program, a box.
-        beyond: what happens to what comes on top.
-    """
-
-    name: str
-    limit: float
-    unit: str
-    scope: str
-    beyond: str
-
-
 def of_cycle(limit: int, period_s: float) -> int:
     """Return the part of a budget for 8 ms that a control cycle of so many seconds has; at least 1."""
     return max(1, round(limit * period_s / CYCLE))
 
 
 def _budget(limit: float, unit: str, scope: str, beyond: str) -> Any:
+    """A budget of a client, a port, a program or a box; `beyond`: what happens to what comes on top."""
     return field(default=limit, metadata={"unit": unit, "scope": scope, "beyond": beyond})
 
 
@@ -277,9 +260,3 @@ class Budgets:
 
 
 BUDGETS: Final = Budgets()
-
-
-def rows() -> Iterator[BudgetRow]:
-    """Yield the rows of the table, in the order of the fields."""
-    for one in fields(Budgets):
-        yield BudgetRow(one.name, getattr(BUDGETS, one.name), **one.metadata)

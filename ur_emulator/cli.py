@@ -365,8 +365,8 @@ class _WindowProcess:
         self._process.wait()
 
 
-def raise_descriptor_limit() -> int:
-    """Raise this process's limit of descriptors as far as the system allows; return it.
+def raise_descriptor_limit() -> None:
+    """Raise this process's limit of descriptors as far as the system allows.
 
     Each client takes a descriptor, and some systems start with 256.
     """
@@ -374,12 +374,9 @@ def raise_descriptor_limit() -> int:
 
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED_DESCRIPTORS if hard == resource.RLIM_INFINITY else min(WANTED_DESCRIPTORS, hard)
-    if soft == resource.RLIM_INFINITY or soft >= wanted:
-        return soft
-    with suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-        return wanted
-    return soft
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
 def _ports_line(at: ServedAt) -> str:

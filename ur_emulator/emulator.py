@@ -38,7 +38,6 @@ OwnRack: TypeAlias = "LoopRack | ProcessRack"
 
 
 def _make_rack(options: Sequence[BoxOptions], *, in_process: bool) -> OwnRack:
-    """Assemble boxes in a process of their own, or on a loop in this one."""
     check_count(len(options))
     if in_process:
         from ur_emulator.host.rack import LoopRack

@@ -151,7 +151,6 @@ def pytest_runtest_makereport(
 
 
 def _shown_state(box: ControlBox) -> str:
-    """Return modes, program and joints, for people."""
     try:
         now = box.state
     except ControlError as error:
@@ -194,7 +193,6 @@ def _checked(options: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _start(options: dict[str, Any], stack: ExitStack) -> ControlBox:
-    """Start a box that ends with the stack."""
     from ur_emulator.emulator import ControlBox
 
     own_address = options.pop("standard_ports", False)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import NamedTuple
 
 from docs.generate.page_parts import table
 from pc_client.files import FILE_KINDS
 from protocol.ur_types import Ports
-from ur_emulator.budgets import rows
+from ur_emulator.budgets import BUDGETS
 from ur_emulator.host.control_api.http_client import DEFAULT_PORT
 from ur_hil import PENDANT_PORT
 from ur_hil.input_files import MIB
@@ -148,8 +149,9 @@ def _ports() -> Iterator[tuple[str, ...]]:
 
 
 def _budgets() -> Iterator[tuple[str, ...]]:
-    for row in rows():
-        yield f"{row.limit:,} {row.unit}", row.scope, row.beyond, f"`{row.name}`"
+    for row in fields(BUDGETS):
+        limit, about = getattr(BUDGETS, row.name), row.metadata
+        yield f"{limit:,} {about['unit']}", about["scope"], about["beyond"], f"`{row.name}`"
 
 
 def _files() -> Iterator[tuple[str, ...]]:

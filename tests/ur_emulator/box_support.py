@@ -306,7 +306,7 @@ class FakeConnection:
     def __init__(self, port, *, full=False):
         self.port = port
         self.full = full
-        self.is_open = self.takes_answers = True
+        self.is_open = self.can_send = True
         self.has_ended = False
         self.sent = []
         self._calls = []

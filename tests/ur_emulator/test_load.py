@@ -257,9 +257,19 @@ class ForAll(ClientLimits):
 
 def listen(loop, clients, notices=None, **options):
     notices = [] if notices is None else notices
-    limits = options.pop("limits", None) or ClientLimits()
+    limits, spare = options.pop("limits", None) or ClientLimits(), options.pop("spare", SpareDescriptor())
     return Listener(
-        loop, "127.0.0.1", 0, clients, set(), notices.append, pytest.fail, "dashboard", limits, **options
+        loop,
+        "127.0.0.1",
+        0,
+        clients,
+        set(),
+        notices.append,
+        pytest.fail,
+        "dashboard",
+        limits,
+        spare,
+        **options,
     )
 
 
@@ -433,4 +443,15 @@ def test_silent_clients_are_asked_whether_they_are_still_there(loop):
 
 def test_an_address_of_another_machine_is_distinguished_from_a_taken_port(loop):
     with pytest.raises(PortError, match=r"192\.0\.2\.1 is not an address of this machine"):
-        Listener(loop, "192.0.2.1", 0, Clients(), set(), print, pytest.fail, "dashboard", ClientLimits())
+        Listener(
+            loop,
+            "192.0.2.1",
+            0,
+            Clients(),
+            set(),
+            print,
+            pytest.fail,
+            "dashboard",
+            ClientLimits(),
+            SpareDescriptor(),
+        )

@@ -18,7 +18,7 @@ from ur_emulator.host.ports.modbus import ModbusSession
 from ur_emulator.host.ports.session import SessionPort
 from ur_emulator.host.runtime import listener
 from ur_emulator.host.runtime.event_loop import EventLoop
-from ur_emulator.host.runtime.listener import ClientLimits, Listener
+from ur_emulator.host.runtime.listener import ClientLimits, Listener, SpareDescriptor
 from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS, read_coil, read_register
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
@@ -289,7 +289,8 @@ def test_a_forbidden_port_is_distinguished_from_a_taken_one(monkeypatch):
     loop = EventLoop()
 
     def listen(port):
-        Listener(loop, "127.0.0.1", port, None, set(), print, pytest.fail, "modbus", ClientLimits())
+        limits, spare = ClientLimits(), SpareDescriptor()
+        Listener(loop, "127.0.0.1", port, None, set(), print, pytest.fail, "modbus", limits, spare)
 
     with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(PortError) as error:
         listen(taken.getsockname()[1])

@@ -10,8 +10,8 @@ import pytest
 
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS, MIB
-from ur_emulator.host.runtime import memory
-from ur_emulator.host.runtime.memory import MemoryWatch
+from ur_emulator.host import memory
+from ur_emulator.host.memory import MemoryWatch
 
 FULL = BUDGETS.memory // MIB
 MANY_LISTS = "def p():\n" + "".join(f"  global g{k} = make_list(65536, 0)\n" for k in range(1100)) + "end\n"
@@ -50,9 +50,8 @@ class Programs:
 
     def __init__(self, system, *needs):
         self.system, self.needs, self.ended, self.kept = system, list(needs), [], 0
-        self.machine = SimpleNamespace(
-            controller=SimpleNamespace(programs=self), forget_ended=lambda: self.forget()
-        )
+        self.controller = SimpleNamespace(programs=self)
+        self.machine = SimpleNamespace(forget_ended=lambda: self.forget())
         self.commands = []
         system.append(self)
 

@@ -6,6 +6,7 @@ import dataclasses
 import threading
 from collections.abc import Callable, Collection
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import Any
 from weakref import WeakSet
@@ -19,6 +20,7 @@ from ur_emulator.host.box_options import BoxOptions, ServedAt
 from ur_emulator.host.control_api.operations import make
 from ur_emulator.host.control_api.step_operations import Context, StepOperation
 from ur_emulator.host.journal import Journal
+from ur_emulator.host.memory import MemoryWatch
 from ur_emulator.host.pacing import LockstepPacer, Pace, RealtimePacer
 from ur_emulator.host.player.player import ProgramPlayer, start_up
 from ur_emulator.host.ports.port_set import CONTROL, SOFTWARE_OF, PortSet, answering_ports, sending_ports
@@ -27,7 +29,6 @@ from ur_emulator.host.ports.script_intake import ProgramIntake
 from ur_emulator.host.reports.report_writer import ReportWriter
 from ur_emulator.host.runtime.event_loop import WAKE_UP
 from ur_emulator.host.runtime.listener import Port
-from ur_emulator.host.runtime.memory import MemoryWatch
 from ur_emulator.host.runtime.processes import prepare_workers
 from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.host.script_network.addresses import close_to_scripts, give_back
@@ -57,7 +58,6 @@ class Choice:
     model: RobotModel
     version: SoftwareVersion
     fidelity: Fidelity
-    pace: Pace
     closed: Collection[str]
     identity: BoxIdentity
     tools: tuple[ToolModel, ...]
@@ -75,7 +75,6 @@ class Choice:
         fidelity = generation.fidelity(options.fidelity)
         closed = generation.closed_ports(options.services)
         options.check()
-        pace = Pace(options.pace)
         if not (options.remote_control or generation.has_remote_control):
             raise EmulatorError(
                 f"local control given: a box of the {generation.name} has none, "
@@ -86,11 +85,11 @@ class Choice:
             model=model.title,
             wire_model=RobotType(model.robot_type).name,
             serial_number=simulated_serial(model.robot_type, options.seed),
-            masterboard=LOCKSTEP_MASTERBOARD if pace is Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
+            masterboard=LOCKSTEP_MASTERBOARD if options.pace == Pace.LOCKSTEP else SIMULATED_MASTERBOARD,
         )
         tools = tools_by_name(str(options.tool), ModelError)
         scene = None if options.scene is None else load_scene(Path(options.scene))
-        return cls(model, version, fidelity, pace, closed, identity, tools, scene)
+        return cls(model, version, fidelity, closed, identity, tools, scene)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -168,7 +167,7 @@ class Box:
             machine,
             choice.identity,
             LockstepPacer(period)
-            if choice.pace is Pace.LOCKSTEP
+            if options.pace == Pace.LOCKSTEP
             else RealtimePacer(period, options.speed, phase, lead),
             tasks,
             self._fail,
@@ -182,7 +181,10 @@ class Box:
             self._box, folder, self._network, skip_unknown=options.skip_unknown_nodes
         )
         self._reports = ReportWriter(self._box, self._player)
-        self._journal = self._open_journal()
+        self._journal: Journal | None = None
+        if options.journal is not None:
+            self._journal = Journal(Path(options.journal), options, self._box.notice)
+            self._box.keep = self._journal.write
         self._context = Context(self._box, self._player, self._identity_now, make)
         self._lock = threading.Lock()
         self._awaited: WeakSet[Future[Any]] = WeakSet()
@@ -195,7 +197,7 @@ class Box:
         }
         self._port_set = PortSet(loop, options.host, self._box, ports)
         self._box.attach(
-            (*sending.values(), self._intake, self._box.steps),
+            (*(port.publish for port in sending.values()), self._intake.publish, self._box.steps.publish),
             [port.send_message for port in sending.values() if isinstance(port, PrimaryPort)],
         )
         self.served_at = choice.served_at(options, ports)
@@ -248,15 +250,7 @@ class Box:
 
     def watch_memory(self, watch: MemoryWatch) -> None:
         """Have the memory of the process measured after each cycle; before the box runs."""
-        self._box.watch = watch
-
-    def _open_journal(self) -> Journal | None:
-        options = self._options
-        if options.journal is None:
-            return None
-        journal = Journal(Path(options.journal), options, self._box.notice)
-        self._box.keep = journal.write
-        return journal
+        self._box.watch = partial(watch.look, self._box)
 
     def _identity_now(self) -> dict[str, Any]:
         options, identity, at = self._options, self._choice.identity, self.served_at
@@ -265,7 +259,7 @@ class Box:
             "software": str(self._choice.version),
             "robot": identity.model,
             "serial_number": identity.serial_number,
-            "pace": self._choice.pace.value,
+            "pace": str(options.pace),
             "speed": options.speed,
             "seed": options.seed,
             "fidelity": options.fidelity,
@@ -332,7 +326,6 @@ class Box:
         self._loop.call_soon_threadsafe(lambda: self.on_end(), self._fail)
 
     def _fail(self, error: Exception) -> None:
-        """End the box because of an error in a cycle."""
         self.failure = error
         text = f"the box has ended: {type(error).__name__}: {error}"
         self._box.log.write(self._box.snapshot.tick, "Controller", text, ReportLevel.FAULT)

@@ -60,9 +60,7 @@ class BoxOptions:
         try:
             Pace(self.pace)
         except ValueError:
-            raise EmulatorError(
-                f"unknown pace {self.pace!r}: choose one of {', '.join(p.value for p in Pace)}"
-            ) from None
+            raise EmulatorError(f"unknown pace {self.pace!r}: choose one of {', '.join(Pace)}") from None
         if not 0.0 < self.speed < math.inf:
             raise EmulatorError(f"speed {self.speed:g} given: it must be above 0 and finite, 1 is real time")
         if self.seed < 0:

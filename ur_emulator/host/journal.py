@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
+from os import fspath
 from pathlib import Path
 from platform import python_version
 from queue import Full, Queue
@@ -58,13 +59,13 @@ class Journal:
             if path.is_file():  # perhaps of a box that has failed and was started again
                 path.replace(f"{path}.old")
             self._file: IO[str] = path.open("w", encoding="utf-8")
-            self._file.write(json.dumps(_header(options)) + "\n")
+            self._file.write(json.dumps(_header(options), default=fspath) + "\n")
             self._file.flush()
         except OSError as error:
             raise JournalError(f"journal {path} given: {error.strerror}") from None
         self._path = path
         self._report = report
-        self._waits = Pace(options.pace) is Pace.LOCKSTEP
+        self._waits = options.pace == Pace.LOCKSTEP
         # Number, inputs and answer of each cycle; without inputs: so many cycles are lost. None is the end.
         self._cycles: Queue[tuple[int, Sequence[Input] | None, Answer | None] | None]
         self._cycles = Queue(BUDGETS.journal_cycles)
@@ -125,11 +126,8 @@ def _header(options: BoxOptions) -> dict[str, Any]:
     """Return what says which box this is; JournalError if that cannot be written down."""
     if options.generation is not None:
         raise JournalError("a box of a generation of one's own keeps no journal")
-    given = {field.name: getattr(options, field.name) for field in fields(options)}
-    box = {name: value for name, value in given.items() if name not in _OUTSIDE}
-    box = {name: list(value) if name == "services" else value for name, value in box.items()}
-    box = {name: str(value) if isinstance(value, Path) else value for name, value in box.items()}
-    box["pace"] = Pace(box["pace"]).value
+    names = [field.name for field in fields(options) if field.name not in _OUTSIDE]
+    box = {name: getattr(options, name) for name in names} | {"services": list(options.services)}
     files = {
         word: Path(word).read_text(encoding="utf-8")
         for name in FILES
@@ -143,8 +141,6 @@ def versions() -> dict[str, str]:
     """Return the versions of what a box computes with."""
     found = {"python": python_version()}
     for name in _COMPUTES:
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found

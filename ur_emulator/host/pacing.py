@@ -7,7 +7,7 @@
 """
 
 import math
-from enum import Enum
+from enum import StrEnum
 from typing import Protocol
 
 from ur_hil.patience import Patience
@@ -31,7 +31,7 @@ def reader_limit(client_has_read: bool) -> float:
     return READER_LIMIT if client_has_read else FIRST_READ_LIMIT
 
 
-class Pace(Enum):
+class Pace(StrEnum):
     """Names of the pacers on the command line."""
 
     REALTIME = "realtime"
@@ -44,25 +44,20 @@ class Situation(Protocol):
     @property
     def is_active(self) -> bool:
         """The box is active: a command waits, a program runs, the arm moves."""
-        ...
 
     @property
     def waits_outside(self) -> bool:
         """A script waits for bytes that have not come."""
-        ...
 
     @property
     def readers_full(self) -> bool:
         """A client that reads has not taken its frames yet."""
-        ...
 
     def give_up_readers(self, waited: float) -> None:
         """Stop waiting for clients after so long [s]; they lose frames until they have caught up."""
-        ...
 
     def fell_behind(self, n_cycles: int) -> None:
         """Report that the machine was too slow: real time is so many cycles ahead of the box."""
-        ...
 
 
 class Pacer(Protocol):
@@ -71,15 +66,12 @@ class Pacer(Protocol):
     @property
     def publish_at(self) -> float:
         """Not before this time may the cycle that was computed last be published [s]."""
-        ...
 
     def may_tick(self, now: float, situation: Situation) -> bool:
         """True if a cycle may begin at monotonic time `now` [s]; the caller then ticks once."""
-        ...
 
     def next_call(self, now: float) -> float:
         """When to ask again at the latest, if nothing comes from the sockets before [s]."""
-        ...
 
 
 class RealtimePacer:

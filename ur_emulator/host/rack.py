@@ -13,14 +13,13 @@ from ur_emulator.errors import ControlError, EmulatorError
 from ur_emulator.host.box import Box
 from ur_emulator.host.box_log import LogEntry
 from ur_emulator.host.box_options import BoxOptions, ServedAt
+from ur_emulator.host.memory import MemoryWatch, own_process
 from ur_emulator.host.pacing import Pace
 from ur_emulator.host.runtime.event_loop import WAKE_UP, EventLoop
-from ur_emulator.host.runtime.memory import MemoryWatch, own_process
 from ur_emulator.host.runtime.worker import TaskQueue
 from ur_emulator.machine.commands.operation import Operation
 from ur_emulator.machine.controller.command import Command, Done
 
-_LOCKSTEP = (Pace.LOCKSTEP, Pace.LOCKSTEP.value)
 _JOIN_TIMEOUT = 10.0  # s
 
 
@@ -33,7 +32,7 @@ class LoopRack:
 
     def __init__(self, options: Sequence[BoxOptions]) -> None:
         """Assemble the boxes; nothing listens yet. Two boxes need two addresses, or a `port_base` each."""
-        self.loop = EventLoop(precise=any(one.pace not in _LOCKSTEP for one in options))
+        self.loop = EventLoop(precise=any(one.pace != Pace.LOCKSTEP for one in options))
         self.tasks = TaskQueue(self.loop)
         # Several boxes would compute at each other's deadlines.
         lead = WAKE_UP if len(options) == 1 else 0.0

@@ -155,7 +155,6 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def _differing(answer: Answer, changes: bytes, line: dict[str, Any]) -> tuple[str, ...]:
-    """Return the names of the fields that are not as in a line."""
     if "error" in line:
         return ("the error that has ended it",)
     if answer.snapshot.tick != line["t"]:

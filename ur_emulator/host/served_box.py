@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from heapq import heappop, heappush
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import SIMULATED_MASTERBOARD
@@ -21,7 +21,6 @@ from ur_emulator.host.pacing import Pacer, RealtimePacer, reader_limit
 from ur_emulator.host.runtime.barrier import Failed, describe_error, guarded
 from ur_emulator.host.runtime.connection import Connection
 from ur_emulator.host.runtime.listener import Listener
-from ur_emulator.host.runtime.memory import MemoryWatch
 from ur_emulator.host.runtime.worker import TaskQueue, Ticket
 from ur_emulator.host.script_network.loop_network import LoopNetwork
 from ur_emulator.host.steps import StepRunner, Steps, settle
@@ -65,14 +64,6 @@ class BoxIdentity:
     masterboard: int = SIMULATED_MASTERBOARD
 
 
-class Publisher(Protocol):
-    """A part that publishes every cycle."""
-
-    def publish(self, snapshot: Snapshot) -> None:
-        """Send what is due for this cycle."""
-        ...
-
-
 class ServedBox:
     """Advances a machine in an event loop and publishes what it does.
 
@@ -87,7 +78,8 @@ class ServedBox:
         log: programs, errors, modes, text messages, clients.
         listeners: those of the open ports, without that of the control API.
         backlog: the connections with bytes in their outbox; they enter and leave it themselves.
-        watch: measures the memory of a process that only serves boxes; None in a process of the user.
+        watch: called with the time [s] after each cycle, to measure the memory of a process that only serves
+            boxes; None in a process of the user.
         stops: how many commands so far stop the program and all that waits to be compiled.
     """
 
@@ -110,7 +102,7 @@ class ServedBox:
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._has_noted_input = False
-        self._publishers: tuple[Publisher, ...] = ()
+        self._publishers: tuple[Callable[[Snapshot], None], ...] = ()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         # Commands for the next cycle, by the name under which a later one replaces them, or by an object.
         self._commands: dict[object, tuple[Command, Done]] = {}
@@ -125,7 +117,7 @@ class ServedBox:
         self.stops = 0
         # When the newest of the programs that were started was asked for, in monotonic time [s].
         self.newest = 0.0
-        self.watch: MemoryWatch | None = None
+        self.watch: Callable[[float], None] | None = None
         self.listeners: tuple[Listener, ...] = ()
         self.backlog: set[Connection] = set()
         self._on_failure = on_failure
@@ -136,7 +128,9 @@ class ServedBox:
         self._is_held = False
 
     def attach(
-        self, publishers: Iterable[Publisher], listeners: Iterable[Callable[[Event], None]] = ()
+        self,
+        publishers: Iterable[Callable[[Snapshot], None]],
+        listeners: Iterable[Callable[[Event], None]] = (),
     ) -> None:
         """Register publishers, called after every cycle in this order, and listeners of events.
 
@@ -148,11 +142,6 @@ class ServedBox:
     def snapshot(self) -> Snapshot:
         """State at the end of the last cycle."""
         return self.controller.snapshot
-
-    @property
-    def clients(self) -> tuple[str, ...]:
-        """Address and port of each client, for people."""
-        return tuple(client for listener in self.listeners for client in listener.clients)
 
     @property
     def takes_commands(self) -> bool:
@@ -366,7 +355,7 @@ class ServedBox:
             answer = self._tick()
             snapshot = answer.snapshot
             if self.watch is not None:
-                self.watch.look(self, now)
+                self.watch(now)
             # Events first, also before a cycle that is held: an error must have arrived before any state or
             # answer that shows its effect.
             for event in answer.events:
@@ -388,7 +377,6 @@ class ServedBox:
         return self._pacer.next_call(now)
 
     def _tick(self) -> Answer:
-        """Advance the machine by a cycle, and do what it asks for."""
         commands = [*self._quiet, *self._commands.values()] if self._quiet or self._commands else []
         inputs: list[Input] = [command for command, _ in commands]
         if commands:
@@ -419,11 +407,11 @@ class ServedBox:
 
     def _publish(self, snapshot: Snapshot, now: float) -> None:
         self._last_frame = now
-        for publisher in self._publishers:
+        for publish in self._publishers:
             try:
-                publisher.publish(snapshot)
+                publish(snapshot)
             except Exception as error:
-                self._fail_to_publish(publisher, error)
+                self._fail_to_publish(publish, error)
 
     def _fail_to_publish(self, part: object, error: Exception) -> None:
         """Do without what a port could not publish; reported once, for it may be so in every cycle."""

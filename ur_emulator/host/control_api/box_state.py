@@ -165,12 +165,11 @@ def take_state(box: ServedBox) -> BoxState:
             for r in pendant.requests
             if r.kind is not RequestedType.NONE
         ),
-        clients=box.clients,
+        clients=tuple(client for listener in box.listeners for client in listener.clients),
     )
 
 
 def _shape_of(plane: SafetyPlane) -> BodyShape:
-    """A safety plane to be drawn."""
     x, y, z = plane.normal
     across = hypot(x, y)
     angle = atan2(across, z) / across if across else pi * (z < 0.0)

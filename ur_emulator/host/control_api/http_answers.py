@@ -18,6 +18,8 @@ from ur_emulator.machine.commands.operation import Operation
 
 PREFIX = "/v1/"
 LIST = "operations"
+# The first that an error is; the status of others is 500.
+_STATUS = ((ArgumentError, 400), (WaitTimeoutError, 408), (RefusedError, 409), (NotRunningError, 503))
 _GONE = HttpAnswer(503, {"error": "the client has gone"})
 
 
@@ -61,7 +63,8 @@ class ControlAnswers:
         except StopIteration as end:
             return HttpAnswer(200, end.value)
         except EmulatorError as error:
-            raise HttpError(_status_of(error), str(error)) from None
+            status = next((status for kind, status in _STATUS if isinstance(error, kind)), 500)
+            raise HttpError(status, str(error)) from None
 
     def _check(self, headers: Mapping[str, str]) -> None:
         check_origin(headers, self._own_host)
@@ -87,11 +90,3 @@ def _from_query(name: str, query: str) -> dict[str, object]:
     except ValueError:
         raise HttpError(400, "the query has too many fields") from None
     return {key: parameters[key].parse(text) if key in parameters else text for key, text in given}
-
-
-# The first that an error is.
-_STATUS = ((ArgumentError, 400), (WaitTimeoutError, 408), (RefusedError, 409), (NotRunningError, 503))
-
-
-def _status_of(error: EmulatorError) -> int:
-    return next((status for kind, status in _STATUS if isinstance(error, kind)), 500)

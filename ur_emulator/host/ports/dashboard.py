@@ -38,7 +38,6 @@ class DashboardAnswers:
     def __init__(
         self, box: ServedBox, player: ProgramPlayer, reports: ReportWriter, shut_down: Callable[[], None]
     ) -> None:
-        """Bind the commands to a box."""
         self._box = box
         self._player = player
         self._shut_down = shut_down

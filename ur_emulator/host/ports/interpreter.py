@@ -99,7 +99,6 @@ class InterpreterPort:
             client.close_when_sent()
 
     def _take(self, client: Connection, text: str) -> None:
-        """Take a line of statements."""
         self._n_taken += 1
         line = _Line(client, text, self._n_taken, self._queue.run, self._queue.n_cleanups)
         if self._held + line.cost > BUDGETS.interpreter_bytes:

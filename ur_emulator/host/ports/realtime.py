@@ -9,7 +9,6 @@ class RealtimePort(ScriptPort):
     """Streams realtime frames; there is no greeting."""
 
     def __init__(self, layout: RealtimeLayout, intake: ProgramIntake | None) -> None:
-        """Prepare the encoder; the intake takes script text, None makes the port read-only."""
         super().__init__(intake)
         self._encode = layout.encoder()
 

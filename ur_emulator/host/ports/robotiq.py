@@ -58,8 +58,6 @@ class RobotiqPort(SessionPort["_RobotiqSession"]):
 
 
 class _RobotiqSession(Session):
-    """A client."""
-
     def __init__(self, connection: Connection, box: ServedBox, port: RobotiqPort) -> None:
         super().__init__(connection, box)
         self._port = port

@@ -109,7 +109,6 @@ class ProgramIntake:
     """Turns script text into commands for one box."""
 
     def __init__(self, tasks: TaskQueue, box: ServedBox) -> None:
-        """Have programs compiled as tasks, and started by the box."""
         self._tasks = tasks
         self._box = box
         # Those with programs that have not begun.

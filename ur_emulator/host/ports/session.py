@@ -29,7 +29,6 @@ class Session(ABC):
     allows_half_close: ClassVar[bool] = False
 
     def __init__(self, connection: Connection, box: ServedBox) -> None:
-        """Prepare; nothing has arrived yet."""
         self.connection = connection
         self.is_busy = False
         self._box = box
@@ -72,7 +71,7 @@ class Session(ABC):
 
     def _is_served(self) -> bool:
         """Whether its next request is answered."""
-        if self.connection.is_open and self.connection.takes_answers:
+        if self.connection.is_open and self.connection.can_send:
             return True
         self._n_of_the_gone += 1
         return self._n_of_the_gone <= self.most_of_the_gone
@@ -87,7 +86,7 @@ class Session(ABC):
             self.connection.close()
         elif error is not None:
             self.connection.failed(error)
-        elif not self.connection.takes_answers:
+        elif not self.connection.can_send:
             self.connection.close()  # gone: what else it has sent ahead is not executed
         elif self.connection.has_ended:
             self.connection.close_when_sent()

@@ -45,8 +45,6 @@ class ToolLinePort(SessionPort["_LineSession"]):
 
 
 class _LineSession(Session):
-    """A client."""
-
     def __init__(self, connection: Connection, box: ServedBox, port: ToolLinePort) -> None:
         super().__init__(connection, box)
         self._port = port

@@ -171,7 +171,6 @@ def _all_flight_reports(folder: ProgramFolder) -> dict[str, bytes]:
 
 
 def _flight_reports(folder: ProgramFolder, place: PurePosixPath) -> dict[int, PurePosixPath]:
-    """Return the flight reports in a folder by their numbers."""
     return {
         int(match[1]): inside
         for inside, _ in folder.sizes()

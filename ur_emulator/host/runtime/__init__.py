@@ -1,1 +1,1 @@
-"""Event loop, connections, worker processes, memory: nothing of robots."""
+"""Event loop, connections, worker processes: nothing of robots."""

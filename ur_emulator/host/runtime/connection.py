@@ -23,6 +23,7 @@ class BufferedSocket(ABC):
 
     Attributes:
         is_open: bytes can be received, until either side closes.
+        can_send: False as soon as it is known that the peer is gone; what it has sent may still be read.
         n_taken: how many bytes the kernel has taken.
     """
 
@@ -36,7 +37,7 @@ class BufferedSocket(ABC):
         self._read_size = read_size
         self._sock: socket.socket | None = None
         self._outbox = bytearray()
-        self._can_send = False
+        self.can_send = False
         self._wants_data = True
         self.is_open = False
         self.n_taken = 0
@@ -46,7 +47,7 @@ class BufferedSocket(ABC):
 
         False if it was dropped: the outbox is full, or the peer takes nothing any more.
         """
-        if not self._can_send:
+        if not self.can_send:
             return False
         if self._outbox:
             if len(self._outbox) + len(data) > self._outbox_limit:
@@ -74,7 +75,7 @@ class BufferedSocket(ABC):
             self._sock.close()
             self._sock = None
         self._outbox.clear()
-        self.is_open = self._can_send = False
+        self.is_open = self.can_send = False
 
     @abstractmethod
     def failed(self, error: Exception) -> None:
@@ -85,7 +86,7 @@ class BufferedSocket(ABC):
         if sock.family != socket.AF_UNIX:
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._sock = sock
-        self.is_open = self._can_send = True
+        self.is_open = self.can_send = True
         self._watch()
 
     @abstractmethod
@@ -208,11 +209,6 @@ class Connection(BufferedSocket):
         return self.peer.rpartition(":")[0]
 
     @property
-    def takes_answers(self) -> bool:
-        """False as soon as it is known that the client is gone; what it has sent may still be read."""
-        return self._can_send
-
-    @property
     def has_read(self) -> bool:
         """False if it is known that the client has not read anything yet."""
         waiting = None if self._sock is None else _bytes_on_the_way(self._sock)
@@ -278,7 +274,7 @@ class Connection(BufferedSocket):
 
         Without this, a script is lost when its sender closes the socket at once, as many do.
         """
-        self._can_send = False
+        self.can_send = False
         self._outbox.clear()
         self._sent()
         if self.is_open:

@@ -88,11 +88,9 @@ class Service(Protocol):
 
     def advance(self, now: float) -> float:
         """Advance to monotonic time `now` [s]; return the time of the next call at the latest."""
-        ...
 
     def failed(self, error: Exception) -> None:
         """Take notice of an error in `advance`: the service is not in the loop any more."""
-        ...
 
 
 class EventLoop:

@@ -105,15 +105,12 @@ class Port(Protocol):
 
     def opened(self, connection: Connection) -> None:
         """A client has connected."""
-        ...
 
     def received(self, connection: Connection, data: bytes) -> None:
         """A client has sent something."""
-        ...
 
     def closed(self, connection: Connection) -> None:
         """A client is gone, also one with which `opened` has failed."""
-        ...
 
 
 class Listener:
@@ -134,7 +131,7 @@ class Listener:
         report: Report,
         name: str,
         limits: ClientLimits,
-        spare: SpareDescriptor | None = None,
+        spare: SpareDescriptor,
         *,
         reads_http: bool = False,
     ) -> None:
@@ -147,7 +144,7 @@ class Listener:
             notice: called with a text when a client connects or disconnects.
             report: called with an error of ours and what it has ended.
             limits: of the box, for its clients.
-            spare: refuses clients when no descriptor is left; without one they wait.
+            spare: refuses clients when no descriptor is left.
             reads_http: the port answers or refuses requests of browsers itself.
 
         Raises:
@@ -232,8 +229,6 @@ class Listener:
     def _refuse_next(self, error: OSError) -> None:
         """Close the next client, or pause: the port stays readable, the loop would spin."""
         try:
-            if self._spare is None:
-                raise error
             is_refused = self._spare.refuse_client(self._sock)
         except OSError:
             self._pause()
@@ -263,7 +258,6 @@ class Listener:
 
 
 def _listening_socket(host: str, number: int) -> socket.socket:
-    """Return a socket that listens."""
     sock = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -332,7 +332,6 @@ class TaskQueue:
     # --- ends
 
     def _end(self, process: _Process, error: WorkerError) -> None:
-        """End a task with its process."""
         task = self._under_way[process]
         self._kill(process)
         self._finish(task, None, error)

@@ -419,7 +419,9 @@ class ModbusClient:
             if not self._links:
                 self._loop.add(self)
             elif len(self._links) >= BUDGETS.modbus_links:
-                self._end_oldest_released()
+                released = next((other for other, link in self._links.items() if link.is_released), None)
+                if released is not None:
+                    self._end(released)
             link = self._links[address] = ModbusLink(
                 str(address), partial(self._connect, *address), self._period
             )
@@ -433,12 +435,6 @@ class ModbusClient:
             if known != self._told.get(number, _AT_FIRST):
                 self._told[number] = known
                 self._arrive(SignalServed(number, *known))
-
-    def _end_oldest_released(self) -> None:
-        for address, link in self._links.items():
-            if link.is_released:
-                self._end(address)
-                return
 
     def _end(self, address: UnitAddress) -> None:
         self._links.pop(address).close()

@@ -101,7 +101,6 @@ class OutgoingConnection(BufferedSocket):
     """
 
     def __init__(self, buffers: Buffers) -> None:
-        """Prepare; nothing is connected."""
         super().__init__(buffers.loop, BUDGETS.unsent_bytes, _READ_SIZE)
         self._buffers = buffers
         self._peer = ""

@@ -14,7 +14,7 @@ from __future__ import annotations
 import ctypes
 import gc
 from contextlib import suppress
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from ur_emulator.budgets import BUDGETS, MIB
 from ur_emulator.host.runtime.processes import limit_memory, resident
@@ -22,9 +22,7 @@ from ur_emulator.machine.commands.programs import EndPrograms
 
 if TYPE_CHECKING:
     from ur_emulator.host.runtime.worker import TaskQueue
-    from ur_emulator.machine.controller.command import Command
-    from ur_emulator.machine.controller.program_runner import ProgramRunner
-    from ur_emulator.machine.machine import Machine
+    from ur_emulator.host.served_box import ServedBox
 
 # Objects that are new when the collector looks at them [1]: so many take a fifth of a millisecond.
 _NEW = 2_000
@@ -53,16 +51,6 @@ def own_process() -> None:
     limit_memory(BUDGETS.memory + _MARGIN)
 
 
-class Box(Protocol):
-    """A box whose programs hold memory."""
-
-    machine: Machine
-
-    def submit_quietly(self, command: Command) -> None:
-        """Take a command for the next cycle."""
-        ...
-
-
 class MemoryWatch:
     """Watches the memory of a process that only serves boxes."""
 
@@ -72,17 +60,17 @@ class MemoryWatch:
         # What it holds when nothing can be given back.
         self._floor = 0
         # How much each box has made it grow since it held half of what is allowed.
-        self._grown: dict[Box, int] = {}
+        self._grown: dict[ServedBox, int] = {}
         # The box whose programs had to end last, until what they held is given back.
-        self._ended: Box | None = None
+        self._ended: ServedBox | None = None
         self._next_look = 0.0
 
-    def look(self, box: Box, now: float) -> None:
+    def look(self, box: ServedBox, now: float) -> None:
         """Measure, after a cycle of a box; let pay who must."""
         if gc.get_count()[0] > _NEW or self._now - self._collected > _GROWN:
             gc.collect(1)
             self._collected = self._now
-        if now < self._next_look or any(_programs(one).is_releasing for one in (box, *self._grown)):
+        if now < self._next_look or any(one.controller.programs.is_releasing for one in (box, *self._grown)):
             return
         if self._ended is not None:
             if self._ended is not box:
@@ -95,7 +83,7 @@ class MemoryWatch:
         if 2 * held < BUDGETS.memory:
             self._next_look = now + _PERIOD
             self._grown.clear()
-            if held - self._floor > _WORTH_IT and not _programs(box).is_any_running:
+            if held - self._floor > _WORTH_IT and not box.controller.programs.is_any_running:
                 self._give_back(box)
             held = max(0, held)
         else:
@@ -108,12 +96,12 @@ class MemoryWatch:
         if tasks > held:
             self._tasks.end_for_memory()
             return
-        box = max(self._grown, key=lambda one: (_programs(one).is_any_running, self._grown[one]))
+        box = max(self._grown, key=lambda one: (one.controller.programs.is_any_running, self._grown[one]))
         text = f"the program was ended: box and programs hold more than {BUDGETS.memory // MIB} MiB of memory"
         box.submit_quietly(EndPrograms(text))
         self._ended = box
 
-    def _give_back(self, box: Box) -> None:
+    def _give_back(self, box: ServedBox) -> None:
         """Give back what programs held that have ended."""
         box.machine.forget_ended()
         gc.collect(_ALL)
@@ -122,7 +110,3 @@ class MemoryWatch:
         self._grown.clear()
         self._now = resident()
         self._floor = self._now - self._at_rest
-
-
-def _programs(box: Box) -> ProgramRunner:
-    return box.machine.controller.programs
