@@ -47,7 +47,7 @@ class Served(ServedBox):
         software = E_SERIES.software(SoftwareVersion(5, 25))
         identity = BoxIdentity(software, "UR5e", "UR5", "20993000007")
         super().__init__(machine_of(controller), identity, RealtimePacer(controller.period_s), None, None)
-        self.attach((self.steps.publish,))
+        self.attach((self.steps,))
         self.journal = []
         robotiq, onrobot = controller.state.grippers
         self.robotiq, self.modbus = RobotiqPort(self, [robotiq]), SessionPort(self, ModbusSession)

@@ -1,6 +1,7 @@
 """When the next cycle of a box begins, in real time and in lockstep; the clock is a number."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -100,7 +101,7 @@ def served_box():
 def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count_in_the_next_cycle():
     box = served_box()
     seen = []
-    box.attach([seen.append])
+    box.attach([SimpleNamespace(publish=seen.append)])
     assert box.advance(10.0) == pytest.approx(10.0 + PERIOD)
     assert len(seen) == 1
     deadline = box.advance(10.0 + PERIOD - 0.0003)
@@ -117,7 +118,7 @@ def test_what_was_computed_early_leaves_at_the_deadline_and_later_commands_count
 def test_messages_of_a_cycle_that_was_computed_early_are_sent_before_anybody_can_see_its_state():
     box = served_box()
     seen = []
-    box.attach([lambda snapshot: seen.append("state")], [seen.append])
+    box.attach([SimpleNamespace(publish=lambda snapshot: seen.append("state"))], [seen.append])
     box.advance(10.0)
     seen.clear()
     box.submit(TriggerFault())

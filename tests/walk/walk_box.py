@@ -104,14 +104,15 @@ class WalkBox:
         """Call `look(snapshot)` after every cycle, and `note(event)`; an error in `look` is raised by `tick`."""
         box = self
 
-        def publish(snapshot: Snapshot) -> None:
-            try:
-                if box._error is None:
-                    look(snapshot)
-            except AssertionError as error:
-                box._error = error
+        class Watcher:
+            def publish(self, snapshot: Snapshot) -> None:
+                try:
+                    if box._error is None:
+                        look(snapshot)
+                except AssertionError as error:
+                    box._error = error
 
-        self.served._publishers = (*self.served._publishers, publish)
+        self.served._publishers = (*self.served._publishers, Watcher())
         self.served._listeners = (*self.served._listeners, note)
 
     # --- the pacer

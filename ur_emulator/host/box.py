@@ -197,7 +197,7 @@ class Box:
         }
         self._port_set = PortSet(loop, options.host, self._box, ports)
         self._box.attach(
-            (*(port.publish for port in sending.values()), self._intake.publish, self._box.steps.publish),
+            (*sending.values(), self._intake, self._box.steps),
             [port.send_message for port in sending.values() if isinstance(port, PrimaryPort)],
         )
         self.served_at = choice.served_at(options, ports)

@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from heapq import heappop, heappush
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from protocol.primary.messages import ReportLevel
 from protocol.ur_types import SIMULATED_MASTERBOARD
@@ -64,6 +64,14 @@ class BoxIdentity:
     masterboard: int = SIMULATED_MASTERBOARD
 
 
+class Publisher(Protocol):
+    """A part that publishes every cycle."""
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Send what is due for this cycle."""
+        ...
+
+
 class ServedBox:
     """Advances a machine in an event loop and publishes what it does.
 
@@ -102,7 +110,7 @@ class ServedBox:
         self._pacer = pacer
         self._repeats = not isinstance(pacer, RealtimePacer)
         self._has_noted_input = False
-        self._publishers: tuple[Callable[[Snapshot], None], ...] = ()
+        self._publishers: tuple[Publisher, ...] = ()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
         # Commands for the next cycle, by the name under which a later one replaces them, or by an object.
         self._commands: dict[object, tuple[Command, Done]] = {}
@@ -128,9 +136,7 @@ class ServedBox:
         self._is_held = False
 
     def attach(
-        self,
-        publishers: Iterable[Callable[[Snapshot], None]],
-        listeners: Iterable[Callable[[Event], None]] = (),
+        self, publishers: Iterable[Publisher], listeners: Iterable[Callable[[Event], None]] = ()
     ) -> None:
         """Register publishers, called after every cycle in this order, and listeners of events.
 
@@ -407,11 +413,11 @@ class ServedBox:
 
     def _publish(self, snapshot: Snapshot, now: float) -> None:
         self._last_frame = now
-        for publish in self._publishers:
+        for publisher in self._publishers:
             try:
-                publish(snapshot)
+                publisher.publish(snapshot)
             except Exception as error:
-                self._fail_to_publish(publish, error)
+                self._fail_to_publish(publisher, error)
 
     def _fail_to_publish(self, part: object, error: Exception) -> None:
         """Do without what a port could not publish; reported once, for it may be so in every cycle."""
