@@ -17,6 +17,7 @@ from ur_emulator.errors import PortError
 from ur_hil import PENDANT_PORT
 
 DRAWING = Path(__file__).parent / "drawings" / "signature.csv"
+PACE = "realtime"  # as a hand draws
 
 
 def main() -> int:
@@ -26,7 +27,7 @@ def main() -> int:
     parser.add_argument("--once", action="store_true", help="end after the signature")
     options = parser.parse_args()
     for base in range(0, 20_000, 1000):
-        with suppress(PortError), ControlBox(port_base=base, control_port=0, seed=7) as box:
+        with suppress(PortError), ControlBox(port_base=base, control_port=0, pace=PACE, seed=7) as box:
             return show(box, options)
     sys.exit("show: no free ports found; stop what listens on 29999 to 30013")
 

@@ -118,7 +118,8 @@ def test_pick(run, tmp_path):
 @pytest.mark.slow
 def test_show(run, tmp_path):
     letter = EXAMPLES / "drawings" / "letter_i.txt"
-    said = run("09_show.py", "--once", "--port", 0, "--out", tmp_path, DRAWING=letter)
+    arguments = ("--once", "--port", 0, "--out", tmp_path)
+    said = run("09_show.py", *arguments, DRAWING=letter, PACE="lockstep")
     assert "window at http://127.0.0.1:" in said
     assert (tmp_path / "report.html").exists()
     assert "<script" in (tmp_path / "signature.html").read_text()
