@@ -45,7 +45,7 @@ class Journal:
     """Writes the journal of one box, in a thread of its own: a slow disk delays no cycle."""
 
     def __init__(self, path: Path, options: BoxOptions, report: Callable[[str], None]) -> None:
-        """Open the file and write the first line; one that is there gets `.old` behind its name.
+        """Open the file and write the first line; an existing file is renamed to `FILE.old` first.
 
         In lockstep a cycle waits when too many others are not written yet; in real time it is lost.
 
