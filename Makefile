@@ -15,7 +15,7 @@ PAGES := README.md SECURITY.md CONTRIBUTING.md CHANGELOG.md docs examples
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: ablation attack bench check check-static clean demo docs draw explore format help pick pictures setup show soak test walk
+.PHONY: ablation attack bench check check-static clean demo docs draw explore format help nightly pick pictures setup show soak test walk
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -55,8 +55,11 @@ pick: $(STAMP) ## a block picked up like a hand and like a robot, page and film,
 show: $(STAMP) ## a box with its window: an arm that signs, then waits for your hands; into out/show
 	$(BIN)/python examples/09_show.py $(ARGS)
 
-test: $(STAMP) ## all tests, in one process more than there are cores, at most four
-	$(PYTEST)
+test: $(STAMP) ## the tests, in one process more than there are cores, at most four
+	$(PYTEST) -m "not nightly"
+
+nightly: $(STAMP) ## all tests, with twenty times as many random cases and the costly ones
+	HYPOTHESIS_PROFILE=nightly $(PYTEST)
 
 explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
 	HYPOTHESIS_PROFILE=explore $(PYTEST) -m hypothesis
@@ -73,7 +76,7 @@ check-static: $(STAMP)
 	$(BIN)/mypy tests/walk
 
 check: check-static ## lint, types, fast tests
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow and not nightly"
 
 bench: $(STAMP) ## measure speed, lateness, memory, tracking; writes bench/results.json
 	$(BIN)/python -m bench $(ARGS)

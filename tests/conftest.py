@@ -1,4 +1,4 @@
-"""Property tests: `make test` runs the same cases every time, `make explore` draws new ones. None looks at a clock.
+"""Property tests: `make test` runs the same few cases every time, `make nightly` and `make explore` draw new ones. None looks at a clock.
 
 Files with slow tests come first, so that none is left for the end when the others are done. The garbage collector
 rests while tests are collected, and never looks again at what exists then.
@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, settings
 
 gc.disable()
 _COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("fixed", _COMMON, derandomize=True)
+settings.register_profile("fixed", _COMMON, derandomize=True, max_examples=25)
+settings.register_profile("nightly", _COMMON, print_blob=True, max_examples=500)
 settings.register_profile("explore", _COMMON, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
 
