@@ -31,11 +31,11 @@ from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.velocity_stream import StreamLog, StreamReport
 from pc_client.driver.watchdog import conditions_text, require
 from pc_client.errors import LOG, ClientError, ControllerError, DriverError, PlanningError, printable
-from pc_client.experiment.checks import guarded
 from pc_client.experiment.experiment import Experiment, check_folder, experiment_text, scratch_folder
 from pc_client.experiment.law_stream import ACCELERATION, LawStep, LawStream, VelocityLaw, check_law, rehearse
+from pc_client.experiment.prediction import guarded
 from pc_client.experiment.preflight import changes, model_of, preflight
-from pc_client.experiment.runner import ExperimentReport, ExperimentRunner, run_approach
+from pc_client.experiment.run import ExperimentReport, ExperimentRunner, run_approach
 from pc_client.kinematics.model import RobotModel, nearest_posture, robot_model, tcp_pose
 from pc_client.kinematics.tool import gripper_model, surroundings
 from pc_client.movements.movement import Movement
@@ -189,7 +189,7 @@ class Arm:
         mass = checked(number(0.0, 100.0, "kg"), mass, "mass", ClientError)
         centre: Point = checked(cast(Any, Point), centre_of_gravity, "centre_of_gravity", ClientError)
         self._ask(f"the payload of the arm at {self._host} becomes {mass:g} kg")
-        with self._session() as driver:
+        with self._open() as driver:
             driver.set_payload(mass, centre)
         tool = replace(self.model.cell.tool, mass=mass, centre_of_gravity=centre)
         self.model = replace(self.model, cell=replace(self.model.cell, tool=tool))
@@ -341,7 +341,6 @@ class Arm:
         _need(plan, Plan, "plan", "a Plan")
         wanted = Experiment(self.model, (plan,), 1, Path())
         with self._session(lambda report: self.describe(wanted, None, report)) as driver:
-            require(preflight(driver.report(), self.model))
             approach = plan_approach(plan.joints, driver.actual_q(), model=self.model)
             run_approach(driver, approach, self.model)
         return replace(plan, joints=approach.plan)
@@ -373,7 +372,6 @@ class Arm:
             return Signals(t - t[0], q, qd, pose, command, driver.info.source, stream)
 
         with scratch_folder() as folder, self._session(lambda report: text) as driver:
-            require(preflight(driver.report(), self.model))
             try:
                 with self._fingers(law):
                     stream = driver.stream(source, log, acceleration=value)
@@ -437,27 +435,39 @@ class Arm:
         self._check_same(report.info)
         return report
 
-    def _session(self, describe: Callable[[RobotReport], str] | None = None) -> UrDriver:
-        """Open a session, after a yes to what is described; a robot that has changed meanwhile is shown anew.
+    def _session(self, describe: Callable[[RobotReport], str]) -> UrDriver:
+        """Open a session for a motion: a yes to its description, the same robot, every condition met.
 
-        Nobody is asked about a robot that reports itself as simulated.
+        A robot that is not any more as it was shown is shown anew. Nobody is asked about a robot that reports
+        itself as simulated.
         """
         before = ""
         while True:
             shown = None
-            if describe is not None and self.simulated is not True:
+            if self.simulated is not True:
                 shown = self._report_now()
                 self._ask(before + describe(shown))
-            driver = UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
+            driver = self._open()
             try:
-                self._check_same(driver.info)
-                if not (changed := shown and changes(shown, driver.report(), self.model)):
+                now = driver.report()
+                if not (changed := shown and changes(shown, now, self.model)):
+                    require(preflight(now, self.model))
                     return driver
             except BaseException:
                 driver.close()
                 raise
             driver.close()
             before = f"it is not as it was shown: {changed}; so once more:\n"
+
+    def _open(self) -> UrDriver:
+        """Take the remote control: a session with the robot of `connect`."""
+        driver = UrDriver(self._host, self._ports, reverse_port=self._reverse_port)
+        try:
+            self._check_same(driver.info)
+        except BaseException:
+            driver.close()
+            raise
+        return driver
 
     def _check_same(self, now: RobotInfo) -> None:
         """Refuse another robot than that of `connect`, or one of another origin."""

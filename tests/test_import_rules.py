@@ -247,7 +247,7 @@ def test_effects_stay_at_the_rim(package):
         ),
         ("ur_emulator.emulator", {"mujoco", "numpy", "lark"}),
         ("ur_emulator.host.runtime.worker", {"mujoco"}),
-        ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
+        ("pc_client.experiment.run", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
     ],
 )
 def test_a_fresh_interpreter_loads_nothing_of_the_other_side(package, absent):

@@ -43,7 +43,7 @@ class Controller:
         integral_limit: largest correction by the integral part [rad/s].
         speed_share: share of the joint speed limits that a command may use, 0..1.
         path_tolerance: largest distance of the tool from its path that is allowed [m]; the guard of a run
-            allows what the loop predicts and a margin (`experiment.checks`), never more than this.
+            allows what the loop predicts and a margin (`experiment.prediction`), never more than this.
         angle_tolerance: the same for the angle of the tool to its orientation on the path [rad].
         compensates_lag: with `uses_preview`: dead time and lag are identified apart; the feed-forward is
             ahead by the dead time and adds lag * joint acceleration.

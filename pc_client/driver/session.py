@@ -1,12 +1,13 @@
 """A session with one robot: connect, stream, and always leave the arm stopped.
 
 It uses the real protocol only. Whatever moves the arm is streamed, so that the program on the robot stops it
-when commands stop. Every end of a motion (done, refused, Ctrl-C, lost robot) goes through `UrDriver.stop`:
-first the stop word to the program, then a program of our own that stops the arm.
+when commands stop. A session is in one of the states of `_NEXT`; a motion that ends early (refused, Ctrl-C,
+lost robot) is stopped by the ways of `_WAYS_TO_STOP`, the next one when the arm is not seen to rest.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from enum import StrEnum
 from types import TracebackType
 from typing import Self
 
@@ -33,14 +34,49 @@ _START_TIMEOUT = 5.0
 _READ_ONLY = 210
 """Error code for a program that came in local control. Source: test of the maker's client library."""
 
+_NO_REST = "the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves"
+
 _STOP_WORD = "stop program\n"
 """A controller's own word, no program: ends what runs or is paused. Source: public client library."""
+
+
+class SessionState(StrEnum):
+    """Of a session; what it says of the arm holds for motions of this session."""
+
+    READY = "ready"  # no program of ours runs, the arm rests
+    STARTING = "starting a motion"  # our program was sent, it has not dialled back
+    STREAMING = "in motion"  # our program follows our velocities
+    LOST = "broken: the arm was not seen to come to rest"
+    CLOSED = "closed"
+
+
+class _Event(StrEnum):
+    START = "start a motion"
+    DIALLED = "take a program's call"
+    REST = "come to rest"
+    NO_REST = "be lost"
+
+
+_NEXT: Mapping[SessionState, Mapping[_Event, SessionState]] = {
+    SessionState.READY: {_Event.START: SessionState.STARTING},
+    SessionState.STARTING: {
+        _Event.DIALLED: SessionState.STREAMING,
+        _Event.REST: SessionState.READY,
+        _Event.NO_REST: SessionState.LOST,
+    },
+    SessionState.STREAMING: {_Event.REST: SessionState.READY, _Event.NO_REST: SessionState.LOST},
+    SessionState.LOST: {},
+    SessionState.CLOSED: {},
+}
+"""The state after each event; an event that is not there is refused. From any state a session can be closed:
+without a client the robot's program stops the arm by itself."""
 
 
 class UrDriver:
     """A session with one robot.
 
-    Use as a context manager; leaving it stops the arm if it is still moving and closes all connections.
+    Use as a context manager; leaving it closes all connections. The arm rests then: whatever ends a motion
+    stops it.
 
     Args:
         reverse_port: where its programs dial back; see ReverseServer.
@@ -48,6 +84,7 @@ class UrDriver:
 
     Attributes:
         layout: columns of its realtime frames.
+        state: of the session.
     """
 
     def __init__(
@@ -60,7 +97,7 @@ class UrDriver:
     ) -> None:
         self._robot = robot = _SessionPorts(network or TcpNetwork(), host, ports or Ports.standard())
         self._watch = _ProgramWatch(robot)
-        self._in_motion = False
+        self.state = SessionState.READY
         try:
             robot.open(reverse_port)
         except BaseException:
@@ -78,12 +115,14 @@ class UrDriver:
         self.close()
 
     def close(self) -> None:
-        """Stop the arm if we left it in motion, and close all connections."""
-        try:
-            if self._in_motion:
-                self.stop(None)
-        finally:
-            self._robot.close()
+        """Close all connections."""
+        self.state = SessionState.CLOSED
+        self._robot.close()
+
+    def _take(self, event: _Event) -> None:
+        if (after := _NEXT[self.state].get(event)) is None:
+            raise DriverError(f"the session is {self.state}, it cannot {event}: connect again")
+        self.state = after
 
     def actual_q(self) -> Array:
         """Joint positions (6,) as reported now [rad].
@@ -125,23 +164,6 @@ class UrDriver:
             self._raise_safety_stop(error)
             raise
 
-    def stop(self, reverse: TcpTransport | None) -> None:
-        """Bring the arm to rest, by every available method.
-
-        Args:
-            reverse: connection to the receiver program; None if none runs.
-
-        Raises:
-            DriverError: the arm could not be seen to come to rest.
-        """
-        robot, word = self._robot, encode_velocity(VelocityMode.STOP_PROGRAM)
-        stopped = reverse is not None and _attempt(robot, lambda: reverse.send(word))
-        if not stopped and not _attempt(robot, lambda: _send_stop_program(robot)):
-            raise DriverError(
-                "the arm was not seen to come to rest: PRESS THE EMERGENCY STOP if it still moves"
-            )
-        self._in_motion = False
-
     def set_payload(self, mass: float, centre_of_gravity: tuple[float, float, float]) -> None:
         """Set what the flange carries [kg, m]; DriverError if the robot reports another mass afterwards."""
         robot, waited = self._robot, Patience()
@@ -180,13 +202,13 @@ class UrDriver:
         """Run the receiver program for one stream; any exception, Ctrl-C included, stops the arm."""
         robot, watch, period = self._robot, self._watch, self.info.period
         server, frames = robot.server, robot.frames
+        text = receiver_script(server.address, server.port, acceleration=acceleration, period=period)
         reverse: TcpTransport | None = None
-        self._in_motion = True
+        self._take(_Event.START)
         try:
-            watch.start(
-                receiver_script(server.address, server.port, acceleration=acceleration, period=period)
-            )
+            watch.start(text)
             reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
+            self._take(_Event.DIALLED)
             stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
             try:
                 with velocity_stream.collector_paused():
@@ -197,16 +219,15 @@ class UrDriver:
             watch.wait(watchdog.is_stopped, REST_TIMEOUT, complaint)
             wait_for_rest(frames, robot.network)
         except BaseException as error:
-            try:
-                self.stop(reverse)
-            except DriverError as not_stopped:
-                error.add_note(str(not_stopped))
+            rests = any(_attempt(way, robot, reverse) for way in _WAYS_TO_STOP[self.state])
+            self._take(_Event.REST if rests else _Event.NO_REST)
+            if not rests:
+                error.add_note(_NO_REST)
             raise
         finally:
-            # Tried once with everything there is; closing the session would only try the same again.
-            self._in_motion = False
             if reverse is not None:
                 reverse.close()
+        self._take(_Event.REST)
         return report
 
     def _raise_safety_stop(self, error: DriverError) -> None:
@@ -321,15 +342,19 @@ class _ProgramWatch:
         return not watchdog.is_stopped(frame)
 
 
-def _attempt(robot: _SessionPorts, act: Callable[[], object]) -> bool:
-    """Try one method to stop; True when the arm then rests and no program runs."""
+def _attempt(
+    way: Callable[[_SessionPorts, TcpTransport | None], None],
+    robot: _SessionPorts,
+    reverse: TcpTransport | None,
+) -> bool:
+    """Try one way to stop; True when the arm then rests and no program runs."""
     try:
-        act()
+        way(robot, reverse)
         complaint = "the robot's program goes on"
         wait_until(watchdog.has_ended, robot.frames, robot.network, REST_TIMEOUT, complaint)
         if not watchdog.is_stopped(wait_for_rest(robot.frames, robot.network)):
             _end_paused_program(robot)
-    except (Exception, KeyboardInterrupt):  # nothing, and no second Ctrl-C, keeps us from the next method
+    except (Exception, KeyboardInterrupt):  # nothing, and no second Ctrl-C, keeps us from the next way
         return False
     return True
 
@@ -344,10 +369,23 @@ def _end_paused_program(robot: _SessionPorts) -> None:
         wait_until(watchdog.is_stopped, robot.frames, robot.network, REST_TIMEOUT, "the paused program stays")
 
 
-def _send_stop_program(robot: _SessionPorts) -> None:
+def _send_stop_word(robot: _SessionPorts, reverse: TcpTransport | None) -> None:
+    """End the program that follows our velocities."""
+    assert reverse is not None  # a program streams
+    reverse.send(encode_velocity(VelocityMode.STOP_PROGRAM))
+
+
+def _send_stop_program(robot: _SessionPorts, reverse: TcpTransport | None) -> None:
     """Replace whatever runs by a program that stops the arm."""
     robot.renew()
     robot.scripts.send_program(stop_script())
+
+
+_WAYS_TO_STOP = {
+    SessionState.STARTING: (_send_stop_program,),
+    SessionState.STREAMING: (_send_stop_word, _send_stop_program),
+}
+"""What ends a motion, in order, each tried until the arm is seen to rest."""
 
 
 def stop_script() -> str:

@@ -17,7 +17,7 @@ from pc_client.control.reference import ReferenceTable, RunRecipe
 from pc_client.control.tracker import ControlLaw, Tracker, six_velocities
 from pc_client.driver.velocity_stream import check_command
 from pc_client.errors import LOG, ClientError, ControllerError, DriverError, one_line
-from pc_client.experiment.checks import posture_complaint, way_to_rest
+from pc_client.experiment.prediction import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import RobotModel, check_flange, tcp_pose
 from pc_client.planning.limits import limits_of

@@ -29,7 +29,7 @@ from pc_client.driver.receiver import ReverseServer
 from pc_client.driver.session import UrDriver
 from pc_client.driver.watchdog import refusal
 from pc_client.errors import DriverError, one_line
-from pc_client.experiment.identification import identify
+from pc_client.experiment.excitation import identify
 from pc_client.experiment.preflight import model_of, preflight
 from pc_client.kinematics.model import robot_model
 from protocol.frame_buffer import FrameBuffer

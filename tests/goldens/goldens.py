@@ -24,7 +24,7 @@ from wire_story import MODBUS, Story  # noqa: E402
 from pc_client.control.controller import CONTROLLERS  # noqa: E402
 from pc_client.driver.session import UrDriver  # noqa: E402
 from pc_client.experiment.experiment import Experiment  # noqa: E402
-from pc_client.experiment.runner import ExperimentRunner  # noqa: E402
+from pc_client.experiment.run import ExperimentRunner  # noqa: E402
 from pc_client.kinematics.model import robot_model  # noqa: E402
 from pc_client.movements.movement import load_motion  # noqa: E402
 from pc_client.planning.plan import make_plan  # noqa: E402

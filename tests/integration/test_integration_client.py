@@ -37,8 +37,8 @@ from pc_client.driver.report import read_report
 from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
 from pc_client.errors import DriverError
-from pc_client.experiment.checks import guarded
-from pc_client.experiment.runner import ExperimentRunner
+from pc_client.experiment.prediction import guarded
+from pc_client.experiment.run import ExperimentRunner
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model
 from pc_client.recording.recording import load_recording

@@ -29,7 +29,7 @@ from pc_client.driver.session import UrDriver
 from pc_client.driver.transport import TcpNetwork
 from pc_client.driver.watchdog import REST_SPEED
 from pc_client.errors import DriverError
-from pc_client.experiment.runner import ExperimentRunner
+from pc_client.experiment.run import ExperimentRunner
 from pc_client.movements.movement import Movement
 from pc_client.recording.recording import load_recording
 from protocol.ur_types import ProgramState, SafetyMode

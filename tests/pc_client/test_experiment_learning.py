@@ -19,11 +19,11 @@ from pc_client.control.reference import ReferenceTable, RunRecipe
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamLog, StreamReport
 from pc_client.errors import DriverError
-from pc_client.experiment import checks, runner
-from pc_client.experiment.checks import broken_limit
-from pc_client.experiment.identification import learning_filter
-from pc_client.experiment.repetitions import Repetitions
-from pc_client.experiment.runner import ExperimentRunner
+from pc_client.experiment import prediction
+from pc_client.experiment import run as runner
+from pc_client.experiment.excitation import learning_filter
+from pc_client.experiment.prediction import broken_limit
+from pc_client.experiment.run import ExperimentRunner, Memory
 from pc_client.movements.movement import Movement, load_movement
 from pc_client.planning.plan import plan_movement
 from pc_client.recording.recording import load_recording
@@ -110,7 +110,7 @@ def test_the_guard_is_made_for_the_reference_that_runs(two, tmp_path, monkeypatc
     def spy(known, kind):
         return lambda table, *others: known.append(table.commands()) or kind(table, *others)
 
-    monkeypatch.setattr(checks, "ToolGuard", spy(predicted, checks.ToolGuard))
+    monkeypatch.setattr(prediction, "ToolGuard", spy(predicted, prediction.ToolGuard))
     monkeypatch.setattr(runner, "Tracker", spy(followed, runner.Tracker))
     one = replace(two, planned=two.planned[:1], repeat=1)
     run(WavyRobot(), one, tmp_path, replace(CONTROLLERS["preview"], **changes))
@@ -183,34 +183,49 @@ def test_a_learned_displacement_is_limited(two, plan):
     assert broken_limit(plan, commands, replace(RECIPE, learned=0.5 * learned), two.model) == ""
 
 
-def memory_of(experiment):
-    return Repetitions(RECIPE, learning_filter(RECIPE), experiment.model)
+class Gears:
+    """What a `GearObserver` knows, as a test says."""
+
+    def __init__(self, known=None):
+        self.known = known
+
+    def model(self):
+        return self.known
+
+    def take(self, qd_cmd, q):
+        pass
+
+
+def memory_of(experiment, gears=None):
+    return Memory(RECIPE, learning_filter(RECIPE), gears or Gears(), experiment.model)
 
 
 def test_what_breaks_a_limit_is_forgotten_before_anything_is_sent(two, plan):
-    gear, plain = WavyRobot.gear, commands_of(plan)
-    memory, tcp = memory_of(two), two.planned[0].movement
-    memory.renew(lambda: gear)
+    plain = commands_of(plan)
+    memory, tcp = memory_of(two, Gears(WavyRobot.gear)), two.planned[0].movement
     assert 0.0 < np.abs(memory.table(plan, tcp).commands() - plain).max() < 0.1
     memory.recipe = replace(memory.recipe, learned=np.full_like(plain, 0.19))
     memory.learned_from = 1
     np.testing.assert_array_equal(memory.table(plan, tcp).commands(), plain)
     assert (memory.recipe, memory.learned_from) == (RECIPE, 0)
     assert "learned displacement" in memory.remarks[0]
-    memory.renew(lambda: gear)
+    memory.table(plan, tcp)
     assert memory.recipe.gear is None  # refused for the rest of this movement
 
 
-def test_gears_are_renewed_unless_something_was_learned_with_them(two):
-    memory = memory_of(two)
-    memory.renew(lambda: None)
+def test_gears_are_renewed_unless_something_was_learned_with_them(two, plan):
+    gears, tcp = Gears(), two.planned[0].movement
+    memory = memory_of(two, gears)
+    memory.table(plan, tcp)
     assert memory.recipe.gear is None
-    memory.renew(lambda: WavyRobot.gear)
+    gears.known = WavyRobot.gear
+    memory.table(plan, tcp)
     memory.recipe = replace(memory.recipe, learned=np.zeros((10, 6)))
-    memory.renew(lambda: None)
+    gears.known = None
+    memory.table(plan, tcp)
     assert memory.recipe.gear is WavyRobot.gear
-    memory.forget("run 2 had a late frame")
-    memory.renew(lambda: None)
+    memory.take(2, log_of(1e-3, 0.0), StreamReport(late_frames=1))
+    memory.table(plan, tcp)
     assert memory.recipe.gear is None
 
 

@@ -26,12 +26,12 @@ from pc_client.errors import (
     RobotStoppedError,
     full_message,
 )
+from pc_client.experiment.excitation import identify
 from pc_client.experiment.experiment import (
     clear_folder,
     scratch_folder,
 )
-from pc_client.experiment.identification import identify
-from pc_client.experiment.runner import ExperimentRunner, run_approach
+from pc_client.experiment.run import ExperimentRunner, run_approach
 from pc_client.kinematics.clearance import Clearance
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.movement import Movement, load_motion
@@ -121,7 +121,7 @@ def test_a_robot_in_real_time_that_repeats_frames_is_not_in_lockstep(tmp_path, r
 def test_log_times_are_absolute_in_real_time_only(tmp_path, monkeypatch, lockstep):
     """In lockstep they are the controller's, so that equal runs give equal bytes."""
     now = 1_700_000_000_000_000_000
-    monkeypatch.setattr("pc_client.experiment.runner.time.time_ns", lambda: now)
+    monkeypatch.setattr("pc_client.experiment.run.time.time_ns", lambda: now)
     one = prepare_experiment([THERE], repeat=1, out=tmp_path)
     path = run(FakeRobot(lockstep=lockstep, delay=4), one).paths[0]
     with path.open("rb") as stream:
@@ -324,13 +324,6 @@ def test_an_arm_that_does_not_follow_is_found_before_the_first_movement(two, tmp
 def test_too_slow_a_loop_is_refused(cycles, words, two, tmp_path):
     with pytest.raises(DriverError, match=words):
         run(FakeRobot(delay=cycles), with_folder(two, tmp_path), posture=two.planned[0].joints.start_q)
-
-
-def test_plans_for_a_ur3_do_not_run_on_another_arm(two, tmp_path):
-    robot = FakeRobot(model="UR10")
-    with pytest.raises(DriverError, match=r"arm is UR10, must be UR3"):
-        run(robot, with_folder(two, tmp_path))
-    assert robot.programs == []
 
 
 @pytest.mark.parametrize(("movements", "repeat"), [([], 1), (["uniform_4_1"], 0), (["uniform_4_1"] * 2, 1)])

@@ -29,10 +29,12 @@ from typing import TYPE_CHECKING
 
 from pc_client.analysis.run import analyse_run
 from pc_client.driver.session import UrDriver
+from pc_client.driver.watchdog import require
 from pc_client.errors import LOG, ClientError, GainMarginError, SweepError, full_message
+from pc_client.experiment.excitation import Identification
 from pc_client.experiment.experiment import Experiment
-from pc_client.experiment.identification import Identification
-from pc_client.experiment.runner import ExperimentRunner
+from pc_client.experiment.preflight import preflight
+from pc_client.experiment.run import ExperimentRunner
 from pc_client.kinematics.model import robot_model
 from pc_client.movements.library_sets import library_name_of
 from pc_client.movements.movement import load_movement
@@ -193,6 +195,7 @@ def run_case(case: Case, keep_recordings: bool) -> Outcome:
                 with UrDriver(host, ports, reverse_port=reverse_port) as driver:
                     if isinstance(case.arm, GivenRobot):
                         driver.info.check_same(experiment.model.title, case.arm.serial)
+                    require(preflight(driver.report(), experiment.model))
                     report = ExperimentRunner(driver, experiment, case.controller).run()
                 rows = tuple(_row(path, report.delay) for path in report.paths)
             except (ClientError, ProtocolError, OSError) as error:

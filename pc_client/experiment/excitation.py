@@ -19,7 +19,7 @@ from pc_client.control.tracker import Tracker, TrackerStep
 from pc_client.driver.session import UrDriver
 from pc_client.driver.velocity_stream import StreamLog
 from pc_client.errors import DriverError, GainMarginError
-from pc_client.experiment.checks import posture_complaint, way_to_rest
+from pc_client.experiment.prediction import posture_complaint, way_to_rest
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import RobotModel
 from pc_client.planning.limits import limits_of
