@@ -119,10 +119,11 @@ class UrDriver:
         self.state = SessionState.CLOSED
         self._robot.close()
 
-    def _take(self, event: _Event) -> None:
+    def _after(self, event: _Event) -> SessionState:
+        """The state after an event; DriverError for one that cannot be now."""
         if (after := _NEXT[self.state].get(event)) is None:
             raise DriverError(f"the session is {self.state}, it cannot {event}: connect again")
-        self.state = after
+        return after
 
     def actual_q(self) -> Array:
         """Joint positions (6,) as reported now [rad].
@@ -154,6 +155,7 @@ class UrDriver:
             RobotStoppedError: the robot stopped, or its program failed.
             DriverError: anything else that ended the run; the arm has been stopped.
         """
+        self._after(_Event.START)
         self.check_ready()
         self._robot.server.forget_callers()
         try:
@@ -204,11 +206,11 @@ class UrDriver:
         server, frames = robot.server, robot.frames
         text = receiver_script(server.address, server.port, acceleration=acceleration, period=period)
         reverse: TcpTransport | None = None
-        self._take(_Event.START)
+        self.state = self._after(_Event.START)
         try:
             watch.start(text)
             reverse = server.accept_program(watch.look_after, frames.patience(DIAL_TIMEOUT))
-            self._take(_Event.DIALLED)
+            self.state = self._after(_Event.DIALLED)
             stream = VelocityStream(frames, reverse, robot.network, period, watch.check)
             try:
                 with velocity_stream.collector_paused():
@@ -220,14 +222,14 @@ class UrDriver:
             wait_for_rest(frames, robot.network)
         except BaseException as error:
             rests = any(_attempt(way, robot, reverse) for way in _WAYS_TO_STOP[self.state])
-            self._take(_Event.REST if rests else _Event.NO_REST)
+            self.state = self._after(_Event.REST if rests else _Event.NO_REST)
             if not rests:
                 error.add_note(_NO_REST)
             raise
         finally:
             if reverse is not None:
                 reverse.close()
-        self._take(_Event.REST)
+        self.state = self._after(_Event.REST)
         return report
 
     def _raise_safety_stop(self, error: DriverError) -> None:
