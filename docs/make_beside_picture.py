@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from pc_client.results.matplotlib_figures import figure, image_bytes
-from pc_client.results.sheet import BLUE, GRID_GREY, REFERENCE_GREY, TEXT
+from pc_client.results.figures import BLUE, GRID_GREY, REFERENCE_GREY, TEXT, figure, image_bytes
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "tests" / "ur_emulator"))
@@ -109,7 +108,7 @@ def main() -> None:
         [resting(one, joint) for of_motion in records.values() for one in of_motion] for joint in range(6)
     ]
     print_tables(ours, still)
-    with figure(7.4, letters=8.5) as page:
+    with figure(7.4, letters=8.5, layout=None) as page:
         for i, name in enumerate(FIGURES):
             axes = page.add_axes((0.12 + 0.126 * i, 0.46, 0.111, 0.49))
             draw_moving(axes, name, {key: [getattr(it, name) for it in ours[key]] for key in ours})

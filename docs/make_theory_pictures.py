@@ -14,8 +14,7 @@ from matplotlib.axes import Axes
 from pc_client.movements.lognormal import LiteralTiming, Lognormal, TwoSidedTiming
 from pc_client.movements.minimum_jerk import stroke_shape
 from pc_client.movements.uniform import SmoothedSquareWave
-from pc_client.results.matplotlib_figures import figure, svg_text
-from pc_client.results.sheet import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY
+from pc_client.results.figures import BLUE, GREEN, ORANGE, PURPLE, RED, REFERENCE_GREY, figure, svg_text
 
 IMG = Path(__file__).parent / "img"
 LOGNORMAL = Lognormal(0.0, -1.6, 0.25)
@@ -77,8 +76,9 @@ def draw_profiles(axes: Axes) -> None:
 
 def main() -> None:
     with figure(3.6) as page:
-        draw_lognormal(page.add_axes((0.055, 0.14, 0.4, 0.76)))
-        draw_profiles(page.add_axes((0.53, 0.14, 0.455, 0.76)))
+        left, right = page.subplots(1, 2)
+        draw_lognormal(left)
+        draw_profiles(right)
     (IMG / "theory.svg").write_text(svg_text(page), encoding="utf-8", newline="\n")
 
 

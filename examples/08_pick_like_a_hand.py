@@ -24,6 +24,7 @@ from markupsafe import Markup
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.console import Console
 
@@ -33,9 +34,8 @@ from pc_client.kinematics.model import tcp_pose
 from pc_client.movements.movement import Style
 from pc_client.planning.joint_spline import JointSpline
 from pc_client.recording.provenance import origin_of
-from pc_client.results.matplotlib_figures import draw, figure
+from pc_client.results.figures import BLUE, ORANGE, REFERENCE_GREY, figure, label_axes, shade
 from pc_client.results.pages import picture
-from pc_client.results.sheet import BLUE, ORANGE, REFERENCE_GREY, WIDTH, Curve, Panel, Sheet, boxes
 from pc_client.results.tables import Column, frame_of, to_html, to_rich
 from protocol.realtime.layout import RealtimeFrame
 from ur_emulator import ControlBox
@@ -206,44 +206,28 @@ def stage(name: str, plan: ur.Plan, signals: ur.Signals, begin: float) -> Stage:
 # --- what came of it
 
 
-def curves(takes: list[Take]) -> Sheet:
+def curves(takes: list[Take]) -> Figure:
     """Speed, width and height over time, one column a style."""
-    size = (WIDTH, 6.6)
-    grid = boxes(size, [1] * len(takes), (1.6, 1, 1), margins=(0.7, 0.15, 0.45, 0.5), gaps=(0.7, 0.42))
     span = (0.0, max(take.column(0)[-1] - take.begin for take in takes))
-    panels = []
-    for k, take in enumerate(takes):
-        speeds, ends, names = [], [], []
-        for one in take.stages:
-            t = one.t - take.begin
-            speeds.append(Curve(np.c_[t, 1e3 * one.wanted], REFERENCE_GREY, width=4.0))
-            speeds.append(Curve(np.c_[t, 1e3 * one.speed], COLOURS[take.style], width=1.1))
-            ends.append((t[0], t[-1]))
-            names.append((np.array((t.mean(), 0.95 * TOP_SPEED)), one.name))
-        t = take.column(0) - take.begin
-        width, block = (
-            Curve(np.c_[t, 1e3 * values][t >= 0.0], COLOURS[take.style])
-            for values in (take.column(3), take.column(2)[:, 2])
-        )
-        rows = (
-            (speeds, "TCP speed [mm/s]", TOP_SPEED),
-            ([width], "between the pads [mm]", 90.0),
-            ([block], "block, height [mm]", 220.0),
-        )
-        for row, (drawn, label, top) in enumerate(rows):
-            first, last = row == 0, row == len(rows) - 1
-            panels.append(
-                Panel(
-                    grid[row][k],
-                    drawn,
-                    f"{take.style} style: {STYLES[take.style]}" if first else "",
-                    ("time [s]" if last else "", label),
-                    (span, (0.0, top)),
-                    texts=names if first else (),
-                    shaded=np.array(ends),
-                )
-            )
-    return Sheet(size[1], panels, MARK)
+    with figure(6.6, MARK) as page:
+        grid = page.subplots(3, len(takes), height_ratios=(1.6, 1, 1), squeeze=False)
+        for (speed, width, height), take in zip(grid.T, takes, strict=True):
+            colour = COLOURS[take.style]
+            for one in take.stages:
+                t = one.t - take.begin
+                speed.plot(t, 1e3 * one.wanted, color=REFERENCE_GREY, lw=4.0)
+                speed.plot(t, 1e3 * one.speed, color=colour, lw=1.1)
+                speed.text(t.mean(), 0.95 * TOP_SPEED, one.name, ha="center", va="center")
+            t = take.column(0) - take.begin
+            width.plot(t, 1e3 * take.column(3), color=colour)
+            height.plot(t, 1e3 * take.column(2)[:, 2], color=colour)
+            for axes in (speed, width, height):
+                shade(axes, np.array([(one.t[0], one.t[-1]) for one in take.stages]) - take.begin)
+            title = f"{take.style} style: {STYLES[take.style]}"
+            label_axes(speed, title, "", "TCP speed [mm/s]", span, 0.0, TOP_SPEED)
+            label_axes(width, "", "", "between the pads [mm]", span, 0.0, 90.0)
+            label_axes(height, "", "time [s]", "block, height [mm]", span, 0.0, 220.0)
+    return page
 
 
 FIGURES = (
@@ -307,7 +291,7 @@ def save_film(arm: ur.Arm, takes: list[Take], path: Path) -> None:
     """The arms as stick figures beside each other, each with its speed below it."""
     longest = max(take.column(0)[-1] - take.begin for take in takes)
     times = np.arange(0.0, longest + 0.5, 1.0 / FPS)
-    with figure(4.4, MARK, width=4.6 * len(takes)) as page:
+    with figure(4.4, MARK, width=4.6 * len(takes), layout=None) as page:
         FigureCanvasAgg(page)
         page.set_dpi(66)
         grid = page.subplots(2, len(takes), height_ratios=(3.6, 1), squeeze=False)
@@ -381,7 +365,7 @@ def page(arm: ur.Arm, takes: list[Take], film: bytes, table: pl.DataFrame) -> st
         styles=" and ".join({"human": "like a hand", "robot": "like a robot"}[take.style] for take in takes),
         controller=ur.Controller.preview().title,
         film=image,
-        curves=picture(draw(curves(takes)), "Speed, width of the gripper, height of the block over time"),
+        curves=picture(curves(takes), "Speed, width of the gripper, height of the block over time"),
         table=Markup(to_html(table, FIGURES)),
         origin=origin_of(True),
         seed=arm.report.info.seed,

@@ -203,13 +203,12 @@ def markdown(results: list[dict[str, Any]]) -> str:
 
 def draw(results: list[dict[str, Any]], path: Path) -> None:
     """Draw one panel a fidelity: mean SNR of each composition, by kind and run, and the floor."""
-    from pc_client.results.matplotlib_figures import figure, image_bytes
-    from pc_client.results.sheet import BLUE, ORANGE
+    from pc_client.results.figures import BLUE, ORANGE, figure, image_bytes
 
     fidelities = [f for f in FIDELITIES if any(r["fidelity"] == f for r in _of_main(results))]
     with figure(4.4, "SIMULATED") as page:
-        for k, fidelity in enumerate(fidelities):
-            axes = page.add_axes((0.05 + 0.32 * k, 0.25, 0.285, 0.64))
+        grid = page.subplots(1, len(fidelities), squeeze=False)[0]
+        for k, (fidelity, axes) in enumerate(zip(fidelities, grid, strict=True)):
             cases = [r for r in _of_main(results) if r["fidelity"] == fidelity]
             for shift, kind, colour in ((-0.2, "lognormal", BLUE), (0.2, "uniform", ORANGE)):
                 for i, r in enumerate(cases):

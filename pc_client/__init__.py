@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
-    from pc_client.analysis.run import Run as Run
-    from pc_client.analysis.run import Signals as Signals
+    from pc_client.analysis.signals import Run as Run
+    from pc_client.analysis.signals import Signals as Signals
     from pc_client.arm import Arm as Arm
     from pc_client.arm import connect as connect
     from pc_client.arm import plan as plan
@@ -51,8 +51,8 @@ _HOMES = {
     "Plan": "pc_client.planning.plan",
     "PlanningError": "pc_client.errors",
     "RobotStoppedError": "pc_client.errors",
-    "Run": "pc_client.analysis.run",
-    "Signals": "pc_client.analysis.run",
+    "Run": "pc_client.analysis.signals",
+    "Signals": "pc_client.analysis.signals",
     "Solid": "ur_hil.cell",
     "Tool": "ur_hil.cell",
     "Wall": "ur_hil.cell",

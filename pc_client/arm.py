@@ -19,7 +19,7 @@ from typing import Any, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pc_client.analysis.run import Run, Signals
+from pc_client.analysis.signals import Run, Signals
 from pc_client.arrays import Array
 from pc_client.control.controller import CONTROLLERS, DEFAULT, FIELDS, Controller, controller_of_law
 from pc_client.control.reference import RunRecipe

@@ -16,7 +16,7 @@ MAY_IMPORT = {
     "urscript": {"ur_hil", "protocol", "lark", "numpy", "typer", "rich"},
     "ur_emulator": {"ur_hil", "urscript", "protocol", "mujoco", "numpy", "h11", "typer", "rich", "pytest"},
     "pc_client": {
-        "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "markupsafe", "plotly", "polars", "distributed", "optuna",
+        "ur_hil", "protocol", "numpy", "scipy", "pinocchio", "typer", "rich", "mcap", "matplotlib", "jinja2", "markupsafe", "polars", "distributed", "optuna",
     },
     "ur_pendant": {
         "ur_hil", "protocol", "ur_emulator", "pc_client", "numpy", "pinocchio", "typer", "rich", "viser", "websockets",

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from pc_client.analysis.run import Run
+from pc_client.analysis.signals import Run
 from pc_client.arrays import Array
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS

@@ -2,7 +2,8 @@
 
     measures      the TCP path of a recording; the signal-to-noise ratio of its velocity (Eq. 10), errors,
                   and where the rest is lost
-    run           a run as signals, what is measured on it, its figure
+    run           a recording and all that is measured on it
+    signals       a motion as arrays, for programs that import the client
     table         Table I: ours beside the paper's
     figures       bars and speeds of all movements; loads matplotlib, so import it only to draw
     report        one self-contained page from a folder of recordings

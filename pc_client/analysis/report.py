@@ -18,7 +18,7 @@ from rich.progress import track as progress
 
 from pc_client.analysis.measures import PARTS, SPLIT_HZ
 from pc_client.analysis.noise_floor import LEAST_STEPS
-from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column, movement_sheet
+from pc_client.analysis.run import MeasuredRun, analyse_run, budget_column
 from pc_client.analysis.table import (
     FLOOR,
     LAG,
@@ -36,7 +36,7 @@ from pc_client.errors import CellError, RecordingError, one_line
 from pc_client.files import FILE_KINDS
 from pc_client.kinematics.arms import ROBOTS
 from pc_client.recording.recording import load_recording
-from pc_client.results.pages import picture, render, require_report_libraries, write_files, zoomable
+from pc_client.results.pages import picture, render, require_report_libraries, write_files
 from pc_client.results.tables import Column, to_html, to_json
 from protocol.ur_types import JOINT_NAMES
 from ur_hil.cell import NO_CELL, parse_cell
@@ -137,8 +137,8 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
         {
             "row": row,
             "errors": table.runs[row["name"]][0].errors,
-            "figure": zoomable(
-                movement_sheet(table.runs[row["name"]]),
+            "figure": picture(
+                figures.movement_figure(table.runs[row["name"]]),
                 f"Speed, speed error, path, joints and position error of {row['name']}",
             ),
         }
@@ -155,7 +155,6 @@ def render_page(table: Table, left_out: Iterable[str] = (), console: Console | N
     definitions = [replace(MOVEMENT, header="means over the repetitions" if several else ""), *_DEFINITIONS]
     return render(
         _TEMPLATE,
-        scripts=True,
         table=table,
         levels=to_html(rows, [*columns, _PATH_ERROR, lag], bold="is_mean", links=True),
         definitions=to_html(means, definitions),
@@ -277,7 +276,6 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
     ]
     text = render(
         _TOGETHER,
-        scripts=True,
         shown=shown,
         n_movements=len(shown.frame),
         cards=[(level.header, mean_by_kind(shown.frame, level.name)) for level in levels],
@@ -288,8 +286,8 @@ def build_side_by_side(reports: Sequence[Report], out: Path) -> SideBySide:
             figures.levels_figure(shown.frame, experiments, shown.mark),
             "Bars of the SNR of each movement: the paper's, and those of each experiment",
         ),
-        speeds_figure=zoomable(
-            figures.speeds_sheet(shown.frame["name"].to_list(), experiments, shown.mark),
+        speeds_figure=picture(
+            figures.speeds_figure(shown.frame["name"].to_list(), experiments, shown.mark),
             "TCP speed over time of each movement, desired and actual",
         ),
         mark=shown.mark,

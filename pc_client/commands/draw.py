@@ -194,23 +194,23 @@ def _report(entries: Sequence[Entry], out: Path) -> None:
     """Write page, tables and pictures, and show the tables."""
     from rich.progress import track
 
-    from pc_client.results.matplotlib_figures import draw, svg_text
+    from pc_client.results.figures import svg_text
     from pc_client.results.pages import write_files
     from pc_client.results.tables import to_json
-    from pc_client.studies.drawing.figures import Shown, sheets_of
+    from pc_client.studies.drawing.figures import Shown, figures_of
     from pc_client.studies.drawing.table import drawing_rich, drawings_json, drawings_markdown, render_page
 
-    sheets = {
-        entry.name: sheets_of(Shown(entry.drawing, entry.executions[-1]))
+    figures = {
+        entry.name: figures_of(Shown(entry.drawing, entry.executions[-1]))
         for entry in track(entries, description="drawing", console=console, transient=True)
     }
     texts = {
         "draw.json": to_json(drawings_json(entries)),
         "draw.md": drawings_markdown(entries),
-        "report.html": render_page(entries, sheets),
+        "report.html": render_page(entries, figures),
     }
-    for name, own in sheets.items():
-        texts |= {f"figures/{name}_{kind}.svg": svg_text(draw(sheet)) for kind, sheet in own.items()}
+    for name, own in figures.items():
+        texts |= {f"figures/{name}_{kind}.svg": svg_text(one) for kind, one in own.items()}
     write_files(out, texts)
     for entry in entries:
         console.print(drawing_rich(entry))

@@ -189,14 +189,14 @@ def _write(
     table: Comparison, one: MovementSet, runs: Mapping[str, MeasuredRun] | None, out: Path
 ) -> tuple[Path, ...]:
     """Write table and pictures; returns the files."""
-    from pc_client.results.matplotlib_figures import draw, svg_text
+    from pc_client.results.figures import svg_text
     from pc_client.results.pages import write_files
     from pc_client.results.tables import to_json
-    from pc_client.studies.comparison import comparison_sheet
+    from pc_client.studies.comparison import comparison_figure
 
     texts = {
         "compare.json": to_json(table.to_json()),
         "compare.md": table.to_markdown(),
-        "compare.svg": svg_text(draw(comparison_sheet(one, runs))),
+        "compare.svg": svg_text(comparison_figure(one, runs)),
     }
     return write_files(out, texts)

@@ -32,13 +32,13 @@ from pc_client.control.loop import SAMPLING_TIME
 from pc_client.errors import ClientError
 from pc_client.movements.generate import GENERATORS, generate_movement
 from pc_client.movements.movement import Movement
-from pc_client.results.sheet import BLUE, REFERENCE_GREY, Curve, Panel, Sheet, boxes, cube_around
 from pc_client.results.tables import Column, finite, to_markdown, to_rich
 from pc_client.studies import likeness
 from pc_client.studies.likeness import Likeness
 from pc_client.studies.signals import Trace, low_passed
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.table import Table as RichTable
 
 MovementSet = Mapping[str, Movement]
@@ -339,48 +339,41 @@ _PANEL_HEIGHT = 1.75
 _WIDTH = 12.0
 
 
-def comparison_sheet(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = None) -> Sheet:
-    """The movements of one seed, and their recordings by name where they were executed."""
+def comparison_figure(one: MovementSet, runs: Mapping[str, MeasuredRun] | None = None) -> Figure:
+    """The movements of one seed, and their recordings by name where they were executed. Loads matplotlib."""
+    from pc_client.results.figures import BLUE, HOLLOW, REFERENCE_GREY, figure, label_axes, space_axes
+
     n_rows = -(-len(one) // _COLUMNS)
-    height = _PANEL_HEIGHT * n_rows + 0.75
-    grid = boxes(
-        (_WIDTH, height),
-        (2.5, 1.0) * _COLUMNS,
-        (1.0,) * n_rows,
-        margins=(0.6, 0.15, 0.65, 0.5),
-        gaps=(0.25, 0.4),
-    )
     plans = {movement.name: planned_signal(movement) for movement in one.values()}
     top = 1.08e3 * max(float(plan.speed.max()) for plan in plans.values())
-    cube = cube_around(np.vstack([1e3 * plan.p for plan in plans.values()]))
-    panels = []
-    for index, (kind, movement) in enumerate(one.items()):
-        row, column = divmod(index, _COLUMNS)
-        plan, run = plans[movement.name], (runs or {}).get(movement.name)
-        speeds = [Curve(np.c_[plan.t, 1e3 * plan.speed], REFERENCE_GREY, width=2.6)]
-        paths = [Curve(1e3 * plan.p, REFERENCE_GREY, width=2.4, opacity=0.7)]
-        if run is not None:
-            done = executed_signal(run, movement.duration)
-            speeds.append(Curve(np.c_[done.t, 1e3 * done.speed], BLUE))
-            paths.append(Curve(1e3 * run.track.p_actual[run.track.movement], BLUE, width=0.9))
-        paths.append(
-            Curve(1e3 * movement.target_points, "#000000", width=0.0, marker="o", size=3.5, hollow=True)
-        )
-        panels += [
-            Panel(
-                grid[row][2 * column],
+    everything = np.vstack([1e3 * plan.p for plan in plans.values()])
+    executed = "; blue: as executed, filtered" if runs else ""
+    title = (
+        f"TCP speed and path, grey: as planned{executed}. Same time, same target points (all but duplicate)"
+    )
+    mark = next(iter(runs.values())).provenance.origin.mark if runs else ""
+    with figure(_PANEL_HEIGHT * n_rows + 0.75, mark, width=_WIDTH, title=title) as page:
+        grid = page.add_gridspec(n_rows, 2 * _COLUMNS, width_ratios=(2.5, 1.0) * _COLUMNS)
+        for index, (kind, movement) in enumerate(one.items()):
+            row, column = divmod(index, _COLUMNS)
+            speeds = page.add_subplot(grid[row, 2 * column])
+            paths: Any = page.add_subplot(grid[row, 2 * column + 1], projection="3d")
+            plan, run = plans[movement.name], (runs or {}).get(movement.name)
+            speeds.plot(plan.t, 1e3 * plan.speed, color=REFERENCE_GREY, lw=2.6)
+            paths.plot(*(1e3 * plan.p).T, color=REFERENCE_GREY, lw=2.4, alpha=0.7)
+            if run is not None:
+                done = executed_signal(run, movement.duration)
+                speeds.plot(done.t, 1e3 * done.speed, color=BLUE)
+                paths.plot(*(1e3 * run.track.p_actual[run.track.movement]).T, color=BLUE, lw=0.9)
+            paths.plot(*(1e3 * movement.target_points).T, color="black", **HOLLOW)
+            label_axes(
                 speeds,
                 f"{kind}: {GENERATORS[kind].says}",
-                ("time [s]" if index + _COLUMNS >= len(plans) else "", "" if column else "mm/s"),
-                ((0.0, movement.duration), (0.0, top)),
-            ),
-            Panel(grid[row][2 * column + 1], paths, ranges=cube, view=(24.0, -40.0), zoom=1.3),
-        ]
-    executed = "; blue: as executed, filtered" if runs else ""
-    return Sheet(
-        height,
-        panels,
-        next(iter(runs.values())).provenance.origin.mark if runs else "",
-        f"TCP speed and path, grey: as planned{executed}. Same time, same target points (all but duplicate)",
-        _WIDTH,
-    )
+                "time [s]" if index + _COLUMNS >= len(plans) else "",
+                "" if column else "mm/s",
+                (0.0, movement.duration),
+                0.0,
+                top,
+            )
+            space_axes(paths, everything, view=(24.0, -40.0), zoom=1.3)
+    return page

@@ -6,9 +6,9 @@ import re
 
 
 def own_text(html: str) -> str:
-    """A page without what is put into it as a whole: images, the data of figures, the script of plotly."""
+    """A page without what is put into it as a whole: images, the script of all pages."""
     text = re.sub(r"base64,[^\"]+", "", html)
-    return re.sub(r"<script( type=\"application/json\")?>.*?</script>", "", text, flags=re.S)
+    return re.sub(r"<script>.*?</script>", "", text, count=1, flags=re.S)
 
 
 def check_needs_nothing(html: str) -> None:
@@ -17,4 +17,3 @@ def check_needs_nothing(html: str) -> None:
     text = own_text(html)
     assert re.findall(r"(?:https?:)?//|@import|url\(|<script|<link", text) == []
     assert re.findall(r'src="(?!data:image/)', text) == []
-    assert len(re.findall(r"plotly\.js v\d", html)) <= 1

@@ -244,7 +244,7 @@ def test_a_dry_run_shows_plan_and_question_also_of_a_simulated_arm(
     assert not out.exists()
 
 
-@pytest.mark.parametrize("library", ["matplotlib", "jinja2", "plotly"])
+@pytest.mark.parametrize("library", ["matplotlib", "jinja2"])
 def test_a_library_of_the_report_is_missed_before_the_arm_moves(
     library, robot, tmp_path, one_line, monkeypatch
 ):
@@ -392,7 +392,7 @@ def test_missing_extras_name_the_command_to_install(tmp_path):
         ("from pc_client.cli import run; run(['--help'])", HEAVY),
         (
             "import pc_client.recording.recorder, pc_client.recording.recording, pc_client.analysis.report",
-            ("matplotlib", "plotly", "jinja2"),
+            ("matplotlib", "jinja2"),
         ),
         # what moves an arm, and what worker processes run
         (

@@ -55,7 +55,7 @@ def test_drawings_become_recordings_tables_and_a_page_with_a_section_each(robot,
     page = (out / "report.html").read_text()
     check_needs_nothing(page)
     assert all(f'<section id="{one["name"]}">' in page for one in drawings)
-    assert page.count('class="zoom"') == 6
+    assert page.count('<img src="data:image/svg+xml') == 6
     assert str(tmp_path) not in page
     assert "executed" in (out / "draw.md").read_text()
     recording = load_recording(out / "same_one_2_r1.mcap")

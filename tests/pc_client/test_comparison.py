@@ -16,14 +16,14 @@ from pc_client import cli
 from pc_client.errors import ClientError
 from pc_client.movements.generate import GENERATORS
 from pc_client.movements.movement import load_movement
-from pc_client.results.matplotlib_figures import draw, svg_text
+from pc_client.results.figures import svg_text
 from pc_client.studies.comparison import (
     COLUMNS,
     CUTOFF_HZ,
     EXECUTED_COLUMNS,
     Comparison,
     build_comparison,
-    comparison_sheet,
+    comparison_figure,
     executed_signal,
     filtered,
     filtered_signal,
@@ -188,7 +188,7 @@ def test_a_perfect_run_is_the_filtered_plan_wherever_its_frames_fall_in_a_cycle(
 
 
 def test_page_shows_every_generator(sets):
-    root = ET.fromstring(svg_text(draw(comparison_sheet(sets[0]))))
+    root = ET.fromstring(svg_text(comparison_figure(sets[0])))
     assert root.tag.endswith("svg")
     panels = [node for node in root.iter() if (node.get("id") or "").startswith("axes_")]
     assert len(panels) == 2 * len(GENERATORS)

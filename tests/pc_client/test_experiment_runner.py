@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from planning_paths import prepare_experiment
 from recording_samples import SIGNALS, provenance
 
-from pc_client.analysis.run import Run
+from pc_client.analysis.signals import Run
 from pc_client.control.controller import CONTROLLERS
 from pc_client.control.loop import LoopModel, loop_margins
 from pc_client.driver.session import UrDriver

@@ -1,27 +1,37 @@
-"""One description of a figure, drawn by two libraries; one frame of a table, in all its forms."""
+"""Figures that are the same every time, and one frame of a table in all its forms."""
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import json
 import math
 import re
 import sys
+import xml.etree.ElementTree as ET
 
 import numpy as np
 import polars as pl
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from rich.console import Console
 
 from pc_client import cli
-from pc_client.results.matplotlib_figures import Bars, bars_of_levels, draw, svg_text
-from pc_client.results.pages import zoomable
-from pc_client.results.plotly_figures import plotly_figure, thinned
-from pc_client.results.sheet import BLUE, RED, Curve, Panel, Sheet, boxes, cube_around
+from pc_client.results.figures import (
+    BLUE,
+    RED,
+    Bars,
+    bars_of_levels,
+    figure,
+    image_bytes,
+    label_axes,
+    show_legend,
+    space_axes,
+    svg_text,
+)
+from pc_client.results.pages import picture
 from pc_client.results.tables import (
     Column,
     cells,
@@ -35,94 +45,45 @@ from pc_client.results.tables import (
 )
 
 T = np.linspace(0.0, 8.0, 1001)
-SPACE = np.column_stack((np.cos(T), np.sin(T), 0.1 * T))
 
 
-def sheet(label: str = "actual") -> Sheet:
-    upper, lower = (
-        row[0] for row in boxes((11.0, 6.0), [1], [1, 1], margins=(1, 5, 0.5, 0.5), gaps=(0, 0.5))
-    )
-    curves = (Curve(np.c_[T, np.sin(T)], BLUE, label), Curve(np.c_[T, np.cos(T)], RED, "other", filled=True))
-    span = (0.0, 8.0)
-    return Sheet(
-        6.0,
-        (
-            Panel(upper, curves, label, ("", "speed [mm/s]"), (span, (0.0, None)), "above"),
-            Panel(lower, curves, "", ("time [s]", "error"), (span, (None, None)), "inside", columns=1),
-            Panel(
-                (0.6, 0.1, 0.4, 0.8), (Curve(SPACE, RED),), labels=("x", "y", "z"), ranges=cube_around(SPACE)
-            ),
-        ),
-        "SIMULATED",
-    )
+def page_of(label: str = "actual"):
+    with figure(6.0, "SIMULATED", title="a title") as page:
+        plane, space = page.add_subplot(1, 2, 1), page.add_subplot(1, 2, 2, projection="3d")
+        plane.plot(T, np.sin(T), color=BLUE, label=label)
+        plane.plot(T, np.cos(T), color=RED, label="other")
+        label_axes(plane, label, "time [s]", "speed [mm/s]", (0.0, 8.0), -1.0, 1.0)
+        show_legend(plane, "inside", columns=1)
+        space.plot(np.cos(T), np.sin(T), 0.1 * T)
+        space_axes(space, np.column_stack((np.cos(T), np.sin(T), 0.1 * T)), ("x", "y", "z"))
+    return page
 
 
-@given(
-    points=arrays(np.float64, st.tuples(st.integers(3, 4000), st.integers(2, 3)), elements=st.floats(-9, 9)),
-    most=st.integers(20, 500),
-)
-def test_thinned_curves_keep_their_ends_and_all_peaks(points: np.ndarray, most: int) -> None:
-    kept = thinned(points, most)
-    assert len(kept) <= max(most, 8)
-    np.testing.assert_array_equal(kept[[0, -1]], points[[0, -1]])
-    np.testing.assert_array_equal(kept.min(axis=0), points.min(axis=0))
-    np.testing.assert_array_equal(kept.max(axis=0), points.max(axis=0))
+def test_the_same_data_give_the_same_bytes_without_a_date():
+    text = svg_text(page_of())
+    assert svg_text(page_of()) == text
+    assert not re.search(r"\d{4}-\d\d-\d\dT", text)
+    assert "<!-- SIMULATED -->" in text
+    assert image_bytes(page_of()) == image_bytes(page_of())
 
 
-def test_thinned_curves_keep_gaps_and_short_ones_all_points() -> None:
-    points = np.c_[np.arange(5000.0), np.arange(5000.0)]
-    points[2000:3000] = np.nan
-    kept = thinned(points, 300)
-    assert np.isnan(kept).any()
-    assert np.nanmax(kept) == 4999.0
-    np.testing.assert_array_equal(thinned(points[:300], 300), points[:300])
-
-
-def test_a_sheet_for_the_browser() -> None:
-    figure = plotly_figure(sheet())
-    text = json.dumps(figure, allow_nan=False)
-    assert [trace["type"] for trace in figure["data"]] == ["scatter"] * 4 + ["scatter3d"]
-    assert (figure["data"][0]["x0"], figure["data"][0]["dx"]) == (0.0, pytest.approx(0.008))
-    assert figure["layout"]["xaxis2"]["matches"] == "x"  # the same time: zoomed together
-    assert figure["layout"]["yaxis"]["range"] == [0.0, None]
-    assert "<b>SIMULATED</b>" in text
-
-
-def test_names_are_text_whatever_they_are() -> None:
-    evil = sheet("<b>$x$</script>")
-    element = str(zoomable(evil, 'a "quoted" <name>'))
-    assert element.count("</script") == 1
-    assert "<b>$x" not in element
-    (data,) = re.findall(r'<script type="application/json">(.*)</script>', element)
-    assert json.loads(data)["data"][0]["name"] == "&lt;b&gt;$x$&lt;/script&gt;"
+def test_names_are_text_whatever_they_are():
+    element = str(picture(page_of("<b>$x$--></script>"), 'a "quoted" <name>'))
     assert 'alt="a &#34;quoted&#34; &lt;name&gt;"' in element
+    svg = base64.b64decode(re.findall(r'base64,([^"]+)"', element)[0]).decode()
+    assert ET.fromstring(svg).tag.endswith("}svg")
+    assert "<b>" not in re.sub(r"<!--.*?-->", "", svg)
 
 
-def test_the_same_data_give_the_same_bytes() -> None:
-    assert svg_text(draw(sheet())) == svg_text(draw(sheet()))
-    assert zoomable(sheet(), "a") == zoomable(sheet(), "a")
-    assert not re.search(r"\d{4}-\d\d-\d\dT", svg_text(draw(sheet())))
+def test_a_legend_inside_has_room_over_the_curves():
+    assert page_of().axes[0].get_ylim() == pytest.approx((-1.0, 1.0 + 2 * 0.16 * 2.0))
 
 
-def test_a_legend_inside_has_room_over_the_curves() -> None:
-    panel = sheet().panels[1]
-    low, high = panel.upwards
-    assert low is not None
-    assert high is not None
-    assert low < -1.0
-    assert high - 1.0 > 0.3 * (1.0 - low)  # two rows
-    assert draw(sheet()).axes[1].get_ylim() == pytest.approx((low, high))
-
-
-def test_boxes_fill_the_sheet_between_the_margins() -> None:
-    grid = boxes((10.0, 5.0), (2, 1), (1, 1, 1), margins=(1.0, 0.5, 0.4, 0.6), gaps=(0.5, 0.2))
-    assert [len(row) for row in grid] == [2, 2, 2]
-    left, right = grid[0]
-    assert left[0] == pytest.approx(0.1)
-    assert right[0] + right[2] == pytest.approx(0.95)
-    assert left[2] == pytest.approx(2 * right[2])
-    assert left[1] + left[3] == pytest.approx(1 - 0.08)
-    assert grid[2][0][1] == pytest.approx(0.12)
+def test_axes_in_space_have_one_scale():
+    axes = page_of().axes[1]
+    edges = [np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
+    assert edges == pytest.approx([edges[0]] * 3)
+    assert edges[0] >= 1.99
 
 
 def test_bars_without_a_level_are_left_out() -> None:

@@ -2,25 +2,41 @@
 
 All pictures are made of `Shown`: one frame and one time, millimetres on the sheet, x to the right and y up as
 the person saw it, and seconds of the hand. Each of the four signals has its colour on the whole page. Letters
-are larger than elsewhere: these figures are shown to audiences.
+are larger than elsewhere: these figures are shown to audiences. Loads matplotlib.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pc_client.arrays import Array
-from pc_client.results import sheet
-from pc_client.results.sheet import Box, Curve, Panel, Sheet, boxes
+from pc_client.results.figures import (
+    AXIS_GREY,
+    BLUE,
+    GREEN,
+    HOLLOW,
+    OUTLINE,
+    RED,
+    SKY,
+    figure,
+    label_axes,
+    shade,
+    show_legend,
+    space_axes,
+)
 from pc_client.studies.drawing.drawing import Drawing
 from pc_client.studies.drawing.judgement import Execution, signals
 from pc_client.studies.signals import Trace
 
 #: Colour of each signal; names as of `judgement.signals`.
-COLOURS = {"human": "#3A3A3A", "reconstructed": sheet.BLUE, "planned": sheet.GREEN, "executed": sheet.RED}
+COLOURS = {"human": "#3A3A3A", "reconstructed": BLUE, "planned": GREEN, "executed": RED}
 #: Colours of what the pen does in the air, of the person's signal behind others, of the sheet.
 _AIR, _FAINT, _PAPER_EDGE = "#A8A8A8", "#BDBDBD", "#C9B37E"
 #: The figures are shown to audiences: letters [points] for a width [inches].
@@ -118,12 +134,12 @@ _FAR = 0.45
 _VIEWS = {"vertical": (18.0, -152.0), "horizontal": (32.0, -152.0), "inclined": (24.0, -152.0)}
 
 
-def sheets_of(shown: Shown) -> dict[str, Sheet]:
+def figures_of(shown: Shown) -> dict[str, Figure]:
     """The figures of a drawing by name, as `FIGURES` names them."""
-    return {"paths": _paths_sheet(shown), "speeds": _speeds_sheet(shown), "space": _space_sheet(shown)}
+    return {"paths": _paths_figure(shown), "speeds": _speeds_figure(shown), "space": _space_figure(shown)}
 
 
-def _paths_sheet(shown: Shown) -> Sheet:
+def _paths_figure(shown: Shown) -> Figure:
     """The four paths side by side: human, reconstructed, planned, executed."""
     half = _half_width(shown)
     # A path in space is shown from where it is widest.
@@ -136,45 +152,38 @@ def _paths_sheet(shown: Shown) -> Sheet:
         "planned": "planned, with lifts",
         "executed": "executed",
     }
-    height = 3.75
-    places = boxes((_SHEET_WIDTH, height), [1] * 4, [1], margins=(0.7, 0.2, 0.6, 0.6), gaps=(0.3, 0.0))[0]
-    page = ((-half, half), (-half, half))
-    panels = [
-        Panel(
-            box,
-            _paths(shown, name, half),
-            title,
-            (across + outside if name == "reconstructed" else across, "" if name != "human" else up),
-            page,
-            equal=True,
-            texts=_numbers(shown, half) if name == "human" else (),
-        )
-        for box, (name, title) in zip(places, titles.items(), strict=True)
-    ]
-    return Sheet(height, panels, shown.mark, "", _SHEET_WIDTH, _LETTERS)
+    with figure(3.75, shown.mark, width=_SHEET_WIDTH, letters=_LETTERS) as page:
+        for axes, (name, title) in zip(page.subplots(1, 4), titles.items(), strict=True):
+            _draw_paths(axes, shown, name, half)
+            x = across + outside if name == "reconstructed" else across
+            label_axes(axes, title, x, up if name == "human" else "", (-half, half), -half, half)
+            axes.set_aspect("equal", adjustable="box")
+    return page
 
 
-def _paths(shown: Shown, name: str, half: float) -> list[Curve]:
+def _draw_paths(axes: Axes, shown: Shown, name: str, half: float) -> None:
     """One of the four paths, over that of the person."""
-    curves, colour = [], COLOURS[name]
+    colour = COLOURS[name]
     if name in ("planned", "executed"):
-        curves.append(Curve(_air(shown, executed=name == "executed"), _AIR, style="--"))
+        axes.plot(*_air(shown, executed=name == "executed").T, color=_AIR, ls="--")
     if name != "human":
-        curves += [Curve(shown.on_page(part.p), _FAINT, width=5.0) for part in shown.parts["human"]]
+        for part in shown.parts["human"]:
+            axes.plot(*shown.on_page(part.p).T, color=_FAINT, lw=5.0)
     for part in shown.parts[name]:
         p = shown.on_page(part.p)
-        curves.append(Curve(p, colour, width=2.0))
+        axes.plot(*p.T, color=colour, lw=2.0)
         if name == "human":
-            curves += [Curve(p[:1], colour, width=0.0, marker="o"), Curve(_arrow(p, half), colour, width=2.0)]
+            axes.plot(*p[0], "o", color=colour, ms=5.0)
+            axes.plot(*_arrow(p, half).T, color=colour, lw=2.0)
     if name == "reconstructed":
         for extracted in shown.drawing.extraction.parts:
             targets = shown.on_page(extracted.trajectory.target_points)
-            curves += [
-                Curve(targets, sheet.SKY, width=0.7),
-                Curve(targets, colour, width=0.0, marker="o", size=3.6, hollow=True),
-            ]
-    curves += [Curve(shown.on_page(dot), colour, width=0.0, marker="o") for dot in shown.dots]
-    return curves
+            axes.plot(*targets.T, color=SKY, lw=0.7)
+            axes.plot(*targets.T, color=colour, **(HOLLOW | {"ms": 3.6}))
+    for dot in shown.dots:
+        axes.plot(*shown.on_page(dot).T, "o", color=colour, ms=5.0)
+    if name == "human":
+        _write_numbers(axes, shown, half)
 
 
 def _arrow(p: Array, half: float) -> Array:
@@ -187,17 +196,16 @@ def _arrow(p: Array, half: float) -> Array:
     return np.array([ahead - along + aside, ahead, ahead - along - aside])
 
 
-def _numbers(shown: Shown, half: float) -> list[tuple[Array, str]]:
+def _write_numbers(axes: Axes, shown: Shown, half: float) -> None:
     """The order of the marks, where there are several, beside their starts."""
     marks = shown.drawing.marks
     begins = {index: part.p[: 1 + len(part.p) // 8] for index, part in shown.moving("human")}
-    numbers = []
     for index, mark in enumerate(marks if len(marks) > 1 else ()):
         path = shown.on_page(begins.get(index, mark.first[None]))
         away = path[0] - path[-1]
         length = float(np.linalg.norm(away))
-        numbers.append((path[0] + (0.11 * half * away / length if length else 0.0), str(index + 1)))
-    return numbers
+        place = path[0] + (0.11 * half * away / length if length else 0.0)
+        axes.text(place[0], place[1], str(index + 1), ha="center", va="center", path_effects=OUTLINE)
 
 
 def _half_width(shown: Shown) -> float:
@@ -224,43 +232,33 @@ def _air(shown: Shown, *, executed: bool) -> Array:
     return page
 
 
-def _space_sheet(shown: Shown) -> Sheet:
+def _space_figure(shown: Shown) -> Figure:
     """The movement in the base frame, with its lifts; and the height of the pen over the sheet."""
-    height = 4.7
-    left, right = boxes(
-        (_SHEET_WIDTH, height), (1.0, 0.85), (1,), margins=(0.3, 0.2, 0.55, 0.65), gaps=(1.1, 0.0)
-    )[0]
-    return Sheet(height, (_space(left, shown), _height(right, shown)), shown.mark, "", _SHEET_WIDTH, _LETTERS)
+    with figure(4.7, shown.mark, width=_SHEET_WIDTH, letters=_LETTERS) as page:
+        grid = page.add_gridspec(1, 2, width_ratios=(1.0, 0.85))
+        _draw_space(page.add_subplot(grid[0], projection="3d"), shown)
+        _draw_height(page.add_subplot(grid[1]), shown)
+    return page
 
 
-def _space(box: Box, shown: Shown) -> Panel:
+def _draw_space(axes: Any, shown: Shown) -> None:
     plan = shown.whole(executed=False)
     p, done = 1e3 * plan.p, 1e3 * shown.execution.whole.p
     down = _pen_is_down(plan.t, shown.drawing.joined.pen_down)[:, None]
-    similarity = shown.drawing.placement.similarity
-    curves = [
-        Curve(np.where(down, np.nan, p), _AIR, "pen lifted", 1.4, "--"),
-        Curve(np.where(down, p, np.nan), COLOURS["planned"], "planned", 3.6, opacity=0.5),
-        Curve(done, COLOURS["executed"], "executed", 1.1),
-        *(
-            Curve(1e3 * similarity.points(dot), COLOURS["planned"], width=0.0, marker="o")
-            for dot in shown.dots
-        ),
-        Curve(p[:1], "#000000", width=0.0, marker="o", hollow=True),
-    ]
-    if shown.drawing.flat:
-        curves.append(Curve(_sheet(shown), _PAPER_EDGE))
-    return Panel(
-        box,
-        curves,
-        "",
-        ("x [mm]", "y [mm]", "z [mm]"),
-        sheet.cube_around(np.vstack([curve.points for curve in curves]), least=0.35, margin=0.1),
-        "above",
-        texts=((p[0], "begin"),),
-        zoom=1.3,
-        view=_VIEWS.get(shown.drawing.placement.plane, (24.0, -60.0)),
-    )
+    dots = [1e3 * shown.drawing.placement.similarity.points(dot) for dot in shown.dots]
+    edge = _sheet(shown) if shown.drawing.flat else np.empty((0, 3))
+    axes.plot(*np.where(down, np.nan, p).T, color=_AIR, label="pen lifted", lw=1.4, ls="--")
+    axes.plot(*np.where(down, p, np.nan).T, color=COLOURS["planned"], label="planned", lw=3.6, alpha=0.5)
+    axes.plot(*done.T, color=COLOURS["executed"], label="executed", lw=1.1)
+    for dot in dots:
+        axes.plot(*dot.T, "o", color=COLOURS["planned"], ms=5.0)
+    axes.plot(*p[:1].T, color="black", **HOLLOW)
+    axes.text(*p[0], "  begin", path_effects=OUTLINE)
+    axes.plot(*edge.T, color=_PAPER_EDGE)
+    view = _VIEWS.get(shown.drawing.placement.plane, (24.0, -60.0))
+    labels = ("x [mm]", "y [mm]", "z [mm]")
+    space_axes(axes, np.vstack([p, done, *dots, edge]), labels, least=0.35, margin=0.1, zoom=1.3, view=view)
+    show_legend(axes, "above")
 
 
 def _sheet(shown: Shown) -> Array:
@@ -272,74 +270,56 @@ def _sheet(shown: Shown) -> Array:
     return 1e3 * shown.drawing.placement.similarity.points(flat)
 
 
-def _height(box: Box, shown: Shown) -> Panel:
+def _draw_height(axes: Axes, shown: Shown) -> None:
     placement = shown.drawing.placement
     if shown.drawing.flat:
         out = placement.lift / float(np.linalg.norm(placement.lift))
         zero, title = float(placement.similarity.shift @ out), "height of the pen over the sheet"
     else:
         out, zero, title = np.array([0.0, 0.0, 1.0]), 0.0, "height of the pen, z of the base frame"
-    curves = []
     for name, width, opacity in (("planned", 4.0, 0.5), ("executed", 1.4, 1.0)):
         whole = shown.whole(executed=name == "executed")
-        height = np.c_[whole.t - shown.start, 1e3 * (whole.p @ out - zero)]
-        curves.append(Curve(height, COLOURS[name], name, width, opacity=opacity))
-    return Panel(
-        box,
-        curves,
-        title,
-        ("time of the hand [s]; shaded: pen down", "mm"),
-        (shown.span, (None, None)),
-        "inside",
-        shaded=shown.pen_down,
-    )
+        height = 1e3 * (whole.p @ out - zero)
+        axes.plot(whole.t - shown.start, height, color=COLOURS[name], label=name, lw=width, alpha=opacity)
+    shade(axes, shown.pen_down)
+    label_axes(axes, title, "time of the hand [s]; shaded: pen down", "mm", shown.span)
+    show_legend(axes, "inside")
 
 
 #: Lognormals that are this many times as high as the speed itself, since they cancel, are cut off.
 _TALL = 1.5
 
 
-def _speeds_sheet(shown: Shown) -> Sheet:
+def _speeds_figure(shown: Shown) -> Figure:
     """The four speed profiles one under the other, then overlaid, then differences from the person's."""
     parts, factor = shown.drawing.extraction.parts, shown.drawing.factor
     top = shown.unit * max(float(part.speed.max()) for own in shown.parts.values() for part in own)
     highest = shown.unit * max(float(part.trajectory.stroke_speeds(part.t).max()) for part in parts)
-    overlaid = [
-        curve
-        for name, width in zip(COLOURS, (4.5, 2.0, 1.4, 1.2), strict=True)
-        for curve in _speeds(shown, name, width, _FAINT if name == "human" else COLOURS[name])
-    ]
-    rows: list[tuple[str, list[Curve], float | None]] = [
-        (name, _profile(shown, name), 1.1 * max(top, min(highest, _TALL * top))) for name in COLOURS
-    ]
-    rows += [("overlaid", overlaid, 1.22 * top), ("difference", _differences(shown), None)]
-    heights = (1.0, 1.0, 1.0, 1.0, 1.55, 0.75)
-    height = 9.6
-    margins = (0.85, 0.75, 0.5, 0.6)
-    places = boxes((_SHEET_WIDTH, height), (1,), heights, margins=margins, gaps=(0.0, 0.2))
-    panels = [
-        Panel(
-            box,
-            curves,
-            "",
-            ("time of the hand since the pen came down [s]; shaded: pen down" if upper is None else "", name),
-            (shown.span, (None if upper is None else 0.0, upper)),
-            "inside" if name == "overlaid" else "",
-            columns=4,
-            shaded=shown.pen_down,
-            slower=factor if factor > 1.0 and upper is not None else 1.0,
-        )
-        for (box,), (name, curves, upper) in zip(places, rows, strict=True)
-    ]
-    title = "speed on the sheet [mm per s of the hand]" + (
-        "; right: of the arm [mm/s]" if factor > 1.0 else ""
-    )
-    return Sheet(height, panels, shown.mark, title, _SHEET_WIDTH, _LETTERS)
+    title = "speed on the sheet [mm per s of the hand]"
+    title += "; right: of the arm [mm/s]" if factor > 1.0 else ""
+    with figure(9.6, shown.mark, width=_SHEET_WIDTH, title=title, letters=_LETTERS) as page:
+        *single, overlaid, difference = page.subplots(6, 1, height_ratios=(1.0, 1.0, 1.0, 1.0, 1.55, 0.75))
+        for axes, name in zip(single, COLOURS, strict=True):
+            _draw_profile(axes, shown, name)
+            label_axes(axes, "", "", name, shown.span, 0.0, 1.1 * max(top, min(highest, _TALL * top)))
+        for name, width in zip(COLOURS, (4.5, 2.0, 1.4, 1.2), strict=True):
+            _draw_speeds(overlaid, shown, name, width, _FAINT if name == "human" else COLOURS[name])
+        label_axes(overlaid, "", "", "overlaid", shown.span, 0.0, 1.22 * top)
+        overlaid.legend(ncols=4, loc="upper left")
+        _draw_differences(difference, shown)
+        x = "time of the hand since the pen came down [s]; shaded: pen down"
+        label_axes(difference, "", x, "difference", shown.span)
+        for axes in (*single, overlaid, difference):
+            shade(axes, shown.pen_down)
+            if factor > 1.0 and axes is not difference:
+                arm = axes.secondary_yaxis("right", functions=(lambda v: v / factor, lambda v: v * factor))
+                arm.yaxis.set_major_locator(MaxNLocator(3))
+                arm.spines["right"].set_visible(True)
+    return page
 
 
-def _profile(shown: Shown, name: str) -> list[Curve]:
+def _draw_profile(axes: Axes, shown: Shown, name: str) -> None:
     """One signal, with its strokes or with the movement of the arm while the pen is up."""
-    curves = []
     if name == "reconstructed":
         for index, part in zip(shown.drawing.moving, shown.drawing.extraction.parts, strict=True):
             mark, nearly = shown.drawing.marks[index], 1e-3 * float(np.ptp(part.p, axis=0).max())
@@ -347,30 +327,24 @@ def _profile(shown: Shown, name: str) -> list[Curve]:
             at = shown.since_pen_down(t, index)
             for stroke in shown.unit * part.trajectory.stroke_speeds(t).T:
                 visible = stroke > 1e-3 * stroke.max()
-                curves.append(Curve(np.c_[at, stroke][visible], sheet.SKY, width=0.8, filled=True))
+                axes.plot(at[visible], stroke[visible], color=SKY, lw=0.8)
+                axes.fill_between(at[visible], stroke[visible], color=SKY, alpha=0.28, lw=0)
     if name in ("planned", "executed"):
         whole = shown.whole(executed=name == "executed")
-        curves.append(Curve(np.c_[whole.t - shown.start, 1e3 * whole.speed], _AIR, width=1.1))
-    return curves + _speeds(shown, name, 1.8, COLOURS[name])
+        axes.plot(whole.t - shown.start, 1e3 * whole.speed, color=_AIR, lw=1.1)
+    _draw_speeds(axes, shown, name, 1.8, COLOURS[name])
 
 
-def _speeds(shown: Shown, name: str, width: float, colour: str) -> list[Curve]:
-    return [
-        Curve(
-            np.c_[shown.since_pen_down(part.t, index), shown.unit * part.speed],
-            colour,
-            "" if count else name,
-            width,
-            "--" if name == "planned" and width < 1.8 else "-",
-        )
-        for count, (index, part) in enumerate(shown.moving(name))
-    ]
+def _draw_speeds(axes: Axes, shown: Shown, name: str, width: float, colour: str) -> None:
+    style = "--" if name == "planned" and width < 1.8 else "-"
+    for count, (index, part) in enumerate(shown.moving(name)):
+        t, text = shown.since_pen_down(part.t, index), None if count else name
+        axes.plot(t, shown.unit * part.speed, color=colour, label=text, lw=width, ls=style)
 
 
-def _differences(shown: Shown) -> list[Curve]:
-    curves = [Curve(np.array([[at, 0.0] for at in shown.span]), sheet.AXIS_GREY, width=0.7)]
+def _draw_differences(axes: Axes, shown: Shown) -> None:
+    axes.axhline(0.0, color=AXIS_GREY, lw=0.7)
     for name in ("reconstructed", "executed"):
         for (index, own), human in zip(shown.moving(name), shown.parts["human"], strict=True):
             t = shown.since_pen_down(human.t, index)
-            curves.append(Curve(np.c_[t, shown.unit * (own.speed - human.speed)], COLOURS[name], "", 1.3))
-    return curves
+            axes.plot(t, shown.unit * (own.speed - human.speed), color=COLOURS[name], lw=1.3)

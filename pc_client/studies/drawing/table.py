@@ -16,14 +16,14 @@ import polars as pl
 
 from pc_client.analysis.report import provenance_facts
 from pc_client.recording.provenance import Provenance
-from pc_client.results.pages import render, zoomable
-from pc_client.results.sheet import Sheet
+from pc_client.results.pages import picture, render
 from pc_client.results.tables import Column, finite, frame_of, to_html, to_markdown, to_rich
 from pc_client.studies.drawing.drawing import Drawing
 from pc_client.studies.drawing.figures import COLOURS, FIGURES
 from pc_client.studies.drawing.judgement import Agreement, Execution, Verdict
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.table import Table as RichTable
 
 COLUMNS = (
@@ -221,11 +221,15 @@ def _list(facts: Mapping[str, str]) -> list[str]:
 _TEMPLATE = "studies/drawing/draw.html.j2"
 
 
-def render_page(entries: Sequence[Entry], sheets: Mapping[str, Mapping[str, Sheet]]) -> str:
-    """Return the text of `report.html`: the drawings, at least one, and `figures.sheets_of` each by its name.
+def render_page(entries: Sequence[Entry], figures: Mapping[str, Mapping[str, Figure]]) -> str:
+    """Return the text of `report.html`.
+
+    Args:
+        entries: the drawings, at least one.
+        figures: `figures.figures_of` each, by its name.
 
     Raises:
-        ModuleNotFoundError: matplotlib, jinja2 or plotly is not installed (extra `report`).
+        ModuleNotFoundError: matplotlib or jinja2 is not installed (extra `report`).
     """
     sections = [
         {
@@ -234,13 +238,12 @@ def render_page(entries: Sequence[Entry], sheets: Mapping[str, Mapping[str, Shee
             "factor": entry.drawing.factor,
             "table": to_html(table_of(entry.verdict), COLUMNS),
             "facts": _facts_of(entry),
-            "pictures": {name: zoomable(sheet, FIGURES[name]) for name, sheet in sheets[entry.name].items()},
+            "pictures": {name: picture(one, FIGURES[name]) for name, one in figures[entry.name].items()},
         }
         for entry in entries
     ]
     return render(
         _TEMPLATE,
-        scripts=True,
         sections=sections,
         colours=COLOURS,
         facts=_common_facts(entries),

@@ -7,15 +7,25 @@ strokes, virtual targets) has a colour of its own.
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pc_client.arrays import Array
 from pc_client.errors import printable
 from pc_client.movements.trajectory import Motion
-from pc_client.results.matplotlib_figures import draw, figure, image_bytes
-from pc_client.results.sheet import BLUE, RED, REFERENCE_GREY, SKY, Curve, Panel, Sheet, boxes, cube_around
+from pc_client.results.figures import (
+    BLUE,
+    HOLLOW,
+    RED,
+    REFERENCE_GREY,
+    SKY,
+    figure,
+    image_bytes,
+    label_axes,
+    show_legend,
+    space_axes,
+)
 from pc_client.studies.extraction.extract import Extraction, PartExtraction
 
 if TYPE_CHECKING:
@@ -33,44 +43,39 @@ def draw_extraction(extraction: Extraction) -> bytes:
         extraction: with at least one part that moves.
     """
     dim = extraction.parts[0].p.shape[1]
-    paths: list[Curve] = []
-    speeds: list[Curve] = []
-    for index, part in enumerate(extraction.parts):
-        t, motion = _reconstruction(part)
-        targets = part.trajectory.target_points[:, :dim]
-        names = ("recorded", "reconstructed", "virtual targets", "single strokes") if index == 0 else [""] * 4
-        paths += [
-            Curve(part.p, REFERENCE_GREY, names[0], 4.0, opacity=0.7),
-            Curve(targets, BLUE, width=0.5, style=":"),
-            Curve(targets, BLUE, names[2], 0.0, marker="o", size=4.0, hollow=True),
-            Curve(motion.p[:, :dim], RED, names[1], 1.3),
-        ]
-        speeds.append(Curve(_over(part.t, part.v), REFERENCE_GREY, names[0], 4.0, opacity=0.7))
-        if part.n_strokes <= _MOST_STROKES:
-            strokes = part.trajectory.stroke_speeds(t).T
-            speeds += [Curve(np.c_[t, v], SKY, "" if k else names[3], 0.8) for k, v in enumerate(strokes)]
-        speeds.append(Curve(_over(t, motion.v), RED, names[1], 1.3))
-    paths += [Curve(still.p[:1], REFERENCE_GREY, width=0.0, marker="o") for still in extraction.still]
-    left, right = boxes(_SIZE, (1.0, 1.7), (1,), margins=(0.7, 0.15, 0.75, 0.55), gaps=(0.8, 0.0))[0]
-    everything = np.vstack([curve.points for curve in paths])
-    panels = (
-        Panel(
-            left,
-            paths,
-            labels=("x [unit of the recording]", "y", "z")[:dim],
-            ranges=[(None, None)] * 2 if dim == 2 else cube_around(everything, least=0.3),
-            legend="above",
-            equal=True,
-        ),
-        Panel(
-            right,
-            speeds,
-            labels=("time [s]", "speed, low-passed [unit of the recording per s]"),
-            ranges=((None, None), (0.0, None)),
-            legend="above",
-        ),
-    )
-    return image_bytes(draw(Sheet(_SIZE[1], panels, "", printable(_title(extraction)), _SIZE[0])))
+    everything: list[Array] = []
+    with figure(_SIZE[1], width=_SIZE[0], title=printable(_title(extraction))) as page:
+        grid = page.add_gridspec(1, 2, width_ratios=(1.0, 1.7))
+        paths: Any = page.add_subplot(grid[0], projection="3d" if dim == 3 else None)
+        speeds = page.add_subplot(grid[1])
+        for index, part in enumerate(extraction.parts):
+            t, motion = _reconstruction(part)
+            targets = part.trajectory.target_points[:, :dim]
+            names = ("recorded", "reconstructed", "virtual targets", "single strokes")
+            texts = names if index == 0 else [None] * 4
+            recorded: dict[str, Any] = {"color": REFERENCE_GREY, "label": texts[0], "lw": 4.0, "alpha": 0.7}
+            paths.plot(*part.p.T, **recorded)
+            paths.plot(*targets.T, color=BLUE, lw=0.5, ls=":")
+            paths.plot(*targets.T, color=BLUE, label=texts[2], **(HOLLOW | {"ms": 4.0}))
+            paths.plot(*motion.p[:, :dim].T, color=RED, label=texts[1], lw=1.3)
+            everything += [part.p, targets, motion.p[:, :dim]]
+            speeds.plot(part.t, np.linalg.norm(part.v, axis=1), **recorded)
+            if part.n_strokes <= _MOST_STROKES:
+                for k, v in enumerate(part.trajectory.stroke_speeds(t).T):
+                    speeds.plot(t, v, color=SKY, label=None if k else texts[3], lw=0.8)
+            speeds.plot(t, np.linalg.norm(motion.v, axis=1), color=RED, label=texts[1], lw=1.3)
+        for still in extraction.still:
+            paths.plot(*still.p[:1].T, "o", color=REFERENCE_GREY)
+        labels = ("x [unit of the recording]", "y", "z")
+        if dim == 3:
+            space_axes(paths, np.vstack(everything), labels, least=0.3)
+        else:
+            label_axes(paths, "", *labels[:2])
+            paths.set_aspect("equal", adjustable="datalim")
+        label_axes(speeds, "", "time [s]", "speed, low-passed [unit of the recording per s]", bottom=0.0)
+        for axes in (paths, speeds):
+            show_legend(axes, "above")
+    return image_bytes(page)
 
 
 def draw_overview(table: pl.DataFrame) -> bytes:
@@ -85,11 +90,9 @@ def draw_overview(table: pl.DataFrame) -> bytes:
         ("SNR_t [dB]", "snr_t_db", ".1f", "least"),
         ("strokes per speed peak", "strokes_per_peak", ".2f", "most"),
     )
-    size = (12.0, 3.4)
-    places = boxes(size, (1, 1, 1), (1,), margins=(0.6, 0.15, 0.7, 0.55), gaps=(0.5, 0.0))[0]
-    with figure(size[1], width=size[0], title=f"{len(moving)} recordings") as page:
-        for box, (label, name, form, worst) in zip(places, figures, strict=True):
-            axes = page.add_axes(box, xlabel=label, ylabel="recordings")
+    with figure(3.4, width=12.0, title=f"{len(moving)} recordings") as page:
+        for axes, (text, name, form, worst) in zip(page.subplots(1, 3), figures, strict=True):
+            axes.set(xlabel=text, ylabel="recordings")
             known = moving[name].drop_nulls().to_numpy()
             if len(known):
                 axes.hist(known, bins=min(40, max(5, len(known) // 4)), color=BLUE)
@@ -105,10 +108,6 @@ def _title(extraction: Extraction) -> str:
         f"SNR_t {extraction.snr_t_db:.1f} dB, {extraction.n_strokes} strokes for "
         f"{extraction.n_speed_peaks} speed peaks"
     )
-
-
-def _over(t: Array, v: Array) -> Array:
-    return np.column_stack((t, np.linalg.norm(v, axis=1)))
 
 
 def _reconstruction(part: PartExtraction) -> tuple[Array, Motion]:

@@ -5,7 +5,7 @@ One file that needs no network and holds no date. Import it only where a page is
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 
 from pc_client.arrays import Array
 from pc_client.control.controller import FIELDS
-from pc_client.results.matplotlib_figures import draw, figure
+from pc_client.results.figures import COLOURS, figure, label_axes, show_legend
 from pc_client.results.pages import picture, render
-from pc_client.results.sheet import COLOURS, Curve, Panel, Sheet
 from pc_client.results.tables import to_html
 from pc_client.studies.sweep.case import origin_of_rows
 from pc_client.studies.sweep.settings import RANKING, edge_of, rank_settings, spans_grid, varying
@@ -29,15 +28,15 @@ _MOST_SETTINGS = 25
 
 _MOST_ERRORS = 50
 
-_STYLES: tuple[tuple[Literal["s", "^", "o", "D"], Literal["-", "--", ":", "-."]], ...] = (
-    ("s", "-"),
-    ("^", "--"),
-    ("o", ":"),
-    ("D", "-."),
-)
+_STYLES = (("s", "-"), ("^", "--"), ("o", ":"), ("D", "-."))
+"""Markers and lines."""
+
 _NOT_DONE = "#DDDDDD"
 _MOST_TICKS = 10
 """Values of a grid that are written on its axis."""
+
+_MOST_LEVEL = 4
+"""Texts that have room beside each other; more are turned."""
 
 
 def render_page(name: str, table: pl.DataFrame) -> str:
@@ -70,9 +69,7 @@ def render_page(name: str, table: pl.DataFrame) -> str:
         edge=edge_of(table, settings),
         map_figure=map_figure,
         axis_figures=[
-            picture(
-                draw(_axis_sheet(done, axis, connect=connect or axis == "repetition")), f"SNR over {axis}"
-            )
+            picture(_axis_figure(done, axis, connect=connect or axis == "repetition"), f"SNR over {axis}")
             for axis in plotted
         ],
         not_done=[row for row in rows if row["status"] != "done"][:_MOST_ERRORS],
@@ -87,7 +84,7 @@ def map_axes(table: pl.DataFrame) -> tuple[str, str] | None:
     return (numbers[0], numbers[1]) if len(numbers) > 1 else None
 
 
-def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
+def _axis_figure(rows: _Rows, axis: str, *, connect: bool) -> Figure:
     """The SNR of all runs that are done over an axis that varies.
 
     The means are by kind of movement, controller and fidelity. Lines join the means of numbers if `connect`:
@@ -99,34 +96,29 @@ def _axis_sheet(rows: _Rows, axis: str, *, connect: bool) -> Sheet:
     places = dict(zip(values, values if scale else range(len(values)), strict=True))
     splits = [c for c in ("controller", "fidelity") if c != axis and len(_in_order(rows, c)) > 1]
     groups = list(dict.fromkeys(tuple(row[c] for c in splits) for row in rows))
-    curves = []
-    for kind, colour in zip(_in_order(rows, "kind"), cycle(COLOURS)):
-        for group, (marker, line) in zip(groups, cycle(_STYLES)):
-            series = [r for r in rows if r["kind"] == kind and tuple(r[c] for c in splits) == group]
-            if not series:
-                continue
-            runs = np.array([(places[row[axis]], row["snr_db"]) for row in series])
-            means = np.array([(x, runs[runs[:, 0] == x, 1].mean()) for x in np.unique(runs[:, 0])])
-            width, label = float(scale and connect), ", ".join((kind, *map(str, group)))
-            curves += [
-                Curve(runs, colour, width=0.0, marker=marker, size=3.0, opacity=0.3),
-                Curve(means, colour, label, width, line, marker, 6.0),
-            ]
-    ticks = None
-    if not scale:
-        ticks = {place: str(value) for value, place in places.items()}
-    elif connect and len(values) <= _MOST_TICKS:
-        ticks = {place: f"{value:g}" for value, place in places.items()}
-    panel = Panel(
-        (0.06, 0.27, 0.73, 0.61),
-        curves,
-        f"SNR over {axis}: runs and means",
-        (axis, "SNR [dB]"),
-        ((None, None) if scale else (-0.6, len(values) - 0.4), (None, None)),
-        "right",
-        ticks=ticks,
-    )
-    return Sheet(3.2, [panel], origin_of_rows(rows).mark)
+    with figure(3.2, origin_of_rows(rows).mark) as page:
+        axes = page.add_subplot()
+        for kind, colour in zip(_in_order(rows, "kind"), cycle(COLOURS)):
+            for group, (marker, line) in zip(groups, cycle(_STYLES)):
+                series = [r for r in rows if r["kind"] == kind and tuple(r[c] for c in splits) == group]
+                if not series:
+                    continue
+                runs = np.array([(places[row[axis]], row["snr_db"]) for row in series])
+                means = np.array([(x, runs[runs[:, 0] == x, 1].mean()) for x in np.unique(runs[:, 0])])
+                text = ", ".join((kind, *map(str, group)))
+                axes.plot(*runs.T, color=colour, ls="", marker=marker, ms=3.0, alpha=0.3)
+                style = line if scale and connect else ""
+                axes.plot(*means.T, color=colour, label=text, ls=style, marker=marker, ms=6.0)
+        span = (None, None) if scale else (-0.6, len(values) - 0.4)
+        label_axes(axes, f"SNR over {axis}: runs and means", axis, "SNR [dB]", span)
+        if not scale or (connect and len(values) <= _MOST_TICKS):
+            turned = len(values) > _MOST_LEVEL
+            texts = [f"{value:g}" if scale else str(value) for value in places]
+            way: dict[str, Any] = {"rotation": 20, "ha": "right"} if turned else {}
+            axes.set_xticks(list(places.values()), texts, **way)
+            axes.grid(axis="x", visible=False)
+        show_legend(axes, "right")
+    return page
 
 
 def _map_figure(rows: _Rows, x: str, y: str) -> Figure:
@@ -138,9 +130,9 @@ def _map_figure(rows: _Rows, x: str, y: str) -> Figure:
     panels = _in_order(rows, "fidelity")
     xs, ys = _in_order(rows, x), _in_order(rows, y)
     with figure(4.2, origin_of_rows(rows).mark) as page:
-        grid = page.add_gridspec(1, len(panels), left=0.06, right=0.95, bottom=0.14, top=0.86, wspace=0.2)
-        for i, panel in enumerate(panels):
-            axes = page.add_subplot(grid[0, i])
+        for i, (panel, axes) in enumerate(
+            zip(panels, page.subplots(1, len(panels), squeeze=False)[0], strict=True)
+        ):
             points = _means([row for row in rows if row["fidelity"] == panel], x, y)
             levels = [mean for mean in points.values() if mean is not None] or [0.0]
             colours = {"vmin": min(levels), "vmax": max(max(levels), min(levels) + 1e-3), "cmap": "viridis"}
