@@ -87,7 +87,7 @@ def compiled_program(program: ResolvedProgram, catalogue: Catalogue, dialect: Di
         ScriptCompileError: It is nested too deeply.
     """
     try:
-        compiled = compile_resolved(program, catalogue, dialect, f"<urscript {program.name}>")
+        compiled = compile_resolved(program, catalogue, f"<urscript {program.name}>")
     except RecursionError:
         raise _too_deep(program.source) from None
     return CompiledProgram(

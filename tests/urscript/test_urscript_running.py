@@ -300,14 +300,6 @@ def test_a_run_leaves_nothing_for_the_garbage_collector():
         gc.enable()
 
 
-def test_short_circuit_is_a_switch():
-    text = "def loud():\n  textmsg(1)\n  return True\nend\nx = False and loud()\ny = True or loud()"
-    for short_circuit, expected in ((True, []), (False, ["1", "1"])):
-        host = RecordingHost()
-        host.run(compile_program(text, dialect=Dialect(short_circuit=short_circuit)))
-        assert host.messages == expected
-
-
 # --- positions
 
 

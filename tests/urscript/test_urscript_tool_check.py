@@ -12,8 +12,8 @@ from program_texts import program_of
 from typer.testing import CliRunner
 
 from urscript.catalogue import catalogue_for
-from urscript.check.checking import RULES as SYNTAX_RULES
 from urscript.check.checking import advise, check_program, check_with_advice, first_syntax_error
+from urscript.check.syntax_rules import RULES as SYNTAX_RULES
 from urscript.check.warnings import RULES
 from urscript.cli import app
 from urscript.source import Source, as_utf8

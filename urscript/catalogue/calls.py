@@ -170,7 +170,7 @@ def converted(kind: ParamType, value: Any) -> Any:
     """A value as a parameter of this type takes it, if it can be converted.
 
     Where it takes numbers, True is 1 and False 0; where it takes bools, 0 is False, any other number True. An
-    integer may be a float without fraction: programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS).
+    integer may be a float without fraction: programs compute indexes.
     """
     if isinstance(value, list):
         parts = [converted(kind, item) for item in value]

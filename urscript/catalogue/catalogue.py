@@ -31,7 +31,6 @@ from typing import Any, Final
 from protocol.ur_types import JOINT_ACCELERATION, JOINT_SPEED
 from urscript.catalogue import types
 from urscript.catalogue.calls import Fitting, Slot, compile_fitting, static_bind
-from urscript.catalogue.methods import ValueMethod, methods_of
 from urscript.catalogue.types import Builtin, Generation, ModuleVariable, Param, PerGeneration, Version
 from urscript.errors import ScriptTypeError
 from urscript.values import Pose
@@ -47,7 +46,13 @@ _SOURCES: Final = {
     "FIELD_USE": "called by field scripts and public clients",
 }
 
-_NAMED: Final = {"a_joint_default": JOINT_ACCELERATION, "v_joint_default": JOINT_SPEED}
+VARIABLES: Final = {
+    "a_joint_default": ModuleVariable(JOINT_ACCELERATION, "rad/s^2"),
+    "a_tool_default": ModuleVariable(1.2, "m/s^2"),
+    "v_joint_default": ModuleVariable(JOINT_SPEED, "rad/s"),
+    "v_tool_default": ModuleVariable(0.25, "m/s"),
+}
+"""By name. Source: URScript API Reference CB3 3.15.4, module motion, Variables."""
 
 _TYPES: Final = {kind.name.lower().replace("_or_", "|"): kind for kind in types.ParamType}
 _WORDS: Final[dict[str, tuple[str, Any]]] = {
@@ -56,9 +61,10 @@ _WORDS: Final[dict[str, tuple[str, Any]]] = {
     "deprecated": ("deprecated", True),
     "nan ok": ("nan_ok", True),
     "any names": ("any_names", True),
+    "changes": ("changes", True),
 }
 
-_HEAD = re.compile(r"(\w+)\((.*)\) -> (.+)")
+_HEAD = re.compile(r"([\w.]+)\((.*)\) -> (.+)")
 _PARAM = re.compile(
     r"""(?P<name>\w+):\ (?P<type>[\w|]+)
     (?:\ (?P<low>-?[\d.]*\d)?\.\.(?P<high>-?[\d.]+)?)?
@@ -129,8 +135,8 @@ def _params(text: str, head: str) -> Iterator[Param]:
 
 
 def _value(text: str) -> Any:
-    if text in _NAMED:
-        return _NAMED[text]
+    if text in VARIABLES:
+        return VARIABLES[text].value
     return Pose(*literal_eval(text[1:])) if text[0] == "p" else literal_eval(text)
 
 
@@ -150,7 +156,8 @@ def _settings(lines: list[str]) -> dict[str, Any]:
             if unknown := set(words.split(", ")) - set(_WORDS):
                 raise ValueError(f"{', '.join(sorted(unknown))} in {line!r}; allowed: {', '.join(_WORDS)}")
             # A row's own line replaces the whole line of `by default:`.
-            fields |= {"time": types.TimeClass.ZERO, "deprecated": False, "nan_ok": False, "any_names": False}
+            fields |= {"time": types.TimeClass.ZERO, "deprecated": False}
+            fields |= {"nan_ok": False, "any_names": False, "changes": False}
             fields |= dict(_WORDS[word] for word in words.split(", "))
     return fields
 
@@ -166,33 +173,36 @@ ALL_ROWS: tuple[Builtin, ...] = (
     *_read_chapter("world_model"),
 )
 
-VARIABLES: tuple[ModuleVariable, ...] = tuple(
-    ModuleVariable(name, value, unit, "motion", "URScript API Reference CB3 3.15.4, module motion, Variables")
-    for name, value, unit in (
-        ("a_joint_default", JOINT_ACCELERATION, "rad/s^2"),
-        ("a_tool_default", 1.2, "m/s^2"),
-        ("v_joint_default", JOINT_SPEED, "rad/s"),
-        ("v_tool_default", 0.25, "m/s"),
-    )
-)
+METHODS: tuple[Builtin, ...] = tuple(_read_chapter("methods"))
+"""The methods of values: `list.append(value)` and its like."""
 
-ARRAYS: tuple[types.BuiltinArray, ...] = (
-    types.BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out", _SOURCES["FIELD_USE"]),
-)
+ARRAYS: Final = {"digital_out": types.BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out")}
+"""By name. Source: field use of `digital_out[2]=True` as a one-line program by an early Python client;
+undocumented."""
 
 _MOST_CALL_FORMS = 10_000
 
 
+def method_key(row: Builtin) -> tuple[str, str]:
+    """The type of values that have a method, and its name in calls."""
+    of_type, name = row.name.split(".")
+    return of_type, name
+
+
 class Catalogue:
-    """The builtins of one software version."""
+    """The builtins of one software version.
+
+    Attributes:
+        methods: By `method_key`; none before the software that knows them.
+    """
 
     def __init__(self, version: Version, rows: tuple[Builtin, ...] = ALL_ROWS) -> None:
         self.version = version
         self._rows = rows
         self._by_name: dict[str, Builtin] = {row.name: row for row in rows if row.is_in(version)}
-        self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
-        self.arrays: Mapping[str, types.BuiltinArray] = {item.name: item for item in ARRAYS}
-        self.methods: Mapping[tuple[str, str], ValueMethod] = methods_of(version)
+        self.variables: Mapping[str, ModuleVariable] = VARIABLES
+        self.arrays: Mapping[str, types.BuiltinArray] = ARRAYS
+        self.methods = {method_key(row): row for row in METHODS if row.is_in(version)}
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
         self._fittings = {
             name: compile_fitting(name, row.params, row.nan_ok) for name, row in self._by_name.items()

@@ -230,7 +230,7 @@ def default_text(value: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Builtin:
-    """One function that URScript programs can call.
+    """One function that URScript programs can call, or a method of values, `list.append`.
 
     Args:
         params: in positional order.
@@ -246,6 +246,7 @@ class Builtin:
         deprecated: the manual advises a successor.
         nan_ok: NaN and infinity do no harm as arguments (sums, texts, registers); else they are errors.
         any_names: takes named arguments of any name, and no others.
+        changes: a method that changes the variable, element or member that it is called on.
         note: why the support is not exact.
     """
 
@@ -263,6 +264,7 @@ class Builtin:
     deprecated: bool = False
     nan_ok: bool = False
     any_names: bool = False
+    changes: bool = False
     note: str = ""
 
     @property
@@ -287,26 +289,17 @@ class Builtin:
         return self.is_in(version) and version.generation not in self.undocumented
 
 
-@dataclass(frozen=True, slots=True)
-class ModuleVariable:
+class ModuleVariable(NamedTuple):
     """A constant that programs can read by name, e.g. `a_joint_default`."""
 
-    name: str
     value: float
     unit: str
-    module: str
-    source: str
 
 
-@dataclass(frozen=True, slots=True)
-class BuiltinArray:
-    """An indexable builtin name: reading `name[n]` calls the getter, assigning calls the setter.
-
-    Source: field use of `digital_out[2]=True` as a one-line program by an early Python client; undocumented.
-    """
+class BuiltinArray(NamedTuple):
+    """An indexable builtin name: reading `name[n]` calls the getter, assigning calls the setter."""
 
     name: str
     size: int
     getter: str
-    setter: str | None
-    source: str
+    setter: str

@@ -43,12 +43,12 @@ def nothing_runs(block: Block, source: Source) -> ScriptWarning | None:
     more = f" and {len(definitions) - _MOST_NAMES} more" if len(definitions) > _MOST_NAMES else ""
     call = f"run {first.name}()" if first.kind == "thread" else f"{first.name}()"
     message, hint = f"nothing runs: the text only defines {names}{more}", f"write {call} at its end"
-    return ScriptWarning(warnings.NOTHING_RUNS, message, name_of(first, source), source, hint)
+    return ScriptWarning(warnings.NOTHING_RUNS, message, name_of(first, source), hint)
 
 
-def owner(name: str, scope: FunctionScope) -> Variable:
-    """The variable of `name` in `scope`."""
-    return (scope if name in scope.locals else None), name
+def owner(name: str, scope: FunctionScope, qualifier: str | None = None) -> Variable:
+    """The variable of `name` in `scope`, there perhaps assigned to with `global` before it."""
+    return (scope if name in scope.locals and qualifier != "global" else None), name
 
 
 def read_expressions(statement: Statement) -> tuple[Expression, ...]:
@@ -89,7 +89,7 @@ def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Spa
                 name, span = statement.target.name, statement.target.span
             else:
                 continue
-            yield ((None, name) if statement.scope == "global" else owner(name, scope)), span
+            yield owner(name, scope, statement.scope), span
 
 
 def name_of(function: nodes.Function, source: Source) -> Span:
@@ -116,11 +116,11 @@ def _unused_variables(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             continue
         seen.add(variable)
         rule, kind = (warnings.UNUSED_GLOBAL, "global") if scope is None else (warnings.UNUSED_LOCAL, "local")
-        yield ScriptWarning(rule, f"{kind} variable '{name}' is never read", span, program.source)
+        yield ScriptWarning(rule, f"{kind} variable '{name}' is never read", span)
     for scope, name, span in _parameters(program):
         if (scope, name) not in read and not name.startswith("_"):
             message = f"parameter '{name}' of '{scope.name}' is never read"
-            yield ScriptWarning(warnings.UNUSED_PARAMETER, message, span, program.source)
+            yield ScriptWarning(warnings.UNUSED_PARAMETER, message, span)
 
 
 def _parameters(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, str, Span]]:
@@ -140,7 +140,7 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             runs[scope].add(callee)
         if not callee.is_thread:
             message = f"'{part.thread}' is run as a thread but defined with 'def'"
-            yield ScriptWarning(warnings.RUN_OF_DEF, message, part.span, program.source)
+            yield ScriptWarning(warnings.RUN_OF_DEF, message, part.span)
     reached: set[FunctionScope] = set()
     todo = program.scopes() if program.is_open else [program.main]
     while todo:
@@ -153,14 +153,14 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
         span = name_of(scope.node, program.source)
         if scope.parent is not None and scope.parent.functions[scope.name] is not scope:
             message = f"'{scope.name}' is defined twice here; the last definition is used"
-            yield ScriptWarning(warnings.DEFINED_TWICE, message, span, program.source)
+            yield ScriptWarning(warnings.DEFINED_TWICE, message, span)
         elif scope not in reached and not scope.name.startswith("_"):
             rule, what = (
                 (warnings.UNUSED_THREAD, "thread '{}' is never run")
                 if scope.is_thread
                 else (warnings.UNUSED_FUNCTION, "function '{}' is never called")
             )
-            yield ScriptWarning(rule, what.format(scope.name), span, program.source)
+            yield ScriptWarning(rule, what.format(scope.name), span)
 
 
 # --- hiding ----------------------------------------------------------------------------------------------
@@ -168,9 +168,7 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
 
 def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     def warning(what: str, name: str, span: Span) -> ScriptWarning:
-        return ScriptWarning(
-            warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span, program.source
-        )
+        return ScriptWarning(warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span)
 
     def is_builtin(name: str) -> bool:
         return name in catalogue or name in catalogue.variables or name in catalogue.arrays
@@ -185,9 +183,8 @@ def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator
             yield warning("parameter", name, span)
     for scope in program.functions:
         if scope.node is not None and is_builtin(scope.name):
-            yield warning(
-                scope.node.kind.replace("def", "function"), scope.name, name_of(scope.node, program.source)
-            )
+            kind = scope.node.kind.replace("def", "function")
+            yield warning(kind, scope.name, name_of(scope.node, program.source))
 
 
 # --- values ---------------------------------------------------------------------------------------------
@@ -199,14 +196,14 @@ def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[S
         for statement in all_statements(scope.body):
             if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
                 message, hint = _unused(statement.value)
-                yield ScriptWarning(warnings.UNUSED_VALUE, message, statement.span, program.source, hint)
+                yield ScriptWarning(warnings.UNUSED_VALUE, message, statement.span, hint)
     if "rpc_factory" in program.builtins or catalogue.methods:
         return
     for _, part in expressions_read(program):
         if isinstance(part, nodes.MethodCall):
             message = f"nothing in this program has a method '{part.method}'"
             hint = _FUNCTIONS.get(part.method)
-            yield ScriptWarning(warnings.CALL_WITHOUT_HANDLE, message, part.span, program.source, hint)
+            yield ScriptWarning(warnings.CALL_WITHOUT_HANDLE, message, part.span, hint)
 
 
 _FUNCTIONS = {

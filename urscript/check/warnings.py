@@ -6,7 +6,7 @@ A code never changes its meaning and is never reused.
 from typing import Final, NamedTuple
 
 from urscript.errors import ScriptError
-from urscript.source import Source, Span
+from urscript.source import Span
 
 
 class Rule(NamedTuple):
@@ -110,9 +110,9 @@ class ScriptWarning(ScriptError):
 
     kind = "Warning"
 
-    def __init__(self, rule: Rule, message: str, span: Span, source: Source, hint: str | None = None) -> None:
+    def __init__(self, rule: Rule, message: str, span: Span, hint: str | None = None) -> None:
         width = span.end_column - span.column if span.line == span.end_line else 1
-        super().__init__(message, line=span.line, column=span.column, width=width, source=source, hint=hint)
+        super().__init__(message, line=span.line, column=span.column, width=width, hint=hint)
         self.rule = rule
         self.span = span
 

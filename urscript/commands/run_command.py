@@ -84,6 +84,7 @@ def run(
         output.compile_error(with_advice(error))
         raise typer.Exit(ExitCode.FAILED) from None
     if warning := nothing_runs(parse(source), source):
+        warning.source = source
         output.warning(warning)
     n_lines = trace_lines if trace else 0
     if maker is None:

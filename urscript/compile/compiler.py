@@ -33,7 +33,6 @@ from urscript.compile.python_tree import (
     place,
     store,
 )
-from urscript.dialect import Dialect
 from urscript.errors import ScriptContextError
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
@@ -60,16 +59,14 @@ class CompiledCode:
     file_name: str
 
 
-def compile_resolved(
-    program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect, file_name: str
-) -> CompiledCode:
+def compile_resolved(program: ResolvedProgram, catalogue: Catalogue, file_name: str) -> CompiledCode:
     """Compile a program without errors to Python.
 
     Raises:
         ScriptContextError: Something is nested deeper than Python can; loops are limited before.
     """
     types = StaticTypes(program, catalogue)
-    expressions = ExpressionCompiler(program, types, catalogue, dialect)
+    expressions = ExpressionCompiler(program, types, catalogue)
     functions: list[ast.stmt] = []
     function_names: dict[str, str] = {}
     try:
@@ -255,10 +252,6 @@ class _FunctionCompiler:
             array = expressions.array(inner, scope)
             indices = [expressions.compile(index, scope) for index in target.indices]
             if array is not None:
-                if array.setter is None:
-                    raise ScriptContextError(f"'{array.name}' cannot be assigned to").locate(
-                        self._program.source, span.line, span.column
-                    )
                 made = call(f"b_{array.setter}", [load("_T", span), *indices, value], span)
                 return expression_statement(made, span)
             helper = "_store_item" if len(indices) == 1 else "_store_cell"

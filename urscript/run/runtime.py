@@ -28,9 +28,8 @@ from urscript.dialect import Dialect
 from urscript.errors import ScriptRuntimeError
 from urscript.run import variables
 from urscript.run.host import Host
-from urscript.run.metering import Meter, host_cost, pure_cost
+from urscript.run.metering import Meter, call_cost
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread, join
-from urscript.run.variables import same_kind
 from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Wait
 from urscript.values import (
     INT_MAX,
@@ -94,8 +93,6 @@ def div(a: Any, b: Any) -> Any:
     if (ta is float or ta is int) and (tb is float or tb is int):
         if b == 0:
             raise ScriptRuntimeError("division by zero")
-        if dialect.EXACT_DIVISION_GIVES_INT and ta is int and tb is int and a % b == 0:
-            return a // b
         return a / b
     return _elementwise("/", div, a, b)
 
@@ -106,8 +103,6 @@ def mod(a: Any, b: Any) -> Any:
     if (ta is float or ta is int) and (tb is float or tb is int):
         if b == 0:
             raise ScriptRuntimeError("modulo by zero")
-        if dialect.MODULO_SIGN == "divisor":
-            return a % b
         if ta is int and tb is int:
             rest = abs(a) % abs(b)
             return -rest if a < 0 else rest
@@ -151,7 +146,7 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
 
 def _is_scalar(value: Any) -> bool:
     """Whether an arithmetic operator takes it for a number."""
-    return is_number(value) or (dialect.BOOL_IN_ARITHMETIC and type(value) is bool)
+    return is_number(value) or type(value) is bool
 
 
 def _to_builtin(value: Any) -> Any:
@@ -229,11 +224,7 @@ def equal(a: Any, b: Any) -> bool:
         return bool(a == b)
     if is_number(a) and is_number(b):
         return bool(a == b)
-    if isinstance(a, list) and isinstance(b, list):
-        return len(a) == len(b) and all(map(equal, a, b))
-    if dialect.MIXED_TYPES_COMPARE or a is None or b is None or same_kind(ta, b):
-        return False
-    raise ScriptRuntimeError(f"cannot compare {values.a_type(a)} with {values.a_type(b)}")
+    return isinstance(a, list) and isinstance(b, list) and len(a) == len(b) and all(map(equal, a, b))
 
 
 def unequal(a: Any, b: Any) -> bool:
@@ -255,12 +246,12 @@ def _ordering(sign: str, compare: Callable[[Any, Any], bool]) -> Callable[[Any, 
 
 
 def truth(value: Any) -> bool:
-    """A condition: a bool, a number that is not 0, or a string that is not empty; see `dialect`."""
+    """A condition: a bool, a number that is not 0, or a string that is not empty."""
     if value is True or value is False:
         return bool(value)
     if type(value) is str:
         return value != ""
-    if dialect.NUMBER_AS_CONDITION and (type(value) is float or type(value) is int):
+    if type(value) is float or type(value) is int:
         return bool(value != 0)
     raise ScriptRuntimeError(f"a condition must be True or False, got {values.a_type(value)}")
 
@@ -348,7 +339,7 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
             bound[f"b_{name}"] = _fitted(name, function, catalogue, meter)
         elif name in PURE:
             pure = _without_thread(PURE[name], catalogue.fitting_of(name))
-            bound[f"b_{name}"] = meter.function(pure, pure_cost(name), name)
+            bound[f"b_{name}"] = meter.function(pure, call_cost(name, is_pure=True), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
     return bound
@@ -372,7 +363,7 @@ def _fitted(
     name: str, function: Callable[..., Any], catalogue: Catalogue, meter: Meter
 ) -> Callable[..., Any]:
     """A builtin of the host, charged for, that gets its arguments as it takes them."""
-    cost, builtin = host_cost(name), catalogue.lookup(name)
+    cost, builtin = call_cost(name, is_pure=False), catalogue.lookup(name)
     if builtin is None or not builtin.params:
         return meter.function(function, cost, name)
     fit = catalogue.fitting_of(name)
