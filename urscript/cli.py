@@ -74,7 +74,6 @@ def check(
 
 
 def _codes(words: Iterable[str]) -> frozenset[str]:
-    """The codes in the values of `--ignore`."""
     codes = frozenset(code.strip().upper() for word in words for code in word.split(","))
     unknown = codes - {rule.code for rule in RULES}
     if unknown:
@@ -121,7 +120,8 @@ def fmt(
             if changes and not as_json:
                 typer.echo(f"{source.name}: not in canonical layout")
         elif file == support.STANDARD_INPUT:
-            _write_bytes(formatted)
+            sys.stdout.buffer.write(formatted.encode("latin-1"))
+            sys.stdout.flush()
         elif changes:
             _write(file, formatted)
     if as_json:
@@ -142,12 +142,6 @@ def _write(file: Path, text: str) -> None:
     except OSError as error:
         typer.echo(f"cannot write {file}: {error.strerror}", err=True)
         raise typer.Exit(ExitCode.WRONG_USAGE) from None
-
-
-def _write_bytes(text: str) -> None:
-    """Program text on standard output, byte for byte."""
-    sys.stdout.buffer.write(text.encode("latin-1"))
-    sys.stdout.flush()
 
 
 # --- all commands ----------------------------------------------------------------------------------------

@@ -47,7 +47,8 @@ def format_program(source: Source) -> str:
     """
     tree = parse(source)
     try:
-        formatted = _render(_Layout(source.text).lines(read_logical_lines(source)))
+        logical_lines = _logical_lines(_concrete_parser().parse(source.text))
+        formatted = _render(_Layout(source.text).lines(logical_lines))
         unchanged = same_tree(parse(Source(formatted, source.name)), tree)
     except RecursionError:
         message = "the program is nested too deeply"
@@ -74,15 +75,14 @@ class _Layout:
         self._lines: list[_PhysicalLine] = []
         self._end = 0
 
-    def lines(self, logical_lines: list[LogicalLine]) -> list[_PhysicalLine]:
+    def lines(self, logical_lines: Iterator[LogicalLine]) -> list[_PhysicalLine]:
         """The lines of a whole program."""
         for logical in logical_lines:
-            first = logical.tokens[0]
-            for comment in self._comments_until(first.start):
-                self._add_comment(
-                    comment, INDENT * _comment_level(comment, logical, self._column(first.start))
-                )
-            self._keep_blank_line(first.start)
+            start = logical.tokens[0].start
+            column = start - self._text.rfind("\n", 0, start)
+            for comment in self._comments_until(start):
+                self._add_comment(comment, INDENT * _comment_level(comment, logical, column))
+            self._keep_blank_line(start)
             self._add(logical)
         for comment in self._comments_until(len(self._text)):
             self._add_comment(comment, "")
@@ -91,11 +91,7 @@ class _Layout:
     def _comments_until(self, position: int) -> list[Comment]:
         return read_comments(self._text, self._end, position)
 
-    def _column(self, position: int) -> int:
-        return position - self._text.rfind("\n", 0, position)
-
     def _add_comment(self, comment: Comment, indent: str) -> None:
-        """Add a comment after the line before it, or on its own line."""
         if comment.follows_code:
             self._lines[-1].comment = comment.text
         else:
@@ -293,11 +289,6 @@ class LogicalLine(NamedTuple):
 
     level: int
     tokens: tuple[RuleToken, ...]
-
-
-def read_logical_lines(source: Source) -> list[LogicalLine]:
-    """The logical lines of a program that `parser.parse` accepts."""
-    return list(_logical_lines(_concrete_parser().parse(source.text)))
 
 
 def read_comments(text: str, start: int, end: int) -> list[Comment]:

@@ -17,9 +17,6 @@ import urscript.commands.run_command
 from ur_emulator.machine.models.robots import ROBOTS
 from ur_emulator.script_robots import MAKER
 from urscript.cli import app
-from urscript.commands.run_command import LineTracer
-from urscript.program import compile_program
-from urscript.recording_host import RecordingHost
 from urscript.robot import find_makers
 
 ROOT = Path(__file__).parents[2]
@@ -368,17 +365,16 @@ end
 """
 
 
-def traced(text, limit=1000):
-    program = compile_program(text)
-    host = RecordingHost()
-    lines, stops = [], []
-    with LineTracer(program, lambda it: lines.append((host.cycle, *it)), lambda: stops.append(1), limit):
-        host.run(program, max_cycles=50)
-    return lines, stops
+def traced(run, text, *words):
+    result = run(text, "--robot", "none", "--quiet", "--trace", *words)
+    shown = [
+        re.fullmatch(r" *(\d+)  (\w+):(\d+): (.*)", line).groups() for line in result.stdout.splitlines()
+    ]
+    return [(int(cycle), thread, int(line), text) for cycle, thread, line, text in shown], result.stderr
 
 
-def test_every_line_is_shown_once_before_it_is_executed_with_cycle_and_thread():
-    lines, stops = traced(PROGRAM)
+def test_every_line_is_shown_once_before_it_is_executed_with_cycle_and_thread(run):
+    lines, stops = traced(run, PROGRAM)
     assert lines == [
         (0, "p", 1, "def p():"),
         (0, "p", 10, "h = run t()"),
@@ -393,31 +389,29 @@ def test_every_line_is_shown_once_before_it_is_executed_with_cycle_and_thread():
         (1, "p", 16, "elif a < b:"),
         (1, "p", 17, "kill h"),
     ]
-    assert stops == []
+    assert stops == ""
 
 
-def test_a_loop_is_shown_round_by_round():
-    lines, _ = traced("i = 0\nwhile i < 2:\n  i = i + 1\nend")
+def test_a_loop_is_shown_round_by_round(run):
+    lines, _ = traced(run, "i = 0\nwhile i < 2:\n  i = i + 1\nend")
     assert [line for _, _, line, _ in lines] == [1, 2, 3, 2, 3, 2]
 
 
-def test_an_endless_loop_is_shown_up_to_the_limit_and_runs_on():
-    lines, stops = traced("while True:\n  sync()\nend", limit=7)
+def test_an_endless_loop_is_shown_up_to_the_limit_and_runs_on(run):
+    lines, stops = traced(run, "while True:\n  sync()\nend", "--trace-lines", "7", "--limit", "1")
     assert len(lines) == 7
-    assert stops == [1]
+    assert stops.startswith("trace stops after 7 lines (--trace-lines)\nstopped: still running after 1 s")
 
 
 @pytest.mark.parametrize("text", ["halt", "x = [1]\ny = x[1]", "while True:\nend"])
-def test_the_tracing_of_others_is_as_before_whatever_happens(text):
+def test_the_tracing_of_others_is_as_before_whatever_happens(run, text):
     before = sys.gettrace()
-    traced(text, limit=5)
+    run(text, "--robot", "none", "--trace", "--trace-lines", "5")
     assert sys.gettrace() is before
 
 
-def test_run_trace_mixes_lines_and_effects_in_their_order(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("a.script").write_text('textmsg("\u00e4")\nset_flag(0, True)\n', encoding="utf-8")
-    result = CliRunner().invoke(app, ["run", "--robot", "none", "--trace", "a.script"])
+def test_run_trace_mixes_lines_and_effects_in_their_order(run):
+    result = run('textmsg("\u00e4")\nset_flag(0, True)\n', "--robot", "none", "--trace")
     assert result.stdout == (
         '     0  textmsg:1: textmsg("\u00e4")\n\u00e4\n'
         "     0  textmsg:2: set_flag(0, True)\n    0.000 s  textmsg: set_flag(0, True)\n"

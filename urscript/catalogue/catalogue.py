@@ -141,7 +141,6 @@ def _value(text: str) -> Any:
 
 
 def _settings(lines: list[str]) -> dict[str, Any]:
-    """The fields that the lines below the summary give."""
     fields: dict[str, Any] = {}
     for line in lines:
         key, _, rest = line.partition(" ")

@@ -227,7 +227,6 @@ def _has_effect(value: Expression) -> bool:
 
 
 def _unused(value: Expression) -> tuple[str, str | None]:
-    """Message and hint for an unused value."""
     match value:
         case nodes.BinaryOperation(operator="==", left=nodes.Name(name=name)):
             return "the result of this comparison is not used", f"write {name} = ... to assign"

@@ -314,8 +314,6 @@ class MoveWatch:
 
 @dataclass(frozen=True, slots=True)
 class _WatchedProgram(CompiledProgram):
-    """A program that runs on a watched host."""
-
     watch: MoveWatch
 
     def start(self, host: Host, work: WorkBudget | None = None) -> RunningProgram:
@@ -323,8 +321,6 @@ class _WatchedProgram(CompiledProgram):
 
 
 class _WatchedHost:
-    """A host whose motion builtins are watched."""
-
     def __init__(self, host: Host, watch: MoveWatch) -> None:
         self.step_time = host.step_time
         self.textmsg = host.textmsg

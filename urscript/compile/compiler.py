@@ -14,7 +14,7 @@ import ast
 import marshal
 from array import array
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import CodeType
 from typing import Any, Final, NamedTuple
@@ -82,9 +82,8 @@ def compile_resolved(program: ResolvedProgram, catalogue: Catalogue, file_name: 
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return CompiledCode(
-        marshal.dumps(code), expressions.constants, function_names, _position_tables(code), file_name
-    )
+    positions = {item.co_name: _table(item) for item in code.co_consts if isinstance(item, CodeType)}
+    return CompiledCode(marshal.dumps(code), expressions.constants, function_names, positions, file_name)
 
 
 class _FunctionCompiler:
@@ -313,7 +312,6 @@ class _Cost(NamedTuple):
 
 
 def _block_cost(block: Block, types: StaticTypes, scope: FunctionScope) -> _Cost:
-    """The cost of `block` in the function of `scope`."""
     statements = tenths = 0
     for statement in block:
         if isinstance(statement, nodes.If):
@@ -396,17 +394,6 @@ class PositionTable:
         """Line and column of the instruction at byte `offset`."""
         i = bisect_right(self.starts, offset // _WORD) - 1
         return (self.lines[i], self.columns[i]) if i >= 0 else (1, 1)
-
-
-def _position_tables(code: CodeType) -> dict[str, PositionTable]:
-    """The table of each function that `code` defines, by the name of the function."""
-    return {function.co_name: _table(function) for function in _functions(code)}
-
-
-def _functions(code: CodeType) -> Iterator[CodeType]:
-    for value in code.co_consts:
-        if isinstance(value, CodeType):
-            yield value
 
 
 def _table(code: CodeType) -> PositionTable:

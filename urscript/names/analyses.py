@@ -91,7 +91,7 @@ class _AssignmentAnalysis:
         return set.intersection(*map(set, outcomes))
 
     def assign(self, names: Iterable[str], newly_assigned: list[str]) -> None:
-        """Mark `names` as assigned; append those that were not to `newly_assigned`."""
+        """Mark `names` as assigned; append the new ones to `newly_assigned`."""
         for name in names:
             if name not in self.assigned:
                 self.assigned.add(name)

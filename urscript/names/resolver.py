@@ -136,7 +136,6 @@ class _Resolver:
         self._block(scope.body, scope, loops=0)
 
     def _block(self, block: Block, scope: FunctionScope, loops: int) -> None:
-        """Look up the names of a block inside `loops` loops."""
         for statement in block:
             self._statement(statement, scope, loops)
             inside = loops + isinstance(statement, nodes.While)
