@@ -35,9 +35,6 @@ app.command(
 )(run)
 
 
-# --- check -----------------------------------------------------------------------------------------------
-
-
 @app.command(
     epilog=examples(
         "urscript check my_program.script",
@@ -65,7 +62,7 @@ def check(
         in_order = sorted([*errors, *kept], key=lambda problem: (problem.line, problem.column))
         found += [(str(file), problem) for problem in in_order]
     if as_json:
-        support.echo_json(diagnostics=[support.diagnostic_of(error, file)._asdict() for file, error in found])
+        support.echo_json(diagnostics=[support.diagnostic_of(error, file) for file, error in found])
     else:
         for _, error in found:
             typer.echo(as_utf8(error.render()))
@@ -80,9 +77,6 @@ def _codes(words: Iterable[str]) -> frozenset[str]:
         known = f"{RULES[0].code} to {RULES[-1].code}"
         raise typer.BadParameter(f"no warning has the code {', '.join(sorted(unknown))}; there are {known}")
     return codes
-
-
-# --- fmt -------------------------------------------------------------------------------------------------
 
 
 @app.command(
@@ -101,7 +95,7 @@ def fmt(
 ) -> None:
     """Put programs into the canonical layout; comments and labels stay, and what the program does."""
     reports: list[dict[str, Any]] = []
-    diagnostics: list[support.Diagnostic] = []
+    diagnostics: list[dict[str, Any]] = []
     for file in files:
         source = Source(support.read_program(file), support.shown_name(file))
         try:
@@ -125,7 +119,7 @@ def fmt(
         elif changes:
             _write(file, formatted)
     if as_json:
-        support.echo_json(files=reports, diagnostics=[item._asdict() for item in diagnostics])
+        support.echo_json(files=reports, diagnostics=diagnostics)
     if diagnostics or (only_check and any(report["changes"] for report in reports)):
         raise typer.Exit(ExitCode.FAILED)
 
@@ -142,9 +136,6 @@ def _write(file: Path, text: str) -> None:
     except OSError as error:
         typer.echo(f"cannot write {file}: {error.strerror}", err=True)
         raise typer.Exit(ExitCode.WRONG_USAGE) from None
-
-
-# --- all commands ----------------------------------------------------------------------------------------
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from urscript.syntax.nodes import same_tree
 from urscript.syntax.parser import make_parser, parse
 
 if TYPE_CHECKING:
-    from lark import Lark, Token, Tree
+    from lark import Lark, Tree
 
 
 _OPERATORS: Final = frozenset({"OR", "XOR", "AND", "PLUS", "MINUS", "TIMES", "COMPARE"})
@@ -97,7 +97,7 @@ class _Layout:
         else:
             self._keep_blank_line(comment.position)
             self._lines.append(_PhysicalLine(indent, comment=comment.text))
-        self._end = comment.end
+        self._end = comment.position + len(comment.text)
 
     def _keep_blank_line(self, position: int) -> None:
         if self._lines and self._text.count("\n", self._end, position) > 1:
@@ -152,9 +152,9 @@ def _comment_level(comment: Comment, logical: LogicalLine, column: int) -> int:
 
 def _spelling(token: RuleToken) -> str:
     if token.kind == "LABEL":
-        text = token.token[1:].strip(BLANKS)
+        text = token.text[1:].strip(BLANKS)
         return f"$ {text}" if text else "$"
-    return str(token.token)
+    return token.text
 
 
 def _is_sign(token: RuleToken) -> bool:
@@ -256,32 +256,22 @@ class Comment(NamedTuple):
     column: int
     follows_code: bool
 
-    @property
-    def end(self) -> int:
-        """The position after it."""
-        return self.position + len(self.text)
-
 
 class RuleToken(NamedTuple):
-    """One token and the rule of the grammar that it belongs to."""
+    """One token.
 
-    token: Token
+    Attributes:
+        kind: Its name in the grammar.
+        start: Characters of the source before it.
+        end: The position after it.
+        rule: The rule of the grammar that it belongs to.
+    """
+
+    kind: str
+    text: str
+    start: int
+    end: int
     rule: str
-
-    @property
-    def kind(self) -> str:
-        """The name of the token in the grammar."""
-        return self.token.type
-
-    @property
-    def start(self) -> int:
-        """Characters of the text before it."""
-        return self.token.start_pos or 0
-
-    @property
-    def end(self) -> int:
-        """The position after it."""
-        return self.token.end_pos or 0
 
 
 class LogicalLine(NamedTuple):
@@ -341,4 +331,4 @@ def _tokens(item: Any, parent: str) -> Iterator[RuleToken]:
         if hasattr(part, "data"):
             stack.extend((str(part.data), inner) for inner in reversed(part.children))
         elif part is not None:
-            yield RuleToken(part, rule)
+            yield RuleToken(part.type, str(part), part.start_pos, part.end_pos, rule)

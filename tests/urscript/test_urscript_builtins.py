@@ -25,7 +25,7 @@ ROWS = catalogue_for("5.25")
 
 
 def call(name: str, *args: Any) -> Any:
-    return PURE[name](*ROWS.fitting_of(name)(args))
+    return PURE[name](*ROWS.fittings[name](args))
 
 
 def refusal(name: str, *args: Any) -> str:

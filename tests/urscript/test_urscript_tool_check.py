@@ -142,7 +142,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "urscript-tool.md"
 def test_the_table_of_warnings_is_that_of_the_rules():
     lines = PAGE.read_text(encoding="utf-8").splitlines()
     table = [line for line in lines if re.match(r"\| W\d+ \|", line)]
-    assert table == [f"| {rule.code} | {rule.meaning} | {rule.reason} |" for rule in RULES]
+    assert [row.split(" | ")[:2] for row in table] == [[f"| {rule.code}", rule.meaning] for rule in RULES]
 
 
 # --- the command -----------------------------------------------------------------------------------------

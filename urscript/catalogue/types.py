@@ -79,8 +79,7 @@ LAST_CB3 = Version(3, 15)
 """The last minor release of the CB3 series. Source: the maker's download pages, manuals up to 3.15.8."""
 
 
-@dataclass(frozen=True, slots=True)
-class PerGeneration:
+class PerGeneration(NamedTuple):
     """One release for each generation; None where it does not apply."""
 
     cb3: Version | None = None
@@ -89,9 +88,7 @@ class PerGeneration:
 
     def get(self, generation: Generation) -> Version | None:
         """The release of that generation, or None."""
-        if generation is Generation.CB3:
-            return self.cb3
-        return self.e_series if generation is Generation.E_SERIES else self.polyscope_x
+        return self[list(Generation).index(generation)]
 
     def __str__(self) -> str:
         known = ((g, self.get(g)) for g in Generation)
@@ -241,7 +238,6 @@ class Builtin:
         until: first release that no longer has this form.
         support: how well this box models it.
         summary: one line.
-        source: the document or observation the row rests on.
         undocumented: generations whose controllers know the name although their manual does not list it.
         deprecated: the manual advises a successor.
         nan_ok: NaN and infinity do no harm as arguments (sums, texts, registers); else they are errors.
@@ -259,7 +255,6 @@ class Builtin:
     until: PerGeneration = NEVER
     support: Support = Support.DECLARED_ONLY
     summary: str = ""
-    source: str = ""
     undocumented: frozenset[Generation] = frozenset()
     deprecated: bool = False
     nan_ok: bool = False

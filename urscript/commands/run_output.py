@@ -157,7 +157,7 @@ class JsonOutput:
             joints=run and list(run.joints),
             tcp_pose=run and list(run.tcp_pose),
             events=self._events,
-            diagnostics=[diagnostic_of(error, self._file)._asdict() for error in self._errors],
+            diagnostics=[diagnostic_of(error, self._file) for error in self._errors],
         )
 
 

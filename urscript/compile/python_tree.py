@@ -11,13 +11,8 @@ from urscript.source import Span
 
 
 def place(span: Span) -> dict[str, Any]:
-    """The position attributes of a Python node."""
-    return {
-        "lineno": span.line,
-        "col_offset": span.column - 1,
-        "end_lineno": span.end_line,
-        "end_col_offset": span.end_column - 1,
-    }
+    """The position attributes of a Python node; nobody asks for its end."""
+    return {"lineno": span.line, "col_offset": span.column - 1}
 
 
 def load(name: str, span: Span) -> ast.Name:
@@ -69,16 +64,12 @@ def ask(span: Span) -> ast.If:
 
 def ask_after(value: ast.expr) -> ast.expr:
     """`(value, _b < 0 and (yield _OUT_OF_UNITS))[0]`: `value`, then the question of `ask`."""
-    span = _span_of(value)
+    line, column = value.lineno, value.col_offset + 1
+    span = Span(line, column, line, column)
     at = place(span)
     wait = ast.BoolOp(ast.And(), [_is_used_up(load("_b", span), span), _wait(span)], **at)
     both = ast.Tuple([value, wait], ast.Load(), **at)
     return ast.Subscript(both, constant(0, span), ast.Load(), **at)
-
-
-def _span_of(node: ast.expr) -> Span:
-    end_line, end_column = node.end_lineno or node.lineno, node.end_col_offset or node.col_offset
-    return Span(node.lineno, node.col_offset + 1, end_line, end_column + 1)
 
 
 def _ask(left: ast.expr, span: Span) -> ast.If:

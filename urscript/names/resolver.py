@@ -8,7 +8,7 @@ function may be used before its definition; names in branches that never run cou
 All errors of a program are collected, the first one in the text is raised.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import Final
 
 from urscript.catalogue import Catalogue
@@ -204,9 +204,7 @@ class _Resolver:
             hint = f"'{name}' is a function, call it as {name}(...)"
             self.add(ScriptNameError(name, hint=hint), span)
         else:
-            self._unknown(
-                name, span, lambda: [*scope.locals, *self._program.globals, *self._catalogue.variables]
-            )
+            self._unknown(name, span, [*scope.locals, *self._program.globals])
 
     def _call(self, call: nodes.Call, scope: FunctionScope, runs_in: FunctionScope) -> None:
         if not self._argument_order(call.arguments):
@@ -221,9 +219,7 @@ class _Resolver:
             return
         builtin = self._catalogue.lookup(call.function)
         if builtin is None:
-            self._unknown(
-                call.function, call.span, lambda: [*scope.visible_functions(), *self._catalogue.names]
-            )
+            self._unknown(call.function, call.span, scope.visible_functions())
             return
         self._program.builtins.add(call.function)
         runs_in.blocks = runs_in.blocks or builtin.may_wait
@@ -235,7 +231,7 @@ class _Resolver:
     def _run(self, run: nodes.RunThread, scope: FunctionScope) -> None:
         callee = scope.find_function(run.thread)
         if callee is None:
-            self._unknown(run.thread, run.span, lambda: list(scope.visible_functions()))
+            self._unknown(run.thread, run.span, scope.visible_functions())
         elif callee.node is not None and callee.node.parameters:
             self.add(ScriptTypeError(f"cannot run {run.thread}: a thread takes no parameters"), run.span)
 
@@ -250,8 +246,8 @@ class _Resolver:
                 return False
         return True
 
-    def _unknown(self, name: str, span: Span, known: Callable[[], list[str]]) -> None:
-        """Add an unknown name, with a hint; `known` returns the names that may have been meant."""
+    def _unknown(self, name: str, span: Span, own: Iterable[str]) -> None:
+        """Add an unknown name, with a hint; `own` are those of the program that may have been meant."""
         self._n_unknown += 1
         hint = None
         # The searches are slow, so there is a limit.
@@ -259,7 +255,7 @@ class _Resolver:
             releases, version = self._catalogue.first_releases(name), self._catalogue.version
             if releases != NEVER:
                 hint = f"known since {releases}; this is {version.generation.value} {version}"
-            elif alike := self._catalogue.suggest(name, known()):
+            elif alike := self._catalogue.suggest(name, own):
                 hint = f"did you mean '{alike}'?"
         name_only = Span(span.line, span.column, span.line, span.column + len(name))
         self.add(ScriptNameError(name, hint=hint), name_only)

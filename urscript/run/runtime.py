@@ -338,7 +338,7 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
         if function is not None:
             bound[f"b_{name}"] = _fitted(name, function, catalogue, meter)
         elif name in PURE:
-            pure = _without_thread(PURE[name], catalogue.fitting_of(name))
+            pure = _without_thread(PURE[name], catalogue.fittings[name])
             bound[f"b_{name}"] = meter.function(pure, call_cost(name, is_pure=True), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
@@ -366,7 +366,7 @@ def _fitted(
     cost, builtin = call_cost(name, is_pure=False), catalogue.lookup(name)
     if builtin is None or not builtin.params:
         return meter.function(function, cost, name)
-    fit = catalogue.fitting_of(name)
+    fit = catalogue.fittings[name]
     if all(param.type in FIXED_SIZE for param in builtin.params):
         return meter.fitted(function, cost, fit)
 

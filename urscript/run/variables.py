@@ -415,6 +415,7 @@ def _changed(target: list[Any], items: list[Any], result: Any = None) -> Changed
 
 def _grown(target: list[Any], method: str, index: int, items: list[Any]) -> Changed:
     """`target` with `items` before the element `index`."""
+    _place(method, index, len(target))
     capacity = capacity_of(target)
     if len(target) + len(items) > capacity:
         raise ScriptRuntimeError(
@@ -430,18 +431,6 @@ def _grown(target: list[Any], method: str, index: int, items: list[Any]) -> Chan
     return _changed(target, grown)
 
 
-def _append(target: list[Any], value: Any) -> Changed:
-    return _grown(target, "append", len(target), [value])
-
-
-def _extend(target: list[Any], items: list[Any]) -> Changed:
-    return _grown(target, "extend", len(target), items)
-
-
-def _insert(target: list[Any], index: int, value: Any) -> Changed:
-    return _grown(target, "insert", _place("insert", index, len(target)), [value])
-
-
 def _pop(target: list[Any]) -> Changed:
     if not target:
         raise ScriptRuntimeError("pop: the list is empty")
@@ -453,10 +442,6 @@ def _remove(target: list[Any], index: int) -> Changed:
     rest = target.copy()
     del rest[place]
     return _changed(target, rest)
-
-
-def _clear(target: list[Any]) -> Changed:
-    return _changed(target, [])
 
 
 def _slice(target: list[Any], begin: int, end: int) -> list[Any]:
@@ -491,25 +476,21 @@ def _to_string(target: Any) -> str:
     return text[: values.TEXT_LIMIT - len(end)] + end
 
 
-def _length(target: Struct) -> int:
-    return len(target.members)
-
-
 _FITTINGS: Final = {key: compile_fitting(key[1], row.params) for row in METHODS for key in (method_key(row),)}
 
 _FUNCTIONS: Final[dict[tuple[str, str], Callable[..., Any]]] = {
-    ("list", "append"): _append,
-    ("list", "extend"): _extend,
-    ("list", "insert"): _insert,
+    ("list", "append"): lambda target, value: _grown(target, "append", len(target), [value]),
+    ("list", "extend"): lambda target, items: _grown(target, "extend", len(target), items),
+    ("list", "insert"): lambda target, index, value: _grown(target, "insert", index, [value]),
     ("list", "pop"): _pop,
     ("list", "remove"): _remove,
-    ("list", "clear"): _clear,
+    ("list", "clear"): lambda target: _changed(target, []),
     ("list", "slice"): _slice,
     ("list", "length"): len,
     ("list", "capacity"): capacity_of,
     ("list", "excess_capacity"): lambda target: capacity_of(target) - len(target),
     ("list", "to_string"): _to_string,
-    ("struct", "length"): _length,
+    ("struct", "length"): lambda target: len(target.members),
     ("struct", "to_string"): _to_string,
     ("matrix", "get_row"): _get_row,
     ("matrix", "get_column"): _get_column,
