@@ -76,7 +76,6 @@ class _Layout:
         self._end = 0
 
     def lines(self, logical_lines: Iterator[LogicalLine]) -> list[_PhysicalLine]:
-        """The lines of a whole program."""
         for logical in logical_lines:
             start = logical.tokens[0].start
             column = start - self._text.rfind("\n", 0, start)
@@ -179,7 +178,6 @@ def _may_break(before: RuleToken, token: RuleToken) -> bool:
 
 
 def _needs_space(before: RuleToken, token: RuleToken) -> bool:
-    """Whether a space separates two tokens of a line."""
     kind = token.kind
     if kind == "DOT":
         return before.kind in _NUMBERS  # or the dot would become part of the number

@@ -136,7 +136,7 @@ def _settings(lines: list[str]) -> dict[str, Any]:
     for line in lines:
         key, _, rest = line.partition(" ")
         if key in ("since", "until"):
-            fields[key] = types.releases(*(None if release == "-" else release for release in rest.split()))
+            fields[key] = PerGeneration(*(None if it == "-" else Version.of(it) for it in rest.split()))
         elif key == "undocumented":
             fields[key] = frozenset(map(Generation, rest.split(", ")))
         elif key != "source":

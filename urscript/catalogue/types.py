@@ -95,16 +95,8 @@ class PerGeneration(NamedTuple):
         return ", ".join(f"{g.value} {version}" for g, version in known if version is not None) or "-"
 
 
-def releases(
-    cb3: str | None = None, e_series: str | None = None, polyscope_x: str | None = None
-) -> PerGeneration:
-    """Short form for tables: `releases("3.0", "5.0", "10.0")`."""
-    numbers = [None if text is None else Version.of(text) for text in (cb3, e_series, polyscope_x)]
-    return PerGeneration(*numbers)
-
-
 NEVER = PerGeneration()
-EVERYWHERE = releases("3.0", "5.0", "10.0")
+EVERYWHERE = PerGeneration(Version(3, 0), Version(5, 0), Version(10, 0))
 
 
 class TimeClass(Enum):

@@ -122,7 +122,6 @@ def _refused(builtin: Builtin, param: Param, known: KnownValue) -> str | None:
 
 
 def _known_value(expression: Expression) -> KnownValue | None:
-    """What is known of an expression, or None."""
     match expression:
         case (
             nodes.IntLiteral(value=value)
@@ -162,12 +161,8 @@ _TOOL_SPEED: Final = 10.0
 """More than twice what the fastest arm does with its tool [m/s]."""
 
 
-class _Excess(NamedTuple):
-    """A value that is too large for its unit: the warning, what is too large, what to write instead."""
-
-    rule: warnings.Rule
-    text: str
-    hint: str
+_Excess = tuple[warnings.Rule, str, str]
+"""Of a value that is too large for its unit: the warning, what is too large, what to write instead."""
 
 
 def _wrong_unit(param: Param, value: Any) -> _Excess | None:
@@ -226,8 +221,8 @@ def _too_long(lengths: Sequence[float]) -> _Excess | None:
 
 
 def _in_degrees(text: str, value: float) -> _Excess:
-    return _Excess(warnings.DEGREES, text, f"write d2r({value:g}) if degrees are meant")
+    return warnings.DEGREES, text, f"write d2r({value:g}) if degrees are meant"
 
 
 def _in_millimetres(text: str, value: float) -> _Excess:
-    return _Excess(warnings.MILLIMETRES, text, f"write {value / 1000:g} if millimetres are meant")
+    return warnings.MILLIMETRES, text, f"write {value / 1000:g} if millimetres are meant"

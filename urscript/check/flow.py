@@ -91,9 +91,8 @@ def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> b
         return True
     changes = any(isinstance(item, (nodes.Assign, nodes.Kill)) for item in statements)
     leaves_at_once = any(map(_end_of, loop.body))
-    return (
-        not changes and not leaves_at_once and not any(_has_effect(part, scope, catalogue) for part in parts)
-    )
+    has_effect = any(_has_effect(part, scope, catalogue) for part in parts)
+    return not (changes or leaves_at_once or has_effect)
 
 
 def _is_pause(statement: Statement) -> bool:

@@ -265,20 +265,21 @@ def trailing_comma(problem: Problem) -> Advice | None:
     return advice_at(comma, "nothing follows this ','", "remove it", replacement(comma, " "))
 
 
+_NOT_IN_BRACKETS: Final = {
+    ":": ("slices x[a:b] and no pairs a: b", "write a while loop"),
+    "for": ("list comprehensions", "write a while loop"),
+    "if": ("conditional expressions", "write if ...: x = a else: x = b end"),
+    "else": ("conditional expressions", "write if ...: x = a else: x = b end"),
+}
+
+
 def inside_brackets(problem: Problem) -> Advice | None:
     """`x[1:2]`, `[i for i in x]`: what is not allowed in brackets."""
     token = problem.token
     if problem.starts_line or not problem.open_brackets() or not problem.accepts("COMMA", "RPAR", "RSQB"):
         return None
-    if token.text == ":":
-        return advice_at(token, "URScript has no slices x[a:b] and no pairs a: b", "write a while loop")
-    if token.text == "for":
-        return advice_at(token, "URScript has no list comprehensions", "write a while loop")
-    if token.text in ("if", "else"):
-        return advice_at(
-            token, "URScript has no conditional expressions", "write if ...: x = a else: x = b end"
-        )
-    return None
+    what, hint = _NOT_IN_BRACKETS.get(token.text, ("", ""))
+    return advice_at(token, f"URScript has no {what}", hint) if what else None
 
 
 # --- blocks; the indentation shows where an `end` is missing or superfluous -----------------------------

@@ -9,14 +9,7 @@ from urscript.check.warnings import ScriptWarning
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import (
-    Block,
-    Expression,
-    Statement,
-    all_expressions,
-    all_statements,
-    own_expressions,
-)
+from urscript.syntax.nodes import Block, Expression, Statement
 
 _MOST_NAMES: Final = 5
 Variable = tuple[FunctionScope | None, str]
@@ -54,7 +47,7 @@ def owner(name: str, scope: FunctionScope, qualifier: str | None = None) -> Vari
 def read_expressions(statement: Statement) -> tuple[Expression, ...]:
     """The expressions a statement reads: storing into `x[i]` reads `i`, not `x`."""
     if not isinstance(statement, nodes.Assign):
-        return own_expressions(statement)
+        return nodes.own_expressions(statement)
     parts: list[Expression] = [statement.value]
     target: Expression = statement.target
     while isinstance(target, (nodes.Subscript, nodes.Attribute)):
@@ -67,21 +60,21 @@ def read_expressions(statement: Statement) -> tuple[Expression, ...]:
 def expressions_read(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, Expression]]:
     """Every expression that is read, with all its parts, and the scope of its names."""
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             for expression in read_expressions(statement):
-                for part in all_expressions(expression):
+                for part in nodes.all_expressions(expression):
                     yield scope, part
         if scope.parent is not None and scope.node is not None:
             for parameter in scope.node.parameters:
                 if parameter.default is not None:
-                    for part in all_expressions(parameter.default):
+                    for part in nodes.all_expressions(parameter.default):
                         yield scope.default_scope(), part
 
 
 def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Span]]:
     """Every declaration of a variable and assignment to a whole variable, without parameters."""
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.Declaration):
                 name, span = statement.name, statement.span
                 span = span._replace(line=span.end_line, column=span.end_column - len(name))
@@ -167,24 +160,21 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
 
 
 def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
-    def warning(what: str, name: str, span: Span) -> ScriptWarning:
-        return ScriptWarning(warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span)
-
-    def is_builtin(name: str) -> bool:
-        return name in catalogue or name in catalogue.variables or name in catalogue.arrays
-
-    seen: set[Variable] = {(scope, name) for scope, name, _ in _parameters(program)}
+    parameters = list(_parameters(program))
+    seen: set[Variable] = {(scope, name) for scope, name, _ in parameters}
+    hiding: list[tuple[str, str, Span]] = []
     for variable, span in declared_variables(program):
-        if variable not in seen and is_builtin(variable[1]):
+        if variable not in seen:
             seen.add(variable)
-            yield warning("variable", variable[1], span)
-    for _, name, span in _parameters(program):
-        if is_builtin(name):
-            yield warning("parameter", name, span)
+            hiding.append(("variable", variable[1], span))
+    hiding += (("parameter", name, span) for _, name, span in parameters)
     for scope in program.functions:
-        if scope.node is not None and is_builtin(scope.name):
-            kind = scope.node.kind.replace("def", "function")
-            yield warning(kind, scope.name, name_of(scope.node, program.source))
+        assert scope.node is not None
+        what = scope.node.kind.replace("def", "function")
+        hiding.append((what, scope.name, name_of(scope.node, program.source)))
+    for what, name, span in hiding:
+        if name in catalogue or name in catalogue.variables or name in catalogue.arrays:
+            yield ScriptWarning(warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span)
 
 
 # --- values ---------------------------------------------------------------------------------------------
@@ -193,7 +183,7 @@ def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator
 def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order."""
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
                 message, hint = _unused(statement.value)
                 yield ScriptWarning(warnings.UNUSED_VALUE, message, statement.span, hint)

@@ -45,12 +45,10 @@ class TextOutput:
         self._quiet = quiet
 
     def compile_error(self, error: ScriptError) -> None:
-        """Print the error of a program that does not compile, with its place."""
+        """Print the error of a program that does not compile, or a warning about one, with its place."""
         show(error.render(), error=True)
 
-    def warning(self, warning: ScriptError) -> None:
-        """Print what is probably a mistake, with its place; the program runs."""
-        show(warning.render(), error=True)
+    warning = compile_error
 
     def report(self, report: Report) -> None:
         """Print a text unchanged, errors with their place, everything else with its time."""

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from urscript.catalogue import Catalogue
 from urscript.catalogue.costs import EXPENSIVE, UNITS
-from urscript.compile.inference import StaticTypes, Type, is_numeric
+from urscript.compile.inference import NUMERIC, StaticTypes, Type
 from urscript.compile.python_tree import ask_after, call, constant, load, place
 from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
 from urscript.source import Span
@@ -41,10 +41,6 @@ class ExpressionCompiler:
         self.constants: dict[str, Any] = {}
         self.asks = 0
         self.globals_stored: set[str] = set()
-
-    def begin_statement(self) -> None:
-        """The expressions that follow belong to another statement."""
-        self.asks = 0
 
     def asking(self, made: ast.expr, weight: int = 1) -> ast.expr:
         """An operation whose cost depends on values; a long expression asks in between."""
@@ -77,9 +73,8 @@ class ExpressionCompiler:
                 return self._prefix(expression, scope)
             case nodes.ListLiteral(items=items):
                 values = ast.List(self._all(items, scope), ast.Load(), **place(span))
-                return (
-                    values if self._are_numbers(items, scope) else self.asking(call("_list", [values], span))
-                )
+                are_numbers = self._are_numbers(items, scope)
+                return values if are_numbers else self.asking(call("_list", [values], span))
             case nodes.PoseLiteral(items=items):
                 return self._pose(items, span, scope)
             case nodes.RunThread(thread=thread):
@@ -136,7 +131,7 @@ class ExpressionCompiler:
         return [self.compile(item, scope) for item in items]
 
     def _are_numbers(self, items: tuple[Expression, ...], scope: FunctionScope) -> bool:
-        return all(is_numeric(self._types.of(item, scope)) for item in items)
+        return all(self._types.of(item, scope) in NUMERIC for item in items)
 
     # --- operators ---------------------------------------------------------------------------------------
 
@@ -174,7 +169,7 @@ class ExpressionCompiler:
         kind = self._types.of(operand, scope)
         value = self.compile(operand, scope)
         if expression.operator == "+":
-            return value if is_numeric(kind) else self.asking(call("_pos", [value], span))
+            return value if kind in NUMERIC else self.asking(call("_pos", [value], span))
         if isinstance(operand, (nodes.IntLiteral, nodes.FloatLiteral)):
             return constant(-operand.value, span)
         if kind is Type.FLOAT:
@@ -185,9 +180,7 @@ class ExpressionCompiler:
         target, indices, span = expression.target, expression.indices, expression.span
         array = self.array(target, scope)
         if array is not None:
-            return call(
-                f"b_{array.getter}", [load("_T", span), *(self.compile(i, scope) for i in indices)], span
-            )
+            return call(f"b_{array.getter}", [load("_T", span), *self._all(indices, scope)], span)
         values = [self.compile(target, scope), *self._all(indices, scope)]
         if len(indices) == 2:
             return call("_cell", values, span)
@@ -345,7 +338,7 @@ def _plain_operation(
     operator: str, left: ast.expr, right: ast.expr, types: tuple[Type, Type], span: Span
 ) -> ast.expr | None:
     """The operation as one of Python; None where the types need the run-time library."""
-    are_numbers = all(map(is_numeric, types))
+    are_numbers = NUMERIC.issuperset(types)
     if operator in _COMPARISON:
         are_bools = types == (Type.BOOL, Type.BOOL) and operator in ("==", "!=")
         if not are_numbers and not are_bools:

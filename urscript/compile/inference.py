@@ -32,18 +32,15 @@ class Type(Enum):
     ANY = "any"
 
 
-_NUMBERS = frozenset({Type.INT, Type.FLOAT, Type.NUMBER})
-SCALARS = _NUMBERS | {Type.BOOL, Type.STRING}
+NUMERIC = frozenset({Type.INT, Type.FLOAT, Type.NUMBER})
+"""Types of numbers."""
+
+SCALARS = NUMERIC | {Type.BOOL, Type.STRING}
 """Types of variables that need no check when something is assigned to them."""
 
 
 _ELEMENT = {Type.NEVER: Type.NEVER, Type.POSE: Type.FLOAT, Type.NUMBERS: Type.NUMBER}
 """Types of `x[i]` by that of x."""
-
-
-def is_numeric(kind: Type) -> bool:
-    """Whether values of this type are numbers."""
-    return kind in _NUMBERS
 
 
 def join_types(a: Type, b: Type) -> Type:
@@ -52,7 +49,7 @@ def join_types(a: Type, b: Type) -> Type:
         return a
     if a is Type.NEVER:
         return b
-    return Type.NUMBER if a in _NUMBERS and b in _NUMBERS else Type.ANY
+    return Type.NUMBER if a in NUMERIC and b in NUMERIC else Type.ANY
 
 
 Symbol = tuple[FunctionScope | None, str] | FunctionScope
@@ -100,14 +97,14 @@ class StaticTypes:
                 return Type.STRING
             case nodes.UnaryOperation(operand=operand):
                 kind = self.of(operand, scope)
-                return kind if kind in _NUMBERS or kind is Type.NEVER else Type.ANY
+                return kind if kind in NUMERIC or kind is Type.NEVER else Type.ANY
             case nodes.PoseLiteral():
                 return Type.POSE
             case nodes.ListLiteral(items=items) if items:
                 kinds = {self.of(item, scope) for item in items}
                 if Type.NEVER in kinds:
                     return Type.NEVER
-                if kinds <= _NUMBERS:
+                if kinds <= NUMERIC:
                     return Type.NUMBERS
             case nodes.NoneLiteral():
                 return Type.NONE
@@ -120,7 +117,7 @@ class StaticTypes:
         left, right = self.of(expression.left, scope), self.of(expression.right, scope)
         if left is Type.NEVER or right is Type.NEVER:
             return Type.NEVER
-        if left in _NUMBERS and right in _NUMBERS:
+        if left in NUMERIC and right in NUMERIC:
             if operator == "/":
                 return Type.FLOAT
             if left is Type.INT and right is Type.INT:
@@ -128,7 +125,7 @@ class StaticTypes:
             return Type.FLOAT if Type.FLOAT in (left, right) else Type.NUMBER
         if operator == "+" and left is Type.STRING and right is Type.STRING:
             return Type.STRING
-        if {left, right} <= _NUMBERS | {Type.NUMBERS}:
+        if {left, right} <= NUMERIC | {Type.NUMBERS}:
             return Type.NUMBERS
         return Type.ANY
 

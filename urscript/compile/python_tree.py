@@ -37,8 +37,8 @@ def call(function: str, arguments: list[ast.expr], span: Span) -> ast.Call:
     return ast.Call(ast.Name(function, ast.Load(), **at), arguments, [], **at)
 
 
-def expression_statement(value: ast.expr, span: Span) -> ast.Expr:
-    """`value` alone."""
+def discarded(value: ast.expr, span: Span) -> ast.Expr:
+    """`value` as a statement; what it is, is not used."""
     return ast.Expr(value, **place(span))
 
 
@@ -73,7 +73,7 @@ def ask_after(value: ast.expr) -> ast.expr:
 
 
 def _ask(left: ast.expr, span: Span) -> ast.If:
-    return ast.If(_is_used_up(left, span), [expression_statement(_wait(span), span)], [], **place(span))
+    return ast.If(_is_used_up(left, span), [discarded(_wait(span), span)], [], **place(span))
 
 
 def _is_used_up(left: ast.expr, span: Span) -> ast.Compare:
@@ -87,18 +87,7 @@ def _wait(span: Span) -> ast.Yield:
 def function(name: str, parameters: list[str], body: list[ast.stmt], span: Span) -> ast.FunctionDef:
     """`def name(parameters...): body`."""
     at = place(span)
-    arguments = ast.arguments(
-        posonlyargs=[],
-        args=[ast.arg(parameter, **at) for parameter in parameters],
-        kwonlyargs=[],
-        kw_defaults=[],
-        defaults=[],
-    )
-    fields: dict[str, Any] = {
-        "name": name,
-        "args": arguments,
-        "body": body,
-        "decorator_list": [],
-        "type_params": [],
-    }
-    return ast.FunctionDef(**fields, **at)
+    names = [ast.arg(parameter, **at) for parameter in parameters]
+    arguments = ast.arguments(posonlyargs=[], args=names, kwonlyargs=[], kw_defaults=[], defaults=[])
+    later: dict[str, Any] = {"type_params": []}  # which Python 3.11 does not know
+    return ast.FunctionDef(name, arguments, body, [], **later, **at)

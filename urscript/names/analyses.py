@@ -13,9 +13,7 @@ def find_maybe_unassigned(program: ResolvedProgram) -> None:
     for scope in program.functions:
         parameters = {item.name for item in scope.node.parameters} if scope.node else set()
         _AssignmentAnalysis(scope, scope.locals, scope.maybe_unassigned, parameters).block(scope.body)
-        for name in _names_read(scope):
-            if name not in scope.locals:
-                read_elsewhere.add(name)
+        read_elsewhere |= _names_read(scope) - scope.locals
     analysis = _AssignmentAnalysis(program.main, program.globals, program.maybe_unassigned_globals, set())
     analysis.block(program.main.body)
     # The order of assignments in functions is not known.

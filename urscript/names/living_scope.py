@@ -90,9 +90,8 @@ class LivingScope:
                 if isinstance(statement, (nodes.Assign, nodes.Declaration)) and statement.scope == "global":
                     new = program.declared_globals.keys() - (self.globals - self.variables)
                     if new:
-                        text = (
-                            f"'{min(new)}' cannot be declared: interpreter mode has no new global variables"
-                        )
+                        why = "interpreter mode has no new global variables"
+                        text = f"'{min(new)}' cannot be declared: {why}"
                         return ScriptContextError(text).locate(program.source, *statement.span[:2])
                 if _calls(statement) and scope.find_function(CALL) is None:
                     text = f"{CALL} cannot be called in interpreter mode: it cannot be nested"

@@ -127,7 +127,6 @@ class _Resolver:
     # --- what each name is -------------------------------------------------------------------------------
 
     def look_up(self, scope: FunctionScope) -> None:
-        """Look up all names of a function."""
         if scope.node is not None and scope.parent is not None:
             for parameter in scope.node.parameters:
                 if parameter.default is not None:
@@ -269,10 +268,13 @@ def _open_program(block: Block, source: Source) -> ResolvedProgram:
 
     Calls of that program after its definition are ignored: on a port it has run before they come.
     """
-    function, calls = _definition_and_calls(block)
-    if function is not None:
-        main = FunctionScope(function.name, function, None, function.body, "main")
-        return ResolvedProgram(source, function.kind, function.name, main, calls)
+    items = tuple(item for item in block if not isinstance(item, nodes.Label))
+    if items and isinstance(items[0], nodes.Function) and items[0].kind != "thread":
+        definition, calls = items[0], items[1:]
+        its_call = nodes.ExpressionStatement(nodes.Call(definition.name, ()))
+        if all(item == its_call for item in calls):
+            main = FunctionScope(definition.name, definition, None, definition.body, "main")
+            return ResolvedProgram(source, definition.kind, definition.name, main, calls)
     name = _statement_name(block)
     return ResolvedProgram(source, "statement", name, FunctionScope(name, None, None, block, "main"))
 
@@ -290,16 +292,6 @@ def _statement_name(block: Block) -> str:
         if isinstance(statement, nodes.KeywordStatement):
             return statement.keyword
     return "unnamed"
-
-
-def _definition_and_calls(block: Block) -> tuple[nodes.Function | None, tuple[Statement, ...]]:
-    """The one definition that is the whole program, and calls of it below."""
-    items = tuple(item for item in block if not isinstance(item, nodes.Label))
-    if not items or not isinstance(items[0], nodes.Function) or items[0].kind == "thread":
-        return None, ()
-    definition, calls = items[0], items[1:]
-    its_call = nodes.ExpressionStatement(nodes.Call(definition.name, ()))
-    return (definition, calls) if all(item == its_call for item in calls) else (None, ())
 
 
 def _declared_name(statement: nodes.Assign | nodes.Declaration) -> str | None:

@@ -31,17 +31,7 @@ from urscript.run.host import Host
 from urscript.run.metering import Meter, call_cost
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread, join
 from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Wait
-from urscript.values import (
-    INT_MAX,
-    INT_MIN,
-    CapacityList,
-    Matrix,
-    Pose,
-    Struct,
-    is_number,
-    type_name,
-    wrap_int,
-)
+from urscript.values import INT_MAX, INT_MIN, CapacityList, Matrix, Pose, Struct, is_number, wrap_int
 
 # --- arithmetic ----------------------------------------------------------------------------------------
 
@@ -137,7 +127,7 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
 
     def operate(*operands: Any) -> Any:
         if any(isinstance(operand, (list, Matrix)) for operand in operands):
-            names = " and ".join(map(type_name, operands))
+            names = " and ".join(map(values.type_name, operands))
             raise ScriptRuntimeError(f"'{sign}' is not defined for {names} in this software version")
         return compute(*operands)
 
@@ -178,7 +168,7 @@ def _elementwise(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> A
         return Matrix([one(x, y) for x, y in zip(left, right, strict=True)] for left, right in pairs)
     if _is_scalar(a) and _is_scalar(b):
         return one(_to_builtin(a), _to_builtin(b))
-    raise ScriptRuntimeError(f"'{sign}' is not defined for {type_name(a)} and {type_name(b)}")
+    raise ScriptRuntimeError(f"'{sign}' is not defined for {values.type_name(a)} and {values.type_name(b)}")
 
 
 def _size(matrix: Matrix) -> str:
@@ -240,7 +230,9 @@ def _ordering(sign: str, compare: Callable[[Any, Any], bool]) -> Callable[[Any, 
         a, b = getattr(a, "thread_id", a), getattr(b, "thread_id", b)
         if is_number(a) and is_number(b):
             return bool(compare(a, b))
-        raise ScriptRuntimeError(f"'{sign}' compares numbers, got {type_name(a)} and {type_name(b)}")
+        raise ScriptRuntimeError(
+            f"'{sign}' compares numbers, got {values.type_name(a)} and {values.type_name(b)}"
+        )
 
     return ordered
 

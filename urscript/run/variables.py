@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 
 from urscript import values
-from urscript.catalogue.calls import CallSignature, compile_fitting, converted
+from urscript.catalogue.calls import CallSignature, compile_fitting, converted, fits
 from urscript.catalogue.catalogue import METHODS, method_key
 from urscript.catalogue.types import Builtin, ParamType
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
@@ -146,13 +146,9 @@ def _assign_other(value: Any, old: Any, kind: str, name: str) -> Any:
     are_structs = type(old) is type(value) is Struct
     if old is UNDEFINED or (same_kind(type(old), value) and not are_structs):
         return value
-    if _is_six_numbers(old) and _is_six_numbers(value):
+    if fits(ParamType.VECTOR6, old) and fits(ParamType.VECTOR6, value):
         return value
     raise _other_type(f"{kind} '{name}'", old, value)
-
-
-def _is_six_numbers(value: Any) -> bool:
-    return type(value) is Pose or (isinstance(value, list) and len(value) == 6 and all(map(is_number, value)))
 
 
 def _other_type(what: str, old: Any, new: Any) -> ScriptRuntimeError:
