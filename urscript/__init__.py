@@ -15,20 +15,25 @@ from typing import TYPE_CHECKING, Any, Final
 from ur_hil import check_packages
 
 if TYPE_CHECKING:
-    from urscript.check.checking import check_program
-    from urscript.errors import (
-        ScriptCompileError,
-        ScriptError,
-        ScriptNameError,
-        ScriptRuntimeError,
-        ScriptSyntaxError,
-    )
-    from urscript.program import CompiledProgram, ProgramStatus, RunningProgram, compile_program
-    from urscript.recording_host import RecordingHost
-    from urscript.run.host import Host, HostFunction
-    from urscript.run.threads import ScriptThread
-    from urscript.run.waits import NEXT_CYCLE, Blocked, Outside
-    from urscript.values import Matrix, Pose
+    from urscript.check.checking import check_program as check_program
+    from urscript.errors import ScriptCompileError as ScriptCompileError
+    from urscript.errors import ScriptError as ScriptError
+    from urscript.errors import ScriptNameError as ScriptNameError
+    from urscript.errors import ScriptRuntimeError as ScriptRuntimeError
+    from urscript.errors import ScriptSyntaxError as ScriptSyntaxError
+    from urscript.program import CompiledProgram as CompiledProgram
+    from urscript.program import ProgramStatus as ProgramStatus
+    from urscript.program import RunningProgram as RunningProgram
+    from urscript.program import compile_program as compile_program
+    from urscript.recording_host import RecordingHost as RecordingHost
+    from urscript.run.host import Host as Host
+    from urscript.run.host import HostFunction as HostFunction
+    from urscript.run.threads import ScriptThread as ScriptThread
+    from urscript.run.waits import NEXT_CYCLE as NEXT_CYCLE
+    from urscript.run.waits import Blocked as Blocked
+    from urscript.run.waits import Outside as Outside
+    from urscript.values import Matrix as Matrix
+    from urscript.values import Pose as Pose
 
 check_packages()
 
@@ -46,28 +51,7 @@ _NAMES: Final = {
 }  # fmt: skip
 _HOME: Final = {name: module for module, names in _NAMES.items() for name in names}
 """Which module each public name lives in."""
-
-__all__ = [
-    "NEXT_CYCLE",
-    "Blocked",
-    "CompiledProgram",
-    "Host",
-    "HostFunction",
-    "Matrix",
-    "Outside",
-    "Pose",
-    "ProgramStatus",
-    "RecordingHost",
-    "RunningProgram",
-    "ScriptCompileError",
-    "ScriptError",
-    "ScriptNameError",
-    "ScriptRuntimeError",
-    "ScriptSyntaxError",
-    "ScriptThread",
-    "check_program",
-    "compile_program",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

@@ -35,9 +35,6 @@ app.command(
 )(run)
 
 
-# --- check -----------------------------------------------------------------------------------------------
-
-
 @app.command(
     epilog=examples(
         "urscript check my_program.script",
@@ -65,7 +62,7 @@ def check(
         in_order = sorted([*errors, *kept], key=lambda problem: (problem.line, problem.column))
         found += [(str(file), problem) for problem in in_order]
     if as_json:
-        support.echo_json(diagnostics=[support.diagnostic_of(error, file)._asdict() for file, error in found])
+        support.echo_json(diagnostics=[support.diagnostic_of(error, file) for file, error in found])
     else:
         for _, error in found:
             typer.echo(as_utf8(error.render()))
@@ -74,16 +71,12 @@ def check(
 
 
 def _codes(words: Iterable[str]) -> frozenset[str]:
-    """The codes in the values of `--ignore`."""
     codes = frozenset(code.strip().upper() for word in words for code in word.split(","))
     unknown = codes - {rule.code for rule in RULES}
     if unknown:
         known = f"{RULES[0].code} to {RULES[-1].code}"
         raise typer.BadParameter(f"no warning has the code {', '.join(sorted(unknown))}; there are {known}")
     return codes
-
-
-# --- fmt -------------------------------------------------------------------------------------------------
 
 
 @app.command(
@@ -102,7 +95,7 @@ def fmt(
 ) -> None:
     """Put programs into the canonical layout; comments and labels stay, and what the program does."""
     reports: list[dict[str, Any]] = []
-    diagnostics: list[support.Diagnostic] = []
+    diagnostics: list[dict[str, Any]] = []
     for file in files:
         source = Source(support.read_program(file), support.shown_name(file))
         try:
@@ -121,11 +114,12 @@ def fmt(
             if changes and not as_json:
                 typer.echo(f"{source.name}: not in canonical layout")
         elif file == support.STANDARD_INPUT:
-            _write_bytes(formatted)
+            sys.stdout.buffer.write(formatted.encode("latin-1"))
+            sys.stdout.flush()
         elif changes:
             _write(file, formatted)
     if as_json:
-        support.echo_json(files=reports, diagnostics=[item._asdict() for item in diagnostics])
+        support.echo_json(files=reports, diagnostics=diagnostics)
     if diagnostics or (only_check and any(report["changes"] for report in reports)):
         raise typer.Exit(ExitCode.FAILED)
 
@@ -142,15 +136,6 @@ def _write(file: Path, text: str) -> None:
     except OSError as error:
         typer.echo(f"cannot write {file}: {error.strerror}", err=True)
         raise typer.Exit(ExitCode.WRONG_USAGE) from None
-
-
-def _write_bytes(text: str) -> None:
-    """Program text on standard output, byte for byte."""
-    sys.stdout.buffer.write(text.encode("latin-1"))
-    sys.stdout.flush()
-
-
-# --- all commands ----------------------------------------------------------------------------------------
 
 
 def main() -> None:

@@ -8,6 +8,16 @@ Decisions without a constant, and where they are made:
 
 | question (U where nothing stands) | decision | made in |
 |---|---|---|
+| a result outside 32 bits (I: the controller's C) | wraps around | values |
+| 6 / 3 (the maker's driver relies on real division) | a float, as 7 / 3 is | runtime |
+| -7 % 3 | -1, as in C | runtime |
+| x[4 / 2] (or no index could be computed) | x[2] | variables |
+| a bool in arithmetic (O for `*`, a driver up to 3.2; I for the others) | 1 or 0 | runtime |
+| a number as a condition (O: the maker's driver tests a float of a socket) | 0 is false | runtime |
+| a string, or a pose, `==` a number, or a list | False, no error | runtime |
+| the right side of `and` / `or` when the left side decides | is not evaluated | expressions |
+| None in a variable of any type, and back | allowed; the type is else fixed (D) | variables |
+| six numbers in a variable with a pose, and back (O: a driver for the UR5e) | allowed | variables |
 | a bool where a builtin, or a pose, takes a number (O, drivers) | 1 or 0 | catalogue.calls |
 | a number where a builtin takes a bool (O, PolyScope) | 0 is False | catalogue.calls |
 | a bool in a list of numbers, compared with a number | an error, not equal | variables, runtime |
@@ -74,37 +84,6 @@ recursive function needs one more."""
 MAX_THREADS: Final = 200
 """Threads that one program may have running at the same time (U). Driver scripts have a few."""
 
-INT_OVERFLOW: Literal["wrap", "error"] = "wrap"
-"""Results outside 32 bits wrap around as in the controller's C (I)."""
-
-EXACT_DIVISION_GIVES_INT: Final = False
-"""6 / 3 is a float as 7 / 3 is (U). Both print the same; the driver script relies on real division."""
-
-BOOL_IN_ARITHMETIC: Final = True
-"""`2 * get_digital_in(1)` is 2 or 0 (O for `*`: a driver for software up to 3.2 makes a word of the inputs; I
-for the other signs)."""
-
-MODULO_SIGN: Literal["dividend", "divisor"] = "dividend"
-"""-7 % 3 is -1, the rule of C (U)."""
-
-INDEX_TAKES_WHOLE_FLOATS: Final = True
-"""x[4/2] is x[2] (U; follows from EXACT_DIVISION_GIVES_INT, or indexes could not be computed)."""
-
-MIXED_TYPES_COMPARE: Final = True
-"""`==` between a string and a number, or a pose and a list, is False, not an error (U)."""
-
-NUMBER_AS_CONDITION: Final = True
-"""`if 1.0:` is as `if True:`, 0 is false (O: the maker's driver tests a float that came through a socket, in
-its program for all software). Strings are allowed: empty is false (D)."""
-
-SIX_NUMBERS_FIT_A_POSE_VARIABLE: Final = True
-"""A variable that holds a pose takes a list of six numbers, and vice versa (O: a driver for the
-UR5e has one name for joints in its thread and for a pose in its body). They stay two types otherwise (D)."""
-
-NONE_FITS_EVERY_VARIABLE: Final = True
-"""A variable may go from None to any type and back (U; a variable's type is otherwise fixed, D)."""
-
-
 ListResize = Literal["free", "error", "capacity"]
 
 
@@ -113,7 +92,6 @@ class Dialect:
     """The language options that one program is compiled with.
 
     Attributes:
-        short_circuit: `and` / `or` do not evaluate the right side when the left decides (U).
         list_resize: What storing a list of another length into a list variable does. "capacity" since 5.15:
             it keeps its capacity, a list that is longer is an error (D); "error" since 3.14 / 5.9.4 (O for
             5.9.4-5.14.6, I for 3.14-3.15), "free" before (O), "error" before 3.2 (I: a driver of that time
@@ -124,7 +102,6 @@ class Dialect:
         recursion_limit: Depth of calls of a recursive function.
     """
 
-    short_circuit: bool = True
     list_resize: ListResize = "error"
     array_arithmetic: bool = True
     has_pause: bool = False

@@ -20,7 +20,7 @@ from urscript.syntax.nodes import same_tree
 from urscript.syntax.parser import make_parser, parse
 
 if TYPE_CHECKING:
-    from lark import Lark, Token, Tree
+    from lark import Lark, Tree
 
 
 _OPERATORS: Final = frozenset({"OR", "XOR", "AND", "PLUS", "MINUS", "TIMES", "COMPARE"})
@@ -47,7 +47,8 @@ def format_program(source: Source) -> str:
     """
     tree = parse(source)
     try:
-        formatted = _render(_Layout(source.text).lines(read_logical_lines(source)))
+        logical_lines = _logical_lines(_concrete_parser().parse(source.text))
+        formatted = _render(_Layout(source.text).lines(logical_lines))
         unchanged = same_tree(parse(Source(formatted, source.name)), tree)
     except RecursionError:
         message = "the program is nested too deeply"
@@ -74,15 +75,13 @@ class _Layout:
         self._lines: list[_PhysicalLine] = []
         self._end = 0
 
-    def lines(self, logical_lines: list[LogicalLine]) -> list[_PhysicalLine]:
-        """The lines of a whole program."""
+    def lines(self, logical_lines: Iterator[LogicalLine]) -> list[_PhysicalLine]:
         for logical in logical_lines:
-            first = logical.tokens[0]
-            for comment in self._comments_until(first.start):
-                self._add_comment(
-                    comment, INDENT * _comment_level(comment, logical, self._column(first.start))
-                )
-            self._keep_blank_line(first.start)
+            start = logical.tokens[0].start
+            column = start - self._text.rfind("\n", 0, start)
+            for comment in self._comments_until(start):
+                self._add_comment(comment, INDENT * _comment_level(comment, logical, column))
+            self._keep_blank_line(start)
             self._add(logical)
         for comment in self._comments_until(len(self._text)):
             self._add_comment(comment, "")
@@ -91,17 +90,13 @@ class _Layout:
     def _comments_until(self, position: int) -> list[Comment]:
         return read_comments(self._text, self._end, position)
 
-    def _column(self, position: int) -> int:
-        return position - self._text.rfind("\n", 0, position)
-
     def _add_comment(self, comment: Comment, indent: str) -> None:
-        """Add a comment after the line before it, or on its own line."""
         if comment.follows_code:
             self._lines[-1].comment = comment.text
         else:
             self._keep_blank_line(comment.position)
             self._lines.append(_PhysicalLine(indent, comment=comment.text))
-        self._end = comment.end
+        self._end = comment.position + len(comment.text)
 
     def _keep_blank_line(self, position: int) -> None:
         if self._lines and self._text.count("\n", self._end, position) > 1:
@@ -156,9 +151,9 @@ def _comment_level(comment: Comment, logical: LogicalLine, column: int) -> int:
 
 def _spelling(token: RuleToken) -> str:
     if token.kind == "LABEL":
-        text = token.token[1:].strip(BLANKS)
+        text = token.text[1:].strip(BLANKS)
         return f"$ {text}" if text else "$"
-    return str(token.token)
+    return token.text
 
 
 def _is_sign(token: RuleToken) -> bool:
@@ -183,7 +178,6 @@ def _may_break(before: RuleToken, token: RuleToken) -> bool:
 
 
 def _needs_space(before: RuleToken, token: RuleToken) -> bool:
-    """Whether a space separates two tokens of a line."""
     kind = token.kind
     if kind == "DOT":
         return before.kind in _NUMBERS  # or the dot would become part of the number
@@ -260,32 +254,22 @@ class Comment(NamedTuple):
     column: int
     follows_code: bool
 
-    @property
-    def end(self) -> int:
-        """The position after it."""
-        return self.position + len(self.text)
-
 
 class RuleToken(NamedTuple):
-    """One token and the rule of the grammar that it belongs to."""
+    """One token.
 
-    token: Token
+    Attributes:
+        kind: Its name in the grammar.
+        start: Characters of the source before it.
+        end: The position after it.
+        rule: The rule of the grammar that it belongs to.
+    """
+
+    kind: str
+    text: str
+    start: int
+    end: int
     rule: str
-
-    @property
-    def kind(self) -> str:
-        """The name of the token in the grammar."""
-        return self.token.type
-
-    @property
-    def start(self) -> int:
-        """Characters of the text before it."""
-        return self.token.start_pos or 0
-
-    @property
-    def end(self) -> int:
-        """The position after it."""
-        return self.token.end_pos or 0
 
 
 class LogicalLine(NamedTuple):
@@ -293,11 +277,6 @@ class LogicalLine(NamedTuple):
 
     level: int
     tokens: tuple[RuleToken, ...]
-
-
-def read_logical_lines(source: Source) -> list[LogicalLine]:
-    """The logical lines of a program that `parser.parse` accepts."""
-    return list(_logical_lines(_concrete_parser().parse(source.text)))
 
 
 def read_comments(text: str, start: int, end: int) -> list[Comment]:
@@ -350,4 +329,4 @@ def _tokens(item: Any, parent: str) -> Iterator[RuleToken]:
         if hasattr(part, "data"):
             stack.extend((str(part.data), inner) for inner in reversed(part.children))
         elif part is not None:
-            yield RuleToken(part, rule)
+            yield RuleToken(part.type, str(part), part.start_pos, part.end_pos, rule)

@@ -87,7 +87,7 @@ def compiled_program(program: ResolvedProgram, catalogue: Catalogue, dialect: Di
         ScriptCompileError: It is nested too deeply.
     """
     try:
-        compiled = compile_resolved(program, catalogue, dialect, f"<urscript {program.name}>")
+        compiled = compile_resolved(program, catalogue, f"<urscript {program.name}>")
     except RecursionError:
         raise _too_deep(program.source) from None
     return CompiledProgram(
@@ -276,8 +276,16 @@ class RunningProgram:
         return self._namespace[f"g_{name}"]
 
     def position(self, thread: ScriptThread) -> tuple[int, int]:
-        """Line and column of a suspended thread."""
-        return _thread_position(thread, self.program.compiled)
+        """Line and column of a suspended thread, of the innermost call in the script."""
+        compiled = self.program.compiled
+        place = 1, 1
+        body: Any = thread.body
+        while body is not None and hasattr(body, "gi_frame"):
+            frame = body.gi_frame
+            if frame is not None and frame.f_code.co_filename == compiled.file_name:
+                place = compiled.positions[frame.f_code.co_name].at(frame.f_lasti)
+            body = body.gi_yieldfrom
+        return place
 
     def _fail(self, error: ScriptRuntimeError) -> None:
         if error.stack:
@@ -304,8 +312,7 @@ class RunningProgram:
         self._host.program_ended()
 
 
-# --- places in the script, of errors and of suspended threads: compiled code carries lines and columns, see
-# `compile.python_tree`
+# --- places of errors in the script: compiled code carries lines and columns, see `compile.python_tree`
 
 
 _Texts = Mapping[str, tuple[CompiledCode, Source]]
@@ -367,17 +374,3 @@ def _stack(
             innermost = None
         traceback = traceback.tb_next
     return stack, innermost, source
-
-
-def _thread_position(thread: ScriptThread, program: CompiledCode) -> tuple[int, int]:
-    """Line and column of a suspended thread, of the innermost call in the script."""
-    innermost: FrameType | None = None
-    body: Any = thread.body
-    while body is not None and hasattr(body, "gi_frame"):
-        frame = body.gi_frame
-        if frame is not None and frame.f_code.co_filename == program.file_name:
-            innermost = frame
-        body = body.gi_yieldfrom
-    if innermost is None:
-        return 1, 1
-    return program.positions[innermost.f_code.co_name].at(innermost.f_lasti)

@@ -28,23 +28,17 @@ _HOME: Final = [0.0, -1.5708, 0.0, -1.5708, 0.0, 0.0]
 
 
 class _NoStatements:
-    """A queue for interpreter mode into which nobody puts anything: the mode ends at once."""
+    """A queue into which nobody puts anything: interpreter mode ends at once."""
 
     is_ending = True
     is_clearing = clears_on_end = False
 
-    def take(self) -> None:
-        """No statements."""
-
     def is_ready(self) -> bool:
-        """Never."""
         return False
 
-    def cleared(self) -> None:
-        """Nothing is done."""
-
-    def leave(self) -> None:
-        """Nothing is done."""
+    def take(self) -> None: ...
+    def cleared(self) -> None: ...
+    def leave(self) -> None: ...
 
 
 class RecordedCall(NamedTuple):
@@ -240,21 +234,20 @@ def _register_name(name: str) -> str:
 def _default(builtin: Builtin) -> Any:
     """A value of the type that `builtin` returns."""
     kind = builtin.returns
-    if kind.startswith("bool"):
-        return False
-    if kind.startswith("int"):
-        return 0
-    if kind.startswith(("float", "number")):
-        return 0.0
-    if kind.startswith("string"):
-        return ""
-    if kind.startswith("pose"):
-        return _ZERO_POSE
-    if kind.startswith("list of 3"):
-        return [0.0] * 3
-    if kind.startswith(("list", "six-vector")):
-        return [0.0] * 6
     if kind.startswith("struct("):
         names = kind.removeprefix("struct(").removesuffix(")").split(", ")
         return Struct(dict.fromkeys(names, 0.0))
-    return None
+    return next((value for prefix, value in _DEFAULTS.items() if kind.startswith(prefix)), None)
+
+
+_DEFAULTS: Final = {
+    "bool": False,
+    "int": 0,
+    "float": 0.0,
+    "number": 0.0,
+    "string": "",
+    "pose": _ZERO_POSE,
+    "list of 3": [0.0] * 3,
+    "list": [0.0] * 6,
+}
+"""How the type of a result begins -> a value of it."""

@@ -79,5 +79,4 @@ class Source:
         before, under = as_utf8(shown[: column - 1]), as_utf8(shown[column - 1 : column - 1 + width])
         lead = "".join("\t" if char == "\t" else " " for char in before)
         lead += " " * max(0, column - 1 - len(shown))
-        width = max(1, len(under))
-        return f"    {shown}\n    {lead}{'^' * width}"
+        return f"    {shown}\n    {lead}{'^' * max(1, len(under))}"

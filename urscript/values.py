@@ -223,9 +223,7 @@ def to_script_text(text: str) -> str:
 
 
 def wrap_int(value: int) -> int:
-    """`value` wrapped to 32 bits, two's complement (see `dialect.INT_OVERFLOW`)."""
-    if dialect.INT_OVERFLOW == "error" and not INT_MIN <= value <= INT_MAX:
-        raise ScriptRuntimeError(f"{value} does not fit into an integer of 32 bits")
+    """`value` wrapped to 32 bits, two's complement."""
     return (value - INT_MIN) % 2**32 + INT_MIN
 
 

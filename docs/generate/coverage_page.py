@@ -6,9 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Final
 
-from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, catalogue_for
-from urscript.catalogue.methods import METHODS
-from urscript.catalogue.methods import SINCE as METHODS_SINCE
+from urscript.catalogue.catalogue import ALL_ROWS, CB3_3_15, METHODS, catalogue_for
 from urscript.catalogue.types import Builtin, Generation, Support
 
 _HEAD = """\
@@ -93,7 +91,7 @@ def _table(rows: Iterable[Builtin]) -> list[str]:
 
 def _method_table() -> list[str]:
     lines = ["| method | returns | what it does |", "|---|---|---|"]
-    return [*lines, *(f"| `{row.form}` | {row.returns} | {row.summary} |" for row in METHODS)]
+    return [*lines, *(f"| `{row.signature}` | {row.returns} | {row.summary} |" for row in METHODS)]
 
 
 def _later_table(rows: Iterable[Builtin]) -> list[str]:
@@ -118,7 +116,7 @@ def render() -> str:
     lines += [*_summary(CB3_3_15), ""]
     lines += [
         "Besides the functions, programs can read the variables "
-        + ", ".join(f"`{item.name}` ({item.value:g} {item.unit})" for item in CB3_3_15.variables.values())
+        + ", ".join(f"`{name}` ({item.value:g} {item.unit})" for name, item in CB3_3_15.variables.items())
         + " and use the arrays "
         + ", ".join(
             f"`{item.name}[n]` (as `{item.getter}` and `{item.setter}`)" for item in CB3_3_15.arrays.values()
@@ -137,7 +135,7 @@ def render() -> str:
         "",
         "## Methods",
         "",
-        f"Lists, structs and matrices have methods since {METHODS_SINCE}. A list has a length and a "
+        f"Lists, structs and matrices have methods since {METHODS[0].since}. A list has a length and a "
         "capacity, which it keeps. Error texts are chosen.",
         "",
         *_method_table(),

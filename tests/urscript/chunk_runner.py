@@ -12,7 +12,7 @@ Chunks stand apart by a line `---`. Expectations are comments, so a chunk is a p
     #discard text      why the next line is discarded that cannot be compiled
     #< 1 2 3           a frame of integers that the peer of socket "s" sends (also makes it accept)
     #software 5.11     the software version, 3.15 if not given
-    #ref 1.1 comment   the row of the language notes that the chunk shows (see `reference_rows`)
+    #ref 1.1 comment   the row of the language notes that the chunk shows (see `reference_rows.txt`)
 
 A chunk without `#!` must compile and end by itself. Every chunk runs twice: as compiled, and with every static type
 unknown, so that the shortcuts of the compiler cannot mean anything else than the operators they stand for.

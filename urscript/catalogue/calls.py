@@ -130,17 +130,13 @@ def _is_bools(value: Any) -> bool:
     return isinstance(value, list) and all(type(item) is bool for item in value)
 
 
-def _is_pose(value: Any) -> bool:
-    return type(value) is Pose
-
-
 _PREDICATES: dict[ParamType, Predicate] = {
     ParamType.BOOL: lambda value: type(value) is bool,
     ParamType.INT: lambda value: type(value) is int,
     ParamType.NUMBER: is_number,
     ParamType.STRING: lambda value: isinstance(value, str),
     ParamType.STRING_OR_INT: lambda value: isinstance(value, (str, int)),
-    ParamType.POSE: _is_pose,
+    ParamType.POSE: lambda value: type(value) is Pose,
     ParamType.JOINTS: _is_six,
     ParamType.POSE_OR_JOINTS: lambda value: type(value) is Pose or _is_numbers(value, 6),
     ParamType.VECTOR3: lambda value: _is_numbers(value, 3),
@@ -170,7 +166,7 @@ def converted(kind: ParamType, value: Any) -> Any:
     """A value as a parameter of this type takes it, if it can be converted.
 
     Where it takes numbers, True is 1 and False 0; where it takes bools, 0 is False, any other number True. An
-    integer may be a float without fraction: programs compute indexes (dialect: INDEX_TAKES_WHOLE_FLOATS).
+    integer may be a float without fraction: programs compute indexes.
     """
     if isinstance(value, list):
         parts = [converted(kind, item) for item in value]
@@ -214,13 +210,8 @@ def type_error(function: str, parameter: str, kind: ParamType, value: Any) -> Sc
     )
 
 
-def _is_finite(value: Any) -> bool:
-    """For a number, a list of numbers or a pose."""
-    return all(map(isfinite, value)) if isinstance(value, (list, Pose)) else isfinite(value)
-
-
 def _is_bounded(value: Any) -> bool:
-    """Like `_is_finite`, and not larger than `_LARGEST`."""
+    """Whether a number, or each of a list or pose, is finite and not larger than `_LARGEST`."""
     if isinstance(value, (list, Pose)):
         # NaN slips through a maximum, not through a sum.
         return not value or (isfinite(sum(value)) and max(map(abs, value)) <= _LARGEST)
@@ -241,7 +232,8 @@ def explain(function: str, param: Param, value: Any, needs_finite: bool) -> Scri
     if not fits(param.type, taken):
         return type_error(function, param.name, param.type, value)
     if needs_finite and not _is_bounded(taken):
-        allowed = f"in the range {-_LARGEST:g} to {_LARGEST:g}" if _is_finite(taken) else "finite"
+        is_finite = all(map(isfinite, taken if isinstance(taken, (list, Pose)) else [taken]))
+        allowed = f"in the range {-_LARGEST:g} to {_LARGEST:g}" if is_finite else "finite"
     elif param.choices:
         allowed = "one of " + ", ".join(map(str, param.choices))
     elif param.low is not None and param.high is not None:

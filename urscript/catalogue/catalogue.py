@@ -12,9 +12,16 @@ A file of `chapters/` is one module of the script manual:
 A parameter has a type of `ParamType`, then what applies of: a range `0..7`, `0..` or `..1`, the only values
 allowed `{0, 12, 24}`, a default `= 1.4`, or `= (active TCP)` for one that the controller fills in, a unit in
 brackets. Lines below the summary: time, support, `deprecated`, `nan ok`, `any names`, then the note; `since`
-and `until` with a release of CB3, e-Series and PolyScope X each, `-` for none; `undocumented` generations;
-`source`, where it is not the manuals. Eight spaces continue a line. What `by default:` lists holds for the
+and `until` with a release of CB3, e-Series and PolyScope X each, `-` for none; `undocumented` generations.
+Eight spaces continue a line. What `by default:` lists holds for the
 rows up to the next blank line.
+
+Sources are the manuals (MANUAL_CB3: URScript API Reference CB3 3.15.4; MANUAL_E: Script Manual e-Series 5.11)
+of the generations that document a row, unless a line `source`, which is for readers, names others:
+MANUAL_LATE: Script Directory e-Series 5.2x; MANUAL_X: world model and ROS 2 pages of the 5.2x / 10.x script
+directories; DRIVER_SCRIPT: called after run-time tests by the maker's driver script, which 3.14.3 and later
+accept; POLYSCOPE_EXPORT: written by PolyScope into exported programs; FIELD_USE: called by field scripts and
+public clients.
 
 "3.0", "5.0" and "10.0" mean "since the first release": the manuals rarely give a later one. "5.21": names
 first seen in an e-Series manual of the 5.2x editions; the exact first release is not known.
@@ -31,23 +38,17 @@ from typing import Any, Final
 from protocol.ur_types import JOINT_ACCELERATION, JOINT_SPEED
 from urscript.catalogue import types
 from urscript.catalogue.calls import Fitting, Slot, compile_fitting, static_bind
-from urscript.catalogue.methods import ValueMethod, methods_of
 from urscript.catalogue.types import Builtin, Generation, ModuleVariable, Param, PerGeneration, Version
 from urscript.errors import ScriptTypeError
 from urscript.values import Pose
 
-_SOURCES: Final = {
-    "MANUAL_CB3": "URScript API Reference CB3 3.15.4",
-    "MANUAL_E": "Script Manual e-Series 5.11",
-    "MANUAL_LATE": "Script Directory e-Series 5.2x",
-    "MANUAL_X": "world model and ROS 2 pages of the 5.2x / 10.x script directories",
-    "DRIVER_SCRIPT": "called after run-time tests by the maker's driver script, "
-    "which 3.14.3 and later accept",
-    "POLYSCOPE_EXPORT": "written by PolyScope into exported programs",
-    "FIELD_USE": "called by field scripts and public clients",
+VARIABLES: Final = {
+    "a_joint_default": ModuleVariable(JOINT_ACCELERATION, "rad/s^2"),
+    "a_tool_default": ModuleVariable(1.2, "m/s^2"),
+    "v_joint_default": ModuleVariable(JOINT_SPEED, "rad/s"),
+    "v_tool_default": ModuleVariable(0.25, "m/s"),
 }
-
-_NAMED: Final = {"a_joint_default": JOINT_ACCELERATION, "v_joint_default": JOINT_SPEED}
+"""By name. Source: URScript API Reference CB3 3.15.4, module motion, Variables."""
 
 _TYPES: Final = {kind.name.lower().replace("_or_", "|"): kind for kind in types.ParamType}
 _WORDS: Final[dict[str, tuple[str, Any]]] = {
@@ -56,9 +57,10 @@ _WORDS: Final[dict[str, tuple[str, Any]]] = {
     "deprecated": ("deprecated", True),
     "nan ok": ("nan_ok", True),
     "any names": ("any_names", True),
+    "changes": ("changes", True),
 }
 
-_HEAD = re.compile(r"(\w+)\((.*)\) -> (.+)")
+_HEAD = re.compile(r"([\w.]+)\((.*)\) -> (.+)")
 _PARAM = re.compile(
     r"""(?P<name>\w+):\ (?P<type>[\w|]+)
     (?:\ (?P<low>-?[\d.]*\d)?\.\.(?P<high>-?[\d.]+)?)?
@@ -97,11 +99,6 @@ def _row(module: str, head: str, lines: list[str], defaults: dict[str, Any]) -> 
         raise ValueError(f"{module}: {head!r} is not a row; write name(...) -> type, and below what it does")
     fields: dict[str, Any] = {"since": types.EVERYWHERE, "undocumented": frozenset()}
     fields |= defaults | _settings(lines[1:])
-    if "source" not in fields:
-        manuals = (Generation.CB3, "MANUAL_CB3"), (Generation.E_SERIES, "MANUAL_E")
-        known = {g for g in Generation if fields["since"].get(g) is not None} - fields["undocumented"]
-        cited = " and ".join(_SOURCES[manual] for generation, manual in manuals if generation in known)
-        fields["source"] = f"{cited}, module {module}"
     return Builtin(
         name=form[1], params=tuple(_params(form[2], head)), returns=form[3], module=module, summary=lines[0],
         **fields,
@@ -129,28 +126,26 @@ def _params(text: str, head: str) -> Iterator[Param]:
 
 
 def _value(text: str) -> Any:
-    if text in _NAMED:
-        return _NAMED[text]
+    if text in VARIABLES:
+        return VARIABLES[text].value
     return Pose(*literal_eval(text[1:])) if text[0] == "p" else literal_eval(text)
 
 
 def _settings(lines: list[str]) -> dict[str, Any]:
-    """The fields that the lines below the summary give."""
     fields: dict[str, Any] = {}
     for line in lines:
         key, _, rest = line.partition(" ")
         if key in ("since", "until"):
-            fields[key] = types.releases(*(None if release == "-" else release for release in rest.split()))
+            fields[key] = PerGeneration(*(None if it == "-" else Version.of(it) for it in rest.split()))
         elif key == "undocumented":
             fields[key] = frozenset(map(Generation, rest.split(", ")))
-        elif key == "source":
-            fields[key] = rest.format_map(_SOURCES)
-        else:
+        elif key != "source":
             words, _, fields["note"] = line.partition(": ")
             if unknown := set(words.split(", ")) - set(_WORDS):
                 raise ValueError(f"{', '.join(sorted(unknown))} in {line!r}; allowed: {', '.join(_WORDS)}")
             # A row's own line replaces the whole line of `by default:`.
-            fields |= {"time": types.TimeClass.ZERO, "deprecated": False, "nan_ok": False, "any_names": False}
+            fields |= {"time": types.TimeClass.ZERO, "deprecated": False}
+            fields |= {"nan_ok": False, "any_names": False, "changes": False}
             fields |= dict(_WORDS[word] for word in words.split(", "))
     return fields
 
@@ -166,35 +161,40 @@ ALL_ROWS: tuple[Builtin, ...] = (
     *_read_chapter("world_model"),
 )
 
-VARIABLES: tuple[ModuleVariable, ...] = tuple(
-    ModuleVariable(name, value, unit, "motion", "URScript API Reference CB3 3.15.4, module motion, Variables")
-    for name, value, unit in (
-        ("a_joint_default", JOINT_ACCELERATION, "rad/s^2"),
-        ("a_tool_default", 1.2, "m/s^2"),
-        ("v_joint_default", JOINT_SPEED, "rad/s"),
-        ("v_tool_default", 0.25, "m/s"),
-    )
-)
+METHODS: tuple[Builtin, ...] = tuple(_read_chapter("methods"))
+"""The methods of values: `list.append(value)` and its like."""
 
-ARRAYS: tuple[types.BuiltinArray, ...] = (
-    types.BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out", _SOURCES["FIELD_USE"]),
-)
+ARRAYS: Final = {"digital_out": types.BuiltinArray("digital_out", 10, "get_digital_out", "set_digital_out")}
+"""By name. Source: field use of `digital_out[2]=True` as a one-line program by an early Python client;
+undocumented."""
 
 _MOST_CALL_FORMS = 10_000
 
 
+def method_key(row: Builtin) -> tuple[str, str]:
+    """The type of values that have a method, and its name in calls."""
+    of_type, name = row.name.split(".")
+    return of_type, name
+
+
 class Catalogue:
-    """The builtins of one software version."""
+    """The builtins of one software version.
+
+    Attributes:
+        methods: By `method_key`; none before the software that knows them.
+        fittings: Functions that return bound arguments as the tables ask for them: types, ranges, finiteness.
+            They raise ScriptRuntimeError with the controller's text where it is known.
+    """
 
     def __init__(self, version: Version, rows: tuple[Builtin, ...] = ALL_ROWS) -> None:
         self.version = version
         self._rows = rows
         self._by_name: dict[str, Builtin] = {row.name: row for row in rows if row.is_in(version)}
-        self.variables: Mapping[str, ModuleVariable] = {item.name: item for item in VARIABLES}
-        self.arrays: Mapping[str, types.BuiltinArray] = {item.name: item for item in ARRAYS}
-        self.methods: Mapping[tuple[str, str], ValueMethod] = methods_of(version)
+        self.variables: Mapping[str, ModuleVariable] = VARIABLES
+        self.arrays: Mapping[str, types.BuiltinArray] = ARRAYS
+        self.methods = {method_key(row): row for row in METHODS if row.is_in(version)}
         self._slots: dict[tuple[str, int, tuple[str, ...]], list[Slot]] = {}
-        self._fittings = {
+        self.fittings: Mapping[str, Fitting] = {
             name: compile_fitting(name, row.params, row.nan_ok) for name, row in self._by_name.items()
         }
 
@@ -218,11 +218,6 @@ class Catalogue:
 
     def __len__(self) -> int:
         return len(self._by_name)
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Names of all builtin functions of this version."""
-        return frozenset(self._by_name)
 
     def suggest(self, name: str, others: Iterable[str] = ()) -> str | None:
         """The known name that looks most like a misspelt one, among builtins, variables and `others`."""
@@ -258,13 +253,6 @@ class Catalogue:
                     error.hint = f"with these arguments it is known since {since}; this is {here}"
                 raise
         return slots
-
-    def fitting_of(self, name: str) -> Fitting:
-        """A function that returns bound arguments as the table asks for them: types, ranges, finiteness.
-
-        It raises ScriptRuntimeError with the controller's text where it is known.
-        """
-        return self._fittings[name]
 
 
 def _fits(builtin: Builtin, n_positional: int, keyword_names: Sequence[str]) -> bool:

@@ -8,11 +8,8 @@ too: a text message is also a line of the log and a package for the clients of p
 from collections.abc import Mapping
 from typing import Final
 
-OF_HOST: Final = 10
-"""Of a builtin of the host that has no row here (0.2 to 0.7 µs)."""
-
-OF_PURE: Final = 10
-"""Of a pure builtin that has no row here (0.3 to 0.6 µs)."""
+OF_OTHERS: Final = 10
+"""Of a builtin that has no row here (0.2 to 0.7 µs)."""
 
 OF_THREAD: Final = 100
 """Of starting a thread."""

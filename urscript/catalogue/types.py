@@ -79,8 +79,7 @@ LAST_CB3 = Version(3, 15)
 """The last minor release of the CB3 series. Source: the maker's download pages, manuals up to 3.15.8."""
 
 
-@dataclass(frozen=True, slots=True)
-class PerGeneration:
+class PerGeneration(NamedTuple):
     """One release for each generation; None where it does not apply."""
 
     cb3: Version | None = None
@@ -89,25 +88,15 @@ class PerGeneration:
 
     def get(self, generation: Generation) -> Version | None:
         """The release of that generation, or None."""
-        if generation is Generation.CB3:
-            return self.cb3
-        return self.e_series if generation is Generation.E_SERIES else self.polyscope_x
+        return self[list(Generation).index(generation)]
 
     def __str__(self) -> str:
         known = ((g, self.get(g)) for g in Generation)
         return ", ".join(f"{g.value} {version}" for g, version in known if version is not None) or "-"
 
 
-def releases(
-    cb3: str | None = None, e_series: str | None = None, polyscope_x: str | None = None
-) -> PerGeneration:
-    """Short form for tables: `releases("3.0", "5.0", "10.0")`."""
-    numbers = [None if text is None else Version.of(text) for text in (cb3, e_series, polyscope_x)]
-    return PerGeneration(*numbers)
-
-
 NEVER = PerGeneration()
-EVERYWHERE = releases("3.0", "5.0", "10.0")
+EVERYWHERE = PerGeneration(Version(3, 0), Version(5, 0), Version(10, 0))
 
 
 class TimeClass(Enum):
@@ -230,7 +219,7 @@ def default_text(value: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Builtin:
-    """One function that URScript programs can call.
+    """One function that URScript programs can call, or a method of values, `list.append`.
 
     Args:
         params: in positional order.
@@ -241,11 +230,11 @@ class Builtin:
         until: first release that no longer has this form.
         support: how well this box models it.
         summary: one line.
-        source: the document or observation the row rests on.
         undocumented: generations whose controllers know the name although their manual does not list it.
         deprecated: the manual advises a successor.
         nan_ok: NaN and infinity do no harm as arguments (sums, texts, registers); else they are errors.
         any_names: takes named arguments of any name, and no others.
+        changes: a method that changes the variable, element or member that it is called on.
         note: why the support is not exact.
     """
 
@@ -258,11 +247,11 @@ class Builtin:
     until: PerGeneration = NEVER
     support: Support = Support.DECLARED_ONLY
     summary: str = ""
-    source: str = ""
     undocumented: frozenset[Generation] = frozenset()
     deprecated: bool = False
     nan_ok: bool = False
     any_names: bool = False
+    changes: bool = False
     note: str = ""
 
     @property
@@ -287,26 +276,17 @@ class Builtin:
         return self.is_in(version) and version.generation not in self.undocumented
 
 
-@dataclass(frozen=True, slots=True)
-class ModuleVariable:
+class ModuleVariable(NamedTuple):
     """A constant that programs can read by name, e.g. `a_joint_default`."""
 
-    name: str
     value: float
     unit: str
-    module: str
-    source: str
 
 
-@dataclass(frozen=True, slots=True)
-class BuiltinArray:
-    """An indexable builtin name: reading `name[n]` calls the getter, assigning calls the setter.
-
-    Source: field use of `digital_out[2]=True` as a one-line program by an early Python client; undocumented.
-    """
+class BuiltinArray(NamedTuple):
+    """An indexable builtin name: reading `name[n]` calls the getter, assigning calls the setter."""
 
     name: str
     size: int
     getter: str
-    setter: str | None
-    source: str
+    setter: str

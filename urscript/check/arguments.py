@@ -1,7 +1,7 @@
 """Warnings about constant arguments: a type, length or range that a builtin refuses, degrees, millimetres."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import degrees, hypot
 from typing import Any, Final, NamedTuple
 
@@ -12,7 +12,7 @@ from urscript.check import warnings
 from urscript.check.unused import Variable, expressions_read, owner
 from urscript.check.warnings import ScriptWarning
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
-from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
+from urscript.names.scopes import ResolvedProgram, wrong_count
 from urscript.syntax import nodes
 from urscript.syntax.nodes import Expression, all_statements
 from urscript.values import Pose, is_number, log_form
@@ -42,30 +42,33 @@ def argument_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterato
         callee = scope.find_function(call.function)
         if callee is not None:
             if refusal := wrong_count(call, callee):
-                yield ScriptWarning(warnings.WRONG_COUNT, refusal, call.span, program.source)
+                yield ScriptWarning(warnings.WRONG_COUNT, refusal, call.span)
             continue
         builtin = catalogue.lookup(call.function)
         if builtin is None:
             continue
         for param, argument in _arguments(call, builtin, catalogue):
-            known = _known_value(_value_of(argument, scope, constants))
+            value = argument
+            if isinstance(argument, nodes.Name):
+                value = constants.get(owner(argument.name, scope), argument)
+            known = _known_value(value)
             if known is None:
                 continue
             message = _refused(builtin, param, known)
             taken = converted(param.type, known.value)
             if message:
-                yield ScriptWarning(warnings.REFUSED_ARGUMENT, message, argument.span, program.source)
+                yield ScriptWarning(warnings.REFUSED_ARGUMENT, message, argument.span)
             elif taken is not known.value:
                 message = type_error(builtin.name, param.name, param.type, known.value).message
                 hint = f"it is taken as {log_form(taken)}"
-                yield ScriptWarning(warnings.IN_NO_MANUAL, message, argument.span, program.source, hint)
+                yield ScriptWarning(warnings.IN_NO_MANUAL, message, argument.span, hint)
             elif found := _wrong_unit(param, known.value):
                 rule, text, hint = found
-                yield ScriptWarning(rule, f"{builtin.name}: {text}", argument.span, program.source, hint)
+                yield ScriptWarning(rule, f"{builtin.name}: {text}", argument.span, hint)
             elif builtin.name in _STREAMED and param.name == "t" and 0 < known.value < cycle:
                 text = f"{builtin.name}: {known.value:g} s is shorter than a control cycle of {cycle:g} s"
                 hint = "write get_steptime()"
-                yield ScriptWarning(warnings.SHORT_TIME, text, argument.span, program.source, hint)
+                yield ScriptWarning(warnings.SHORT_TIME, text, argument.span, hint)
 
 
 def _constants(program: ResolvedProgram) -> dict[Variable, Expression]:
@@ -78,26 +81,15 @@ def _constants(program: ResolvedProgram) -> dict[Variable, Expression]:
         for statement in all_statements(scope.body):
             if not isinstance(statement, nodes.Assign):
                 continue
-            target: Expression = statement.target
-            while isinstance(target, (nodes.Subscript, nodes.Attribute)):
-                target = target.target
+            target = nodes.root_of(statement.target)
             if isinstance(target, nodes.Name):
-                variable = (None, target.name) if statement.scope == "global" else owner(target.name, scope)
+                variable = owner(target.name, scope, statement.scope)
                 assigned[variable] += 1
                 values[variable] = statement.value
     for scope, part in expressions_read(program):
         if isinstance(part, nodes.MethodCall) and isinstance(part.target, nodes.Name):
             assigned[owner(part.target.name, scope)] += 1  # it may change its list
     return {variable: value for variable, value in values.items() if assigned[variable] == 1}
-
-
-def _value_of(
-    expression: Expression, scope: FunctionScope, constants: Mapping[Variable, Expression]
-) -> Expression:
-    """The value of a variable that has only one; any other expression as it is."""
-    if isinstance(expression, nodes.Name):
-        return constants.get(owner(expression.name, scope), expression)
-    return expression
 
 
 def _arguments(
@@ -130,7 +122,6 @@ def _refused(builtin: Builtin, param: Param, known: KnownValue) -> str | None:
 
 
 def _known_value(expression: Expression) -> KnownValue | None:
-    """What is known of an expression, or None."""
     match expression:
         case (
             nodes.IntLiteral(value=value)
@@ -170,12 +161,8 @@ _TOOL_SPEED: Final = 10.0
 """More than twice what the fastest arm does with its tool [m/s]."""
 
 
-class _Excess(NamedTuple):
-    """A value that is too large for its unit: the warning, what is too large, what to write instead."""
-
-    rule: warnings.Rule
-    text: str
-    hint: str
+_Excess = tuple[warnings.Rule, str, str]
+"""Of a value that is too large for its unit: the warning, what is too large, what to write instead."""
 
 
 def _wrong_unit(param: Param, value: Any) -> _Excess | None:
@@ -204,16 +191,14 @@ def _wrong_unit(param: Param, value: Any) -> _Excess | None:
 
 def _too_fast_tool(speeds: Sequence[float]) -> _Excess | None:
     fastest = max(speeds, key=abs)
-    if abs(fastest) <= _TOOL_SPEED:
-        return None
-    return _in_millimetres(f"{fastest:g} m/s is faster than any arm", fastest)
+    text = f"{fastest:g} m/s is faster than any arm"
+    return _in_millimetres(text, fastest) if abs(fastest) > _TOOL_SPEED else None
 
 
 def _too_fast_joint(speeds: Sequence[float]) -> _Excess | None:
     fastest = max(speeds, key=abs)
-    if abs(fastest) <= _JOINT_SPEED:
-        return None
-    return _in_degrees(f"{fastest:g} rad/s is faster than any joint", fastest)
+    text = f"{fastest:g} rad/s is faster than any joint"
+    return _in_degrees(text, fastest) if abs(fastest) > _JOINT_SPEED else None
 
 
 def _beyond_joints(q: Sequence[float]) -> _Excess | None:
@@ -224,22 +209,20 @@ def _beyond_joints(q: Sequence[float]) -> _Excess | None:
 
 
 def _too_far_turned(rotation: Sequence[float]) -> _Excess | None:
-    if hypot(*rotation) <= _JOINT_RANGE:
-        return None
     largest = max(rotation, key=abs)
-    return _in_degrees(f"a rotation vector with {largest:g} rad is more than a turn", largest)
+    text = f"a rotation vector with {largest:g} rad is more than a turn"
+    return _in_degrees(text, largest) if hypot(*rotation) > _JOINT_RANGE else None
 
 
 def _too_long(lengths: Sequence[float]) -> _Excess | None:
     longest = max(lengths, key=abs)
-    if abs(longest) <= _LENGTH:
-        return None
-    return _in_millimetres(f"{longest:g} m is farther than any arm reaches", longest)
+    text = f"{longest:g} m is farther than any arm reaches"
+    return _in_millimetres(text, longest) if abs(longest) > _LENGTH else None
 
 
 def _in_degrees(text: str, value: float) -> _Excess:
-    return _Excess(warnings.DEGREES, text, f"write d2r({value:g}) if degrees are meant")
+    return warnings.DEGREES, text, f"write d2r({value:g}) if degrees are meant"
 
 
 def _in_millimetres(text: str, value: float) -> _Excess:
-    return _Excess(warnings.MILLIMETRES, text, f"write {value / 1000:g} if millimetres are meant")
+    return warnings.MILLIMETRES, text, f"write {value / 1000:g} if millimetres are meant"

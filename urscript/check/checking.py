@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from urscript.catalogue import CB3_3_15, Catalogue
-from urscript.check import syntax_rules
 from urscript.check.arguments import argument_warnings
 from urscript.check.flow import flow_warnings
-from urscript.check.tokens import Advice, Problem, Rule, TokenizedText
+from urscript.check.syntax_rules import RULES
+from urscript.check.tokens import Advice, Problem, TokenizedText
 from urscript.check.unused import name_warnings, value_warnings
 from urscript.check.warnings import ABOUT_VALUES, ScriptWarning
 from urscript.check.words import concerns_whole_line, with_hint
@@ -24,41 +24,6 @@ from urscript.program import compiled_program, resolve_source
 from urscript.source import Source, as_bytes
 from urscript.syntax.parser import find_syntax_errors, parse
 from urscript.values import to_script_text
-
-RULES: Final[tuple[Rule, ...]] = (
-    syntax_rules.quotes,
-    syntax_rules.comment,
-    syntax_rules.foreign_statement,
-    syntax_rules.number,
-    syntax_rules.unterminated_string,
-    syntax_rules.symbol,
-    syntax_rules.pose_elements,
-    syntax_rules.colon_assignment,
-    syntax_rules.lambda_expression,
-    syntax_rules.else_if,
-    syntax_rules.augmented_assignment,
-    syntax_rules.foreign_operator,
-    syntax_rules.function_head,
-    syntax_rules.called_keyword,
-    syntax_rules.reserved_word,
-    syntax_rules.decimal_comma,
-    syntax_rules.trailing_comma,
-    syntax_rules.inside_brackets,
-    syntax_rules.conditional_expression,
-    syntax_rules.unmatched_closer,
-    syntax_rules.unclosed_bracket,
-    syntax_rules.comparison_chain,
-    syntax_rules.word_operator,
-    syntax_rules.assignment_in_expression,
-    syntax_rules.tuples,
-    syntax_rules.missing_comma,
-    syntax_rules.foreign_end,
-    syntax_rules.missing_colon,
-    syntax_rules.missing_value,
-    syntax_rules.extra_end,
-    syntax_rules.missing_end,
-)
-"""In order of priority: the first rule that returns an advice is used."""
 
 MAX_ERRORS: Final = 20
 _MAX_REPAIRS: Final = 60
@@ -93,13 +58,14 @@ def check_program(
 def _find_warnings(
     program: ResolvedProgram, catalogue: Catalogue, *, beside_errors: bool
 ) -> list[ScriptWarning]:
-    groups = (name_warnings, flow_warnings, value_warnings, argument_warnings)
-    found = [
-        warning
-        for group in (groups[-1:] if beside_errors else groups)
-        for warning in group(program, catalogue)
-        if not beside_errors or warning.rule in ABOUT_VALUES
-    ]
+    found = list(argument_warnings(program, catalogue))
+    if beside_errors:
+        found = [warning for warning in found if warning.rule in ABOUT_VALUES]
+    else:
+        for group in (name_warnings, flow_warnings, value_warnings):
+            found += group(program, catalogue)
+    for warning in found:
+        warning.source = program.source
     return sorted(found, key=lambda warning: (warning.line, warning.column, warning.rule.code))
 
 

@@ -22,21 +22,19 @@ COUNTED_READS: Final = frozenset(
 def flow_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order."""
     for scope in program.scopes():
-        yield from _unreachable(scope.body, program)
+        yield from _unreachable(scope.body)
         for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.While) and _is_busy(statement, scope, catalogue):
                 message = "this loop takes no time and never ends by itself: the controller stops the program"
                 place = _head(statement.span, statement.condition)
-                yield ScriptWarning(
-                    warnings.BUSY_LOOP, message, place, program.source, "put a sync() into it"
-                )
+                yield ScriptWarning(warnings.BUSY_LOOP, message, place, "put a sync() into it")
             elif isinstance(statement, nodes.If):
-                yield from _dead_branches(statement, program)
+                yield from _dead_branches(statement)
     yield from _unchecked_reads(program)
     yield from _semicolons(program.source)
     for call in program.calls_after:
         message = f"'{program.name}' runs when it is defined; this call is a program of its own and fails"
-        yield ScriptWarning(warnings.CALL_OF_PROGRAM, message, call.span, program.source, "leave it out")
+        yield ScriptWarning(warnings.CALL_OF_PROGRAM, message, call.span, "leave it out")
 
 
 def _semicolons(source: Source) -> Iterator[ScriptWarning]:
@@ -46,7 +44,7 @@ def _semicolons(source: Source) -> Iterator[ScriptWarning]:
             line, column = text.place(token.start)
             place = Span(line, column, line, column + 1)
             message, hint = "no manual has a ';'", "leave it out"
-            yield ScriptWarning(warnings.IN_NO_MANUAL, message, place, source, hint)
+            yield ScriptWarning(warnings.IN_NO_MANUAL, message, place, hint)
 
 
 def constant_truth(expression: Expression) -> bool | None:
@@ -93,9 +91,8 @@ def _is_busy(loop: nodes.While, scope: FunctionScope, catalogue: Catalogue) -> b
         return True
     changes = any(isinstance(item, (nodes.Assign, nodes.Kill)) for item in statements)
     leaves_at_once = any(map(_end_of, loop.body))
-    return (
-        not changes and not leaves_at_once and not any(_has_effect(part, scope, catalogue) for part in parts)
-    )
+    has_effect = any(_has_effect(part, scope, catalogue) for part in parts)
+    return not (changes or leaves_at_once or has_effect)
 
 
 def _is_pause(statement: Statement) -> bool:
@@ -137,18 +134,18 @@ def _can_leave(block: Block, in_loop: bool = False) -> bool:
 # --- unreachable code ------------------------------------------------------------------------------------
 
 
-def _unreachable(block: Block, program: ResolvedProgram) -> Iterator[ScriptWarning]:
+def _unreachable(block: Block) -> Iterator[ScriptWarning]:
     """The first unreachable statement of each block; definitions and labels are allowed anywhere."""
     ended_by = ""
     for statement in block:
         if ended_by and not isinstance(statement, (nodes.Function, nodes.Label, nodes.Declaration)):
             message = f"unreachable code: it follows {ended_by}"
-            yield ScriptWarning(warnings.UNREACHABLE, message, _first_line(statement), program.source)
+            yield ScriptWarning(warnings.UNREACHABLE, message, _first_line(statement))
             break
         ended_by = ended_by or _end_of(statement)
     for statement in block:
         for inner in nodes.own_blocks(statement):
-            yield from _unreachable(inner, program)
+            yield from _unreachable(inner)
 
 
 def _end_of(statement: Statement) -> str:
@@ -187,7 +184,7 @@ def _first_line(statement: Statement) -> Span:
     return statement.span
 
 
-def _dead_branches(statement: nodes.If, program: ResolvedProgram) -> Iterator[ScriptWarning]:
+def _dead_branches(statement: nodes.If) -> Iterator[ScriptWarning]:
     earlier: list[nodes.Branch] = []
     for branch in statement.branches:
         always = next((other for other in earlier if constant_truth(other.condition) is True), None)
@@ -195,18 +192,16 @@ def _dead_branches(statement: nodes.If, program: ResolvedProgram) -> Iterator[Sc
         if always or same:
             line = (always or same or branch).span.line
             why = f"the condition of line {line} is {'always true' if always else 'the same'}"
-            yield ScriptWarning(
-                warnings.DEAD_BRANCH, f"this branch is never reached: {why}", branch.span, program.source
-            )
+            yield _dead(branch.span, why)
         earlier.append(branch)
     last = earlier[-1]
     if statement.else_body and constant_truth(last.condition) is True:
-        first = statement.else_body[0]
         why = f"the condition of line {last.span.line} is always true"
-        place = _first_line(first)
-        yield ScriptWarning(
-            warnings.DEAD_BRANCH, f"this branch is never reached: {why}", place, program.source
-        )
+        yield _dead(_first_line(statement.else_body[0]), why)
+
+
+def _dead(place: Span, why: str) -> ScriptWarning:
+    return ScriptWarning(warnings.DEAD_BRANCH, f"this branch is never reached: {why}", place)
 
 
 def _is_same(first: Expression, second: Expression) -> bool:
@@ -234,21 +229,21 @@ def _unchecked_reads(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             case nodes.Subscript(target=nodes.Call() as call, indices=indices) if _is_read(
                 call, scope
             ) and indices != (nodes.IntLiteral(0),):
-                yield _unchecked(call, "its count", program)
+                yield _unchecked(call, "its count")
     for scope in program.scopes():
         for statement in nodes.all_statements(scope.body):
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=nodes.Call() as call):
-                    variable = (None, name) if statement.scope == "global" else owner(name, scope)
+                    variable = owner(name, scope, statement.scope)
                     if _is_read(call, scope) and variable in numbers_used - checked:
-                        yield _unchecked(call, f"{name}[0]", program)
+                        yield _unchecked(call, f"{name}[0]")
 
 
 def _is_read(call: nodes.Call, scope: FunctionScope) -> bool:
     return call.function in COUNTED_READS and scope.find_function(call.function) is None
 
 
-def _unchecked(call: nodes.Call, what: str, program: ResolvedProgram) -> ScriptWarning:
+def _unchecked(call: nodes.Call, what: str) -> ScriptWarning:
     message = f"the number of received values is never checked: {what} is not read"
     hint = "after a timeout it is 0 and the values are invalid"
-    return ScriptWarning(warnings.UNCHECKED_READ, message, call.span, program.source, hint)
+    return ScriptWarning(warnings.UNCHECKED_READ, message, call.span, hint)

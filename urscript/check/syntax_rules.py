@@ -10,8 +10,10 @@ from urscript.check.tokens import (
     Advice,
     Edit,
     Problem,
+    Rule,
     Token,
     TokenizedText,
+    absent,
     advice_at,
     replacement,
 )
@@ -78,13 +80,12 @@ def symbol(problem: Problem) -> Advice | None:
     new, hint = words.SYMBOLS[written]
     if written == "{" and problem.previous.text == ":":
         new = " "
-    edit = replacement(token, f" {new} " if new.isalpha() else new, last)
-    what = (
-        f"unexpected {words.INVISIBLE[written]}"
-        if written in words.INVISIBLE
-        else f"there is no '{written}' in URScript"
-    )
-    return advice_at(token, what, hint, edit, last=last)
+    elif new.isalpha():
+        new = f" {new} "
+    if written in words.INVISIBLE:
+        message = f"unexpected {words.INVISIBLE[written]}"
+        return advice_at(token, message, hint, replacement(token, new))
+    return absent(written, hint, token, new, last)
 
 
 def number(problem: Problem) -> Advice | None:
@@ -94,8 +95,7 @@ def number(problem: Problem) -> Advice | None:
         return None
     text = token.text
     if following.start == token.end and as_utf8(following.text) == "\u00b0":
-        edit = replacement(following, " ")
-        return advice_at(following, "there is no '\u00b0' in URScript", f"write d2r({text})", edit)
+        return absent("\u00b0", f"write d2r({text})", following, " ")
     if re.fullmatch(r"0[xX][0-9a-fA-F]{1,8}", text):
         value = int(text, 16)
         message = f"URScript has no hexadecimal numbers, got {text}"
@@ -217,7 +217,7 @@ def tuples(problem: Problem) -> Advice | None:
         return advice_at(opener, "a list is written in [ ]", "write [a, b]", *edits)
     index, head = problem.line_head(comma.line)
     if not brackets and head.kind == "word" and index + 1 == problem.index:
-        end = problem.tokenized.line_start(comma.line) + len(problem.tokenized.line(comma.line))
+        end = problem.tokenized.line_end(comma.line)
         edit = Edit(head.start, end, " " * (end - head.start))
         hint = "write one assignment for each"
         return advice_at(head, "an assignment sets one variable", hint, edit, last=comma, exact=False)
@@ -265,20 +265,21 @@ def trailing_comma(problem: Problem) -> Advice | None:
     return advice_at(comma, "nothing follows this ','", "remove it", replacement(comma, " "))
 
 
+_NOT_IN_BRACKETS: Final = {
+    ":": ("slices x[a:b] and no pairs a: b", "write a while loop"),
+    "for": ("list comprehensions", "write a while loop"),
+    "if": ("conditional expressions", "write if ...: x = a else: x = b end"),
+    "else": ("conditional expressions", "write if ...: x = a else: x = b end"),
+}
+
+
 def inside_brackets(problem: Problem) -> Advice | None:
     """`x[1:2]`, `[i for i in x]`: what is not allowed in brackets."""
     token = problem.token
     if problem.starts_line or not problem.open_brackets() or not problem.accepts("COMMA", "RPAR", "RSQB"):
         return None
-    if token.text == ":":
-        return advice_at(token, "URScript has no slices x[a:b] and no pairs a: b", "write a while loop")
-    if token.text == "for":
-        return advice_at(token, "URScript has no list comprehensions", "write a while loop")
-    if token.text in ("if", "else"):
-        return advice_at(
-            token, "URScript has no conditional expressions", "write if ...: x = a else: x = b end"
-        )
-    return None
+    what, hint = _NOT_IN_BRACKETS.get(token.text, ("", ""))
+    return advice_at(token, f"URScript has no {what}", hint) if what else None
 
 
 # --- blocks; the indentation shows where an `end` is missing or superfluous -----------------------------
@@ -303,9 +304,7 @@ def foreign_end(problem: Problem) -> Advice | None:
         second = tokenized.tokens[index + 1]
         third = tokenized.tokens[min(index + 2, len(tokenized.tokens) - 1)]
         if token.text in words.BLOCK_ENDS and _is_elsewhere(second, token):
-            return advice_at(
-                token, f"there is no '{token.text}' in URScript", "write end", replacement(token, "end")
-            )
+            return absent(token.text, "write end", token, "end")
         alone = not _is_elsewhere(second, token) and _is_elsewhere(third, token)
         if token.text == "end" and second.text in words.WORDS_AFTER_END and alone:
             message = f"a block ends with 'end', not 'end {second.text}'"
@@ -377,8 +376,7 @@ def else_if(problem: Problem) -> Advice | None:
     token, before = problem.token, problem.previous
     if token.text != "if" or before.text != "else" or problem.starts_line:
         return None
-    edit = replacement(before, "elif", token)
-    return advice_at(before, "there is no 'else if' in URScript", "write elif", edit, last=token)
+    return absent("else if", "write elif", before, "elif", token)
 
 
 def missing_colon(problem: Problem) -> Advice | None:
@@ -387,9 +385,7 @@ def missing_colon(problem: Problem) -> Advice | None:
     if not problem.accepts("COLON"):
         return None
     if token.text in ("then", "do"):
-        return advice_at(
-            token, f"there is no '{token.text}' in URScript", "write ':'", replacement(token, ":")
-        )
+        return absent(token.text, "write ':'", token, ":")
     if not problem.starts_line and token.kind != "word":
         return None
     _, head = problem.line_head(before.line)
@@ -418,7 +414,7 @@ def foreign_statement(problem: Problem) -> Advice | None:
         if word.new and not word.new.endswith(":"):
             edit = replacement(head, word.new)
         else:
-            end = problem.tokenized.line_start(line) + len(problem.tokenized.line(line))
+            end = problem.tokenized.line_end(line)
             edit = Edit(head.start, end, word.new.ljust(end - head.start))
         message = f"there is no '{head.text}' in URScript"
         return advice_at(head, message, word.hint, edit, exact=word.exact)
@@ -448,10 +444,8 @@ def augmented_assignment(problem: Problem) -> Advice | None:
         return None
     variable = problem.neighbor(-2)
     name = variable.text if variable.kind == "word" else "x"
-    message = f"there is no '{operator.text}=' in URScript"
     hint = f"write {name} = {name} {operator.text} ..."
-    edit = Edit(operator.start, token.end, f"= {name} {operator.text}")
-    return advice_at(operator, message, hint, edit, last=token)
+    return absent(f"{operator.text}=", hint, operator, f"= {name} {operator.text}", token)
 
 
 def assignment_in_expression(problem: Problem) -> Advice | None:
@@ -461,8 +455,7 @@ def assignment_in_expression(problem: Problem) -> Advice | None:
         return None
     if before.text == ":" or before.text in _COMPARES:
         sign, new = (":=", "=") if before.text == ":" else (f"{before.text}=", before.text)
-        edit = replacement(before, new, token)
-        return advice_at(before, f"there is no '{sign}' in URScript", f"write {new}", edit, last=token)
+        return absent(sign, f"write {new}", before, new, token)
     if problem.line_head(token.line)[1].text in _CONDITIONS:
         return advice_at(token, "'=' assigns; it does not compare", "write ==", replacement(token, "=="))
     if problem.accepts("WHILE"):
@@ -476,8 +469,7 @@ def colon_assignment(problem: Problem) -> Advice | None:
     token, following = problem.token, problem.following
     if token.text != ":" or following.text != "=" or following.start != token.end:
         return None
-    edit = replacement(token, "=", following)
-    return advice_at(token, "there is no ':=' in URScript", "write =", edit, last=following)
+    return absent(":=", "write =", token, "=", following)
 
 
 def comparison_chain(problem: Problem) -> Advice | None:
@@ -498,9 +490,7 @@ def foreign_operator(problem: Problem) -> Advice | None:
     if before.end != token.start or both not in words.OPERATORS:
         return None
     new, hint = words.OPERATORS[both]
-    return advice_at(
-        before, f"there is no '{both}' in URScript", hint, replacement(before, new, token), last=token
-    )
+    return absent(both, hint, before, new, token)
 
 
 def word_operator(problem: Problem) -> Advice | None:
@@ -509,8 +499,7 @@ def word_operator(problem: Problem) -> Advice | None:
     if problem.starts_line or token.text not in words.WORD_OPERATORS:
         return None
     new, hint = words.WORD_OPERATORS[token.text]
-    message = f"there is no '{token.text}' in URScript"
-    return advice_at(token, message, hint, replacement(token, new), exact=token.text != "in")
+    return absent(token.text, hint, token, new, exact=token.text != "in")
 
 
 def conditional_expression(problem: Problem) -> Advice | None:
@@ -532,7 +521,7 @@ def lambda_expression(problem: Problem) -> Advice | None:
     start = problem.line_head(problem.token.line)[0]
     for token in problem.tokenized.tokens[start : problem.index]:
         if token.text == "lambda":
-            end = problem.tokenized.line_start(token.line) + len(problem.tokenized.line(token.line))
+            end = problem.tokenized.line_end(token.line)
             edit = Edit(token.start, end, "0".ljust(end - token.start))
             return advice_at(token, "there is no 'lambda' in URScript", "write a def", edit, exact=False)
     return None
@@ -591,3 +580,13 @@ def missing_value(problem: Problem) -> Advice | None:
     return Advice(
         message, None, before.end - 1, before.end, (Edit(before.end, before.end, " 0"),), exact=False
     )
+
+
+RULES: Final[tuple[Rule, ...]] = (
+    quotes, comment, foreign_statement, number, unterminated_string, symbol, pose_elements, colon_assignment,
+    lambda_expression, else_if, augmented_assignment, foreign_operator, function_head, called_keyword,
+    reserved_word, decimal_comma, trailing_comma, inside_brackets, conditional_expression, unmatched_closer,
+    unclosed_bracket, comparison_chain, word_operator, assignment_in_expression, tuples, missing_comma,
+    foreign_end, missing_colon, missing_value, extra_end, missing_end,
+)  # fmt: skip
+"""In order of priority: the first rule that returns an advice is used."""

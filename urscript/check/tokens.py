@@ -69,12 +69,15 @@ class TokenizedText:
 
     def line(self, number: int) -> str:
         """A line without its end."""
-        end = self._starts[number] - 1 if number < len(self._starts) else len(self.text)
-        return self.text[self._starts[number - 1] : end]
+        return self.text[self.line_start(number) : self.line_end(number)]
 
     def line_start(self, number: int) -> int:
         """Offset of the first character of a line."""
         return self._starts[number - 1]
+
+    def line_end(self, number: int) -> int:
+        """Offset of the line feed that ends a line, or of the end of the text."""
+        return self._starts[number] - 1 if number < len(self._starts) else len(self.text)
 
     def indent(self, number: int) -> int:
         """Blanks before the first token of a line; a tab reaches to the next multiple of eight."""
@@ -83,14 +86,7 @@ class TokenizedText:
 
     def token_at(self, offset: int) -> int:
         """Index of the token at an offset, or of the next one after it."""
-        low, high = 0, len(self.tokens) - 1
-        while low < high:
-            middle = (low + high) // 2
-            if self.tokens[middle].end <= offset:
-                low = middle + 1
-            else:
-                high = middle
-        return low
+        return bisect_right(self.tokens, offset, hi=len(self.tokens) - 1, key=lambda token: token.end)
 
     def is_first(self, index: int) -> bool:
         """Whether a token is the first of its line."""
@@ -141,6 +137,14 @@ def replacement(token: Token, new: str, last: Token | None = None) -> Edit:
     return Edit(token.start, end, new.ljust(end - token.start))
 
 
+def absent(
+    word: str, hint: str, first: Token, new: str, last: Token | None = None, *, exact: bool = True
+) -> Advice:
+    """Advice that URScript has no `word`, which stands from `first` to `last`, and to replace it."""
+    message = f"there is no '{word}' in URScript"
+    return advice_at(first, message, hint, replacement(first, new, last), last=last, exact=exact)
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """The first syntax error of a text; `index` is that of the token at the error."""
@@ -156,12 +160,12 @@ class Problem:
 
     @property
     def previous(self) -> Token:
-        """The token before it; itself at the start of the text."""
+        """The token before it."""
         return self.neighbor(-1)
 
     @property
     def following(self) -> Token:
-        """The token after it; itself at the end of the text."""
+        """The token after it."""
         return self.neighbor(1)
 
     def neighbor(self, distance: int) -> Token:

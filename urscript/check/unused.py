@@ -9,14 +9,7 @@ from urscript.check.warnings import ScriptWarning
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Source, Span
 from urscript.syntax import nodes
-from urscript.syntax.nodes import (
-    Block,
-    Expression,
-    Statement,
-    all_expressions,
-    all_statements,
-    own_expressions,
-)
+from urscript.syntax.nodes import Block, Expression, Statement
 
 _MOST_NAMES: Final = 5
 Variable = tuple[FunctionScope | None, str]
@@ -43,18 +36,18 @@ def nothing_runs(block: Block, source: Source) -> ScriptWarning | None:
     more = f" and {len(definitions) - _MOST_NAMES} more" if len(definitions) > _MOST_NAMES else ""
     call = f"run {first.name}()" if first.kind == "thread" else f"{first.name}()"
     message, hint = f"nothing runs: the text only defines {names}{more}", f"write {call} at its end"
-    return ScriptWarning(warnings.NOTHING_RUNS, message, name_of(first, source), source, hint)
+    return ScriptWarning(warnings.NOTHING_RUNS, message, name_of(first, source), hint)
 
 
-def owner(name: str, scope: FunctionScope) -> Variable:
-    """The variable of `name` in `scope`."""
-    return (scope if name in scope.locals else None), name
+def owner(name: str, scope: FunctionScope, qualifier: str | None = None) -> Variable:
+    """The variable of `name` in `scope`, there perhaps assigned to with `global` before it."""
+    return (scope if name in scope.locals and qualifier != "global" else None), name
 
 
 def read_expressions(statement: Statement) -> tuple[Expression, ...]:
     """The expressions a statement reads: storing into `x[i]` reads `i`, not `x`."""
     if not isinstance(statement, nodes.Assign):
-        return own_expressions(statement)
+        return nodes.own_expressions(statement)
     parts: list[Expression] = [statement.value]
     target: Expression = statement.target
     while isinstance(target, (nodes.Subscript, nodes.Attribute)):
@@ -67,21 +60,21 @@ def read_expressions(statement: Statement) -> tuple[Expression, ...]:
 def expressions_read(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, Expression]]:
     """Every expression that is read, with all its parts, and the scope of its names."""
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             for expression in read_expressions(statement):
-                for part in all_expressions(expression):
+                for part in nodes.all_expressions(expression):
                     yield scope, part
         if scope.parent is not None and scope.node is not None:
             for parameter in scope.node.parameters:
                 if parameter.default is not None:
-                    for part in all_expressions(parameter.default):
+                    for part in nodes.all_expressions(parameter.default):
                         yield scope.default_scope(), part
 
 
 def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Span]]:
     """Every declaration of a variable and assignment to a whole variable, without parameters."""
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.Declaration):
                 name, span = statement.name, statement.span
                 span = span._replace(line=span.end_line, column=span.end_column - len(name))
@@ -89,7 +82,7 @@ def declared_variables(program: ResolvedProgram) -> Iterator[tuple[Variable, Spa
                 name, span = statement.target.name, statement.target.span
             else:
                 continue
-            yield ((None, name) if statement.scope == "global" else owner(name, scope)), span
+            yield owner(name, scope, statement.scope), span
 
 
 def name_of(function: nodes.Function, source: Source) -> Span:
@@ -116,11 +109,11 @@ def _unused_variables(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             continue
         seen.add(variable)
         rule, kind = (warnings.UNUSED_GLOBAL, "global") if scope is None else (warnings.UNUSED_LOCAL, "local")
-        yield ScriptWarning(rule, f"{kind} variable '{name}' is never read", span, program.source)
+        yield ScriptWarning(rule, f"{kind} variable '{name}' is never read", span)
     for scope, name, span in _parameters(program):
         if (scope, name) not in read and not name.startswith("_"):
             message = f"parameter '{name}' of '{scope.name}' is never read"
-            yield ScriptWarning(warnings.UNUSED_PARAMETER, message, span, program.source)
+            yield ScriptWarning(warnings.UNUSED_PARAMETER, message, span)
 
 
 def _parameters(program: ResolvedProgram) -> Iterator[tuple[FunctionScope, str, Span]]:
@@ -140,7 +133,7 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
             runs[scope].add(callee)
         if not callee.is_thread:
             message = f"'{part.thread}' is run as a thread but defined with 'def'"
-            yield ScriptWarning(warnings.RUN_OF_DEF, message, part.span, program.source)
+            yield ScriptWarning(warnings.RUN_OF_DEF, message, part.span)
     reached: set[FunctionScope] = set()
     todo = program.scopes() if program.is_open else [program.main]
     while todo:
@@ -153,41 +146,35 @@ def _functions(program: ResolvedProgram) -> Iterator[ScriptWarning]:
         span = name_of(scope.node, program.source)
         if scope.parent is not None and scope.parent.functions[scope.name] is not scope:
             message = f"'{scope.name}' is defined twice here; the last definition is used"
-            yield ScriptWarning(warnings.DEFINED_TWICE, message, span, program.source)
+            yield ScriptWarning(warnings.DEFINED_TWICE, message, span)
         elif scope not in reached and not scope.name.startswith("_"):
             rule, what = (
                 (warnings.UNUSED_THREAD, "thread '{}' is never run")
                 if scope.is_thread
                 else (warnings.UNUSED_FUNCTION, "function '{}' is never called")
             )
-            yield ScriptWarning(rule, what.format(scope.name), span, program.source)
+            yield ScriptWarning(rule, what.format(scope.name), span)
 
 
 # --- hiding ----------------------------------------------------------------------------------------------
 
 
 def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
-    def warning(what: str, name: str, span: Span) -> ScriptWarning:
-        return ScriptWarning(
-            warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span, program.source
-        )
-
-    def is_builtin(name: str) -> bool:
-        return name in catalogue or name in catalogue.variables or name in catalogue.arrays
-
-    seen: set[Variable] = {(scope, name) for scope, name, _ in _parameters(program)}
+    parameters = list(_parameters(program))
+    seen: set[Variable] = {(scope, name) for scope, name, _ in parameters}
+    hiding: list[tuple[str, str, Span]] = []
     for variable, span in declared_variables(program):
-        if variable not in seen and is_builtin(variable[1]):
+        if variable not in seen:
             seen.add(variable)
-            yield warning("variable", variable[1], span)
-    for _, name, span in _parameters(program):
-        if is_builtin(name):
-            yield warning("parameter", name, span)
+            hiding.append(("variable", variable[1], span))
+    hiding += (("parameter", name, span) for _, name, span in parameters)
     for scope in program.functions:
-        if scope.node is not None and is_builtin(scope.name):
-            yield warning(
-                scope.node.kind.replace("def", "function"), scope.name, name_of(scope.node, program.source)
-            )
+        assert scope.node is not None
+        what = scope.node.kind.replace("def", "function")
+        hiding.append((what, scope.name, name_of(scope.node, program.source)))
+    for what, name, span in hiding:
+        if name in catalogue or name in catalogue.variables or name in catalogue.arrays:
+            yield ScriptWarning(warnings.HIDES_BUILTIN, f"{what} '{name}' hides the builtin", span)
 
 
 # --- values ---------------------------------------------------------------------------------------------
@@ -196,17 +183,17 @@ def _hidden_builtins(program: ResolvedProgram, catalogue: Catalogue) -> Iterator
 def value_warnings(program: ResolvedProgram, catalogue: Catalogue) -> Iterator[ScriptWarning]:
     """Everything this module warns about, in no order."""
     for scope in program.scopes():
-        for statement in all_statements(scope.body):
+        for statement in nodes.all_statements(scope.body):
             if isinstance(statement, nodes.ExpressionStatement) and not _has_effect(statement.value):
                 message, hint = _unused(statement.value)
-                yield ScriptWarning(warnings.UNUSED_VALUE, message, statement.span, program.source, hint)
+                yield ScriptWarning(warnings.UNUSED_VALUE, message, statement.span, hint)
     if "rpc_factory" in program.builtins or catalogue.methods:
         return
     for _, part in expressions_read(program):
         if isinstance(part, nodes.MethodCall):
             message = f"nothing in this program has a method '{part.method}'"
             hint = _FUNCTIONS.get(part.method)
-            yield ScriptWarning(warnings.CALL_WITHOUT_HANDLE, message, part.span, program.source, hint)
+            yield ScriptWarning(warnings.CALL_WITHOUT_HANDLE, message, part.span, hint)
 
 
 _FUNCTIONS = {
@@ -230,7 +217,6 @@ def _has_effect(value: Expression) -> bool:
 
 
 def _unused(value: Expression) -> tuple[str, str | None]:
-    """Message and hint for an unused value."""
     match value:
         case nodes.BinaryOperation(operator="==", left=nodes.Name(name=name)):
             return "the result of this comparison is not used", f"write {name} = ... to assign"

@@ -1,11 +1,11 @@
 """`urscript run`: run a program on an emulated robot, or on a host that only records its calls."""
 
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, Final, NamedTuple, Self
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -84,6 +84,7 @@ def run(
         output.compile_error(with_advice(error))
         raise typer.Exit(ExitCode.FAILED) from None
     if warning := nothing_runs(parse(source), source):
+        warning.source = source
         output.warning(warning)
     n_lines = trace_lines if trace else 0
     if maker is None:
@@ -161,7 +162,7 @@ def _run_on(
         watch.flush(all_streams=False)
         output.report(report)
 
-    with _tracer(program, lambda: round(robot.time / robot.step_time), trace_lines):
+    with _tracing(program, lambda: round(robot.time / robot.step_time), trace_lines):
         end = robot.run(watch.program, limit, report)
     watch.flush()
     output.end(end.status, end.robot_time, robot.title, end)
@@ -183,7 +184,7 @@ def _run_without_robot(
     host = RecordingHost(catalogue=catalogue, on_message=report_text, on_call=report_call)
     status = RunStatus.FINISHED
     try:
-        with _tracer(program, lambda: host.cycle, trace_lines):
+        with _tracing(program, lambda: host.cycle, trace_lines):
             running = host.run(program, max_cycles=int(min(limit / host.step_time, 1e15)))
     except KeyboardInterrupt:
         status = RunStatus.INTERRUPTED
@@ -200,84 +201,43 @@ def _run_without_robot(
     return status
 
 
-def _tracer(program: CompiledProgram, cycle: Callable[[], int], limit: int) -> AbstractContextManager[Any]:
-    """Prints up to `limit` lines while they are executed; none for 0."""
-    if not limit:
-        return nullcontext()
+@contextmanager
+def _tracing(program: CompiledProgram, cycle: Callable[[], int], limit: int) -> Iterator[None]:
+    """Show every line of `program` before it is executed, `limit` of them, or an endless loop fills the disk.
 
-    def show_line(traced: TracedLine) -> None:
-        show(f"{cycle():6d}  {traced.thread}:{traced.line}: {traced.text}")
-
-    def stop() -> None:
-        show(f"trace stops after {limit} lines (--trace-lines)", error=True)
-
-    return LineTracer(program, show_line, stop, limit)
-
-
-# --- --trace: line by line what a program executes ------------------------------------------------------
-#
-# Compiled programs carry the lines of their script, so Python's own tracing shows them; without it nothing is
-# slower. One tracer a process at a time.
-
-
-class TracedLine(NamedTuple):
-    """A line about to be executed: name of the thread, number from 1, text without surrounding spaces."""
-
-    thread: str
-    line: int
-    text: str
-
-
-class LineTracer:
-    """While its `with` block lasts, reports every line of `program` before it is executed.
-
-    A line with two statements is reported once, the head of a loop once a round, that of a function once a
-    call. After `limit` lines it calls `on_limit` and is silent: an endless loop would fill any disk.
+    A line with two statements is shown once, the head of a loop once a round, that of a function once a call.
+    Compiled programs carry the lines of their script, so Python's own tracing shows them; without it nothing
+    is slower. One tracer a process at a time.
     """
+    earlier: Any = sys.gettrace()
+    last: tuple[int, int] | None = None
+    n_shown = 0
 
-    def __init__(
-        self,
-        program: CompiledProgram,
-        on_line: Callable[[TracedLine], None],
-        on_limit: Callable[[], None],
-        limit: int,
-    ) -> None:
-        self._program = program
-        self._on_line = on_line
-        self._on_limit = on_limit
-        self._left = limit
-        self._earlier: Any = None
-        self._last: tuple[int, int] | None = None
+    def enter_frame(frame: FrameType, event: str, argument: Any) -> Any:
+        # Called by Python for every frame that is entered or resumed: only the script's are followed.
+        nonlocal last
+        last = None
+        return show_line if frame.f_code.co_filename == program.compiled.file_name else None
 
-    def __enter__(self) -> Self:
-        self._earlier = sys.gettrace()
-        sys.settrace(self._enter_frame)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        sys.settrace(self._earlier)
-
-    def _enter_frame(self, frame: FrameType, event: str, argument: Any) -> Any:
-        """Called by Python for every frame that is entered or resumed: only the script's are followed."""
-        if frame.f_code.co_filename != self._program.compiled.file_name:
-            return None
-        self._last = None
-        return self._line
-
-    def _line(self, frame: FrameType, event: str, argument: Any) -> Any:
-        # The module itself only defines the functions.
-        if event != "line" or frame.f_code.co_name == "<module>":
-            return self._line
-        # The code of one line comes in pieces.
+    def show_line(frame: FrameType, event: str, argument: Any) -> Any:
+        nonlocal last, n_shown
         place = id(frame), frame.f_lineno
-        if place == self._last:
-            return self._line
-        self._last = place
-        if self._left <= 0:
-            self._on_limit()
-            sys.settrace(self._earlier)
+        # The module itself only defines the functions. The code of one line comes in pieces.
+        if event != "line" or frame.f_code.co_name == "<module>" or place == last:
+            return show_line
+        last = place
+        if n_shown == limit:
+            show(f"trace stops after {limit} lines (--trace-lines)", error=True)
+            sys.settrace(earlier)
             return None
-        self._left -= 1
-        text = self._program.source.line(frame.f_lineno).strip()
-        self._on_line(TracedLine(frame.f_globals["_T"].name, frame.f_lineno, text))
-        return self._line
+        n_shown += 1
+        text = program.source.line(frame.f_lineno).strip()
+        show(f"{cycle():6d}  {frame.f_globals['_T'].name}:{frame.f_lineno}: {text}")
+        return show_line
+
+    if limit:
+        sys.settrace(enter_frame)
+    try:
+        yield
+    finally:
+        sys.settrace(earlier)

@@ -45,12 +45,10 @@ class TextOutput:
         self._quiet = quiet
 
     def compile_error(self, error: ScriptError) -> None:
-        """Print the error of a program that does not compile, with its place."""
+        """Print the error of a program that does not compile, or a warning about one, with its place."""
         show(error.render(), error=True)
 
-    def warning(self, warning: ScriptError) -> None:
-        """Print what is probably a mistake, with its place; the program runs."""
-        show(warning.render(), error=True)
+    warning = compile_error
 
     def report(self, report: Report) -> None:
         """Print a text unchanged, errors with their place, everything else with its time."""
@@ -157,7 +155,7 @@ class JsonOutput:
             joints=run and list(run.joints),
             tcp_pose=run and list(run.tcp_pose),
             events=self._events,
-            diagnostics=[diagnostic_of(error, self._file)._asdict() for error in self._errors],
+            diagnostics=[diagnostic_of(error, self._file) for error in self._errors],
         )
 
 
@@ -314,8 +312,6 @@ class MoveWatch:
 
 @dataclass(frozen=True, slots=True)
 class _WatchedProgram(CompiledProgram):
-    """A program that runs on a watched host."""
-
     watch: MoveWatch
 
     def start(self, host: Host, work: WorkBudget | None = None) -> RunningProgram:
@@ -323,8 +319,6 @@ class _WatchedProgram(CompiledProgram):
 
 
 class _WatchedHost:
-    """A host whose motion builtins are watched."""
-
     def __init__(self, host: Host, watch: MoveWatch) -> None:
         self.step_time = host.step_time
         self.textmsg = host.textmsg

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -75,33 +75,26 @@ ERROR_CODES: Final[dict[type[errors.ScriptError], str]] = {
 """The stable codes of errors; those of warnings are in `check.warnings`."""
 
 
-class Diagnostic(NamedTuple):
-    """An error or warning about a program, with its place.
+def diagnostic_of(error: errors.ScriptError, file: str) -> dict[str, Any]:
+    """An error or warning about a program in `file`, with its place.
 
     Lines and columns count from 1 and columns count bytes, as in a controller's messages; `end_column` is the
     one after the last character.
     """
-
-    file: str
-    line: int
-    column: int
-    end_line: int
-    end_column: int
-    severity: str
-    code: str
-    message: str
-    hint: str | None
-
-
-def diagnostic_of(error: errors.ScriptError, file: str) -> Diagnostic:
-    """The record of an error or warning in `file`."""
     if isinstance(error, ScriptWarning):
         severity, code = "warning", error.rule.code
         end_line, end_column = error.span.end_line, error.span.end_column
     else:
         severity, code = "error", ERROR_CODES.get(type(error), "E100")
         end_line, end_column = error.line, error.column + error.width
-    hint = as_utf8(error.hint) if error.hint else None
-    return Diagnostic(
-        file, error.line, error.column, end_line, end_column, severity, code, as_utf8(error.message), hint
-    )
+    return {
+        "file": file,
+        "line": error.line,
+        "column": error.column,
+        "end_line": end_line,
+        "end_column": end_column,
+        "severity": severity,
+        "code": code,
+        "message": as_utf8(error.message),
+        "hint": as_utf8(error.hint) if error.hint else None,
+    }

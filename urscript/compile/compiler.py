@@ -14,26 +14,15 @@ import ast
 import marshal
 from array import array
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import CodeType
 from typing import Any, Final, NamedTuple
 
 from urscript.catalogue import Catalogue
 from urscript.compile.expressions import ExpressionCompiler
-from urscript.compile.inference import SCALARS, StaticTypes, Type, is_numeric
-from urscript.compile.python_tree import (
-    ask,
-    call,
-    charge,
-    constant,
-    expression_statement,
-    function,
-    load,
-    place,
-    store,
-)
-from urscript.dialect import Dialect
+from urscript.compile.inference import NUMERIC, SCALARS, StaticTypes, Type
+from urscript.compile.python_tree import ask, call, charge, constant, discarded, function, load, place, store
 from urscript.errors import ScriptContextError
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.source import Span
@@ -60,16 +49,14 @@ class CompiledCode:
     file_name: str
 
 
-def compile_resolved(
-    program: ResolvedProgram, catalogue: Catalogue, dialect: Dialect, file_name: str
-) -> CompiledCode:
+def compile_resolved(program: ResolvedProgram, catalogue: Catalogue, file_name: str) -> CompiledCode:
     """Compile a program without errors to Python.
 
     Raises:
         ScriptContextError: Something is nested deeper than Python can; loops are limited before.
     """
     types = StaticTypes(program, catalogue)
-    expressions = ExpressionCompiler(program, types, catalogue, dialect)
+    expressions = ExpressionCompiler(program, types, catalogue)
     functions: list[ast.stmt] = []
     function_names: dict[str, str] = {}
     try:
@@ -85,9 +72,8 @@ def compile_resolved(
             column=(error.offset or 0) + 1,
             source=program.source,
         ) from None
-    return CompiledCode(
-        marshal.dumps(code), expressions.constants, function_names, _position_tables(code), file_name
-    )
+    positions = {item.co_name: _table(item) for item in code.co_consts if isinstance(item, CodeType)}
+    return CompiledCode(marshal.dumps(code), expressions.constants, function_names, positions, file_name)
 
 
 class _FunctionCompiler:
@@ -159,7 +145,7 @@ class _FunctionCompiler:
         """`_d = _enter(_T)`, then `body` with `_leave(_d)` in a `finally`."""
         at = place(span)
         enter = store("_d", call("_enter", [load("_T", span)], span), span)
-        leave = expression_statement(call("_leave", [load("_d", span)], span), span)
+        leave = discarded(call("_leave", [load("_d", span)], span), span)
         return [enter, ast.Try(body, [], [], [leave], **at)]
 
     # --- statements --------------------------------------------------------------------------------------
@@ -167,7 +153,7 @@ class _FunctionCompiler:
     def _block(self, block: Block) -> list[ast.stmt]:
         result: list[ast.stmt] = []
         for statement in block:
-            self._expressions.begin_statement()
+            self._expressions.asks = 0
             result += self._statement(statement)
             if self._expressions.asks and not isinstance(statement, nodes.Return):
                 result.append(ask(statement.span))
@@ -180,7 +166,7 @@ class _FunctionCompiler:
             case nodes.Assign():
                 return [self._assign(statement)]
             case nodes.ExpressionStatement(value=value):
-                return [expression_statement(self._effect(value), span)]
+                return [discarded(self._effect(value), span)]
             case nodes.If(branches=branches, else_body=else_body):
                 return self._if(branches, else_body)
             case nodes.While(condition=condition, body=body):
@@ -198,16 +184,16 @@ class _FunctionCompiler:
                 return [ast.Return(result, **at)]
             case nodes.Join(thread=thread):
                 joined = call("_join", [load("_T", span), self._expressions.compile(thread, scope)], span)
-                return [expression_statement(ast.YieldFrom(joined, **at), span)]
+                return [discarded(ast.YieldFrom(joined, **at), span)]
             case nodes.Kill(thread=thread):
                 killed = call("_kill", [load("_T", span), self._expressions.compile(thread, scope)], span)
-                return [expression_statement(killed, span)]
+                return [discarded(killed, span)]
             case nodes.KeywordStatement(keyword="break"):
                 return [ast.Break(**at)]
             case nodes.KeywordStatement(keyword="continue"):
                 return [ast.Continue(**at)]
             case nodes.KeywordStatement(keyword="halt"):
-                return [expression_statement(call("_halt", [], span), span)]
+                return [discarded(call("_halt", [], span), span)]
             case nodes.Label(text=text):
                 target = ast.Attribute(load("_T", span), "label", ast.Store(), **at)
                 return [ast.Assign([target], constant(text, span), **at)]
@@ -224,7 +210,7 @@ class _FunctionCompiler:
     def _if(self, branches: tuple[nodes.Branch, ...], else_body: Block | None) -> list[ast.stmt]:
         """From the last branch to the first, without recursion for chains of any length."""
         rest = self._block(else_body) if else_body else []
-        self._expressions.begin_statement()
+        self._expressions.asks = 0
         tests = [self._expressions.condition(branch.condition, self._scope) for branch in branches]
         asks = self._expressions.asks
         for branch, test in zip(reversed(branches), reversed(tests), strict=True):
@@ -255,12 +241,8 @@ class _FunctionCompiler:
             array = expressions.array(inner, scope)
             indices = [expressions.compile(index, scope) for index in target.indices]
             if array is not None:
-                if array.setter is None:
-                    raise ScriptContextError(f"'{array.name}' cannot be assigned to").locate(
-                        self._program.source, span.line, span.column
-                    )
                 made = call(f"b_{array.setter}", [load("_T", span), *indices, value], span)
-                return expression_statement(made, span)
+                return discarded(made, span)
             helper = "_store_item" if len(indices) == 1 else "_store_cell"
         else:
             helper, indices = "_store_member", [constant(target.name, span)]
@@ -272,7 +254,7 @@ class _FunctionCompiler:
             variable, steps = expressions.steps(target, scope)
             if variable is None:  # an element of a builtin array has nothing inside: this ends the program
                 arguments = [value, *indices, expressions.compile(inner, scope)]
-                return expression_statement(call("_store_item", arguments, span), span)
+                return discarded(call("_store_item", arguments, span), span)
             name = variable
             arguments = [value, steps, expressions.compile(nodes.Name(name, span=span), scope)]
         changed = expressions.asking(call(helper, arguments, span))
@@ -320,7 +302,6 @@ class _Cost(NamedTuple):
 
 
 def _block_cost(block: Block, types: StaticTypes, scope: FunctionScope) -> _Cost:
-    """The cost of `block` in the function of `scope`."""
     statements = tenths = 0
     for statement in block:
         if isinstance(statement, nodes.If):
@@ -371,7 +352,7 @@ def _is_quick(operator: str, left: Type, right: Type) -> bool:
     """Whether the operator is one of Python's in the compiled code (see `expressions`)."""
     if operator in ("and", "or", "xor"):
         return True
-    if not (is_numeric(left) and is_numeric(right)) or operator == "%":
+    if not NUMERIC.issuperset((left, right)) or operator == "%":
         return False
     return operator not in ("+", "-", "*") or Type.FLOAT in (left, right) or left is right is Type.INT
 
@@ -403,17 +384,6 @@ class PositionTable:
         """Line and column of the instruction at byte `offset`."""
         i = bisect_right(self.starts, offset // _WORD) - 1
         return (self.lines[i], self.columns[i]) if i >= 0 else (1, 1)
-
-
-def _position_tables(code: CodeType) -> dict[str, PositionTable]:
-    """The table of each function that `code` defines, by the name of the function."""
-    return {function.co_name: _table(function) for function in _functions(code)}
-
-
-def _functions(code: CodeType) -> Iterator[CodeType]:
-    for value in code.co_consts:
-        if isinstance(value, CodeType):
-            yield value
 
 
 def _table(code: CodeType) -> PositionTable:

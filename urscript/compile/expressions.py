@@ -8,12 +8,10 @@ names a compiled program uses is listed in `runtime`.
 import ast
 from typing import Any, Final
 
-from urscript import dialect
 from urscript.catalogue import Catalogue
 from urscript.catalogue.costs import EXPENSIVE, UNITS
-from urscript.compile.inference import StaticTypes, Type, is_numeric
+from urscript.compile.inference import NUMERIC, StaticTypes, Type
 from urscript.compile.python_tree import ask_after, call, constant, load, place
-from urscript.dialect import Dialect
 from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
 from urscript.source import Span
 from urscript.syntax import nodes
@@ -35,21 +33,14 @@ class ExpressionCompiler:
         globals_stored: Python names of the globals that the present function stores.
     """
 
-    def __init__(
-        self, program: ResolvedProgram, types: StaticTypes, catalogue: Catalogue, dialect: Dialect
-    ) -> None:
+    def __init__(self, program: ResolvedProgram, types: StaticTypes, catalogue: Catalogue) -> None:
         self._program = program
         self._types = types
         self._catalogue = catalogue
-        self._dialect = dialect
-        self._changing = {row.name for row in catalogue.methods.values() if row.changes}
+        self._changing = {name for (_, name), row in catalogue.methods.items() if row.changes}
         self.constants: dict[str, Any] = {}
         self.asks = 0
         self.globals_stored: set[str] = set()
-
-    def begin_statement(self) -> None:
-        """The expressions that follow belong to another statement."""
-        self.asks = 0
 
     def asking(self, made: ast.expr, weight: int = 1) -> ast.expr:
         """An operation whose cost depends on values; a long expression asks in between."""
@@ -82,9 +73,8 @@ class ExpressionCompiler:
                 return self._prefix(expression, scope)
             case nodes.ListLiteral(items=items):
                 values = ast.List(self._all(items, scope), ast.Load(), **place(span))
-                return (
-                    values if self._are_numbers(items, scope) else self.asking(call("_list", [values], span))
-                )
+                are_numbers = self._are_numbers(items, scope)
+                return values if are_numbers else self.asking(call("_list", [values], span))
             case nodes.PoseLiteral(items=items):
                 return self._pose(items, span, scope)
             case nodes.RunThread(thread=thread):
@@ -141,7 +131,7 @@ class ExpressionCompiler:
         return [self.compile(item, scope) for item in items]
 
     def _are_numbers(self, items: tuple[Expression, ...], scope: FunctionScope) -> bool:
-        return all(is_numeric(self._types.of(item, scope)) for item in items)
+        return all(self._types.of(item, scope) in NUMERIC for item in items)
 
     # --- operators ---------------------------------------------------------------------------------------
 
@@ -158,10 +148,10 @@ class ExpressionCompiler:
         return plain or self.asking(call(_HELPERS[operator], [left, right], span))
 
     def _logic(self, expression: nodes.BinaryOperation, scope: FunctionScope) -> ast.expr:
-        operator = expression.operator
+        operator, at = expression.operator, place(expression.span)
         if operator == "xor":
-            both = [self.condition(expression.left, scope), self.condition(expression.right, scope)]
-            return _logic(operator, both, expression.span)
+            left, right = self.condition(expression.left, scope), self.condition(expression.right, scope)
+            return ast.Compare(left, [ast.NotEq()], [right], **at)
         # A chain of one operator is left-associative; a flat list needs no nesting.
         operands: list[Expression] = []
         chain: Expression = expression
@@ -170,7 +160,7 @@ class ExpressionCompiler:
             chain = chain.left
         operands.append(chain)
         values = [self.condition(operand, scope) for operand in reversed(operands)]
-        return _logic(operator, values, expression.span, short_circuit=self._dialect.short_circuit)
+        return ast.BoolOp(ast.And() if operator == "and" else ast.Or(), values, **at)
 
     def _prefix(self, expression: nodes.UnaryOperation, scope: FunctionScope) -> ast.expr:
         operand, span = expression.operand, expression.span
@@ -179,7 +169,7 @@ class ExpressionCompiler:
         kind = self._types.of(operand, scope)
         value = self.compile(operand, scope)
         if expression.operator == "+":
-            return value if is_numeric(kind) else self.asking(call("_pos", [value], span))
+            return value if kind in NUMERIC else self.asking(call("_pos", [value], span))
         if isinstance(operand, (nodes.IntLiteral, nodes.FloatLiteral)):
             return constant(-operand.value, span)
         if kind is Type.FLOAT:
@@ -190,9 +180,7 @@ class ExpressionCompiler:
         target, indices, span = expression.target, expression.indices, expression.span
         array = self.array(target, scope)
         if array is not None:
-            return call(
-                f"b_{array.getter}", [load("_T", span), *(self.compile(i, scope) for i in indices)], span
-            )
+            return call(f"b_{array.getter}", [load("_T", span), *self._all(indices, scope)], span)
         values = [self.compile(target, scope), *self._all(indices, scope)]
         if len(indices) == 2:
             return call("_cell", values, span)
@@ -350,7 +338,7 @@ def _plain_operation(
     operator: str, left: ast.expr, right: ast.expr, types: tuple[Type, Type], span: Span
 ) -> ast.expr | None:
     """The operation as one of Python; None where the types need the run-time library."""
-    are_numbers = all(map(is_numeric, types))
+    are_numbers = NUMERIC.issuperset(types)
     if operator in _COMPARISON:
         are_bools = types == (Type.BOOL, Type.BOOL) and operator in ("==", "!=")
         if not are_numbers and not are_bools:
@@ -359,25 +347,9 @@ def _plain_operation(
     if not are_numbers or operator == "%":
         return None
     raw = ast.BinOp(left, _ARITHMETIC[operator][1](), right, **place(span))
-    if operator == "/":
-        return None if dialect.EXACT_DIVISION_GIVES_INT else raw
-    if Type.FLOAT in types:
+    if operator == "/" or Type.FLOAT in types:
         return raw
     return _wrapped(raw, span) if types == (Type.INT, Type.INT) else None
-
-
-def _logic(operator: str, values: list[ast.expr], span: Span, *, short_circuit: bool = True) -> ast.expr:
-    """Conditions joined by `and`, `or` or `xor`; without `short_circuit` all are evaluated."""
-    at = place(span)
-    if operator == "xor":
-        left, right = values
-        return ast.Compare(left, [ast.NotEq()], [right], **at)
-    if short_circuit:
-        return ast.BoolOp(ast.And() if operator == "and" else ast.Or(), values, **at)
-    result = values[0]
-    for value in values[1:]:
-        result = ast.BinOp(result, ast.BitAnd() if operator == "and" else ast.BitOr(), value, **at)
-    return result
 
 
 def _wrapped(raw: ast.expr, span: Span) -> ast.expr:

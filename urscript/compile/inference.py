@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import Any
 
-from urscript import dialect
 from urscript.catalogue import Catalogue
 from urscript.names.living_scope import calling_scopes
 from urscript.names.scopes import FunctionScope, ResolvedProgram, wrong_count
@@ -33,18 +32,15 @@ class Type(Enum):
     ANY = "any"
 
 
-_NUMBERS = frozenset({Type.INT, Type.FLOAT, Type.NUMBER})
-SCALARS = _NUMBERS | {Type.BOOL, Type.STRING}
+NUMERIC = frozenset({Type.INT, Type.FLOAT, Type.NUMBER})
+"""Types of numbers."""
+
+SCALARS = NUMERIC | {Type.BOOL, Type.STRING}
 """Types of variables that need no check when something is assigned to them."""
 
 
 _ELEMENT = {Type.NEVER: Type.NEVER, Type.POSE: Type.FLOAT, Type.NUMBERS: Type.NUMBER}
 """Types of `x[i]` by that of x."""
-
-
-def is_numeric(kind: Type) -> bool:
-    """Whether values of this type are numbers."""
-    return kind in _NUMBERS
 
 
 def join_types(a: Type, b: Type) -> Type:
@@ -53,7 +49,7 @@ def join_types(a: Type, b: Type) -> Type:
         return a
     if a is Type.NEVER:
         return b
-    return Type.NUMBER if a in _NUMBERS and b in _NUMBERS else Type.ANY
+    return Type.NUMBER if a in NUMERIC and b in NUMERIC else Type.ANY
 
 
 Symbol = tuple[FunctionScope | None, str] | FunctionScope
@@ -70,8 +66,7 @@ class StaticTypes:
         self._program = program
         self._catalogue = catalogue
         self._types: dict[Symbol, Type] = dict.fromkeys(_unknown(program), Type.ANY)
-        self._constraints = _Constraints(program)
-        self._solve()
+        self._solve(list(_constraints(program)))
 
     def variable(self, name: str, scope: FunctionScope) -> Type:
         """The type of variable `name` as seen in `scope`."""
@@ -102,14 +97,14 @@ class StaticTypes:
                 return Type.STRING
             case nodes.UnaryOperation(operand=operand):
                 kind = self.of(operand, scope)
-                return kind if kind in _NUMBERS or kind is Type.NEVER else Type.ANY
+                return kind if kind in NUMERIC or kind is Type.NEVER else Type.ANY
             case nodes.PoseLiteral():
                 return Type.POSE
             case nodes.ListLiteral(items=items) if items:
                 kinds = {self.of(item, scope) for item in items}
                 if Type.NEVER in kinds:
                     return Type.NEVER
-                if kinds <= _NUMBERS:
+                if kinds <= NUMERIC:
                     return Type.NUMBERS
             case nodes.NoneLiteral():
                 return Type.NONE
@@ -122,15 +117,15 @@ class StaticTypes:
         left, right = self.of(expression.left, scope), self.of(expression.right, scope)
         if left is Type.NEVER or right is Type.NEVER:
             return Type.NEVER
-        if left in _NUMBERS and right in _NUMBERS:
+        if left in NUMERIC and right in NUMERIC:
             if operator == "/":
-                return Type.NUMBER if dialect.EXACT_DIVISION_GIVES_INT else Type.FLOAT
+                return Type.FLOAT
             if left is Type.INT and right is Type.INT:
                 return Type.INT
             return Type.FLOAT if Type.FLOAT in (left, right) else Type.NUMBER
         if operator == "+" and left is Type.STRING and right is Type.STRING:
             return Type.STRING
-        if {left, right} <= _NUMBERS | {Type.NUMBERS}:
+        if {left, right} <= NUMERIC | {Type.NUMBERS}:
             return Type.NUMBERS
         return Type.ANY
 
@@ -141,13 +136,12 @@ class StaticTypes:
         builtin = self._catalogue.lookup(name)
         return _declared_type(builtin.returns) if builtin is not None else Type.ANY
 
-    def _solve(self) -> None:
+    def _solve(self, constraints: list[Constraint]) -> None:
         """Apply all constraints, then again those that read a widened symbol, until no type changes.
 
         Types only widen, in at most three steps, so each constraint is applied a few times for each symbol
         that it reads.
         """
-        constraints = self._constraints.all
         readers = self._readers(constraints)
         queued = [True] * len(constraints)
         todo = deque(range(len(constraints)))
@@ -180,45 +174,38 @@ class StaticTypes:
         return readers
 
 
-class _Constraints:
-    """Collects the constraints of a program."""
-
-    def __init__(self, program: ResolvedProgram) -> None:
-        self.all: list[Constraint] = []
-        for scope in program.scopes():
-            self._statements(scope)
-            if scope.node is not None and scope.parent is not None:
-                self._defaults(scope, scope.node, scope.default_scope())
-
-    def _statements(self, scope: FunctionScope) -> None:
+def _constraints(program: ResolvedProgram) -> Iterator[Constraint]:
+    for scope in program.scopes():
         for statement in all_statements(scope.body):
             match statement:
                 case nodes.Assign(target=nodes.Name(name=name), value=value, scope=qualifier):
                     is_local = name in scope.locals and qualifier != "global"
-                    self.all.append(((scope if is_local else None, name), value, scope))
+                    yield (scope if is_local else None, name), value, scope
                 case nodes.Return(value=value) if scope.parent is not None:
-                    self.all.append((scope, value, scope))
+                    yield scope, value, scope
             for expression in own_expressions(statement):
-                self._calls(expression, scope)
-        if scope.parent is not None and falls_through(scope.body):
-            self.all.append((scope, None, scope))
-
-    def _defaults(self, scope: FunctionScope, node: nodes.Function, outside: FunctionScope) -> None:
-        for parameter in node.parameters:
+                yield from _constraints_of_calls(expression, scope)
+        if scope.parent is None:
+            continue
+        if falls_through(scope.body):
+            yield scope, None, scope
+        outside = scope.default_scope()
+        for parameter in scope.node.parameters if scope.node is not None else ():
             if parameter.default is not None:
-                self.all.append(((scope, parameter.name), parameter.default, outside))
-                self._calls(parameter.default, outside)
+                yield (scope, parameter.name), parameter.default, outside
+                yield from _constraints_of_calls(parameter.default, outside)
 
-    def _calls(self, expression: Expression, scope: FunctionScope) -> None:
-        for part in all_expressions(expression):
-            if not isinstance(part, nodes.Call):
-                continue
-            callee = scope.find_function(part.function)
-            if callee is None or callee.node is None or wrong_count(part, callee):
-                continue
-            for position, argument in enumerate(part.arguments):
-                name = argument.name or callee.node.parameters[position].name
-                self.all.append(((callee, name), argument.value, scope))
+
+def _constraints_of_calls(expression: Expression, scope: FunctionScope) -> Iterator[Constraint]:
+    for part in all_expressions(expression):
+        if not isinstance(part, nodes.Call):
+            continue
+        callee = scope.find_function(part.function)
+        if callee is None or callee.node is None or wrong_count(part, callee):
+            continue
+        for position, argument in enumerate(part.arguments):
+            name = argument.name or callee.node.parameters[position].name
+            yield (callee, name), argument.value, scope
 
 
 def _unknown(program: ResolvedProgram) -> Iterator[Symbol]:

@@ -61,17 +61,16 @@ def compile_statements(
     before: LivingScope = pickle.loads(scope)
     earlier: LivingScope = pickle.loads(added)
     visible = before.with_names(earlier)
-    dialect = dialect_for(catalogue.version)
     try:
         block = parse(source)
         program = visible.open(source, block, f"i{number}_")
-        program, errors = resolve(block, source, catalogue, dialect, program)
+        program, errors = resolve(block, source, catalogue, dialect_for(catalogue.version), program)
         forbidden = visible.find_forbidden(program)
         if errors or forbidden is not None:
             raise errors[0] if errors else forbidden  # type: ignore[misc]
         new = new_names(program, visible)
         program.interpreted |= new.variables
-        compiled = compile_resolved(program, catalogue, dialect, f"<interpreter {number}>")
+        compiled = compile_resolved(program, catalogue, f"<interpreter {number}>")
     except RecursionError:
         text = "the statements are nested too deeply"
         raise ScriptSyntaxError(text, line=1, column=1, source=source) from None

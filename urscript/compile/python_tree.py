@@ -11,13 +11,8 @@ from urscript.source import Span
 
 
 def place(span: Span) -> dict[str, Any]:
-    """The position attributes of a Python node."""
-    return {
-        "lineno": span.line,
-        "col_offset": span.column - 1,
-        "end_lineno": span.end_line,
-        "end_col_offset": span.end_column - 1,
-    }
+    """The position attributes of a Python node; nobody asks for its end."""
+    return {"lineno": span.line, "col_offset": span.column - 1}
 
 
 def load(name: str, span: Span) -> ast.Name:
@@ -42,8 +37,8 @@ def call(function: str, arguments: list[ast.expr], span: Span) -> ast.Call:
     return ast.Call(ast.Name(function, ast.Load(), **at), arguments, [], **at)
 
 
-def expression_statement(value: ast.expr, span: Span) -> ast.Expr:
-    """`value` alone."""
+def discarded(value: ast.expr, span: Span) -> ast.Expr:
+    """`value` as a statement; what it is, is not used."""
     return ast.Expr(value, **place(span))
 
 
@@ -69,20 +64,16 @@ def ask(span: Span) -> ast.If:
 
 def ask_after(value: ast.expr) -> ast.expr:
     """`(value, _b < 0 and (yield _OUT_OF_UNITS))[0]`: `value`, then the question of `ask`."""
-    span = _span_of(value)
+    line, column = value.lineno, value.col_offset + 1
+    span = Span(line, column, line, column)
     at = place(span)
     wait = ast.BoolOp(ast.And(), [_is_used_up(load("_b", span), span), _wait(span)], **at)
     both = ast.Tuple([value, wait], ast.Load(), **at)
     return ast.Subscript(both, constant(0, span), ast.Load(), **at)
 
 
-def _span_of(node: ast.expr) -> Span:
-    end_line, end_column = node.end_lineno or node.lineno, node.end_col_offset or node.col_offset
-    return Span(node.lineno, node.col_offset + 1, end_line, end_column + 1)
-
-
 def _ask(left: ast.expr, span: Span) -> ast.If:
-    return ast.If(_is_used_up(left, span), [expression_statement(_wait(span), span)], [], **place(span))
+    return ast.If(_is_used_up(left, span), [discarded(_wait(span), span)], [], **place(span))
 
 
 def _is_used_up(left: ast.expr, span: Span) -> ast.Compare:
@@ -96,18 +87,7 @@ def _wait(span: Span) -> ast.Yield:
 def function(name: str, parameters: list[str], body: list[ast.stmt], span: Span) -> ast.FunctionDef:
     """`def name(parameters...): body`."""
     at = place(span)
-    arguments = ast.arguments(
-        posonlyargs=[],
-        args=[ast.arg(parameter, **at) for parameter in parameters],
-        kwonlyargs=[],
-        kw_defaults=[],
-        defaults=[],
-    )
-    fields: dict[str, Any] = {
-        "name": name,
-        "args": arguments,
-        "body": body,
-        "decorator_list": [],
-        "type_params": [],
-    }
-    return ast.FunctionDef(**fields, **at)
+    names = [ast.arg(parameter, **at) for parameter in parameters]
+    arguments = ast.arguments(posonlyargs=[], args=names, kwonlyargs=[], kw_defaults=[], defaults=[])
+    later: dict[str, Any] = {"type_params": []}  # which Python 3.11 does not know
+    return ast.FunctionDef(name, arguments, body, [], **later, **at)

@@ -1,6 +1,6 @@
 """Analyses of a resolved program: what may be read unassigned, may block, is recursive, how deep it calls."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 from urscript.names.scopes import FunctionScope, ResolvedProgram
 from urscript.syntax import nodes
@@ -13,9 +13,7 @@ def find_maybe_unassigned(program: ResolvedProgram) -> None:
     for scope in program.functions:
         parameters = {item.name for item in scope.node.parameters} if scope.node else set()
         _AssignmentAnalysis(scope, scope.locals, scope.maybe_unassigned, parameters).block(scope.body)
-        for name in _names_read(scope):
-            if name not in scope.locals:
-                read_elsewhere.add(name)
+        read_elsewhere |= _names_read(scope) - scope.locals
     analysis = _AssignmentAnalysis(program.main, program.globals, program.maybe_unassigned_globals, set())
     analysis.block(program.main.body)
     # The order of assignments in functions is not known.
@@ -91,7 +89,7 @@ class _AssignmentAnalysis:
         return set.intersection(*map(set, outcomes))
 
     def assign(self, names: Iterable[str], newly_assigned: list[str]) -> None:
-        """Mark `names` as assigned; append those that were not to `newly_assigned`."""
+        """Mark `names` as assigned; append the new ones to `newly_assigned`."""
         for name in names:
             if name not in self.assigned:
                 self.assigned.add(name)
@@ -127,10 +125,7 @@ class _AssignmentAnalysis:
 
 def spread_blocking(program: ResolvedProgram) -> None:
     """Mark the functions that may block because one that they call may."""
-    callers: dict[FunctionScope, list[FunctionScope]] = {}
-    for scope in program.scopes():
-        for callee in scope.callees:
-            callers.setdefault(callee, []).append(scope)
+    callers = _callers(program)
     todo = [scope for scope in program.scopes() if scope.blocks]
     while todo:
         for caller in callers.get(todo.pop(), ()):
@@ -141,58 +136,48 @@ def spread_blocking(program: ResolvedProgram) -> None:
 
 def mark_recursion(program: ResolvedProgram) -> None:
     """Mark the functions that can call themselves, directly or through others, and how deep all call."""
-    search = _Components()
-    for scope in program.scopes():
-        search.visit(scope)
-
-
-class _Components:
-    """Tarjan's search for functions that all reach one another, without recursion of its own."""
-
-    def __init__(self) -> None:
-        self._number: dict[FunctionScope, int] = {}
-        # The oldest open function that can be reached from each.
-        self._low: dict[FunctionScope, int] = {}
-        self._open: list[FunctionScope] = []
-        self._is_open: set[FunctionScope] = set()
-        self._path: list[tuple[FunctionScope, Iterator[FunctionScope]]] = []
-
-    def visit(self, root: FunctionScope) -> None:
-        """Visit `root` and everything it calls that was not visited yet."""
-        if root in self._number:
-            return
-        self._enter(root)
-        while self._path:
-            scope, callees = self._path[-1]
-            for callee in callees:
-                if callee not in self._number:
-                    self._enter(callee)
-                    break
-                if callee in self._is_open:
-                    self._low[scope] = min(self._low[scope], self._number[callee])
-            else:
-                self._leave()
-
-    def _enter(self, scope: FunctionScope) -> None:
-        self._number[scope] = self._low[scope] = len(self._number)
-        self._open.append(scope)
-        self._is_open.add(scope)
-        self._path.append((scope, iter(scope.callees)))
-
-    def _leave(self) -> None:
-        scope, _ = self._path.pop()
-        if self._path:
-            caller = self._path[-1][0]
-            self._low[caller] = min(self._low[caller], self._low[scope])
-        if self._low[scope] != self._number[scope]:
-            return
-        members = [self._open.pop()]
-        while members[-1] is not scope:
-            members.append(self._open.pop())
-        self._is_open.difference_update(members)
-        is_recursive = len(members) > 1 or scope in scope.callees
-        below = {callee for member in members for callee in member.callees}.difference(members)
+    for members in _components(program):
+        callees = {callee for member in members for callee in member.callees}
+        is_recursive = len(members) > 1 or not callees.isdisjoint(members)
+        below = callees.difference(members)
         # A function of the program that statements belong to knows its depth already.
-        depth = max([scope.depth, *(callee.depth + (not is_recursive) for callee in below)])
+        depth = max(scope.depth for scope in members)
+        depth = max([depth, *(callee.depth + (not is_recursive) for callee in below)])
         for member in members:
             member.recursive, member.depth = is_recursive, depth
+
+
+def _callers(program: ResolvedProgram) -> dict[FunctionScope, list[FunctionScope]]:
+    callers: dict[FunctionScope, list[FunctionScope]] = {}
+    for scope in program.scopes():
+        for callee in scope.callees:
+            callers.setdefault(callee, []).append(scope)
+    return callers
+
+
+def _components(program: ResolvedProgram) -> list[list[FunctionScope]]:
+    """Functions that all reach one another, those that others call first (Kosaraju), without recursion."""
+    finished: dict[FunctionScope, None] = {}
+    seen: set[FunctionScope] = set()
+    for root in program.scopes():
+        path = [(root, iter(root.callees))] if root not in seen else []
+        seen.add(root)
+        while path:
+            callees = path[-1][1]
+            callee = next((callee for callee in callees if callee not in seen), None)
+            if callee is None:
+                finished[path.pop()[0]] = None
+            else:
+                seen.add(callee)
+                path.append((callee, iter(callee.callees)))
+    callers = _callers(program)
+    components = []
+    while finished:
+        members = [finished.popitem()[0]]
+        for member in members:
+            for caller in callers.get(member, ()):
+                if caller in finished:
+                    del finished[caller]
+                    members.append(caller)
+        components.append(members)
+    return components[::-1]

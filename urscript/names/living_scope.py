@@ -90,13 +90,12 @@ class LivingScope:
                 if isinstance(statement, (nodes.Assign, nodes.Declaration)) and statement.scope == "global":
                     new = program.declared_globals.keys() - (self.globals - self.variables)
                     if new:
-                        text = (
-                            f"'{min(new)}' cannot be declared: interpreter mode has no new global variables"
-                        )
-                        return _at(statement, text, program.source)
+                        why = "interpreter mode has no new global variables"
+                        text = f"'{min(new)}' cannot be declared: {why}"
+                        return ScriptContextError(text).locate(program.source, *statement.span[:2])
                 if _calls(statement) and scope.find_function(CALL) is None:
                     text = f"{CALL} cannot be called in interpreter mode: it cannot be nested"
-                    return _at(statement, text, program.source)
+                    return ScriptContextError(text).locate(program.source, *statement.span[:2])
         return None
 
 
@@ -154,9 +153,3 @@ def _calls(statement: nodes.Statement) -> bool:
         for expression in own_expressions(statement)
         for part in all_expressions(expression)
     )
-
-
-def _at(statement: nodes.Statement, text: str, source: Source) -> ScriptContextError:
-    error = ScriptContextError(text)
-    error.locate(source, statement.span.line, statement.span.column)
-    return error

@@ -16,7 +16,7 @@ from math import inf
 from typing import Any, Final
 
 from urscript.catalogue.calls import Fitting
-from urscript.catalogue.costs import OF_HOST, OF_PURE, TEXT, UNITS
+from urscript.catalogue.costs import OF_OTHERS, TEXT, UNITS
 from urscript.errors import ScriptBudgetError
 from urscript.values import CapacityList, Matrix, Pose, Struct, size_of
 
@@ -265,16 +265,10 @@ class Meter:
         return call
 
 
-def host_cost(name: str) -> tuple[int, int]:
-    """Statements and units of a call of a builtin of the host."""
-    units = UNITS.get(name, OF_HOST)
-    return max(_LEAST_OF_HOST, units // _CALL_SHARE), units
-
-
-def pure_cost(name: str) -> tuple[int, int]:
-    """Statements and units of a call of a pure builtin."""
-    units = UNITS.get(name, OF_PURE)
-    return max(_LEAST_OF_PURE, units // _CALL_SHARE), units
+def call_cost(name: str, *, is_pure: bool) -> tuple[int, int]:
+    """Statements and units of a call of a builtin, of the host or a pure one."""
+    units = UNITS.get(name, OF_OTHERS)
+    return max(_LEAST_OF_PURE if is_pure else _LEAST_OF_HOST, units // _CALL_SHARE), units
 
 
 def _elements(items: list[Any]) -> int:

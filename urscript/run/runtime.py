@@ -28,21 +28,10 @@ from urscript.dialect import Dialect
 from urscript.errors import ScriptRuntimeError
 from urscript.run import variables
 from urscript.run.host import Host
-from urscript.run.metering import Meter, host_cost, pure_cost
+from urscript.run.metering import Meter, call_cost
 from urscript.run.threads import ProgramHalted, Scheduler, ScriptThread, join
-from urscript.run.variables import same_kind
 from urscript.run.waits import NEXT_CYCLE, OUT_OF_UNITS, Wait
-from urscript.values import (
-    INT_MAX,
-    INT_MIN,
-    CapacityList,
-    Matrix,
-    Pose,
-    Struct,
-    is_number,
-    type_name,
-    wrap_int,
-)
+from urscript.values import INT_MAX, INT_MIN, CapacityList, Matrix, Pose, Struct, is_number, wrap_int
 
 # --- arithmetic ----------------------------------------------------------------------------------------
 
@@ -94,8 +83,6 @@ def div(a: Any, b: Any) -> Any:
     if (ta is float or ta is int) and (tb is float or tb is int):
         if b == 0:
             raise ScriptRuntimeError("division by zero")
-        if dialect.EXACT_DIVISION_GIVES_INT and ta is int and tb is int and a % b == 0:
-            return a // b
         return a / b
     return _elementwise("/", div, a, b)
 
@@ -106,8 +93,6 @@ def mod(a: Any, b: Any) -> Any:
     if (ta is float or ta is int) and (tb is float or tb is int):
         if b == 0:
             raise ScriptRuntimeError("modulo by zero")
-        if dialect.MODULO_SIGN == "divisor":
-            return a % b
         if ta is int and tb is int:
             rest = abs(a) % abs(b)
             return -rest if a < 0 else rest
@@ -142,7 +127,7 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
 
     def operate(*operands: Any) -> Any:
         if any(isinstance(operand, (list, Matrix)) for operand in operands):
-            names = " and ".join(map(type_name, operands))
+            names = " and ".join(map(values.type_name, operands))
             raise ScriptRuntimeError(f"'{sign}' is not defined for {names} in this software version")
         return compute(*operands)
 
@@ -151,7 +136,7 @@ def without_arrays(sign: str, compute: Callable[..., Any]) -> Callable[..., Any]
 
 def _is_scalar(value: Any) -> bool:
     """Whether an arithmetic operator takes it for a number."""
-    return is_number(value) or (dialect.BOOL_IN_ARITHMETIC and type(value) is bool)
+    return is_number(value) or type(value) is bool
 
 
 def _to_builtin(value: Any) -> Any:
@@ -183,7 +168,7 @@ def _elementwise(sign: str, one: Callable[[Any, Any], Any], a: Any, b: Any) -> A
         return Matrix([one(x, y) for x, y in zip(left, right, strict=True)] for left, right in pairs)
     if _is_scalar(a) and _is_scalar(b):
         return one(_to_builtin(a), _to_builtin(b))
-    raise ScriptRuntimeError(f"'{sign}' is not defined for {type_name(a)} and {type_name(b)}")
+    raise ScriptRuntimeError(f"'{sign}' is not defined for {values.type_name(a)} and {values.type_name(b)}")
 
 
 def _size(matrix: Matrix) -> str:
@@ -229,11 +214,7 @@ def equal(a: Any, b: Any) -> bool:
         return bool(a == b)
     if is_number(a) and is_number(b):
         return bool(a == b)
-    if isinstance(a, list) and isinstance(b, list):
-        return len(a) == len(b) and all(map(equal, a, b))
-    if dialect.MIXED_TYPES_COMPARE or a is None or b is None or same_kind(ta, b):
-        return False
-    raise ScriptRuntimeError(f"cannot compare {values.a_type(a)} with {values.a_type(b)}")
+    return isinstance(a, list) and isinstance(b, list) and len(a) == len(b) and all(map(equal, a, b))
 
 
 def unequal(a: Any, b: Any) -> bool:
@@ -249,18 +230,20 @@ def _ordering(sign: str, compare: Callable[[Any, Any], bool]) -> Callable[[Any, 
         a, b = getattr(a, "thread_id", a), getattr(b, "thread_id", b)
         if is_number(a) and is_number(b):
             return bool(compare(a, b))
-        raise ScriptRuntimeError(f"'{sign}' compares numbers, got {type_name(a)} and {type_name(b)}")
+        raise ScriptRuntimeError(
+            f"'{sign}' compares numbers, got {values.type_name(a)} and {values.type_name(b)}"
+        )
 
     return ordered
 
 
 def truth(value: Any) -> bool:
-    """A condition: a bool, a number that is not 0, or a string that is not empty; see `dialect`."""
+    """A condition: a bool, a number that is not 0, or a string that is not empty."""
     if value is True or value is False:
         return bool(value)
     if type(value) is str:
         return value != ""
-    if dialect.NUMBER_AS_CONDITION and (type(value) is float or type(value) is int):
+    if type(value) is float or type(value) is int:
         return bool(value != 0)
     raise ScriptRuntimeError(f"a condition must be True or False, got {values.a_type(value)}")
 
@@ -347,8 +330,8 @@ def builtin_namespace(names: Iterable[str], catalogue: Catalogue, host: Host, me
         if function is not None:
             bound[f"b_{name}"] = _fitted(name, function, catalogue, meter)
         elif name in PURE:
-            pure = _without_thread(PURE[name], catalogue.fitting_of(name))
-            bound[f"b_{name}"] = meter.function(pure, pure_cost(name), name)
+            pure = _without_thread(PURE[name], catalogue.fittings[name])
+            bound[f"b_{name}"] = meter.function(pure, call_cost(name, is_pure=True), name)
         else:
             bound[f"b_{name}"] = _declared_only(name)
     return bound
@@ -372,10 +355,10 @@ def _fitted(
     name: str, function: Callable[..., Any], catalogue: Catalogue, meter: Meter
 ) -> Callable[..., Any]:
     """A builtin of the host, charged for, that gets its arguments as it takes them."""
-    cost, builtin = host_cost(name), catalogue.lookup(name)
+    cost, builtin = call_cost(name, is_pure=False), catalogue.lookup(name)
     if builtin is None or not builtin.params:
         return meter.function(function, cost, name)
-    fit = catalogue.fitting_of(name)
+    fit = catalogue.fittings[name]
     if all(param.type in FIXED_SIZE for param in builtin.params):
         return meter.fitted(function, cost, fit)
 

@@ -8,10 +8,10 @@ Undocumented behaviour is decided in `dialect`. The manual says when a method fa
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, Final
 
-from urscript import dialect, values
-from urscript.catalogue.calls import compile_fitting, converted
-from urscript.catalogue.methods import METHODS, ValueMethod
-from urscript.catalogue.types import ParamType
+from urscript import values
+from urscript.catalogue.calls import CallSignature, compile_fitting, converted, fits
+from urscript.catalogue.catalogue import METHODS, method_key
+from urscript.catalogue.types import Builtin, ParamType
 from urscript.errors import ScriptRuntimeError, ScriptTypeError
 from urscript.run.host import Handle
 from urscript.run.threads import ScriptThread
@@ -43,7 +43,7 @@ _SCALARS = frozenset({int, float, bool, str})
 def same_kind(old: type, value: Any) -> bool:
     """Whether a variable or element of type `old` may receive `value`; int and float are one kind, number."""
     new = type(value)
-    if new is old or (dialect.NONE_FITS_EVERY_VARIABLE and (value is None or old is type(None))):
+    if new is old or value is None or old is type(None):
         return True
     if old is int or old is float:
         # A thread handle and an integer replace each other. Source: driver scripts preset handles to 0.
@@ -146,13 +146,9 @@ def _assign_other(value: Any, old: Any, kind: str, name: str) -> Any:
     are_structs = type(old) is type(value) is Struct
     if old is UNDEFINED or (same_kind(type(old), value) and not are_structs):
         return value
-    if dialect.SIX_NUMBERS_FIT_A_POSE_VARIABLE and _is_six_numbers(old) and _is_six_numbers(value):
+    if fits(ParamType.VECTOR6, old) and fits(ParamType.VECTOR6, value):
         return value
     raise _other_type(f"{kind} '{name}'", old, value)
-
-
-def _is_six_numbers(value: Any) -> bool:
-    return type(value) is Pose or (isinstance(value, list) and len(value) == 6 and all(map(is_number, value)))
 
 
 def _other_type(what: str, old: Any, new: Any) -> ScriptRuntimeError:
@@ -216,7 +212,7 @@ def _element_of_pose(value: Any) -> float:
 
 def _position(index: Any, length: int) -> int:
     """`index` as a position in something of `length` elements."""
-    if dialect.INDEX_TAKES_WHOLE_FLOATS and type(index) is float and index.is_integer():
+    if type(index) is float and index.is_integer():
         index = int(index)
     if type(index) is not int:
         raise ScriptRuntimeError(f"an index must be an integer, got {a_type(index)}")
@@ -337,7 +333,7 @@ def store_inside(value: Any, steps: list[Step], target: Any) -> Any:
 
 # --- methods of values, and of handles -------------------------------------------------------------------
 
-Methods = Mapping[tuple[str, str], ValueMethod]
+Methods = Mapping[tuple[str, str], Builtin]
 Changed = tuple[Any, Any]
 """What a method leaves in the place of its list, and its result."""
 
@@ -389,16 +385,18 @@ class MethodCalls:
     def _result(
         self, target: Any, method: str, arguments: Sequence[Any], named: Mapping[str, Any]
     ) -> Changed:
-        row = self._methods.get((type_name(target), method))
+        key = type_name(target), method
+        row = self._methods.get(key)
         if row is None:
             raise ScriptRuntimeError(f"{a_type(target)} has no method '{method}'")
         if named or len(arguments) != len(row.params):
             try:
-                row.signature.check(len(arguments), list(named))
+                signature = CallSignature(method, [param.name for param in row.params], frozenset())
+                signature.check(len(arguments), list(named))
             except ScriptTypeError as error:
                 raise ScriptRuntimeError(error.message) from None
             arguments = [*arguments, *(named[param.name] for param in row.params[len(arguments) :])]
-        made = _FUNCTIONS[row.type, row.name](target, *_FITTINGS[row.type, row.name](arguments))
+        made = _FUNCTIONS[key](target, *_FITTINGS[key](arguments))
         return made if row.changes else (UNDEFINED, made)
 
 
@@ -413,6 +411,7 @@ def _changed(target: list[Any], items: list[Any], result: Any = None) -> Changed
 
 def _grown(target: list[Any], method: str, index: int, items: list[Any]) -> Changed:
     """`target` with `items` before the element `index`."""
+    _place(method, index, len(target))
     capacity = capacity_of(target)
     if len(target) + len(items) > capacity:
         raise ScriptRuntimeError(
@@ -428,18 +427,6 @@ def _grown(target: list[Any], method: str, index: int, items: list[Any]) -> Chan
     return _changed(target, grown)
 
 
-def _append(target: list[Any], value: Any) -> Changed:
-    return _grown(target, "append", len(target), [value])
-
-
-def _extend(target: list[Any], items: list[Any]) -> Changed:
-    return _grown(target, "extend", len(target), items)
-
-
-def _insert(target: list[Any], index: int, value: Any) -> Changed:
-    return _grown(target, "insert", _place("insert", index, len(target)), [value])
-
-
 def _pop(target: list[Any]) -> Changed:
     if not target:
         raise ScriptRuntimeError("pop: the list is empty")
@@ -451,10 +438,6 @@ def _remove(target: list[Any], index: int) -> Changed:
     rest = target.copy()
     del rest[place]
     return _changed(target, rest)
-
-
-def _clear(target: list[Any]) -> Changed:
-    return _changed(target, [])
 
 
 def _slice(target: list[Any], begin: int, end: int) -> list[Any]:
@@ -489,25 +472,21 @@ def _to_string(target: Any) -> str:
     return text[: values.TEXT_LIMIT - len(end)] + end
 
 
-def _length(target: Struct) -> int:
-    return len(target.members)
-
-
-_FITTINGS: Final = {(row.type, row.name): compile_fitting(row.name, row.params) for row in METHODS}
+_FITTINGS: Final = {key: compile_fitting(key[1], row.params) for row in METHODS for key in (method_key(row),)}
 
 _FUNCTIONS: Final[dict[tuple[str, str], Callable[..., Any]]] = {
-    ("list", "append"): _append,
-    ("list", "extend"): _extend,
-    ("list", "insert"): _insert,
+    ("list", "append"): lambda target, value: _grown(target, "append", len(target), [value]),
+    ("list", "extend"): lambda target, items: _grown(target, "extend", len(target), items),
+    ("list", "insert"): lambda target, index, value: _grown(target, "insert", index, [value]),
     ("list", "pop"): _pop,
     ("list", "remove"): _remove,
-    ("list", "clear"): _clear,
+    ("list", "clear"): lambda target: _changed(target, []),
     ("list", "slice"): _slice,
     ("list", "length"): len,
     ("list", "capacity"): capacity_of,
     ("list", "excess_capacity"): lambda target: capacity_of(target) - len(target),
     ("list", "to_string"): _to_string,
-    ("struct", "length"): _length,
+    ("struct", "length"): lambda target: len(target.members),
     ("struct", "to_string"): _to_string,
     ("matrix", "get_row"): _get_row,
     ("matrix", "get_column"): _get_column,

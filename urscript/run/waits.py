@@ -8,11 +8,12 @@ from enum import Enum
 from typing import Final
 
 
-class _NextCycle(Enum):
+class _Signal(Enum):
     NEXT_CYCLE = "next cycle"
+    OUT_OF_UNITS = "out of units"
 
 
-NEXT_CYCLE: Final = _NextCycle.NEXT_CYCLE
+NEXT_CYCLE: Final = _Signal.NEXT_CYCLE
 """The thread's time slice of this cycle is used up: it continues in the next one."""
 
 
@@ -38,16 +39,12 @@ class Blocked:
         self.outside = outside
 
 
-class _OutOfUnits(Enum):
-    OUT_OF_UNITS = "out of units"
-
-
-OUT_OF_UNITS: Final = _OutOfUnits.OUT_OF_UNITS
+OUT_OF_UNITS: Final = _Signal.OUT_OF_UNITS
 """What the thread was granted is used up: compiled code asks whether it may go on (see `metering`)."""
 
 CHECKPOINT: Final = Blocked(lambda: True)
 """For a call that may wait but need not now: the thread continues at once, unless it has used half of its
 budget; then its time slice ends. So a program that reads a flood of data does not exceed its budget."""
 
-Wait = _NextCycle | _OutOfUnits | Blocked
+Wait = _Signal | Blocked
 """Everything a thread may yield."""

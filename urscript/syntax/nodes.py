@@ -283,6 +283,13 @@ def child_expressions(expression: Expression) -> tuple[Expression, ...]:
     return ()
 
 
+def root_of(target: Expression) -> Expression:
+    """What elements and members are taken of in the end: `x` of `x[i].member`."""
+    while isinstance(target, (Subscript, Attribute)):
+        target = target.target
+    return target
+
+
 def own_expressions(statement: Statement) -> tuple[Expression, ...]:
     """The expressions a statement evaluates itself, not those of the blocks in it.
 

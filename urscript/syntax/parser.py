@@ -1,4 +1,4 @@
-"""Text -> tree. The grammar is `grammar.lark`, `_TreeBuilder` makes the nodes; and the errors.
+"""Text -> tree. The grammar is `grammar.lark`, `_MADE` has the node of each rule; and the errors.
 
 `parse` knows the form of a program only: names, types and scopes are for `resolver`.
 The parser is built on first use, once a process (about 0.07 s), then parses 1,000 lines in some 0.05 s.
@@ -7,7 +7,9 @@ The parser is built on first use, once a process (about 0.07 s), then parses 1,0
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import cache
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from urscript.dialect import LONGEST_LABEL, LONGEST_NAME, LONGEST_STRING
@@ -23,8 +25,11 @@ if TYPE_CHECKING:
 # --- nodes. What the grammar leaves open is decided here: what is a pose, what can be called or assigned to.
 
 
+_text: Final[Callable[[Any], Any]] = str
+
+
 def _span(item: Any) -> Span:
-    """The span of a node or token; lark's own tokens, in texts with errors, have four attributes instead."""
+    """The span of a node, or of a token, which has four attributes instead."""
     span: Span | None = getattr(item, "span", None)
     return span or Span(item.line, item.column, item.end_line, item.end_column)
 
@@ -44,160 +49,104 @@ def _syntax_error(message: str, span: Span) -> ScriptSyntaxError:
     return ScriptSyntaxError(message, line=span.line, column=span.column, width=span.end_column - span.column)
 
 
-class _TreeBuilder:
-    """One method per rule of the grammar; each gets the rule's tokens and finished nodes in order."""
+def _function(items: list[Any], parameters: tuple[nodes.Parameter, ...]) -> nodes.Function:
+    kind, name, *_, body, end = items
+    return nodes.Function(_text(kind), str(name), parameters, body, _span(end), span=_cover(items))
 
-    def start(self, items: list[Any]) -> nodes.Block:
-        return cast(nodes.Block, items[0])
 
-    def block(self, items: list[Any]) -> nodes.Block:
-        return _nodes(items)
+def _if(items: list[Any]) -> nodes.If:
+    first = nodes.Branch(items[1], items[3], span=_cover(items[:3]))
+    rest = (item for item in items[4:] if isinstance(item, nodes.Branch))
+    return nodes.If((first, *rest), items[-2], span=_cover(items))
 
-    # definitions
 
-    def function(self, items: list[Any]) -> nodes.Function:
-        kind, name, _, parameters, _, _, body, end = items
-        return nodes.Function(
-            cast(Any, str(kind)), str(name), parameters, body, _span(end), span=_cover(items)
-        )
+def _declaration(items: list[Any]) -> nodes.Statement:
+    scope, name, _, value = items
+    if value is None:
+        return nodes.Declaration(str(name), _text(scope), span=_cover([scope, name]))
+    return nodes.Assign(nodes.Name(str(name), span=_span(name)), value, _text(scope), span=_cover(items))
 
-    def thread(self, items: list[Any]) -> nodes.Function:
-        _, name, _, _, _, body, end = items
-        return nodes.Function("thread", str(name), (), body, _span(end), span=_cover(items))
 
-    def params(self, items: list[Any]) -> tuple[nodes.Parameter, ...]:
-        return _nodes(items)
+def _assignment(items: list[Any]) -> nodes.Assign:
+    target, _, value = items
+    if not isinstance(nodes.root_of(target), nodes.Name):
+        message = "cannot assign to this expression, only to a variable or an element of one"
+        raise _syntax_error(message, target.span)
+    return nodes.Assign(target, value, span=_cover(items))
 
-    def param(self, items: list[Any]) -> nodes.Parameter:
-        name, _, default = items
-        return nodes.Parameter(str(name), default, span=_span(name))
 
-    # statements
+def _call(items: list[Any]) -> nodes.Expression:
+    callee, _, arguments, _ = items
+    if isinstance(callee, nodes.Name):
+        return nodes.Call(callee.name, arguments, span=_cover(items))
+    if isinstance(callee, nodes.Attribute):
+        return nodes.MethodCall(callee.target, callee.name, arguments, span=_cover(items))
+    raise _syntax_error("cannot call this expression, only a function by its name", callee.span)
 
-    def if_(self, items: list[Any]) -> nodes.If:
-        first = nodes.Branch(items[1], items[3], span=_cover(items[:3]))
-        rest = tuple(item for item in items[4:] if isinstance(item, nodes.Branch))
-        else_body = items[-2]
-        return nodes.If((first, *rest), else_body, span=_cover([items[0], items[-1]]))
 
-    def elif_(self, items: list[Any]) -> nodes.Branch:
-        return nodes.Branch(items[1], items[3], span=_cover(items[:3]))
+def _index(items: list[Any]) -> nodes.Expression:
+    target, indices = items[0], _nodes(items[1:])
+    # `p` is an ordinary name: only six items make it a pose. Source: maker's driver script.
+    if len(indices) == 6 and isinstance(target, nodes.Name) and target.name == "p":
+        return nodes.PoseLiteral(indices, span=_cover(items))
+    if len(indices) > 2:
+        message = f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}"
+        raise _syntax_error(message, _cover(items))
+    return nodes.Subscript(target, indices, span=_cover(items))
 
-    def while_(self, items: list[Any]) -> nodes.While:
-        return nodes.While(items[1], items[3], span=_cover(items))
 
-    def simple(self, items: list[Any]) -> nodes.KeywordStatement:
-        return nodes.KeywordStatement(cast(Any, str(items[0])), span=_span(items[0]))
+def _arguments(items: list[Any]) -> tuple[nodes.Argument, ...]:
+    return tuple(
+        item if isinstance(item, nodes.Argument) else nodes.Argument(item, span=item.span)
+        for item in _nodes(items)
+    )
 
-    def return_(self, items: list[Any]) -> nodes.Return:
-        word, value = items
-        return nodes.Return(value, span=_cover([word, word if value is None else value]))
 
-    def join(self, items: list[Any]) -> nodes.Join:
-        return nodes.Join(items[1], span=_cover(items))
+def _integer(items: list[Any]) -> nodes.IntLiteral:
+    if len(items[0]) > 10 or int(items[0]) > 2**31:
+        raise _syntax_error("this integer does not fit into 32 bits; write a float", _span(items[0]))
+    return nodes.IntLiteral(int(items[0]), span=_span(items[0]))
 
-    def kill(self, items: list[Any]) -> nodes.Kill:
-        return nodes.Kill(items[1], span=_cover(items))
 
-    def declare(self, items: list[Any]) -> nodes.Statement:
-        word, name, _, value = items
-        scope = cast(Any, str(word))
-        if value is None:
-            return nodes.Declaration(str(name), scope, span=_cover([word, name]))
-        target = nodes.Name(str(name), span=_span(name))
-        return nodes.Assign(target, value, scope, span=_cover(items))
-
-    def assign(self, items: list[Any]) -> nodes.Assign:
-        target, _, value = items
-        root = target
-        while isinstance(root, (nodes.Subscript, nodes.Attribute)):
-            root = root.target
-        if not isinstance(root, nodes.Name):
-            raise _syntax_error(
-                "cannot assign to this expression, only to a variable or an element of one", target.span
-            )
-        return nodes.Assign(target, value, span=_cover(items))
-
-    def call_for_effect(self, items: list[Any]) -> nodes.ExpressionStatement:
-        return nodes.ExpressionStatement(items[0], span=items[0].span)
-
-    def label(self, items: list[Any]) -> nodes.Label:
-        return nodes.Label(str(items[0])[1:].strip(BLANKS), span=_span(items[0]))
-
-    # expressions
-
-    def binary(self, items: list[Any]) -> nodes.BinaryOperation:
-        left, operator, right = items
-        return nodes.BinaryOperation(str(operator), left, right, span=_cover(items))
-
-    def prefix(self, items: list[Any]) -> nodes.UnaryOperation:
-        operator = "not" if items[0] == "!" else str(items[0])
-        return nodes.UnaryOperation(cast(Any, operator), items[1], span=_cover(items))
-
-    def call(self, items: list[Any]) -> nodes.Expression:
-        callee, _, arguments, _ = items
-        if isinstance(callee, nodes.Name):
-            return nodes.Call(callee.name, arguments, span=_cover(items))
-        if isinstance(callee, nodes.Attribute):
-            return nodes.MethodCall(callee.target, callee.name, arguments, span=_cover(items))
-        raise _syntax_error("cannot call this expression, only a function by its name", callee.span)
-
-    def index(self, items: list[Any]) -> nodes.Expression:
-        target, indices = items[0], _nodes(items[1:])
-        # `p` is an ordinary name: only six items make it a pose. Source: maker's driver script.
-        if len(indices) == 6 and isinstance(target, nodes.Name) and target.name == "p":
-            return nodes.PoseLiteral(indices, span=_cover(items))
-        if len(indices) > 2:
-            raise _syntax_error(
-                f"an index has 1 or 2 values, a pose p[...] 6, not {len(indices)}", _cover(items)
-            )
-        return nodes.Subscript(target, indices, span=_cover(items))
-
-    def member(self, items: list[Any]) -> nodes.Attribute:
-        return nodes.Attribute(items[0], str(items[2]), span=_cover(items))
-
-    def args(self, items: list[Any]) -> tuple[nodes.Argument, ...]:
-        return tuple(
-            item if isinstance(item, nodes.Argument) else nodes.Argument(item, span=item.span)
-            for item in items
-            if isinstance(item, (nodes.Argument, nodes.Expression))
-        )
-
-    def named_argument(self, items: list[Any]) -> nodes.Argument:
-        return nodes.Argument(items[2], str(items[0]), span=_cover(items))
-
-    def integer(self, items: list[Any]) -> nodes.IntLiteral:
-        span = _span(items[0])
-        if len(items[0]) > 10 or int(items[0]) > 2**31:
-            raise _syntax_error("this integer does not fit into 32 bits; write a float", span)
-        return nodes.IntLiteral(int(items[0]), span=span)
-
-    def float_(self, items: list[Any]) -> nodes.FloatLiteral:
-        return nodes.FloatLiteral(float(items[0]), str(items[0]), span=_span(items[0]))
-
-    def string(self, items: list[Any]) -> nodes.StringLiteral:
-        return nodes.StringLiteral(str(items[0])[1:-1], span=_span(items[0]))
-
-    def true(self, items: list[Any]) -> nodes.BoolLiteral:
-        return nodes.BoolLiteral(True, span=_span(items[0]))
-
-    def false(self, items: list[Any]) -> nodes.BoolLiteral:
-        return nodes.BoolLiteral(False, span=_span(items[0]))
-
-    def none(self, items: list[Any]) -> nodes.NoneLiteral:
-        return nodes.NoneLiteral(span=_span(items[0]))
-
-    def name(self, items: list[Any]) -> nodes.Name:
-        return nodes.Name(str(items[0]), span=_span(items[0]))
-
-    def group(self, items: list[Any]) -> nodes.Expression:
-        return cast(nodes.Expression, items[1])
-
-    def list_(self, items: list[Any]) -> nodes.ListLiteral:
-        return nodes.ListLiteral(_nodes(items), span=_cover(items))
-
-    def run(self, items: list[Any]) -> nodes.RunThread:
-        return nodes.RunThread(str(items[1]), span=_cover(items))
+_MADE: Final[dict[str, Callable[[list[Any]], Any]]] = {
+    "start": lambda items: items[0],
+    "block": _nodes,
+    "function": lambda items: _function(items, items[3]),
+    "thread": lambda items: _function(items, ()),
+    "params": _nodes,
+    "param": lambda items: nodes.Parameter(str(items[0]), items[2], span=_span(items[0])),
+    "if_": _if,
+    "elif_": lambda items: nodes.Branch(items[1], items[3], span=_cover(items[:3])),
+    "while_": lambda items: nodes.While(items[1], items[3], span=_cover(items)),
+    "simple": lambda items: nodes.KeywordStatement(_text(items[0]), span=_span(items[0])),
+    "return_": lambda items: nodes.Return(items[1], span=_cover(items if items[1] else items[:1])),
+    "join": lambda items: nodes.Join(items[1], span=_cover(items)),
+    "kill": lambda items: nodes.Kill(items[1], span=_cover(items)),
+    "declare": _declaration,
+    "assign": _assignment,
+    "call_for_effect": lambda items: nodes.ExpressionStatement(items[0], span=items[0].span),
+    "label": lambda items: nodes.Label(str(items[0])[1:].strip(BLANKS), span=_span(items[0])),
+    "binary": lambda items: nodes.BinaryOperation(str(items[1]), items[0], items[2], span=_cover(items)),
+    "prefix": lambda items: nodes.UnaryOperation(
+        "not" if items[0] == "!" else _text(items[0]), items[1], span=_cover(items)
+    ),
+    "call": _call,
+    "index": _index,
+    "member": lambda items: nodes.Attribute(items[0], str(items[2]), span=_cover(items)),
+    "args": _arguments,
+    "named_argument": lambda items: nodes.Argument(items[2], str(items[0]), span=_cover(items)),
+    "integer": _integer,
+    "float_": lambda items: nodes.FloatLiteral(float(items[0]), str(items[0]), span=_span(items[0])),
+    "string": lambda items: nodes.StringLiteral(str(items[0])[1:-1], span=_span(items[0])),
+    "true": lambda items: nodes.BoolLiteral(True, span=_span(items[0])),
+    "false": lambda items: nodes.BoolLiteral(False, span=_span(items[0])),
+    "none": lambda items: nodes.NoneLiteral(span=_span(items[0])),
+    "name": lambda items: nodes.Name(str(items[0]), span=_span(items[0])),
+    "group": lambda items: items[1],
+    "list_": lambda items: nodes.ListLiteral(_nodes(items), span=_cover(items)),
+    "run": lambda items: nodes.RunThread(str(items[1]), span=_cover(items)),
+}
+"""Rule of the grammar -> what is made of its tokens and finished nodes, which are in order."""
 
 
 def parse(source: Source) -> nodes.Block:
@@ -313,7 +262,7 @@ def prepare() -> None:
 
 @cache
 def _lark() -> Lark:
-    return make_parser(_TreeBuilder())
+    return make_parser(SimpleNamespace(**_MADE))
 
 
 def make_parser(transformer: Any) -> Lark:
@@ -347,26 +296,23 @@ _BLOCK_OPENERS = frozenset({"DEF", "SEC", "THREAD", "IF", "WHILE"})
 
 
 def _unexpected_token(error: UnexpectedToken, source: Source) -> ScriptSyntaxError:
-    accepted = error.accepts or error.expected
-    found = (
-        _unexpected_end(source) if error.token.type == "$END" else _unexpected(error.token, accepted, source)
-    )
-    found.unexpected, found.accepted = error.token.type, frozenset(accepted)
+    token, accepted = error.token, error.accepts or error.expected
+    if token.type == "$END":
+        found = _unexpected_end(source)
+    else:
+        wanted = {_SPELLING[name] for name in accepted if name in _SPELLING}
+        if "RUN" in accepted:
+            wanted -= {"'('", "'['", "a name"}
+            wanted.add("a value")
+        message = f"unexpected '{token}'"
+        # Where a new statement could start, the list of what may follow is too long to help.
+        if wanted and "WHILE" not in accepted:
+            message += f", expected {' or '.join(sorted(wanted))}"
+        found = ScriptSyntaxError(
+            message, line=token.line or 1, column=token.column or 1, width=len(token), source=source
+        )
+    found.unexpected, found.accepted = token.type, frozenset(accepted)
     return found
-
-
-def _unexpected(token: Token, accepted: set[str], source: Source) -> ScriptSyntaxError:
-    wanted = {_SPELLING[name] for name in accepted if name in _SPELLING}
-    if "RUN" in accepted:
-        wanted -= {"'('", "'['", "a name"}
-        wanted.add("a value")
-    message = f"unexpected '{token}'"
-    # Where a new statement could start, the list of what may follow is too long to help.
-    if wanted and "WHILE" not in accepted:
-        message += f", expected {' or '.join(sorted(wanted))}"
-    return ScriptSyntaxError(
-        message, line=token.line or 1, column=token.column or 1, width=len(token), source=source
-    )
 
 
 def _unexpected_end(source: Source) -> ScriptSyntaxError:
