@@ -28,20 +28,6 @@ _SAMPLES = {
     "boolean": "<boolean>1</boolean>",
     "string": "<string>rg_stop</string>",
 }
-_NO_VALUES = (
-    "<int>1e3</int>",
-    f"<i8>{5000 * '9'}</i8>",
-    "<double>nan</double>",
-    "<double>-inf</double>",
-    "<double>1e999</double>",
-    "<double>1,5</double>",
-    "<boolean>2</boolean>",
-    "<nil/>",
-    "<base64>AA==</base64>",
-    "<array><data/></array>",
-    "<struct/>",
-)
-_NO_PLACES = (-1, 1, 2**31, -(2**63), 10**2000)
 _names = count(1)
 
 
@@ -116,89 +102,6 @@ def _fault(asking: http.client.HTTPConnection, body: bytes) -> int | None:
     return None
 
 
-def _status(box: BoxUnderAttack, data: bytes) -> int:
-    """Send bytes on a connection of its own; return the status of the last answer before the box closes it."""
-    said = b""
-    with box.connect("onrobot") as client:
-        with suppress(ConnectionError):
-            client.sendall(data)
-        with suppress(ConnectionError):
-            while piece := client.recv(1 << 16):
-                said += piece
-    return int(said.rpartition(b"HTTP/1.1 ")[2][:3] or 0)
-
-
-@CALLS.attack(
-    "Port 41414: all methods with too many and too few arguments, with what is no value or not finite, for places "
-    "without a device; methods that do not exist",
-    "a fault; a value that cannot be",
-    kinds=WITH_GRIPPER,
-)
-def odd_calls(box: BoxUnderAttack, seconds: float) -> str:
-    refused = [_call(5000 * "x"), _call("__init__"), _call("rg_grip.__call__"), _call("")]
-    answered, seen = [], set()
-    with _gripper_obeys(box) as server, _asking(box) as asking:
-        for name in server.system.listMethods():
-            types = server.system.methodSignature(name)[0][1:]
-            given = [_SAMPLES[kind] for kind in types]
-            refused += [_call(name, *given, _SAMPLES["int"])]
-            refused += [_call(name, *given[:-1])] if given else []
-            # What is no value is looked at by signature.
-            for k in range(0 if tuple(types) in seen else len(given)):
-                refused += [_call(name, *given[:k], value, *given[k + 1 :]) for value in _NO_VALUES]
-            seen.add(tuple(types))
-            if name.startswith(("rg_", "cb_is")):
-                answered += [_call(name, f"<i8>{place}</i8>", *given[1:]) for place in _NO_PLACES]
-        before, end = server.rg_get_all_variables(0), time.monotonic() + seconds
-        n = 0
-        while not n or time.monotonic() < end:
-            for body in refused:
-                assert _fault(asking, body) in _REFUSED, f"{body[:200]!r} was answered"
-            for body in answered:
-                assert _fault(asking, body) is None, f"{body[:200]!r} was refused"
-            n += len(refused) + len(answered)
-        after = server.rg_get_all_variables(0)
-        moved = {name for name in before if abs(after[name] - before[name]) > 0.1}
-        assert not moved, f"{', '.join(sorted(moved))} have changed"
-    return f"{n:,} calls"
-
-
-@CALLS.attack(
-    "Port 41414: lengths of 5,000 digits, negative, two, none; a body, chunks, a chunk's extension, trailers, a "
-    "header and headers without end",
-    "400, 413, 431",
-    kinds=WITH_GRIPPER,
-)
-def lengths_of_calls_that_lie(box: BoxUnderAttack, seconds: float) -> str:
-    call, chunked, more = _call("rg_stop", _SAMPLES["int"]), "Transfer-Encoding: chunked", 4 * _LIMIT * b" "
-    said = (
-        (400, _head(box, f"Content-Length: {5000 * '9'}") + call),
-        (400, _head(box, "Content-Length: -1") + call),
-        (400, _head(box, "Content-Length: 5", f"Content-Length: {len(call)}") + call),
-        (400, _head(box) + call + b"\r\n\r\n"),
-        (400, _head(box, chunked) + 30 * b"f" + b"\r\n" + call),
-        (413, _head(box, "Content-Length: 99999999999999999999") + more),
-        (413, _head(box, f"Content-Length: {_LIMIT + 1}") + more),
-        (413, _head(box, chunked) + b"ffffffff\r\n" + more),
-        (413, _head(box, chunked) + (_LIMIT + 1) * b"1\r\n \r\n"),
-        (431, _head(box, chunked) + b"1;" + more),
-        (431, _head(box, chunked) + b"1\r\n \r\n0\r\n" + 2000 * b"X: yyyyyyyyyyyyyyyy\r\n"),
-        (431, _head(box)[:-2] + 2000 * b"X: yyyyyyyyyyyyyyyy\r\n"),
-        (431, b"POST /" + more.replace(b" ", b"x")),
-    )
-    with _gripper_obeys(box) as server:
-        for expected, data in said:
-            status = _status(box, data)
-            assert status == expected, f"{data[:120]!r}: {status} instead of {expected}"
-
-        def attack() -> None:
-            for _, data in said:
-                flood(box, "onrobot", data, seconds / len(said), clients=12)
-
-        with in_background(attack) as attacking:
-            return _answers_while(server, attacking)
-
-
 @CALLS.attack(
     "Port 41414: XML with entities that double, in content and attributes, of files; deep, of 900 values, of 900 "
     "attributes; each time in another encoding that does not exist",
@@ -266,26 +169,6 @@ def calls_that_never_end(box: BoxUnderAttack, seconds: float) -> str:
                 assert server.rg_get_status(0) == 0
 
         return asked_while(attacking, ask)
-
-
-@CALLS.attack(
-    "24 clients of port 41414 send calls ahead without pause and read no answers",
-    "they are closed",
-    kinds=WITH_GRIPPER,
-)
-def unread_answers_of_calls(box: BoxUnderAttack, seconds: float) -> str:
-    calls = (
-        _call("system.listMethods"),
-        _call("rg_get_all_variables", _SAMPLES["int"]),
-        _call("get_discovery"),
-    )
-    block = 50 * b"".join(_post(box, call) for call in calls)
-    # Fewer than the port has places: of more, one that asks at leisure would be closed for another.
-    with (
-        _gripper_obeys(box) as server,
-        in_background(flood, box, "onrobot", block, seconds, clients=24, reads=False) as attacking,
-    ):
-        return _answers_while(server, attacking)
 
 
 @CALLS.attack(

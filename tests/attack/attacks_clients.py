@@ -9,7 +9,7 @@ import time
 from contextlib import suppress
 
 from attack_record import Section
-from attackers import crowd, flood, get, post, request, reset
+from attackers import crowd, flood, get, post, reset
 from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
 
 from protocol.rtde.fields import OUTPUTS
@@ -62,16 +62,6 @@ def long_bodies(box: BoxUnderAttack, seconds: float) -> None:
     )
     for body in bodies:
         flood(box, "control", post(box, "push", body[: 1 << 20]), seconds / len(bodies), clients=16)
-
-
-@CLIENTS.attack(
-    "16 clients of the control API post JSON that is nested 12,000 deep and more", "refused, 400", kinds=ONE
-)
-def deep_json(box: BoxUnderAttack, seconds: float) -> None:
-    for body in (60_000 * b"[", 12_000 * b'{"a":', b'{"force": ' + 30_000 * b"[" + 30_000 * b"]" + b"}"):
-        status, _ = request(box, "POST", "push", body)
-        assert status == 400, status
-        flood(box, "control", post(box, "push", body), seconds / 3, clients=16)
 
 
 @CLIENTS.attack("Clients connect to all ports, as many in a second as come about, and are reset", "they wait")

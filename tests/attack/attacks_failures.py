@@ -12,16 +12,6 @@ from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
 FAILURES = Section("One boundary for failures")
 
 _FEW_DESCRIPTORS = "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (96, 96))"
-# A file beside that of `--ready-file` takes the threads away.
-_NO_THREADS = """
-import os, threading
-_start, _flag = threading.Thread.start, os.path.dirname(sys.argv[sys.argv.index("--ready-file") + 1]) + "/no-threads"
-def start(thread):
-    if os.path.exists(_flag):
-        raise RuntimeError("can't start new thread")
-    _start(thread)
-threading.Thread.start = start
-"""
 _WRITES = ("saveLog", "generate flight report", "generate support file .")
 
 
@@ -41,24 +31,6 @@ def descriptors_exhausted(box: BoxUnderAttack, seconds: float) -> None:
                         dashboard.write(line + "\n")
                         dashboard.flush()
                         dashboard.readline()
-
-
-@FAILURES.attack(
-    "No thread can be started; scripts open sockets by name and call XML-RPC",
-    "the call fails",
-    prelude=_NO_THREADS,
-    kinds=ONE,
-)
-def threads_exhausted(box: BoxUnderAttack, seconds: float) -> None:
-    flag = box.errors.with_name("no-threads")
-    flag.touch()
-    try:
-        for _ in range(max(2, round(seconds))):
-            box.run('socket_open("localhost", 9)', 'rpc_factory("xmlrpc", "http://127.0.0.1:9").f()')
-            box.ask("programState")
-            time.sleep(0.2)
-    finally:
-        flag.unlink()
 
 
 @FAILURES.attack(

@@ -6,13 +6,12 @@ import socket
 import struct
 import threading
 import time
-import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from attack_record import Section
-from attackers import crowd, log_since, peer, plays, request, reset, run_to_end, until
-from box_under_attack import ONE, PATIENCE, WITH_E_SERIES, BoxUnderAttack
+from attackers import crowd, log_since, peer, plays, request, reset, until
+from box_under_attack import ONE, PATIENCE, BoxUnderAttack
 
 SCRIPTS = Section("Budgets of running programs")
 
@@ -138,35 +137,12 @@ def flood_of_requests(box: BoxUnderAttack, seconds: float) -> None:
 # --- much of all
 
 
-@SCRIPTS.attack(
-    "1,100 globals are lists of 65,536 elements, from `make_list`",
-    "the program is ended",
-    kinds=WITH_E_SERIES,
-)
-def many_lists(box: BoxUnderAttack, seconds: float) -> str:
-    n_lists = min(1_100, round(1_100 * seconds))
-    return _hold(box, seconds, *(f"global g{n} = make_list(65536, 0)" for n in range(n_lists)))
-
-
 @SCRIPTS.attack("Globals hold 9,000 strings of 32 kB", "the program is ended")
 def many_strings(box: BoxUnderAttack, seconds: float) -> str:
     lists = (f"global g{n} = [{','.join(3_000 * ('s',))}]" for n in range(3))
     put = (f'g{n}[i] = s + "x"' for n in range(3))
     doubled = ('s = "0123456789abcdef"', *11 * ("s = s + s",))
     return _hold(box, 2 * seconds, *doubled, *lists, *_times(3_000, *put, "sync()"))
-
-
-@SCRIPTS.attack(
-    "Lists of 10,000 structs, each with small lists, are made without end",
-    "the program is ended",
-    kinds=WITH_E_SERIES,
-)
-def structs_of_small_lists(box: BoxUnderAttack, seconds: float) -> str:
-    setup = tuple(
-        f"global g{n} = make_list(10000, struct(a=[0, 1, 2], b=[0], c=[[0, 0], [0, 0]]))" for n in range(20)
-    )
-    put = (f"g{n}[i] = struct(a=[i, 1, 2], b=[i], c=[[i, i], [i, i]])" for n in range(20))
-    return _spend(box, seconds, *_times(10_000, *put, "sync()"), setup=setup)
 
 
 @SCRIPTS.attack(
@@ -315,103 +291,3 @@ def flood_of_look_ups(box: BoxUnderAttack, seconds: float) -> str:
 
 
 # --- XML-RPC
-
-
-def _http(body: bytes, *headers: str, status: str = "200 OK") -> bytes:
-    lines = [f"HTTP/1.1 {status}", "Content-Type: text/xml", f"Content-Length: {len(body)}", *headers]
-    return "\r\n".join([*lines, "", ""]).encode() + body
-
-
-def _value(text: str) -> bytes:
-    return f"<methodResponse><params><param><value>{text}</value></param></params></methodResponse>".encode()
-
-
-ODD_ANSWERS = {
-    "empty fault": _http(b"<methodResponse><fault></fault></methodResponse>"),
-    "fault without text": _http(
-        b"<methodResponse><fault><value><int>1</int></value></fault></methodResponse>"
-    ),
-    "no value": _http(b"<methodResponse><params></params></methodResponse>"),
-    "other tree": _http(b"<a><b/></a>"),
-    "member without name": _http(_value("<struct><member><value>1</value></member></struct>")),
-    "unknown coding": _http(b'<?xml version="1.0" encoding="zip"?>' + _value("1")),
-    "bytes in base64": _http(_value("<base64>!!!!</base64>")),
-    "date": _http(_value("<dateTime.iso8601>never</dateTime.iso8601>")),
-    "integer of 6,000 digits": _http(_value(f"<int>{6000 * '9'}</int>")),
-    "deep": _http(_value(20_000 * "<array><data><value>" + 20_000 * "</value></data></array>")),
-    "entities": _http(b'<!DOCTYPE a [<!ENTITY b "xxxxxxxx"><!ENTITY c "&b;&b;&b;">]>' + _value("&c;")),
-    "damaged gzip": _http(b"\x1f\x8b\x08damaged", "Content-Encoding: gzip"),
-    "wrong length": b"HTTP/1.1 200 OK\r\nContent-Length: -7\r\n\r\n<a/>",
-    "no http": b"hello\r\n\r\n",
-    "moved": _http(b"", "Location: http://127.0.0.1:1/", status="301 Moved"),
-    "cut": _http(_value("1"))[:-30],
-}
-
-
-def _answering(answer: bytes) -> Callable[[socket.socket], None]:
-    def serve(client: socket.socket) -> None:
-        client.recv(1 << 16)
-        client.sendall(answer)
-
-    return serve
-
-
-def _call(box: BoxUnderAttack, port: int | str) -> None:
-    """Let a program call a procedure, and wait for its end."""
-    run_to_end(box, f'h = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")', "x = h.f()", "textmsg(x)")
-
-
-@SCRIPTS.attack(
-    "XML-RPC servers give 16 odd answers, ports are absurd",
-    "the call fails with an error of the language",
-    kinds=ONE,
-)
-def odd_answers_of_procedures(box: BoxUnderAttack, seconds: float) -> None:
-    for name, answer in ODD_ANSWERS.items():
-        with peer(_answering(answer)) as port:
-            try:
-                _call(box, port)
-            except AssertionError as error:
-                raise AssertionError(f"{name}: {error}") from None
-    for absurd in ("99999", "-1", "x", "0"):
-        _call(box, absurd)
-
-
-@SCRIPTS.attack(
-    "An XML-RPC server answers with 0.6 MB of gzip that unpack to 600 MB",
-    "the call fails",
-    is_short=False,
-    kinds=ONE,
-)
-def gzip_bomb_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
-    with peer(_answering(_http(_bomb(), "Content-Encoding: gzip"))) as port:
-        _call(box, port)
-
-
-def _bomb() -> bytes:
-    packer = zlib.compressobj(9, wbits=31)
-    begin, end = _value("<string>|</string>").split(b"|")
-    parts = [packer.compress(begin), *(packer.compress(1_000_000 * b"x") for _ in range(600))]
-    return b"".join([*parts, packer.compress(end), packer.flush()])
-
-
-@SCRIPTS.attack(
-    "An XML-RPC server answers without end, in lines of header and in body",
-    "the call fails",
-    is_short=False,
-    kinds=ONE,
-)
-def endless_answer_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
-    def header(client: socket.socket) -> None:
-        client.sendall(b"HTTP/1.1 200 OK\r\n")
-        for n in range(200_000):
-            client.sendall(b"X-%d: x\r\n" % n)
-
-    def body(client: socket.socket) -> None:
-        client.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
-        for _ in range(400):
-            client.sendall(b"100000\r\n" + 1_048_576 * b"x" + b"\r\n")
-
-    for serve in (header, body):
-        with peer(serve) as port:
-            _call(box, port)

@@ -77,9 +77,8 @@ KINDS = {
         Kind("rack", "ur3", "", ("--boxes", "3")),
     )
 }
-# Those with a dashboard; those of the e-Series; that with grippers; the first, for what is the same in all of them.
+# Those with a dashboard; that with grippers; the first, for what is the same in all of them.
 WITH_DASHBOARD = ("CB3", "e-Series", "oldest", "rack")
-WITH_E_SERIES = ("e-Series", "PolyScope X")
 WITH_GRIPPER = ("e-Series",)
 ONE = ("CB3",)
 
