@@ -281,22 +281,6 @@ def at(box):
     return ("--robot", box.host, "--port-base", box.ports.realtime - Ports.standard().realtime)
 
 
-@contextmanager
-def run_in_movement(box, frames, out):
-    """A `ur-client run` of `reach` on a box, no longer than the block, which begins well inside the movement."""
-    out.mkdir(exist_ok=True)
-    reach().save(out / "reach.toml")
-    client = start("pc_client", "run", out / "reach.toml", *at(box), "--out", out)
-    try:
-        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
-        assert client.poll() is None
-        yield client
-    finally:
-        if not client.stdout.closed:
-            client.kill()
-            finish(client)
-
-
 def free_port_base():
     """An offset at which all ports of a box are free.
 

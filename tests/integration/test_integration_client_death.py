@@ -1,9 +1,8 @@
 """A client that is lost in motion: the arm ramps to rest in 0.3 s, the program ends, the next client works.
 
-In every phase of an experiment, and in every way in which a client can be lost. Time to rest is counted in robot
-time, from the last command that the robot got. In lockstep the client dies at an exact command:
-`DyingNetwork` stands between the real client and its sockets. Killed: all sockets close, as the kernel closes
-those of a process. Frozen: the client stands still, its sockets stay open. Cut off: the client goes on, but
+Time to rest is counted in robot time, from the last command that the robot got. In lockstep the client dies at an
+exact command: `DyingNetwork` stands between the real client and its sockets. Killed: all sockets close, as the kernel
+closes those of a process. Frozen: the client stands still, its sockets stay open. Cut off: the client goes on, but
 nothing reaches the robot any more and nothing comes from it.
 """
 
@@ -13,15 +12,7 @@ import threading
 from dataclasses import replace
 
 import pytest
-from integration_support import (
-    LAYOUT,
-    PERIOD,
-    Frames,
-    at,
-    finish,
-    prepare_experiment,
-    run_in_movement,
-)
+from integration_support import LAYOUT, PERIOD, Frames, at, finish, prepare_experiment, reach, start
 
 import ur_emulator.host.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
@@ -205,37 +196,32 @@ class Bystander:
 DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
 
 
-@pytest.mark.usefixtures("without_page")
-def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(ur_client, standard_box, tmp_path):
+@pytest.mark.parametrize(
+    "end",
+    [signal.SIGINT, *(pytest.param(s, marks=pytest.mark.nightly) for s in (signal.SIGKILL, signal.SIGTERM))],
+)
+def test_a_signal_in_a_movement_ends_the_client_and_the_arm_ramps_to_rest(standard_box, tmp_path, end):
     with Frames(standard_box) as frames:
-        assert cut_off(standard_box, frames, tmp_path / "killed", signal.SIGKILL).code == -signal.SIGKILL
+        reach().save(tmp_path / "reach.toml")
+        client = start("pc_client", "run", tmp_path / "reach.toml", *at(standard_box), "--out", tmp_path)
+        try:
+            frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(tmp_path.glob("*.mcap")))
+            client.send_signal(end)
+            done = finish(client)
+        finally:
+            client.kill()
+        if end == signal.SIGKILL:
+            assert done.code == -signal.SIGKILL
+        else:
+            assert done.code == 130
+            assert "interrupted; the arm rests" in done.complaint()
         before = frames.next()
         while before.runtime_state != ProgramState.STOPPED:
             frame = frames.new()
             assert abs(frame.target_qd - before.target_qd).max() <= DECELERATION * PERIOD * (1 + 1e-9)
             before = frame
-        assert not frames.new().target_qd.any()  # the target of the cycle in which the program stopped
-        assert frames.lost() == 0
-    Movement.through([(0.35, -0.06, 0.25), (0.35, 0.06, 0.3)], durations=[1.5]).save(tmp_path / "next.toml")
-    done = ur_client("run", tmp_path / "next.toml", *at(standard_box), "--out", tmp_path / "next")
-    assert done.code == 0, done.err
-    assert len(list((tmp_path / "next").glob("*_r1.mcap"))) == 1
-
-
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_client_stops_the_arm_and_says_so_in_one_line(standard_box, tmp_path, end):
-    with Frames(standard_box) as frames:
-        ended = cut_off(standard_box, frames, tmp_path, end)
-        assert ended.code == 130
-        assert "interrupted; the arm rests" in ended.complaint()
         assert frames.rest().safety_mode == SafetyMode.NORMAL
-
-
-def cut_off(box, frames, out, signal_number):
-    """Start a run, signal the client well inside the movement, return how it ended."""
-    with run_in_movement(box, frames, out) as client:
-        client.send_signal(signal_number)
-        return finish(client)
+        assert frames.lost() == 0
 
 
 ALLOWED = 0.3  # s
@@ -302,11 +288,15 @@ def lose_client(box, experiment, death, phase, monkeypatch):
 @pytest.mark.parametrize(
     ("death", "phase"),
     [
-        *((death, "stream") for death in (KILLED, FROZEN, CUT_OFF)),
-        (KILLED, "approach"),
+        (KILLED, "stream"),
         (FROZEN, "identification"),
         (CUT_OFF, "return"),
-        *((death, "pause between runs") for death in (FROZEN, CUT_OFF)),
+        pytest.param(KILLED, "approach", marks=pytest.mark.nightly),
+        *(
+            pytest.param(death, phase, marks=pytest.mark.nightly)
+            for death in (FROZEN, CUT_OFF)
+            for phase in ("stream", "pause between runs")
+        ),
     ],
 )
 def test_the_arm_rests_in_time(lockstep_box, twice, tmp_path, death, phase, monkeypatch):
