@@ -9,7 +9,6 @@ import shlex
 import socket
 import struct
 import subprocess
-import xmlrpc.client
 from math import pi
 from pathlib import Path
 from shutil import which
@@ -69,26 +68,12 @@ def box():
         yield box
 
 
-@pytest.fixture(scope="module")
-def e_series_box():
-    options = {"pace": "lockstep", "port_base": None, "tool": "robotiq-2f85,onrobot-rg2"}
-    with ControlBox("ur5e", in_process=True, **options) as box:
-        yield box
-
-
-@pytest.fixture
-def other_box():
-    """One that a test changes."""
-    with ControlBox(in_process=True, version="3.15.8", pace="lockstep", port_base=None) as box:
-        yield box
-
-
 @pytest.fixture
 def dial(box):
     """Connect to a port of the box by its name."""
     socks = []
 
-    def dial(name, box=box):
+    def dial(name):
         socks.append(socket.create_connection((box.host, getattr(box.ports, name)), timeout=20.0))
         return socks[-1]
 
@@ -320,32 +305,6 @@ def test_rtde(box, dial):
         assert answer[0] == "U"
 
 
-def test_dashboard(other_box, dial):
-    """Every command without an argument gets an answer of its form."""
-    page = Page("dashboard.md")
-    words = {name.lower(): re.findall(r"`(\w+)`", text) for name, text in re.findall(
-        r"^- (Robot modes|Safety modes): (.*?)\.", page.text, re.MULTILINE | re.DOTALL)}  # fmt: skip
-    stream = dial("dashboard", other_box).makefile("rw", newline="\n")
-    assert stream.readline().strip() in page.text.replace("`", "")
-    (rows,) = page.tables.values()
-    asked = 0
-    for row in rows:
-        if "<" in row["command"] or row["command"] in ("shutdown", "quit") or not is_there(row["since"]):
-            continue
-        stream.write(f"{row['command']}\n")
-        stream.flush()
-        answer = stream.readline().rstrip("\n")
-        forms = [form for form in [row["reply"], *row["else"].replace("`", "").split("<br>")] if form]
-        patterns = [re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.*)", re.escape(form)) for form in forms]
-        found = [match for pattern in patterns if (match := re.fullmatch(pattern, answer))]
-        assert found, f"{row['command']}: {answer}"
-        if row["command"] in ("robotmode", "safetymode"):
-            kind = {"robotmode": "robot modes", "safetymode": "safety modes"}[row["command"]]
-            assert found[0]["mode"] in words[kind]
-        asked += 1
-    assert asked > 20
-
-
 class Modbus:
     """A client of port 502; `ask` gives what follows the function."""
 
@@ -435,34 +394,3 @@ def test_robot_api(tmp_path):
         for command, answer in re.findall(r"^\$ (.*)\n(.*)$", block, re.MULTILINE):
             assert told(command) == answer, command
         assert json.loads(told(form.replace("pick.script", "other.script")))["programName"] == "other"
-
-
-def test_gripper_variables(e_series_box, dial):
-    page = Page("gripper.md")
-    sock = dial("gripper", e_series_box)
-    stream = sock.makefile("rw", newline="\n")
-    for row in page.tables["Robotiq: variables of port 63352"]:
-        stream.write(f"GET {row['variable']}\n")
-        stream.flush()
-        if "r" not in row["access"]:
-            assert stream.readline() == "?\n"
-            continue
-        name, value = stream.readline().split()
-        assert name == row["variable"]
-        if row["range"] != "text":
-            least, most = map(int, row["range"].split(" - "))
-            assert least <= int(value) <= most
-    stream.write("SET POS 100 SPE 255 GTO 1\n")
-    stream.flush()
-    assert received(sock, 3) == b"ack"
-
-
-def test_gripper_calls(e_series_box):
-    page = Page("gripper.md")
-    address = re.search(r"`(http://HOST:41414/)`", page.text)[1]
-    address = address.replace("HOST:41414", f"{e_series_box.host}:{e_series_box.ports.onrobot}")
-    kinds = {"int": int, "double": float, "boolean": bool, "string": str, "array": list, "struct": dict}
-    with xmlrpc.client.ServerProxy(address) as gripper:
-        for row in page.tables["OnRobot: methods of port 41414"]:
-            if row["method"].startswith("rg_get") and row["arguments"] == "int":
-                assert type(getattr(gripper, row["method"])(0)) is kinds[row["result"]], row["method"]
