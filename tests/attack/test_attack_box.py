@@ -26,7 +26,7 @@ TESTED = {
     "noise",
     "endless lines of a gripper",
     "xml bombs",
-    "pages that lie",
+    "ten pages",
 }
 Serve = Callable[[Attack], BoxUnderAttack]
 

@@ -70,24 +70,16 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
     yield
 
 
-@pytest.mark.parametrize("busy", [compiling, reporting, unread, calling, looking_up])
+@pytest.mark.parametrize(
+    "busy",
+    [
+        compiling,
+        *(pytest.param(busy, marks=pytest.mark.nightly) for busy in (reporting, unread, calling, looking_up)),
+    ],
+)
 def test_a_busy_box_ends(busy: Callable[[BoxUnderAttack], AbstractContextManager[None]]) -> None:
     with serving(KINDS["CB3"], prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):
             assert box.stop() < math.inf
         assert box.process.returncode == 0
         assert box.errors.read_text() == ""
-
-
-def test_a_box_ends_whose_log_nobody_reads() -> None:
-    with serving(KINDS["CB3"], "--log", unread_log=True) as box:
-        lines = 500 * (b"addToLog " + b"x" * 500 + b"\n")
-        with box.connect("dashboard") as sock, sock.makefile("rb") as replies:
-            assert replies.readline()
-            sock.sendall(lines)
-            for _ in range(500):
-                assert replies.readline() == b"Added log message\n"
-            assert box.stop() < math.inf
-        assert box.process.returncode == 0
-        assert box.process.stderr is not None
-        box.process.stderr.close()
