@@ -244,7 +244,7 @@ def test_effects_stay_at_the_rim(package):
         ("pc_client.experiment.runner", {"ur_emulator", "urscript", "mujoco", "matplotlib"}),
     ],
 )
-def test_a_fresh_interpreter_loads_nothing_that_can_wait(package, absent):
+def test_a_fresh_interpreter_loads_nothing_of_the_other_side(package, absent):
     code = f"import sys, {package}; print(*sorted({absent!r} & set(sys.modules)))"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT

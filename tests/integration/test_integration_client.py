@@ -4,6 +4,7 @@ Before an arm moves that does not say itself that it is simulated, the plan is s
 """
 
 import re
+import signal
 import sys
 from contextlib import nullcontext
 from math import isfinite
@@ -15,12 +16,14 @@ from integration_support import (
     Frames,
     Messages,
     at,
+    finish,
     free_port_base,
     in_background,
     prepare_experiment,
     programs_since,
     reach,
     send,
+    start,
 )
 
 import pc_client as ur
@@ -37,7 +40,7 @@ from pc_client.experiment.runner import ExperimentRunner
 from pc_client.kinematics.clearance import clearance_model
 from pc_client.kinematics.model import robot_model
 from pc_client.recording.recording import load_recording
-from protocol.ur_types import SafetyMode
+from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator import ControlBox
 
 
@@ -152,6 +155,36 @@ def test_what_stops_the_robot_in_a_run_is_one_line_and_the_arm_rests(
         assert frames.rest().safety_mode == mode
 
 
+DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
+
+
+@pytest.mark.parametrize(
+    "end", [signal.SIGKILL, signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.nightly)]
+)
+def test_a_signal_in_a_movement_ends_the_client_and_the_arm_ramps_to_rest(standard_box, tmp_path, end):
+    with Frames(standard_box) as frames:
+        reach().save(tmp_path / "reach.toml")
+        client = start("pc_client", "run", tmp_path / "reach.toml", *at(standard_box), "--out", tmp_path)
+        try:
+            frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(tmp_path.glob("*.mcap")))
+            client.send_signal(end)
+            done = finish(client)
+        finally:
+            client.kill()
+        if end == signal.SIGKILL:
+            assert done.code == -signal.SIGKILL
+        else:
+            assert done.code == 130
+            assert "interrupted; the arm rests" in done.complaint()
+        before = frames.next()
+        while before.runtime_state != ProgramState.STOPPED:
+            frame = frames.new()
+            assert abs(frame.target_qd - before.target_qd).max() <= DECELERATION * PERIOD * (1 + 1e-9)
+            before = frame
+        assert frames.rest().safety_mode == SafetyMode.NORMAL
+        assert frames.lost() == 0
+
+
 QUICK = [(0.30, -0.06, 0.30), (0.30, 0.06, 0.35)]
 """Own points .13 m apart: in 1.5 s more acceleration than the published controller lets `speedj` use."""
 
@@ -223,13 +256,13 @@ def test_what_a_user_does_not_allow_is_refused_before_anything_moves(lockstep_bo
 
 
 @pytest.mark.usefixtures("without_page")
-def test_the_same_seed_gives_the_same_bytes_whoever_reads_beside(ur_client, tmp_path):
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(ur_client, tmp_path):
     short = tmp_path / "short.toml"
     ur.Movement.through([(0.35, -0.06, 0.25), (0.35, 0.06, 0.3)], "robot", [1.2], name="short").save(short)
 
-    def recorded(name, watched=False):
+    def recorded(name, seed, watched=False):
         with (
-            ControlBox(pace="lockstep", port_base=free_port_base(), seed=7) as box,
+            ControlBox(pace="lockstep", port_base=free_port_base(), seed=seed) as box,
             Frames(box) as frames,
             in_background(frames.raw) if watched else nullcontext(),
         ):
@@ -239,7 +272,8 @@ def test_the_same_seed_gives_the_same_bytes_whoever_reads_beside(ur_client, tmp_
         assert done.code == 0, done.err
         return load_recording(tmp_path / name / "short_r1.mcap")
 
-    ours, again = recorded("a"), recorded("b", watched=True)
+    ours, again, other = recorded("a", 7), recorded("b", 7, watched=True), recorded("c", 8)
     assert again.path.read_bytes() == ours.path.read_bytes()
     assert ours.complete
-    assert ours.provenance.seed == 7
+    assert (other.column("actual_q")[:100] != ours.column("actual_q")[:100]).any()
+    assert (other.provenance.seed, ours.provenance.seed) == (8, 7)

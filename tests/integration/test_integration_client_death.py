@@ -6,13 +6,12 @@ closes those of a process. Frozen: the client stands still, its sockets stay ope
 nothing reaches the robot any more and nothing comes from it.
 """
 
-import signal
 import struct
 import threading
 from dataclasses import replace
 
 import pytest
-from integration_support import LAYOUT, PERIOD, Frames, at, finish, prepare_experiment, reach, start
+from integration_support import LAYOUT, PERIOD, Frames, prepare_experiment
 
 import ur_emulator.host.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
@@ -191,37 +190,6 @@ class Bystander:
     def time_to_rest(self, since):
         """From a time stamp to the first of the frames in which the arm rests for good [s]; 0 if it rested."""
         return max(self._last_motion + PERIOD - since, 0.0)
-
-
-DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
-
-
-@pytest.mark.parametrize(
-    "end",
-    [signal.SIGINT, *(pytest.param(s, marks=pytest.mark.nightly) for s in (signal.SIGKILL, signal.SIGTERM))],
-)
-def test_a_signal_in_a_movement_ends_the_client_and_the_arm_ramps_to_rest(standard_box, tmp_path, end):
-    with Frames(standard_box) as frames:
-        reach().save(tmp_path / "reach.toml")
-        client = start("pc_client", "run", tmp_path / "reach.toml", *at(standard_box), "--out", tmp_path)
-        try:
-            frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(tmp_path.glob("*.mcap")))
-            client.send_signal(end)
-            done = finish(client)
-        finally:
-            client.kill()
-        if end == signal.SIGKILL:
-            assert done.code == -signal.SIGKILL
-        else:
-            assert done.code == 130
-            assert "interrupted; the arm rests" in done.complaint()
-        before = frames.next()
-        while before.runtime_state != ProgramState.STOPPED:
-            frame = frames.new()
-            assert abs(frame.target_qd - before.target_qd).max() <= DECELERATION * PERIOD * (1 + 1e-9)
-            before = frame
-        assert frames.rest().safety_mode == SafetyMode.NORMAL
-        assert frames.lost() == 0
 
 
 ALLOWED = 0.3  # s

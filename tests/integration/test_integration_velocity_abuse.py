@@ -1,4 +1,4 @@
-"""What a wrong or hostile PC can send to the velocity receiver, and to a box that is already stopped.
+"""What a wrong or hostile PC can send to the velocity receiver.
 
 Whatever comes: no target beyond the limits of the joints, and in the end the arm rests and takes the next program.
 """
@@ -8,15 +8,17 @@ import struct
 
 import numpy as np
 import pytest
-from integration_support import HELLO_PROGRAM, Messages, VelocitySession, is_closed, send
+from integration_support import HELLO_PROGRAM, PERIOD, Messages, VelocitySession, is_closed, send
 
 import ur_emulator.host.pacing as pacing
+from pc_client.driver.watchdog import REST_SPEED
 from protocol.primary.messages import ErrorCodeMessage, KeyMessage, SafetyModeMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.machine.models.robots import robot_by_name
 
 UR3 = robot_by_name("ur3")
 INT_MIN, INT_MAX = -(2**31), 2**31 - 1
+LONGEST_TO_REST = 0.3  # s of robot time after the last command
 RAMP_ROUNDING = 1e-3  # rad; the last cycle of a ramp is a whole one
 
 
@@ -110,16 +112,26 @@ BURST = b"".join(struct.pack(">7i", 1, sign * 2_000_000, 0, 0, 0, 0, 0) for sign
         (HALF, True, "no message from the client"),
         (BURST + bytes(28), False, "stopped by the client"),
     ],
-    ids=["unknown mode", "half a message", "half a message and the end", "a thousand at once"],
+    ids=[
+        "unknown mode",
+        "frozen",
+        "killed",
+        "half a message",
+        "half a message, killed",
+        "a thousand at once",
+    ],
 )
 def test_what_ends_the_program_ramps_the_arm_to_rest(lockstep_box, monkeypatch, data, closes, said):
     monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of a minute
     with Messages(lockstep_box) as primary, VelocitySession(lockstep_box, read_timeout=0.2) as session:
-        session.spin_up()
+        last = session.spin_up().timestamp
         session.reverse.sendall(data)
         if closes:
             session.reverse.close()
-        assert Judge(session.frames).until_rest().safety_mode == SafetyMode.NORMAL
+        judge = Judge(session.frames)
+        at_rest = judge.until(lambda f: not f.target_qd.any() and abs(f.actual_qd).max() < REST_SPEED)
+        assert 4 * PERIOD < at_rest.timestamp - last <= LONGEST_TO_REST
+        assert judge.until_rest().safety_mode == SafetyMode.NORMAL
         assert primary.message(TextMessage).text == f"velocity_receiver: {said}"
         assert closes or is_closed(session.reverse)
         next_program_works(lockstep_box, session.frames)
