@@ -12,15 +12,11 @@ from attack_record import Section
 from attackers import crowd, flood, get, post, reset
 from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
 
-from protocol.rtde.fields import OUTPUTS
-from protocol.ur_types import SoftwareVersion
-
 CLIENTS = Section("Fairness: many clients, many requests")
 
 _QUESTIONS = (
     b"robotmode\nprogramState\nget loaded program\nversion\nget serial number\nsafetystatus\nisProgramSaved\n"
 )
-_LISTED = SoftwareVersion(3, 4)
 _RTDE_START = (
     struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + 27, ord("O"), 125.0) + b"timestamp,actual_q,target_q\0\3S"
 )
@@ -92,19 +88,6 @@ def crowd_of_rtde_clients(box: BoxUnderAttack, seconds: float) -> str:
             fed = sum(_has_frames(client) for client in clients[::2])
             time.sleep(0.05)
     return f"{fed} of 100 were served"
-
-
-@CLIENTS.attack("168 RTDE clients, 64 of an address, with recipes of 2,048 bytes of names", "refused, or fed")
-def long_recipes(box: BoxUnderAttack, seconds: float) -> str:
-    names = b",".join(field.name.encode() for field in OUTPUTS if field.since.covers(_LISTED))
-    names = names[:2_048].rpartition(b",")[0]
-    recipe = struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + len(names), ord("O"), 125.0) + names
-    with crowd(box, "rtde", 168, recipe + b"\0\3S", of_address=64) as clients:
-        end, fed = time.monotonic() + seconds, set()
-        while time.monotonic() < end:
-            fed = {k for k in range(0, len(clients), 2) if _has_frames(clients[k])}
-            time.sleep(0.05)
-    return f"{len(fed)} of 84 were served"
 
 
 @CLIENTS.attack("Clients of all ports that read nothing", "packages to them are dropped, or they are closed")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import time
 
 from attack_record import Section
@@ -61,15 +60,6 @@ def endless_text(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "primary", 8_000_000 * b"x", seconds / 2, clients=20)
 
 
-@COMPILING.attack("Expressions nested 5,000 deep, 20,000 names, a number of a million digits")
-def odd_programs(box: BoxUnderAttack, seconds: float) -> None:
-    deep = b"def f():\n  x = " + 5000 * b"(" + b"1" + 5000 * b")" + b"\nend\n"
-    names = b"def f():\n" + b"".join(b"  global v%d = %d\n" % (n, n) for n in range(20_000)) + b"end\n"
-    digits = b"def f():\n  x = " + 1_000_000 * b"9" + b"\nend\n"
-    for program in (deep, names, digits):
-        box.send("secondary", program)
-
-
 # --- files
 
 
@@ -112,12 +102,3 @@ def uploads_without_end(box: BoxUnderAttack, seconds: float) -> None:
             body = b"10000\r\n" + 0x10000 * b"x" + b"\r\n"
             share = seconds / len(kinds) / len(ports)
             flood(box, port, head + body, share, clients=20, again=len(head))
-
-
-@COMPILING.attack("20 RTDE clients ask for all variables 2,000 times each, in recipes of all lengths")
-def flood_of_recipes(box: BoxUnderAttack, seconds: float) -> None:
-    names = b"timestamp,actual_q,actual_qd,target_q,target_qd,actual_TCP_pose,output_int_register_0"
-    recipes = b"".join(
-        struct.pack(">HBd", 11 + n, ord("O"), 125.0) + names[:n] for n in range(1, len(names) + 1)
-    )
-    flood(box, "rtde", struct.pack(">HBH", 5, ord("V"), 2) + 20 * recipes, seconds, clients=20)

@@ -1,4 +1,4 @@
-"""Attacks on the ports of a gripper: its variables at 63352, and the serial line at 54321."""
+"""Attacks on the ports of grippers: variables at 63352, the serial line at 54321, calls of XML-RPC at 41414."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
+from xmlrpc.client import ServerProxy
 
 from attack_record import Section
 from attackers import arm_at_rest, asked_while, crowd, flood, in_background, until
@@ -15,7 +17,7 @@ from box_under_attack import WITH_GRIPPER, BoxUnderAttack
 
 from protocol.modbus_rtu import encode_rtu
 
-GRIPPERS = Section("Ports of a gripper")
+GRIPPERS = Section("Ports of grippers")
 
 _UNIT = 9
 _STATUS = encode_rtu(_UNIT, struct.pack(">BHH", 4, 0x07D0, 3))
@@ -89,24 +91,6 @@ def endless_lines_of_a_gripper(box: BoxUnderAttack, seconds: float) -> str:
         return remark
 
 
-@GRIPPERS.attack(
-    "300 connections to port 63352, then 300 to port 54321",
-    "64 of an address are the most",
-    kinds=WITH_GRIPPER,
-)
-def crowds_at_a_gripper(box: BoxUnderAttack, seconds: float) -> str:
-    with _arm_at_rest(box):
-        with crowd(box, "gripper", 300, b"GET SID") as clients:
-            served = 0
-            for client in clients:
-                with suppress(OSError):
-                    served += client.recv(10) == b"[9]"
-            time.sleep(seconds / 2)
-        with crowd(box, "tool_line", 300, _STATUS) as clients:
-            time.sleep(seconds / 2)
-    return f"{served} of 300 were served"
-
-
 def _until_line_answers(box: BoxUnderAttack) -> None:
     """Wait until the line is free again, and a request on it is answered."""
 
@@ -130,3 +114,74 @@ def many_masters_of_a_line(box: BoxUnderAttack, seconds: float) -> None:
         with in_background(flood, box, "tool_line", block, seconds, clients=15, reads=False):
             flood(box, "tool_line", block, seconds, clients=15)
         _until_line_answers(box)
+
+
+_CALL = b"<methodCall><methodName>%s</methodName><params>%s</params></methodCall>"
+
+
+def _call(name: str, *values: float) -> bytes:
+    """Return a request that calls a method of the first gripper."""
+    shown = ["<int>0</int>", *(f"<double>{value}</double>" for value in values)]
+    params = "".join(f"<param><value>{value}</value></param>" for value in shown)
+    body = _CALL % (name.encode(), params.encode())
+    return b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+
+
+@contextmanager
+def _server(box: BoxUnderAttack) -> Iterator[Any]:
+    with ServerProxy(f"http://{box.host}:{box.ports.onrobot}/") as server:
+        yield server
+
+
+@GRIPPERS.attack(
+    "60 clients of port 41414 and 60 others after them send half a call, then a byte every 10 ms",
+    "the one that was silent longest is closed for a new one",
+    kinds=WITH_GRIPPER,
+)
+def calls_that_never_end(box: BoxUnderAttack, seconds: float) -> str:
+    half = _call("rg_grip", 1.0)[:-30]
+
+    def attack() -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            with crowd(box, "onrobot", 60, half) as clients:
+                for _ in range(20):
+                    for client in clients:
+                        with suppress(OSError):
+                            client.send(b"<")
+                    time.sleep(0.01)
+
+    def ask() -> None:
+        with _server(box) as server:
+            assert server.rg_get_status(0) == 0
+
+    with arm_at_rest(box), in_background(attack) as attacking:
+        return asked_while(attacking, ask)
+
+
+@GRIPPERS.attack(
+    "20 clients of port 41414 grip, stop, set the fingertips and turn the supply off, 10 masters of port 502 and a "
+    "program by tool outputs move the same fingers at once",
+    kinds=WITH_GRIPPER,
+)
+def three_ways_to_the_same_fingers(box: BoxUnderAttack, seconds: float) -> None:
+    numbers = (0.0, 100.0, 1e308, -1e308, 55.5)
+    grips = [_call("rg_grip", a, b) for a in numbers for b in numbers]
+    tips = [_call("rg_set_fingertip_offset", a) for a in numbers]
+    calls = [*grips, *tips, _call("rg_stop"), *grips, _call("cb_reset_tool_power")]
+    write = struct.Struct(">HHHBBHHB3H")
+    registers = [
+        write.pack(7, 0, 13, 65, 16, 0, 3, 6, *values) for values in ((400, 0, 16), (0xFFFF, 0xFFFF, 1))
+    ]
+    registers += [struct.pack(">HHHBBHH", 7, 0, 6, 63, 6, 0, 2)]
+    outputs = (f"  set_tool_digital_out(0, {word})\n    sync()" for word in ("True", "False"))
+    with arm_at_rest(box), _server(box) as server:
+        box.run("while True:", *outputs, "end")
+        with in_background(flood, box, "modbus", 100 * b"".join(registers), seconds, clients=10):
+            flood(box, "onrobot", b"".join(calls), seconds, clients=20)
+        box.send("secondary", "stop program\n")
+        until(lambda: server.rg_get_status(0) >= 0, "the gripper has power")
+        server.rg_set_fingertip_offset(0, 4.45)
+        until(lambda: server.rg_grip(0, 60.0, 20.0) == 0, "the gripper obeys")
+        until(lambda: abs(server.rg_get_width(0) - 60.0) < 1.0, "the fingers are there")
+        until(lambda: not server.rg_get_busy(0), "the fingers stand")

@@ -6,8 +6,8 @@ import time
 from contextlib import suppress
 
 from attack_record import Section
-from attackers import log_since, request, run_to_end
-from box_under_attack import CONTROL_PORT, WITH_DASHBOARD, BoxUnderAttack
+from attackers import log_since, request
+from box_under_attack import WITH_DASHBOARD, BoxUnderAttack
 
 PLACES = Section("Nothing leaves its place")
 
@@ -50,25 +50,6 @@ def paths_that_lead_out(box: BoxUnderAttack, seconds: float) -> None:
         status, told = request(box, "POST", "run_program", {"file": name})
         assert status != 200, f"{name[:40]}: {told}"
         assert str(outside) not in str(told), f"{name[:40]} shows a path: {told}"
-
-
-@PLACES.attack(
-    "A script opens a socket to the control port and triggers a fault", "the connection is refused"
-)
-def control_port_from_a_script(box: BoxUnderAttack, seconds: float) -> None:
-    for name in (box.host, "127.0.0.1", "localhost"):
-        run_to_end(
-            box,
-            f'if socket_open("{name}", {CONTROL_PORT}):',
-            '  socket_send_line("POST /v1/trigger_fault HTTP/1.1")',
-            '  socket_send_line("Host: localhost")',
-            '  socket_send_line("Content-Length: 0")',
-            '  socket_send_line("")',
-            "  sleep(0.3)",
-            "end",
-        )
-        state = request(box, "GET", "state")[1]
-        assert state["safety_mode"] == "NORMAL", f"the script has triggered: {state['safety_mode']}"
 
 
 @PLACES.attack(

@@ -25,7 +25,7 @@ TESTED = {
     "scripts of web pages",
     "noise",
     "endless lines of a gripper",
-    "xml bombs",
+    "calls that never end",
     "ten pages",
 }
 Serve = Callable[[Attack], BoxUnderAttack]
