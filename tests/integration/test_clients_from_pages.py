@@ -9,7 +9,6 @@ import shlex
 import socket
 import struct
 import subprocess
-from math import pi
 from pathlib import Path
 from shutil import which
 
@@ -303,66 +302,6 @@ def test_rtde(box, dial):
     client.send("v")  # the page: one reply to each request, between data
     while (answer := client.receive())[0] != "v":
         assert answer[0] == "U"
-
-
-class Modbus:
-    """A client of port 502; `ask` gives what follows the function."""
-
-    def __init__(self, sock):
-        self.sock, self.number = sock, 0
-
-    def ask(self, function, payload):
-        self.number += 1
-        self.sock.sendall(struct.pack(">HHHBB", self.number, 0, 2 + len(payload), 255, function) + payload)
-        number, zero, left = struct.unpack(">3H", received(self.sock, 6))
-        assert (number, zero) == (self.number, 0)
-        answer = received(self.sock, left)
-        assert answer[0] == 255
-        return answer[1], answer[2:]
-
-    def read(self, first, count, *, signed=False):
-        function, answer = self.ask(3, struct.pack(">HH", first, count))
-        assert (function, answer[0]) == (3, 2 * count)
-        return struct.unpack(f">{count}{'h' if signed else 'H'}", answer[1:])
-
-
-def test_modbus(box, dial):
-    page = Page("modbus.md")
-    rows = {row["content"]: int(row["address"].split(" - ")[0]) for row in page.tables["Registers"]}
-    client, state = Modbus(dial("modbus")), box.state
-    request, answer = (
-        bytes.fromhex(line) for line in re.search(r"```text\n(.*)\n(.*)\n```", page.text).groups()
-    )
-    client.sock.sendall(request)
-    assert received(client.sock, len(answer))[:9] == answer[:9]
-    angles = client.read(rows["joint angle within its turn, mrad"], 6)
-    turns = client.read(rows["turns of the joint"], 6, signed=True)
-    q = [2 * pi * turn + angle / 1000 for turn, angle in zip(turns, angles, strict=True)]
-    assert q == pytest.approx(state.q, abs=1e-3)
-    place = client.read(rows["TCP in base, 0.1 mm"], 3, signed=True)
-    rotation = client.read(rows["its rotation vector, mrad"], 3, signed=True)
-    assert [n / 10_000 for n in place] == pytest.approx(state.tcp_pose[:3], abs=1e-4)
-    assert [n / 1000 for n in rotation] == pytest.approx(state.tcp_pose[3:], abs=1e-3)
-    for content, mode in (("robot mode", "RUNNING"), ("safety mode", "NORMAL"), ("joint mode", "RUNNING")):
-        kind = {"robot mode": "RobotMode", "safety mode": "SafetyMode", "joint mode": "JointMode"}[content]
-        assert page.numbers(kind)[client.read(rows[content], 1, signed=content == "robot mode")[0]] == mode
-    for content, value in (
-        ("its domain, analogue output 0: 0 current, 1 voltage", 1),
-        ("analogue output 0, part of its range", 65535 // 2),
-        ("outputs to set", 0b1000),
-    ):
-        assert client.ask(6, struct.pack(">HH", rows[content], value))[0] == 6
-    assert box.state.analog_outputs[0] == pytest.approx(5.0, abs=1e-3)
-    assert box.state.digital_outputs["standard"][3]
-    refused = {
-        row["refused"].split(",")[0]: int(row["exception"])
-        for row in page.tables["The box as a server: port 502"]
-    }
-    assert client.ask(3, struct.pack(">HH", 5000, 1)) == (
-        0x83,
-        bytes([refused["an address that does not exist"]]),
-    )
-    assert client.ask(99, b"") == (0x80 + 99, bytes([refused["another function"]]))
 
 
 def test_robot_api(tmp_path):

@@ -15,6 +15,7 @@ from types import FrameType, FunctionType
 
 import psutil
 import pytest
+from box_support import inside
 from integration_support import (
     PERIOD,
     TIMEOUT,
@@ -23,7 +24,6 @@ from integration_support import (
     connect,
     finish,
     in_background,
-    inside,
     send,
     serving,
 )

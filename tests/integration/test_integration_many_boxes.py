@@ -11,6 +11,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from box_support import inside
 from integration_support import (
     LAYOUT,
     TIMEOUT,
@@ -18,7 +19,6 @@ from integration_support import (
     connect,
     finish,
     free_port_base,
-    inside,
     is_closed,
     send,
     serving,
