@@ -73,7 +73,6 @@ def test_kinematics_of_the_arm_work_on_rows_and_stacks(arm):
     [
         (lambda arm: arm.fk([1, 2, 3]), r"q of shape \(3,\): give six finite numbers"),
         (lambda arm: arm.fk([np.nan] * 6), "six finite numbers"),
-        (lambda arm: arm.fk([[1, 2], "x"]), "six finite numbers"),
         (
             lambda arm: arm.ik([2, 0, 0.3, 0, 0, 0]),
             r"no posture of a UR3 brings the TCP to \(2.000, 0.000, 0.300\) m",
@@ -181,12 +180,6 @@ def test_a_velocity_law_that_brakes_just_before_its_refusal_cannot_coast_out_of_
     with pytest.raises(ur.ClientError, match=r"velocity law leads out of the limits: .* of the floor"):
         arm.stream(law, acceleration=0.5)
     assert bodies.along([*reached, arm.frame().actual_q]).floor.least.min() > least
-
-
-def test_what_a_law_raises_comes_through_and_the_arm_rests(arm):
-    with pytest.raises(ZeroDivisionError):
-        arm.stream(lambda frame: [1.0 / 0.0])
-    assert np.abs(arm.frame().actual_qd).max() < 0.01
 
 
 def test_a_control_law_of_the_user_runs_a_plan_like_the_other_controllers(arm, tmp_path):
@@ -304,6 +297,7 @@ def test_whatever_ends_a_run_or_a_stream_names_what_is_kept_of_it(arm, end, tmp_
         calls = []
         with pytest.raises(end) as caught:
             act()
+        assert np.abs(arm.frame().actual_qd).max() < 0.01
         (note,) = caught.value.__notes__
         path = Path(note.removeprefix("recorded until then: "))
         assert path.is_relative_to(tmp_path)
