@@ -63,11 +63,11 @@ class DyingNetwork:
         if self.is_gone():
             self.pass_time(timeout)
             raise DriverError(f"{host}:{port} does not answer")
-        return self._watched(self._tcp.connect(host, port, timeout))
+        return Dying(self, self._tcp.connect(host, port, timeout))
 
     def listen(self, address, port):
         self.is_gone()
-        return _Listener(self, self._tcp.listen(address, port))
+        return Dying(self, self._tcp.listen(address, port))
 
     # ---- death
     def die(self):
@@ -111,15 +111,16 @@ class DyingNetwork:
             if is_fast and self.programs == self.program:
                 self.die()
 
-    def _watched(self, transport):
-        self.sockets.append(transport)
-        return _Transport(self, transport)
 
+class Dying:
+    """A connection or a listener of a client that dies."""
 
-class _Transport:
     def __init__(self, network, inner):
         self._network, self._inner = network, inner
-        self.local_address, self.peer_address = inner.local_address, inner.peer_address
+        network.sockets.append(inner)
+
+    def __getattr__(self, name):
+        return getattr(self._inner, name)
 
     def send(self, data):
         self._network.before(data)
@@ -129,29 +130,17 @@ class _Transport:
 
     def receive(self, timeout):
         if self._network.is_gone():
-            self._network.pass_time(timeout)
-            return None
+            return self._network.pass_time(timeout)
         data = self._inner.receive(timeout)
         if data and len(data) % LAYOUT.size == 0:  # no package of another port has this size
             (self._network.stamp,) = struct.unpack_from(">d", data, len(data) - LAYOUT.size + 4)
         return data
 
-    def close(self):
-        if not self._network.is_gone():
-            self._inner.close()
-
-
-class _Listener:
-    def __init__(self, network, inner):
-        self._network, self._inner, self.port = network, inner, inner.port
-        network.sockets.append(inner)
-
     def accept(self, timeout):
         if self._network.is_gone():
-            self._network.pass_time(timeout)
-            return None
+            return self._network.pass_time(timeout)
         caller = self._inner.accept(timeout)
-        return None if caller is None else self._network._watched(caller)
+        return caller and Dying(self._network, caller)
 
     def close(self):
         if not self._network.is_gone():
@@ -210,47 +199,37 @@ def twice(tmp_path_factory):
     return prepare_experiment([movement], repeat=2, out=tmp_path_factory.mktemp("unused"))
 
 
-class Client(threading.Thread):
-    """A client in a thread; `error` is what ended it."""
-
-    def __init__(self, box, network, experiment):
-        super().__init__()
-        self.box, self.network, self.experiment = box, network, experiment
-        self.error = None
-
-    def run(self):
-        try:
-            with UrDriver(self.box.host, self.box.ports, network=self.network) as driver:
-                ExperimentRunner(driver, self.experiment, CONTROLLERS["preview"]).run()
-        except BaseException as error:
-            self.error = error
-
-
 def lose_client(box, experiment, death, phase, monkeypatch):
     """Run an experiment until its client is lost and the arm rests, then let the client go on if it can.
 
     Returns:
         What ended the client, the time to rest [s] and the frame at rest.
     """
-    network = DyingNetwork(death, *PHASES[phase])
-    client = Client(box, network, experiment)
+    network, errors = DyingNetwork(death, *PHASES[phase]), []
+
+    def work():
+        try:
+            with UrDriver(box.host, box.ports, network=network) as driver:
+                ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
+        except BaseException as error:
+            errors.append(error)
+
+    client = threading.Thread(target=work)
     with Frames(box) as frames:
         bystander = Bystander(frames)
         client.start()
         try:
             bystander.until(lambda: network.dead.is_set() or not client.is_alive())
-            assert network.dead.is_set(), client.error
-            monkeypatch.setattr(
-                pacing, "HANG_LIMIT", 0.05
-            )  # s, instead of a minute: time goes on without a command
-            bystander.until_rest()
+            assert network.dead.is_set(), errors
+            with monkeypatch.context() as patched:  # s, instead of a minute: time goes on without a command
+                patched.setattr(pacing, "HANG_LIMIT", 0.05)
+                bystander.until_rest()
             time_to_rest, at_rest = bystander.time_to_rest(network.last_command), bystander.latest
-            monkeypatch.undo()
         finally:
             network.awake.set()
             bystander.until(lambda: not client.is_alive())
             network.close()
-    return client.error, time_to_rest, at_rest
+    return (errors or [None])[0], time_to_rest, at_rest
 
 
 @pytest.mark.parametrize(
