@@ -58,8 +58,8 @@ show: $(STAMP) ## a box with its window: an arm that signs, then waits for your 
 test: $(STAMP) ## the tests, in one process more than there are cores, at most four
 	$(PYTEST) -m "not nightly"
 
-nightly: $(STAMP) ## all tests, with twenty times as many random cases and the costly ones
-	HYPOTHESIS_PROFILE=nightly $(PYTEST)
+nightly: $(STAMP) ## all tests: the costly ones too, and twenty times as many random cases
+	HYPOTHESIS_PROFILE=nightly $(PYTEST) -rs --timeout 1200 -o faulthandler_timeout=1190
 
 explore: $(STAMP) ## the property tests with new random cases (make test draws the same ones every time)
 	HYPOTHESIS_PROFILE=explore $(PYTEST) -m hypothesis

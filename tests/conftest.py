@@ -24,7 +24,9 @@ def pytest_xdist_auto_num_workers():
 
 
 def pytest_collection_modifyitems(items):
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    slow = {
+        item.path for item in items if item.get_closest_marker("slow") or item.get_closest_marker("nightly")
+    }
     items.sort(key=lambda item: item.path not in slow)
 
 

@@ -20,14 +20,15 @@ from bench.measurements import ASKED, MEASUREMENTS
 BIN = Path(sys.executable).parent
 # Of the e-Series are the same measurements of another arm.
 MEASURED = [name for name in MEASUREMENTS if not name.startswith("e_series_") or name == "e_series_tick"]
-# Targets, and options with which they end soon and write nothing into the tree.
-TARGETS = {
-    "attack": "--box CB3 --seconds 0.1 --out attack.json 'unread log'",
-    "bench": f"--short --out bench.json {' '.join(MEASURED)}",
-    "soak": "",
-    "walk": "--box 'CB3 3.15' --steps 1 --length 1",
-}
-# Commands of pages, and what ends them soon.
+# Targets, and options with which they end soon and write nothing into the tree; then what takes longer.
+TARGETS = (
+    ("attack", "--box CB3 --seconds 0.1 --out attack.json 'unread log'"),
+    ("bench", "--short --out bench.json script"),
+    ("walk", "--box 'CB3 3.15' --steps 1 --length 1"),
+    pytest.param("bench", f"--short --out bench.json {' '.join(MEASURED)}", marks=pytest.mark.nightly),
+    pytest.param("soak", "", marks=pytest.mark.nightly),
+)
+# Commands of pages, and what ends them soon; those of `LONGER` run at night.
 ALONE = {
     "python -m docs.make_beside_picture": "--out picture.png",
     "python -m docs.make_extraction_picture": "--out picture.png",
@@ -36,6 +37,7 @@ ALONE = {
     "python tests/attack": "--box CB3 --seconds 0.1 --repeat 10 --growth 9 'unread log'",
     "python tests/fuzz/campaign.py": "--cases 1 controller",
 }
+LONGER = {"python -m docs.make_beside_picture", "python tests/attack", "python tests/fuzz/campaign.py"}
 # Where the others begin and end, if not in the blocks of a page. CI begins with .ci/run, outside of any test.
 ELSEWHERE = {
     "ur-emulator replay": "ur_emulator/test_journal.py::test_another_process_with_another_hash_seed_finds_the_same",
@@ -51,6 +53,7 @@ ELSEWHERE = {
     "make explore": "test_commands.py::test_targets_run_tests",
     "make format": "test_commands.py::test_make_format_makes_files_canonical",
     "make help": "test_commands.py::test_make_help_lists_the_targets",
+    "make nightly": "test_commands.py::test_targets_run_tests",
     "make pick": "test_examples.py::test_pick",
     "make pictures": "test_commands.py::test_make_pictures_draws",
     "make setup": ".ci/run",
@@ -119,14 +122,16 @@ def make(*words, cwd=ROOT):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("target", TARGETS)
-def test_a_target_begins_and_ends(target, begin, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("target", "arguments"), TARGETS)
+def test_a_target_begins_and_ends(target, arguments, begin, tmp_path, monkeypatch):
     """What `make -n` says is done in this process, where libraries are loaded."""
     monkeypatch.setenv("SOAK_MINUTES", "0.03")
-    command, *_ = make("-n", target, f"ARGS={TARGETS[target]}").splitlines()
+    command, *_ = make("-n", target, f"ARGS={arguments}").splitlines()
     begin(shlex.split(command))
     written = {path.name: json.loads(path.read_text()) for path in tmp_path.rglob("*.json")}
-    if target == "bench":
+    if target == "bench" and arguments.endswith(" script"):
+        assert ASKED["script"].keys() <= written["bench.json"].keys()
+    elif target == "bench":
         figures = written["bench.json"].keys()
         assert {name for measurement in MEASURED for name in ASKED.get(measurement, {})} <= figures
         # The file in the tree has all figures of a run, where they come from, and no others.
@@ -148,12 +153,15 @@ def test_make_walk_has_its_settings_as_options():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ALONE)
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(one, marks=[pytest.mark.nightly] if one in LONGER else []) for one in ALONE],
+)
 def test_a_command_of_a_page_begins_and_ends(command, begin):
     begin([*command.split(), *shlex.split(ALONE[command])])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_make_pictures_draws(tmp_path):
     """In a process of its own: the library that draws is chosen when MuJoCo is loaded."""
     if find_library("EGL") is None:
@@ -163,8 +171,9 @@ def test_make_pictures_draws(tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("target", ["check", "explore"])
+@pytest.mark.parametrize(
+    "target", ["explore", *(pytest.param(one, marks=pytest.mark.nightly) for one in ("check", "nightly"))]
+)
 def test_targets_run_tests(target):
     one = f"PYTEST={BIN}/python -m pytest tests/protocol/test_protocol_frame_buffer.py"
     assert "passed" in make(target, one, "-o", "check-static")

@@ -67,7 +67,7 @@ def test_the_sample_program_of_polyscope_is_played(ur_box_factory):
     assert not any(state.digital_outputs["standard"])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_draw(run, tmp_path):
     """Without a path it draws what is in the tree."""
     said = run("draw.py", "--out", tmp_path, "--repeat", 1, SHOWN=["letter_i.txt"])
@@ -100,7 +100,7 @@ def test_demo_and_plot(run, tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_pick(run, tmp_path):
     """One style and a film of few pictures; the fingers end on the block, and it ends where it should."""
     said = run("08_pick_like_a_hand.py", "--out", tmp_path, STYLES={"human": "lognormal strokes"}, FPS=1)
@@ -115,7 +115,7 @@ def test_pick(run, tmp_path):
     assert "data:image/gif;base64," in page
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_show(run, tmp_path):
     letter = EXAMPLES / "drawings" / "letter_i.txt"
     arguments = ("--once", "--port", 0, "--out", tmp_path)
@@ -125,7 +125,7 @@ def test_show(run, tmp_path):
     assert "<script" in (tmp_path / "signature.html").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ablation(run, tmp_path):
     said = run("ablation.py", "--quick", "--out", tmp_path)
     assert len(said.splitlines()) == 1

@@ -29,11 +29,8 @@ def test_the_overview_of_ports_has_every_port_and_every_page():
 
 
 @pytest.mark.parametrize("path", PROTOCOL, ids=lambda path: path.name)
-def test_links_and_commands_of_a_page_lead_somewhere(path):
-    text = path.read_text(encoding="utf-8")
-    for target in re.findall(r"\]\(([^)#]+)", text):
-        assert (path.parent / target).exists(), target
-    for command in re.findall(r"python -m protocol ([^`\n]+)", text):
+def test_commands_of_a_page_exist(path):
+    for command in re.findall(r"python -m protocol ([^`\n]+)", path.read_text(encoding="utf-8")):
         if "FILE" not in command and command not in ("layout", "decode"):
             _parser().parse_args(shlex.split(command))
 

@@ -55,8 +55,13 @@ NEEDS = {
     r"^ur-client |^(import|from) pc_client": "client",
     r"^ur-emulator |^urscript |^python -m protocol|^(import|from) (ur_emulator|urscript|protocol)": "",
 }
-# Pages that test_wheel.py runs, with what their install brings; here they are read only.
-INSTALLED = {"README.md", "docs/start/paper.md", "docs/start/real-ur3.md"}
+# Pages that test_wheel.py runs, with what their install brings, and those that cost more than a second or show what
+# tests and examples do: `make test` reads them only.
+INSTALLED = ("README.md", "docs/start/paper.md", "docs/start/real-ur3.md")
+AT_NIGHT = (
+    "docs/drawing.md", "docs/extraction.md", "docs/grippers.md", "docs/library.md", "docs/recordings.md",
+    "docs/start/driver-in-ci.md", "docs/tracking.md",
+)  # fmt: skip
 SHOWN = ("sh", "console", "python")
 STOCK = {
     "drawing.txt": drawing,
@@ -110,12 +115,18 @@ def test_commands_in_text_and_their_options_exist():
                 assert named <= options_of(line), f"{page}: {line}"
 
 
+NAMES = [page.relative_to(ROOT).as_posix() for page in PAGES if "```" in page.read_text(encoding="utf-8")]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if "```" in page.read_text(encoding="utf-8")],
-    ids=lambda page: page.relative_to(ROOT).as_posix(),
-)  # fmt: skip
-def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch, ur_box_factory):
+    ("name", "runs"),
+    [
+        *((name, name not in INSTALLED + AT_NIGHT) for name in NAMES),
+        *(pytest.param(name, True, marks=pytest.mark.nightly) for name in AT_NIGHT),
+    ],
+)
+def test_the_blocks_of_a_page_run(name, runs, tmp_path, monkeypatch, ur_box_factory):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
     monkeypatch.setattr("pc_client.studies.executors.open_executor", one_thread)
@@ -126,7 +137,7 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch, ur_box_factory):
     def make_box(**options):
         return ur_box_factory(standard_ports=True, **{"seed": 7, "control_port": 29900, **options})
 
-    blocks = blocks_of(page)
-    if page.relative_to(ROOT).as_posix() in INSTALLED:
-        blocks = [replace(block, reason="test_wheel.py runs it") for block in blocks]
+    blocks = blocks_of(ROOT / name)
+    if not runs:
+        blocks = [replace(block, reason="another test runs it") for block in blocks]
     PageReader(make_box, STOCK).read(blocks)

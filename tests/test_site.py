@@ -15,6 +15,21 @@ FOREIGN = re.compile(
 )
 
 
+def test_every_page_has_its_row_and_its_links_lead_somewhere():
+    rows = re.findall(
+        r"^ .*?([\w/-]+\.md)\b", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    pages = {page.relative_to(ROOT / "docs").as_posix(): page for page in (ROOT / "docs").rglob("*.md")}
+    assert pages.keys() == {row for row in rows if row != "index.md" and not row.startswith("source/")}
+    targets = [
+        (name, target)
+        for name, page in pages.items()
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    ]
+    assert len(targets) > 100
+    assert [(name, to) for name, to in targets if not (pages[name].parent / to).exists()] == []
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
@@ -26,7 +41,7 @@ def site(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_page_is_there_and_asks_no_other_machine(site):
     pages = {
         path.relative_to(site).as_posix(): path.read_text(encoding="utf-8") for path in site.rglob("*.html")
@@ -39,7 +54,7 @@ def test_every_page_is_there_and_asks_no_other_machine(site):
     assert {name: found[0] for name, text in styles.items() if (found := FOREIGN.search(text))} == {}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_reference_has_every_public_name(site):
     import pc_client
     import ur_emulator
@@ -50,7 +65,7 @@ def test_the_reference_has_every_public_name(site):
         assert [name for name in package.__all__ if f'id="{package.__name__}.{name}"' not in text] == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_diagrams_are_drawn_and_the_search_knows_the_pages(site):
     states = (site / "states.html").read_text(encoding="utf-8")
     assert states.count('aria-roledescription="stateDiagram"') == 5

@@ -12,6 +12,7 @@ import sys
 import tarfile
 import tomllib
 import venv
+from fnmatch import fnmatch
 from importlib.metadata import distribution
 from pathlib import Path
 from zipfile import ZipFile
@@ -26,6 +27,7 @@ from pc_client.movements.library_sets import library_names
 from pc_client.movements.movement import Movement
 
 OURS = "ur-hil"
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 PACKAGES = (*ur_hil.PACKAGES, "ur_hil")
 BARE = ("--no-deps", "--no-index", "--no-compile")
 # Does the steps of pages, each as it is done in a terminal, all in one process.
@@ -109,6 +111,18 @@ def wheel(built):
     return made
 
 
+def test_every_file_of_the_packages_is_asked_for():
+    patterns = PYPROJECT["tool"]["setuptools"]["package-data"]["*"]
+    names = [
+        path.name
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    ]
+    assert names
+    assert [name for name in names if not any(fnmatch(name, pattern) for pattern in patterns)] == []
+
+
 def run(*words, cwd=None, **more):
     keep = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | more
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True, cwd=cwd, env=keep)
@@ -116,7 +130,7 @@ def run(*words, cwd=None, **more):
     return done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_file_of_the_packages_is_in_the_wheel(wheel):
     packed = set(ZipFile(wheel).namelist())
     files = {
@@ -129,7 +143,7 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel):
     assert {name.partition("/")[0] for name in packed if ".dist-info/" not in name} == set(PACKAGES)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_sdist_has_the_packages_the_pages_the_examples_and_the_changelog(sdist):
     with tarfile.open(sdist) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames()}
@@ -144,7 +158,7 @@ def test_the_sdist_has_the_packages_the_pages_the_examples_and_the_changelog(sdi
     assert not any(name.startswith("tests/") for name in packed)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_of_the_index_has_no_link_that_leads_nowhere(wheel):
     with ZipFile(wheel) as archive:
         (name,) = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
@@ -279,10 +293,14 @@ STEPS_OF_PAGES = [
 ]
 
 
-@pytest.mark.slow
+def test_the_start_pages_show_no_command_without_an_install_above_it():
+    assert len(STEPS_OF_PAGES) > 20
+    assert [what for wanted, _, what in STEPS_OF_PAGES if not wanted] == []
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize("wanted", sorted({wanted for wanted, _, _ in STEPS_OF_PAGES}), ids=" ".join)
 def test_the_commands_of_a_page_need_no_more_than_its_install(wanted, wheel, environment, tmp_path):
-    assert wanted, "a start page shows a command, and no `pip install` above it"
     packages, here = tmp_path / "packages", tmp_path / "here"
     install(wanted, wheel, packages)
     here.mkdir()
@@ -307,10 +325,10 @@ def test_the_commands_of_a_page_need_no_more_than_its_install(wanted, wheel, env
     run(environment / "bin" / "python", "-c", STEPS, cwd=here, DEPENDENCIES=str(packages))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_commands_of_the_wheel_start(wheel, environment, tmp_path):
     install([OURS], wheel, tmp_path / "packages")
-    for script in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]:
+    for script in PYPROJECT["project"]["scripts"]:
         said = run(
             environment / "bin" / script, "--help", cwd=tmp_path, DEPENDENCIES=str(tmp_path / "packages")
         )

@@ -93,9 +93,9 @@ _PROMISES = """\
 | No bytes that arrive at a port, and no program, end the process of a box or stop its other clients. An error ends the connection or the program that caused it, with a line in the log | `tests/attack`, `tests/fuzz` |
 | The use of resources by clients and programs is bounded (below); the newest request beyond a limit is refused. The memory of the box and its worker processes is measured as one total, which stays below 300 MB, on Linux; a box in the process of its user (`in_process=True`) is not measured | `tests/attack` |
 | A client that is not part of an attack keeps its stream, on an idle machine with the rate and the gaps of docs/security.md; that page also lists the attacks that exceed them | `make attack` |
-| Nothing is read or written outside the folder `--programs`, by no name and through no link; without this option the box writes into a temporary folder, which it removes. No answer contains a path of this machine | `tests/attack` |
-| A web page in a browser on this machine cannot use the box: the control port, the Robot API and port 41414 check `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close connections that begin with an HTTP request | `tests/attack` |
-| The client ends a session with a hostile or broken robot in one line, with the arm at rest, and refuses files that are too large or damaged | `tests/attack` |
+| Nothing is read or written outside the folder `--programs`, by no name and through no link; without this option the box writes into a temporary folder, which it removes. No answer contains a path of this machine | `tests/attack`, `tests/ur_emulator/test_program_places.py` |
+| A web page in a browser on this machine cannot use the box: the control port, the Robot API and port 41414 check `Host`, `Origin` and `Sec-Fetch-Site`, all other ports close connections that begin with an HTTP request | `tests/attack`, `tests/ur_emulator/test_control_http.py` |
+| The client ends a session with a hostile or broken robot in one line, with the arm at rest, and refuses files that are too large or damaged | `tests/attack`, `tests/fuzz` |
 
 ## What is not promised
 

@@ -1,7 +1,6 @@
 """All attacks, in the order of docs/security.md."""
 
 from attacks_bytes import BYTES
-from attacks_calls import CALLS
 from attacks_clients import CLIENTS
 from attacks_compiling import COMPILING
 from attacks_failures import FAILURES
@@ -10,7 +9,7 @@ from attacks_places import PLACES
 from attacks_scripts import SCRIPTS
 from attacks_window import WINDOW
 
-SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS, CALLS, WINDOW)
+SECTIONS = (FAILURES, COMPILING, SCRIPTS, CLIENTS, PLACES, BYTES, GRIPPERS, WINDOW)
 
 
 def described() -> list[dict[str, object]]:

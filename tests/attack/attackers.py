@@ -177,20 +177,6 @@ def log_since(box: BoxUnderAttack, after: int, level: str = "DEBUG") -> tuple[li
     return entries, after
 
 
-def run_to_end(box: BoxUnderAttack, *lines: str) -> None:
-    """Run a program of these lines, and wait for its end."""
-    after = log_since(box, 0)[1]
-    box.run(*lines)
-
-    def has_ended() -> bool:
-        entries, _ = log_since(box, after)
-        return any(
-            entry["level"] == "FAULT" or entry["text"].startswith("Program stopped") for entry in entries
-        )
-
-    until(has_ended, "the program ends")
-
-
 @contextmanager
 def peer(serve: Callable[[socket.socket], None]) -> Iterator[int]:
     """Listen for scripts; each connection gets a thread that serves it. Gives the port."""

@@ -9,18 +9,14 @@ import time
 from contextlib import suppress
 
 from attack_record import Section
-from attackers import crowd, flood, get, post, request, reset
+from attackers import crowd, flood, get, post, reset
 from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
-
-from protocol.rtde.fields import OUTPUTS
-from protocol.ur_types import SoftwareVersion
 
 CLIENTS = Section("Fairness: many clients, many requests")
 
 _QUESTIONS = (
     b"robotmode\nprogramState\nget loaded program\nversion\nget serial number\nsafetystatus\nisProgramSaved\n"
 )
-_LISTED = SoftwareVersion(3, 4)
 _RTDE_START = (
     struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + 27, ord("O"), 125.0) + b"timestamp,actual_q,target_q\0\3S"
 )
@@ -64,16 +60,6 @@ def long_bodies(box: BoxUnderAttack, seconds: float) -> None:
         flood(box, "control", post(box, "push", body[: 1 << 20]), seconds / len(bodies), clients=16)
 
 
-@CLIENTS.attack(
-    "16 clients of the control API post JSON that is nested 12,000 deep and more", "refused, 400", kinds=ONE
-)
-def deep_json(box: BoxUnderAttack, seconds: float) -> None:
-    for body in (60_000 * b"[", 12_000 * b'{"a":', b'{"force": ' + 30_000 * b"[" + 30_000 * b"]" + b"}"):
-        status, _ = request(box, "POST", "push", body)
-        assert status == 400, status
-        flood(box, "control", post(box, "push", body), seconds / 3, clients=16)
-
-
 @CLIENTS.attack("Clients connect to all ports, as many in a second as come about, and are reset", "they wait")
 def connect_storm(box: BoxUnderAttack, seconds: float) -> str:
     n, end = 0, time.monotonic() + seconds
@@ -102,19 +88,6 @@ def crowd_of_rtde_clients(box: BoxUnderAttack, seconds: float) -> str:
             fed = sum(_has_frames(client) for client in clients[::2])
             time.sleep(0.05)
     return f"{fed} of 100 were served"
-
-
-@CLIENTS.attack("168 RTDE clients, 64 of an address, with recipes of 2,048 bytes of names", "refused, or fed")
-def long_recipes(box: BoxUnderAttack, seconds: float) -> str:
-    names = b",".join(field.name.encode() for field in OUTPUTS if field.since.covers(_LISTED))
-    names = names[:2_048].rpartition(b",")[0]
-    recipe = struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + len(names), ord("O"), 125.0) + names
-    with crowd(box, "rtde", 168, recipe + b"\0\3S", of_address=64) as clients:
-        end, fed = time.monotonic() + seconds, set()
-        while time.monotonic() < end:
-            fed = {k for k in range(0, len(clients), 2) if _has_frames(clients[k])}
-            time.sleep(0.05)
-    return f"{len(fed)} of 84 were served"
 
 
 @CLIENTS.attack("Clients of all ports that read nothing", "packages to them are dropped, or they are closed")

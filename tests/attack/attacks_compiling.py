@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import gzip
-import struct
 import time
 
 from attack_record import Section
-from attackers import crowd, flood, get, plays, reset, until
+from attackers import crowd, flood, get, plays, until
 from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
 
 from protocol.robot_api import BASE
@@ -15,8 +13,6 @@ from protocol.robot_api import BASE
 COMPILING = Section("Budgets of what waits: scripts, files, reports")
 
 _SPIN = ("while True:", "  sync()", "end")
-_HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n<URProgram name="x" installation="default">'
-_TAIL = "</URProgram>"
 
 
 def _program(size: int, line: str = "  x = [1, 2, 3, 4, 5, 6]\n") -> bytes:
@@ -52,29 +48,6 @@ def long_program_and_stop(box: BoxUnderAttack, seconds: float) -> str:
     return f"stopped after {until(lambda: not plays(box), 'the program stops'):.2f} s"
 
 
-@COMPILING.attack(
-    "The box is told to end while it compiles a program of nearly 4 MB", is_short=False, kinds=ONE
-)
-def long_program_and_end(box: BoxUnderAttack, seconds: float) -> str:
-    box.send("secondary", _program((4 << 20) - 100))
-    time.sleep(0.5)
-    return f"ended after {box.stop():.2f} s"
-
-
-@COMPILING.attack(
-    "40 clients send a program of 1 MB each and are reset",
-    "what they wanted is dropped",
-    is_short=False,
-    kinds=ONE,
-)
-def senders_that_go(box: BoxUnderAttack, seconds: float) -> None:
-    program = _program(1_000_000)
-    for _ in range(max(4, min(40, round(5 * seconds)))):
-        sock = box.connect("secondary")
-        sock.sendall(program)
-        reset(sock)
-
-
 @COMPILING.attack("Clients of 30001 to 30003 send nothing but control words, as fast as they go")
 def flood_of_words(box: BoxUnderAttack, seconds: float) -> None:
     for port in ("primary", "secondary", "realtime"):
@@ -87,97 +60,7 @@ def endless_text(box: BoxUnderAttack, seconds: float) -> None:
     flood(box, "primary", 8_000_000 * b"x", seconds / 2, clients=20)
 
 
-@COMPILING.attack("Expressions nested 5,000 deep, 20,000 names, a number of a million digits")
-def odd_programs(box: BoxUnderAttack, seconds: float) -> None:
-    deep = b"def f():\n  x = " + 5000 * b"(" + b"1" + 5000 * b")" + b"\nend\n"
-    names = b"def f():\n" + b"".join(b"  global v%d = %d\n" % (n, n) for n in range(20_000)) + b"end\n"
-    digits = b"def f():\n  x = " + 1_000_000 * b"9" + b"\nend\n"
-    for program in (deep, names, digits):
-        box.send("secondary", program)
-
-
 # --- files
-
-
-def _load_all(box: BoxUnderAttack, files: dict[str, bytes]) -> str:
-    for name, data in files.items():
-        (box.programs / name).write_bytes(data)
-    answers = {name: box.ask(f"load {name}", "play", "stop")[0] for name in files}
-    assert not any(str(box.programs.parent) in answer for answer in answers.values()), "a path is shown"
-    refused = sum(not answer.startswith("Loading program:") for answer in answers.values())
-    return f"{refused} of {len(files)} refused"
-
-
-def _urp(body: str) -> bytes:
-    return gzip.compress((_HEAD + body + _TAIL).encode())
-
-
-@COMPILING.attack(
-    "Files of 249 bytes to 35 kB that unpack to 30 MB of elements, text or attributes, or lie about their coding",
-    "they are not loaded",
-    kinds=ONE,
-)
-def program_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
-    (box.programs / "default.installation").write_bytes(gzip.compress(b"<Installation/>"))
-    wide = "<children>" + 5_000_000 * "<a/>" + "</children>"
-    return _load_all(
-        box,
-        {
-            "elements.urp": _urp(wide),
-            "deep.urp": _urp(500_000 * "<a>" + 500_000 * "</a>"),
-            "text.urp": _urp("<script>" + 30_000_000 * "x" + "</script>"),
-            "attribute.urp": _urp(f'<a b="{30_000_000 * "x"}"/>'),
-            "attributes.urp": _urp("<a " + " ".join(f'b{n}=""' for n in range(1_000_000)) + "/>"),
-            "entities.urp": gzip.compress(
-                b'<!DOCTYPE a [<!ENTITY b "x"><!ENTITY c "&b;&b;">]><URProgram>&c;</URProgram>'
-            ),
-            "utf16.urp": gzip.compress(f"{_HEAD}{wide[:4_000_000]}".encode("utf-16")),
-            "coding.urp": gzip.compress(b'<?xml version="1.0" encoding="zip"?><URProgram/>'),
-            "twice.urp": gzip.compress(gzip.compress(bytes(30_000_000))),
-            "itself.urp": _urp(
-                '<children><MainProgram><children><CallSubProgram><subprogram reference="../.."/>'
-                "</CallSubProgram></children></MainProgram></children>"
-            ),
-            "cut.urp": _urp(wide)[:1000],
-        },
-    )
-
-
-@COMPILING.attack(
-    "Script files of 30 MB, without an end, of zero bytes, and installations that are bombs",
-    "they are not loaded",
-    is_short=False,
-    kinds=ONE,
-)
-def script_file_bombs(box: BoxUnderAttack, seconds: float) -> str:
-    (box.programs / "default.installation").write_bytes(gzip.compress(30_000_000 * b"<"))
-    return _load_all(
-        box,
-        {
-            "long.script": 3_000_000 * b"  x = 1 + 1\n",
-            "line.script": 30_000_000 * b"x",
-            "zero.script": bytes(30_000_000),
-            "open.script": 500_000 * b"if True:\n",
-            "plain.urp": _urp("<children/>"),
-        },
-    )
-
-
-@COMPILING.attack(
-    "Dashboards ask for flight reports and support files, one after the other",
-    "refused",
-    kinds=WITH_DASHBOARD,
-)
-def flood_of_reports(box: BoxUnderAttack, seconds: float) -> str:
-    end = time.monotonic() + seconds
-    box.ask(*100 * ["addToLog " + 900 * "x"])
-    n = 0
-    while time.monotonic() < end and n < 3000:
-        box.ask(*5 * ["generate flight report", "generate support file .", "saveLog"])
-        n += 15
-    size = sum(path.stat().st_size for path in box.programs.rglob("*") if path.is_file())
-    assert size < 256 << 20, f"{size} bytes of reports"
-    return f"{n} asked, {size / 1e6:.1f} MB on disk"
 
 
 # --- memory of answers
@@ -219,12 +102,3 @@ def uploads_without_end(box: BoxUnderAttack, seconds: float) -> None:
             body = b"10000\r\n" + 0x10000 * b"x" + b"\r\n"
             share = seconds / len(kinds) / len(ports)
             flood(box, port, head + body, share, clients=20, again=len(head))
-
-
-@COMPILING.attack("20 RTDE clients ask for all variables 2,000 times each, in recipes of all lengths")
-def flood_of_recipes(box: BoxUnderAttack, seconds: float) -> None:
-    names = b"timestamp,actual_q,actual_qd,target_q,target_qd,actual_TCP_pose,output_int_register_0"
-    recipes = b"".join(
-        struct.pack(">HBd", 11 + n, ord("O"), 125.0) + names[:n] for n in range(1, len(names) + 1)
-    )
-    flood(box, "rtde", struct.pack(">HBH", 5, ord("V"), 2) + 20 * recipes, seconds, clients=20)

@@ -6,73 +6,10 @@ import time
 from contextlib import ExitStack, suppress
 
 from attack_record import Section
-from attackers import crowd, flood, get, reset, until
+from attackers import flood, get, reset, until
 from box_under_attack import ONE, WITH_DASHBOARD, BoxUnderAttack
 
 FAILURES = Section("One boundary for failures")
-
-_FEW_DESCRIPTORS = "import resource\nresource.setrlimit(resource.RLIMIT_NOFILE, (96, 96))"
-# A file beside that of `--ready-file` takes the threads away.
-_NO_THREADS = """
-import os, threading
-_start, _flag = threading.Thread.start, os.path.dirname(sys.argv[sys.argv.index("--ready-file") + 1]) + "/no-threads"
-def start(thread):
-    if os.path.exists(_flag):
-        raise RuntimeError("can't start new thread")
-    _start(thread)
-threading.Thread.start = start
-"""
-_WRITES = ("saveLog", "generate flight report", "generate support file .")
-
-
-@FAILURES.attack(
-    "Clients take all descriptors (limit: 96), then a dashboard that is connected has the box write files",
-    "further clients are closed; the writing is refused with one line, or the dashboard is closed",
-    prelude=_FEW_DESCRIPTORS,
-    kinds=ONE,
-)
-def descriptors_exhausted(box: BoxUnderAttack, seconds: float) -> None:
-    with box.connect("dashboard") as sock, sock.makefile("rw", newline="\n") as dashboard:
-        dashboard.readline()
-        with crowd(box, "primary", 100):
-            for _ in range(max(1, round(seconds))):
-                with suppress(OSError):
-                    for line in _WRITES:
-                        dashboard.write(line + "\n")
-                        dashboard.flush()
-                        dashboard.readline()
-
-
-@FAILURES.attack(
-    "No thread can be started; scripts open sockets by name and call XML-RPC",
-    "the call fails",
-    prelude=_NO_THREADS,
-    kinds=ONE,
-)
-def threads_exhausted(box: BoxUnderAttack, seconds: float) -> None:
-    flag = box.errors.with_name("no-threads")
-    flag.touch()
-    try:
-        for _ in range(max(2, round(seconds))):
-            box.run('socket_open("localhost", 9)', 'rpc_factory("xmlrpc", "http://127.0.0.1:9").f()')
-            box.ask("programState")
-            time.sleep(0.2)
-    finally:
-        flag.unlink()
-
-
-@FAILURES.attack(
-    "64 clients of the control API ask for the log, do not read and are reset while others come",
-    "the client that has been silent longest is closed",
-    kinds=ONE,
-)
-def control_clients_that_go(box: BoxUnderAttack, seconds: float) -> None:
-    for _ in range(max(2, round(seconds))):
-        with crowd(box, "control", 64, 4 * get(box, "log")) as clients:
-            for client in clients[::2]:
-                reset(client)
-            with crowd(box, "control", 20, get(box, "state")):
-                pass
 
 
 @FAILURES.attack(

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import socket
-import struct
 import threading
 import time
-import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from attack_record import Section
-from attackers import crowd, log_since, peer, plays, request, reset, run_to_end, until
-from box_under_attack import ONE, PATIENCE, WITH_E_SERIES, BoxUnderAttack
+from attackers import log_since, peer, plays, request, until
+from box_under_attack import BoxUnderAttack
 
 SCRIPTS = Section("Budgets of running programs")
 
 _POSE = "p[-0.2, -0.3, 0.3, 2.2, -2.2, 0.0]"
-_RTDE_LINE = struct.pack(">HBHHBd", 5, ord("V"), 2, 11 + 19, ord("O"), 125.0) + b"script_control_line\0\3S"
-# Names that end in `.invalid` are looked up for long, and no server of this machine is asked.
-_SLOW_NAMES = """
-import socket, time
-_look_up = socket.getaddrinfo
-def look_up(host, *rest, **more):
-    if str(host).endswith(".invalid"):
-        time.sleep(3)
-        raise socket.gaierror("no such name")
-    return _look_up(host, *rest, **more)
-socket.getaddrinfo = look_up
-"""
 
 
 def _spend(box: BoxUnderAttack, seconds: float, *lines: str, setup: tuple[str, ...] = ()) -> str:
@@ -74,34 +60,6 @@ def text_messages(box: BoxUnderAttack, seconds: float) -> str:
     return f"{sum(remark.endswith('on') for remark in remarks)} of 2 run on"
 
 
-@SCRIPTS.attack(
-    "Ten globals of 30,000 elements, changed every cycle, with a reader of 30001",
-    "the program needs too much memory, or the values are not reported whole",
-    is_short=False,
-)
-def long_globals(box: BoxUnderAttack, seconds: float) -> str:
-    names = [f"g{n}" for n in range(10)]
-    setup = (f"global g0 = [{','.join('0' * 30_000)}]", *(f"global {name} = g0" for name in names[1:]))
-    with _reader(box, "primary"):
-        return _spend(box, seconds, *(f"{name}[7] = {name}[7] + 1" for name in names), "sync()", setup=setup)
-
-
-@SCRIPTS.attack(
-    "RTDE clients ask for `script_control_line` while a function of 100,000 statements runs",
-    is_short=False,
-    kinds=ONE,
-)
-def line_of_a_long_function(box: BoxUnderAttack, seconds: float) -> str:
-    with crowd(box, "rtde", 4, _RTDE_LINE):
-        after = log_since(box, 0)[1]
-        n = min(100_000, round(12_500 * seconds))
-        box.run("while True:", *n * ("  x = 1",), "  sync()", "end")
-        until(lambda: _has_begun(box, after), "the program starts", 90.0)
-        time.sleep(seconds / 2)
-    time.sleep(seconds / 2)  # the clients have gone
-    return _state(box, after)
-
-
 @SCRIPTS.attack("Loops of 3,000 to 100,000 steps between two `sync()`", "the script gets slower, or is ended")
 def long_loops(box: BoxUnderAttack, seconds: float) -> str:
     remarks = [_spend(box, seconds / 4, *_times(n, "x = i")) for n in (3_000, 10_000, 30_000, 100_000)]
@@ -128,48 +86,6 @@ def growing_values(box: BoxUnderAttack, seconds: float) -> None:
 
 
 @SCRIPTS.attack(
-    "`popup`, `request_boolean_from_primary_client` and `write_output_integer_register` without pause"
-)
-def flood_of_requests(box: BoxUnderAttack, seconds: float) -> None:
-    _spend(box, seconds, *_times(1000, 'popup("x", "y")', "write_output_integer_register(0, i)"))
-    request(box, "POST", "close_popups", {})
-
-
-# --- much of all
-
-
-@SCRIPTS.attack(
-    "1,100 globals are lists of 65,536 elements, from `make_list`",
-    "the program is ended",
-    kinds=WITH_E_SERIES,
-)
-def many_lists(box: BoxUnderAttack, seconds: float) -> str:
-    n_lists = min(1_100, round(1_100 * seconds))
-    return _hold(box, seconds, *(f"global g{n} = make_list(65536, 0)" for n in range(n_lists)))
-
-
-@SCRIPTS.attack("Globals hold 9,000 strings of 32 kB", "the program is ended")
-def many_strings(box: BoxUnderAttack, seconds: float) -> str:
-    lists = (f"global g{n} = [{','.join(3_000 * ('s',))}]" for n in range(3))
-    put = (f'g{n}[i] = s + "x"' for n in range(3))
-    doubled = ('s = "0123456789abcdef"', *11 * ("s = s + s",))
-    return _hold(box, 2 * seconds, *doubled, *lists, *_times(3_000, *put, "sync()"))
-
-
-@SCRIPTS.attack(
-    "Lists of 10,000 structs, each with small lists, are made without end",
-    "the program is ended",
-    kinds=WITH_E_SERIES,
-)
-def structs_of_small_lists(box: BoxUnderAttack, seconds: float) -> str:
-    setup = tuple(
-        f"global g{n} = make_list(10000, struct(a=[0, 1, 2], b=[0], c=[[0, 0], [0, 0]]))" for n in range(20)
-    )
-    put = (f"g{n}[i] = struct(a=[i, 1, 2], b=[i], c=[[i, i], [i, i]])" for n in range(20))
-    return _spend(box, seconds, *_times(10_000, *put, "sync()"), setup=setup)
-
-
-@SCRIPTS.attack(
     "190 threads, each in a chain of 900 or 190 calls, or in 190 calls of itself; 50 in a chain of 190",
     "the program is refused or ended",
 )
@@ -180,38 +96,9 @@ def threads_in_deep_calls(box: BoxUnderAttack, seconds: float) -> str:
     for threads, calls, last in ((190, 900, end), (190, 190, end), (50, 190, end), (190, 0, itself)):
         chain = (line for n in range(1, calls) for line in (f"def f{n}(a):", f"  f{n - 1}(a + 1)", "end"))
         work = ("thread work():", "  while True:", f"    f{max(0, calls - 1)}(190)", "  end", "end")
-        remarks.append(_hold(box, seconds / 4, *last, *chain, *work, *threads * ("run work()",)))
+        setup = (*last, *chain, *work, *threads * ("run work()",))
+        remarks.append(_spend(box, seconds / 4, "sync()", setup=setup))
     return f"{sum(remark.endswith('on') for remark in remarks)} of 4 run on"
-
-
-@SCRIPTS.attack(
-    "2,000 globals with names of 900 or 250 characters, while 245 clients a second connect to 30001",
-    "the program is refused, or names are not reported",
-)
-def long_names(box: BoxUnderAttack, seconds: float) -> str:
-    remarks = []
-    for length in (900, 250):
-        after = log_since(box, 0)[1]
-        names = (f"global v{n:04}{(length - 5) * 'x'} = {n}" for n in range(2_000))
-        box.run(*names, "while True:", "  sync()", "end")
-        began, n = time.monotonic(), 0
-        while (passed := time.monotonic() - began) < seconds / 2:
-            if n < 245 * passed:
-                with suppress(OSError):
-                    reset(box.connect("primary", 1.0))
-                n += 1
-            else:
-                time.sleep(0.002)
-        remarks.append(_state(box, after))
-    return f"{sum(remark.endswith('on') for remark in remarks)} of 2 run on"
-
-
-def _hold(box: BoxUnderAttack, seconds: float, *lines: str) -> str:
-    """Run `lines`, then nothing, for so many seconds."""
-    return _spend(box, seconds, "sync()", setup=lines)
-
-
-# --- sockets
 
 
 @contextmanager
@@ -238,23 +125,6 @@ def _pour(client: socket.socket) -> None:
         client.sendall(bytes([120]) * (1 << 20))
 
 
-def _listen(client: socket.socket) -> None:
-    client.settimeout(PATIENCE)
-    while client.recv(1 << 16):
-        pass
-
-
-def _keep(client: socket.socket) -> None:
-    time.sleep(PATIENCE)
-
-
-@SCRIPTS.attack("`socket_read_string` with a suffix that never comes, over an inbox that is flooded")
-def search_in_a_flooded_inbox(box: BoxUnderAttack, seconds: float) -> str:
-    with peer(_pour) as port:
-        read = 'socket_read_string(suffix="never", timeout=0.1)'
-        return _spend(box, seconds, read, setup=(f'socket_open("127.0.0.1", {port})', "sleep(0.5)"))
-
-
 @SCRIPTS.attack("A program opens 300 sockets to peers that flood them, and does not read", "held back")
 def flooded_inboxes(box: BoxUnderAttack, seconds: float) -> str:
     with peer(_pour) as port:
@@ -266,152 +136,3 @@ def flooded_inboxes(box: BoxUnderAttack, seconds: float) -> str:
             "end",
         )
         return _spend(box, seconds, "sync()", setup=opening)
-
-
-@SCRIPTS.attack("A program opens and closes sockets in an endless loop", "the next open fails")
-def flood_of_sockets(box: BoxUnderAttack, seconds: float) -> str:
-    with peer(_keep) as port:
-        return _spend(
-            box,
-            min(seconds, 4.0),
-            f'socket_open("127.0.0.1", {port}, to_str(i))',
-            "i = i + 1",
-            setup=("i = 0",),
-        )
-
-
-@SCRIPTS.attack("A program sends 3,000 lines a cycle to a peer, which reads them, or does not")
-def flood_of_sendings(box: BoxUnderAttack, seconds: float) -> None:
-    for serve in (_listen, _keep):
-        with peer(serve) as port:
-            opening = (f'socket_open("127.0.0.1", {port})',)
-            _spend(box, seconds / 2, *_times(3000, f'socket_send_line("{100 * "x"}")'), setup=opening)
-
-
-@SCRIPTS.attack(
-    "Programs look up names that take 3 s each, in 20 threads, and are replaced by others",
-    "further look-ups fail at once",
-    prelude=_SLOW_NAMES,
-    kinds=ONE,
-)
-def flood_of_look_ups(box: BoxUnderAttack, seconds: float) -> str:
-    most = 0
-    for n in range(max(4, min(20, round(3 * seconds)))):
-        threads = [
-            line
-            for k in range(20)
-            for line in (
-                f"thread t{k}():",
-                f'  socket_open("h{n}-{k}.invalid", 9, "s{k}")',
-                "end",
-                f"run t{k}()",
-            )
-        ]
-        box.run(*threads, "sleep(1)")
-        time.sleep(min(0.2, seconds / 20))
-        most = max(most, box.usage()[1])
-    assert most < 100, f"{most} threads"
-    return f"at most {most} threads"
-
-
-# --- XML-RPC
-
-
-def _http(body: bytes, *headers: str, status: str = "200 OK") -> bytes:
-    lines = [f"HTTP/1.1 {status}", "Content-Type: text/xml", f"Content-Length: {len(body)}", *headers]
-    return "\r\n".join([*lines, "", ""]).encode() + body
-
-
-def _value(text: str) -> bytes:
-    return f"<methodResponse><params><param><value>{text}</value></param></params></methodResponse>".encode()
-
-
-ODD_ANSWERS = {
-    "empty fault": _http(b"<methodResponse><fault></fault></methodResponse>"),
-    "fault without text": _http(
-        b"<methodResponse><fault><value><int>1</int></value></fault></methodResponse>"
-    ),
-    "no value": _http(b"<methodResponse><params></params></methodResponse>"),
-    "other tree": _http(b"<a><b/></a>"),
-    "member without name": _http(_value("<struct><member><value>1</value></member></struct>")),
-    "unknown coding": _http(b'<?xml version="1.0" encoding="zip"?>' + _value("1")),
-    "bytes in base64": _http(_value("<base64>!!!!</base64>")),
-    "date": _http(_value("<dateTime.iso8601>never</dateTime.iso8601>")),
-    "integer of 6,000 digits": _http(_value(f"<int>{6000 * '9'}</int>")),
-    "deep": _http(_value(20_000 * "<array><data><value>" + 20_000 * "</value></data></array>")),
-    "entities": _http(b'<!DOCTYPE a [<!ENTITY b "xxxxxxxx"><!ENTITY c "&b;&b;&b;">]>' + _value("&c;")),
-    "damaged gzip": _http(b"\x1f\x8b\x08damaged", "Content-Encoding: gzip"),
-    "wrong length": b"HTTP/1.1 200 OK\r\nContent-Length: -7\r\n\r\n<a/>",
-    "no http": b"hello\r\n\r\n",
-    "moved": _http(b"", "Location: http://127.0.0.1:1/", status="301 Moved"),
-    "cut": _http(_value("1"))[:-30],
-}
-
-
-def _answering(answer: bytes) -> Callable[[socket.socket], None]:
-    def serve(client: socket.socket) -> None:
-        client.recv(1 << 16)
-        client.sendall(answer)
-
-    return serve
-
-
-def _call(box: BoxUnderAttack, port: int | str) -> None:
-    """Let a program call a procedure, and wait for its end."""
-    run_to_end(box, f'h = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")', "x = h.f()", "textmsg(x)")
-
-
-@SCRIPTS.attack(
-    "XML-RPC servers give 16 odd answers, ports are absurd",
-    "the call fails with an error of the language",
-    kinds=ONE,
-)
-def odd_answers_of_procedures(box: BoxUnderAttack, seconds: float) -> None:
-    for name, answer in ODD_ANSWERS.items():
-        with peer(_answering(answer)) as port:
-            try:
-                _call(box, port)
-            except AssertionError as error:
-                raise AssertionError(f"{name}: {error}") from None
-    for absurd in ("99999", "-1", "x", "0"):
-        _call(box, absurd)
-
-
-@SCRIPTS.attack(
-    "An XML-RPC server answers with 0.6 MB of gzip that unpack to 600 MB",
-    "the call fails",
-    is_short=False,
-    kinds=ONE,
-)
-def gzip_bomb_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
-    with peer(_answering(_http(_bomb(), "Content-Encoding: gzip"))) as port:
-        _call(box, port)
-
-
-def _bomb() -> bytes:
-    packer = zlib.compressobj(9, wbits=31)
-    begin, end = _value("<string>|</string>").split(b"|")
-    parts = [packer.compress(begin), *(packer.compress(1_000_000 * b"x") for _ in range(600))]
-    return b"".join([*parts, packer.compress(end), packer.flush()])
-
-
-@SCRIPTS.attack(
-    "An XML-RPC server answers without end, in lines of header and in body",
-    "the call fails",
-    is_short=False,
-    kinds=ONE,
-)
-def endless_answer_of_a_procedure(box: BoxUnderAttack, seconds: float) -> None:
-    def header(client: socket.socket) -> None:
-        client.sendall(b"HTTP/1.1 200 OK\r\n")
-        for n in range(200_000):
-            client.sendall(b"X-%d: x\r\n" % n)
-
-    def body(client: socket.socket) -> None:
-        client.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n")
-        for _ in range(400):
-            client.sendall(b"100000\r\n" + 1_048_576 * b"x" + b"\r\n")
-
-    for serve in (header, body):
-        with peer(serve) as port:
-            _call(box, port)

@@ -13,14 +13,12 @@ from http.client import HTTPConnection
 
 import viser
 from attack_record import Section
-from attackers import in_background, until
+from attackers import in_background, request, until
 from box_under_attack import CONTROL_PORT, ONE, PATIENCE, PORT_BASE, BoxUnderAttack
 from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from ur_emulator.host.control_api.http_client import ControlClient
-from ur_emulator.host.control_api.step_operations import ReadState
 from ur_pendant.server import MOST_PAGES
 
 WINDOW = Section("The window of a box")
@@ -35,7 +33,7 @@ def _window(box: BoxUnderAttack) -> Iterator[int]:
     """A window that shows the box, before and after; gives its port."""
 
     def readers() -> int:
-        clients = ControlClient(box.host, CONTROL_PORT, None).perform(ReadState())["clients"]
+        clients = request(box, "GET", "state")[1]["clients"]
         return sum(" at rtde " in client or " at primary " in client for client in clients)
 
     def shows() -> bool:

@@ -77,9 +77,8 @@ KINDS = {
         Kind("rack", "ur3", "", ("--boxes", "3")),
     )
 }
-# Those with a dashboard; those of the e-Series; that with grippers; the first, for what is the same in all of them.
+# Those with a dashboard; that with grippers; the first, for what is the same in all of them.
 WITH_DASHBOARD = ("CB3", "e-Series", "oldest", "rack")
-WITH_E_SERIES = ("e-Series", "PolyScope X")
 WITH_GRIPPER = ("e-Series",)
 ONE = ("CB3",)
 
@@ -120,23 +119,13 @@ class BoxUnderAttack:
     def open_ports(self) -> tuple[str, ...]:
         """Names of the ports that take something."""
         names = (
-            "dashboard",
-            "primary",
-            "secondary",
-            "realtime",
-            "rtde",
-            "modbus",
-            "interpreter",
-            "robot_api",
-            "tool_line",
-            "gripper",
-            "onrobot",
+            "dashboard primary secondary realtime rtde modbus interpreter robot_api tool_line gripper onrobot"
         )
-        return (*(name for name in names if getattr(self.ports, name)), "control")
+        return (*(name for name in names.split() if getattr(self.ports, name)), "control")
 
-    def has(self, *ports: str) -> bool:
-        """Return whether all these ports are open."""
-        return set(ports) <= set(self.open_ports)
+    def has(self, port: str) -> bool:
+        """Return whether this port is open."""
+        return port in self.open_ports
 
     def connect(self, port: str, timeout: float = PATIENCE, source: str = "") -> socket.socket:
         """Connect to a port by its name in `Ports`, or "control", from an address or from the next of `ADDRESSES`."""
@@ -202,12 +191,7 @@ class BoxUnderAttack:
             told = self.errors.read_text().strip().splitlines()
             return [f"the box has ended with code {self.process.returncode}: {(told or ['no word'])[-1]}"]
         found = []
-        for check in (
-            self._answers,
-            self._keeps_nothing,
-            self._moves,
-            self._is_calm,
-        ):
+        for check in (self._answers, self._keeps_nothing, self._moves, self._is_calm):
             try:
                 problem = check()
             except OSError as error:
@@ -281,21 +265,9 @@ def serving(
         programs.mkdir()
         number = next(_numbers)
         host = f"127.{64 + number % 64}.{os.getpid() >> 6 & 255}.{4 * (os.getpid() & 63) + 1}"
-        code = _START.format(prelude=prelude)
-        command = [
-            sys.executable,
-            "-c",
-            code,
-            "serve",
-            "--robot",
-            kind.robot,
-            *(["--software", kind.software] if kind.software else []),
-            *kind.options,
-            "--host",
-            host,
-            "--port-base",
-            str(PORT_BASE),
-        ]
+        command = [sys.executable, "-c", _START.format(prelude=prelude), "serve", "--robot", kind.robot]
+        command += ["--software", kind.software] if kind.software else []
+        command += [*kind.options, "--host", host, "--port-base", str(PORT_BASE)]
         command += [
             "--control-port",
             str(CONTROL_PORT),
@@ -310,10 +282,8 @@ def serving(
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE if unread_log else file,
-                env={
-                    **os.environ,
-                    "PYTHONDONTWRITEBYTECODE": "",
-                },  # as installed: what is loaded late is compiled
+                # As installed: what is loaded late is compiled.
+                env={**os.environ, "PYTHONDONTWRITEBYTECODE": ""},
             )
         try:
             while not ready.exists():

@@ -14,7 +14,7 @@ import random
 import sys
 import threading
 import time
-from dataclasses import asdict, dataclass
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,32 +41,12 @@ _WARM_UP, _LONGEST_WARM_UP = 0.2, 600.0
 _JOINING = 5.0  # s; what a round needs to begin and to end
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """What the box holds.
-
-    Attributes:
-        t: since the beginning [s].
-        box_mb: memory of its process.
-        workers_mb: of its worker processes.
-        descriptors, threads: of its process.
-        at_rest: no attack is under way, and none was a moment ago.
-    """
-
-    t: float
-    box_mb: float
-    workers_mb: float
-    descriptors: int
-    threads: int
-    at_rest: bool
-
-
 class Sampler(threading.Thread):
-    """Looks at the box every ten seconds."""
+    """Looks every ten seconds at what the box holds: memory [MB], descriptors, threads, at rest or not."""
 
     def __init__(self, box: BoxUnderAttack) -> None:
         super().__init__(daemon=True)
-        self.samples: list[Sample] = []
+        self.samples: list[dict[str, Any]] = []
         self.began = time.monotonic()
         self.is_attacked = False
         self._attacked_at = self.began
@@ -85,21 +65,19 @@ class Sampler(threading.Thread):
         self._ended.set()
         self.join()
 
-    def _look(self, now: float) -> Sample:
+    def _look(self, now: float) -> dict[str, Any]:
         workers = 0
         for child in self._process.children(recursive=True):
-            try:
+            with suppress(psutil.NoSuchProcess):
                 workers += child.memory_info().rss
-            except psutil.NoSuchProcess:
-                continue
-        return Sample(
-            round(now - self.began, 1),
-            round(self._process.memory_info().rss / 1e6, 2),
-            round(workers / 1e6, 2),
-            self._process.num_fds(),
-            self._process.num_threads(),
-            now - self._attacked_at > AFTER,
-        )
+        return {
+            "t": round(now - self.began, 1),
+            "box_mb": round(self._process.memory_info().rss / 1e6, 2),
+            "workers_mb": round(workers / 1e6, 2),
+            "descriptors": self._process.num_fds(),
+            "threads": self._process.num_threads(),
+            "at_rest": now - self._attacked_at > AFTER,
+        }
 
 
 def soak(minutes: float, kind: Kind) -> dict[str, Any]:
@@ -119,7 +97,7 @@ def soak(minutes: float, kind: Kind) -> dict[str, Any]:
         sampler.start()
         while box.process.poll() is None and time.monotonic() - sampler.began < 60.0 * minutes:
             rounds.append(_round(box, sampler, attacks[len(rounds) % len(attacks)], share))
-            console.print(f"{len(rounds)}: {rounds[-1]}, {sampler.samples[-1].box_mb} MB")
+            console.print(f"{len(rounds)}: {rounds[-1]}, {sampler.samples[-1]['box_mb']} MB")
         sampler.end()
         problems = box.problems()
         stop_s = box.stop()
@@ -128,7 +106,7 @@ def soak(minutes: float, kind: Kind) -> dict[str, Any]:
         "problems": [*(p for r in rounds for p in r["problems"]), *problems],
         "stop_s": round(stop_s, 2),
     }
-    return {"figures": figures, "rounds": rounds, "samples": [asdict(sample) for sample in sampler.samples]}
+    return {"figures": figures, "rounds": rounds, "samples": sampler.samples}
 
 
 def _round(box: BoxUnderAttack, sampler: Sampler, attack: Attack, share: float) -> dict[str, Any]:
@@ -156,13 +134,14 @@ def _round(box: BoxUnderAttack, sampler: Sampler, attack: Attack, share: float) 
     }
 
 
-def _figures(rounds: list[dict[str, Any]], samples: list[Sample], period: float) -> dict[str, Any]:
-    warm = min(_LONGEST_WARM_UP, _WARM_UP * samples[-1].t)
-    rest = [sample for sample in samples if sample.at_rest and sample.t >= warm]
-    rss = [sample.box_mb for sample in rest]
-    slope = np.polyfit([sample.t / 3600.0 for sample in rest], rss, 1)[0] if len(rest) > 2 else None
+def _figures(rounds: list[dict[str, Any]], samples: list[dict[str, Any]], period: float) -> dict[str, Any]:
+    warm = min(_LONGEST_WARM_UP, _WARM_UP * samples[-1]["t"])
+    rest = [sample for sample in samples if sample["at_rest"] and sample["t"] >= warm]
+    rss = [sample["box_mb"] for sample in rest]
+    slope = np.polyfit([sample["t"] / 3600.0 for sample in rest], rss, 1)[0] if len(rest) > 2 else None
+    held = {name: [sample[name] for sample in rest] for name in ("descriptors", "threads")}
     return {
-        "seconds": samples[-1].t,
+        "seconds": samples[-1]["t"],
         "attacks": len(rounds),
         "lost_cycles": sum(one["lost"] for one in rounds),
         "timer_late_by_cycles": sum(int(one["timer_max_ms"] / (1e3 * period)) for one in rounds),
@@ -170,13 +149,11 @@ def _figures(rounds: list[dict[str, Any]], samples: list[Sample], period: float)
         "timer_max_ms": max(one["timer_max_ms"] for one in rounds),
         "rss_first_mb": rss[0] if rss else None,
         "rss_last_mb": rss[-1] if rss else None,
-        "rss_max_mb": max(sample.box_mb for sample in samples),
+        "rss_max_mb": max(sample["box_mb"] for sample in samples),
         "rss_slope_mb_per_hour": None if slope is None else round(float(slope), 2),
-        "workers_max_mb": max(sample.workers_mb for sample in samples),
-        "descriptors": [rest[0].descriptors, rest[-1].descriptors, max(s.descriptors for s in rest)]
-        if rest
-        else [],
-        "threads": [rest[0].threads, rest[-1].threads, max(s.threads for s in rest)] if rest else [],
+        "workers_max_mb": max(sample["workers_mb"] for sample in samples),
+        # First, last, most.
+        **{name: [n[0], n[-1], max(n)] if n else [] for name, n in held.items()},
     }
 
 

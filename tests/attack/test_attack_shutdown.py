@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import socket
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 import psutil
 import pytest
 from attackers import crowd, until
-from box_under_attack import KINDS, PATIENCE, BoxUnderAttack, serving
+from box_under_attack import KINDS, BoxUnderAttack, serving
 
 _LONG_PROGRAM = b"def long():\n" + b"  x = [1, 2, 3]\n" * 250_000 + b"end\n"  # 4 MB
 _NO_NAMES = "import socket, threading\nsocket.getaddrinfo = lambda *names: threading.Event().wait()"
@@ -35,30 +34,11 @@ def compiling(box: BoxUnderAttack) -> Iterator[None]:
 
 
 @contextmanager
-def reporting(box: BoxUnderAttack) -> Iterator[None]:
-    with box.connect("dashboard") as sock:
-        worker_of(box).suspend()
-        sock.sendall(b"generate support file .\n")
-        box.ask("robotmode")  # the box has begun with the report by then
-        yield
-
-
-@contextmanager
 def unread(box: BoxUnderAttack) -> Iterator[None]:
     with ExitStack() as stack:
         for port in ("primary", "realtime"):
             stack.enter_context(crowd(box, port, 200))
         yield
-
-
-@contextmanager
-def calling(box: BoxUnderAttack) -> Iterator[None]:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(PATIENCE)
-        box.run(f'rpc_factory("xmlrpc", "http://127.0.0.1:{server.getsockname()[1]}").wait()')
-        with server.accept()[0] as sock:
-            assert sock.recv(4)
-            yield
 
 
 @contextmanager
@@ -70,24 +50,12 @@ def looking_up(box: BoxUnderAttack) -> Iterator[None]:
     yield
 
 
-@pytest.mark.parametrize("busy", [compiling, reporting, unread, calling, looking_up])
+@pytest.mark.parametrize(
+    "busy", [compiling, *(pytest.param(busy, marks=pytest.mark.nightly) for busy in (unread, looking_up))]
+)
 def test_a_busy_box_ends(busy: Callable[[BoxUnderAttack], AbstractContextManager[None]]) -> None:
     with serving(KINDS["CB3"], prelude=_NO_NAMES if busy is looking_up else "") as box:
         with busy(box):
             assert box.stop() < math.inf
         assert box.process.returncode == 0
         assert box.errors.read_text() == ""
-
-
-def test_a_box_ends_whose_log_nobody_reads() -> None:
-    with serving(KINDS["CB3"], "--log", unread_log=True) as box:
-        lines = 500 * (b"addToLog " + b"x" * 500 + b"\n")
-        with box.connect("dashboard") as sock, sock.makefile("rb") as replies:
-            assert replies.readline()
-            sock.sendall(lines)
-            for _ in range(500):
-                assert replies.readline() == b"Added log message\n"
-            assert box.stop() < math.inf
-        assert box.process.returncode == 0
-        assert box.process.stderr is not None
-        box.process.stderr.close()

@@ -1,8 +1,11 @@
 """Boxes of this process. An error that ends a box's loop fails the test that used it."""
 
 import sys
+from pathlib import Path
 
 import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "ur_emulator"))  # what the tests of the box share
 from integration_support import Finished, free_port_base
 
 import ur_emulator.cli

@@ -16,33 +16,18 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import SimpleNamespace
 
-from pc_client.driver.receiver import fill_template, receiver_template
-from protocol.frame_buffer import FrameBuffer
-from protocol.primary.framing import MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE
-from protocol.primary.messages import KeyMessage
-from protocol.primary.packages import decode_package
-from protocol.realtime.layout import layout_for_version
-from protocol.ur_types import Ports, ProgramState, SoftwareVersion
+from box_support import TIMEOUT, VERSION, MessageReader, connect
 
-VERSION = SoftwareVersion(3, 15, 8)
+from pc_client.driver.receiver import fill_template, receiver_template
+from protocol.primary.messages import KeyMessage
+from protocol.realtime.layout import layout_for_version
+from protocol.ur_types import Ports, ProgramState
+
 LAYOUT = layout_for_version(VERSION)
-TIMEOUT = 20.0  # s
 PERIOD = 0.008  # s
 SPIN = "def spin():\n  while True:\n    speedj([0.3,0,0,0,0,0], 2.0, get_steptime())\n  end\nend\n"
 STARTED = "PROGRAM_XXX_STARTED"
 HELLO_PROGRAM = 'def hello():\n  textmsg("hello")\nend\n'
-
-
-def inside(box):
-    """The box behind one that runs in this process."""
-    return box._rack.boxes[box._index]
-
-
-def connect(box, port):
-    """Connect to a port of a box by its name in `Ports`."""
-    sock = socket.create_connection((box.host, getattr(box.ports, port)), timeout=TIMEOUT)
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return sock
 
 
 class Frames:
@@ -110,13 +95,12 @@ class Frames:
         )
 
 
-class Messages:
-    """Reads packages of a primary or secondary port."""
+class Messages(MessageReader):
+    """Reads packages of a primary or secondary port; remembers all."""
 
     def __init__(self, box, port="primary"):
-        self.sock = connect(box, port)
+        super().__init__(connect(box, port))
         self.all = []
-        self._buffer = FrameBuffer(MAX_PACKAGE_SIZE, MIN_PACKAGE_SIZE)
 
     def __enter__(self):
         return self
@@ -125,14 +109,8 @@ class Messages:
         self.sock.close()
 
     def next(self):
-        while (frame := self._buffer.next_frame()) is None:
-            data = self.sock.recv(1 << 16)
-            if not data:
-                raise EOFError("the box closed the port")
-            self._buffer.feed(data)
-        package = decode_package(frame, VERSION)
-        self.all.append(package)
-        return package
+        self.all.append(super().next())
+        return self.all[-1]
 
     def message(self, kind, limit=5000, **wanted):
         """Return the next message of a class, with these values, skipping everything else."""
@@ -271,30 +249,9 @@ def finish(process):
     return Finished(process.returncode, out or "", err or "")
 
 
-def command(package, *arguments):
-    """Run `python -m package arguments...` to its end."""
-    return finish(start(package, *arguments))
-
-
 def at(box):
     """The options that lead the client to a box."""
     return ("--robot", box.host, "--port-base", box.ports.realtime - Ports.standard().realtime)
-
-
-@contextmanager
-def run_in_movement(box, frames, out):
-    """A `ur-client run` of `reach` on a box, no longer than the block, which begins well inside the movement."""
-    out.mkdir(exist_ok=True)
-    reach().save(out / "reach.toml")
-    client = start("pc_client", "run", out / "reach.toml", *at(box), "--out", out)
-    try:
-        frames.until(lambda f: abs(f.target_qd).max() > 0.1 and any(out.glob("*.mcap")))
-        assert client.poll() is None
-        yield client
-    finally:
-        if not client.stdout.closed:
-            client.kill()
-            finish(client)
 
 
 def free_port_base():

@@ -9,8 +9,6 @@ import shlex
 import socket
 import struct
 import subprocess
-import xmlrpc.client
-from math import pi
 from pathlib import Path
 from shutil import which
 
@@ -69,26 +67,12 @@ def box():
         yield box
 
 
-@pytest.fixture(scope="module")
-def e_series_box():
-    options = {"pace": "lockstep", "port_base": None, "tool": "robotiq-2f85,onrobot-rg2"}
-    with ControlBox("ur5e", in_process=True, **options) as box:
-        yield box
-
-
-@pytest.fixture
-def other_box():
-    """One that a test changes."""
-    with ControlBox(in_process=True, version="3.15.8", pace="lockstep", port_base=None) as box:
-        yield box
-
-
 @pytest.fixture
 def dial(box):
     """Connect to a port of the box by its name."""
     socks = []
 
-    def dial(name, box=box):
+    def dial(name):
         socks.append(socket.create_connection((box.host, getattr(box.ports, name)), timeout=20.0))
         return socks[-1]
 
@@ -117,131 +101,6 @@ def test_realtime(box, dial):
         ("robot_mode", "RobotMode"), ("joint_mode", "JointMode"), ("safety_status", "SafetyStatus"),
         ("runtime_state", "ProgramState"))}  # fmt: skip
     assert [*shown.values()] == ["RUNNING", "RUNNING", "NORMAL", "STOPPED"]
-
-
-LETTERS = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "i32": "i", "u32": "I", "u64": "Q", "f32": "f",
-           "f64": "d", "bool": "?"}  # fmt: skip
-
-
-class Fields:
-    """Reads fields of port 30001 from bytes, by the types of the page."""
-
-    def __init__(self, data):
-        self.data, self.at = data, 0
-
-    def take(self, kind):
-        kind, _, times = kind.partition(" x")
-        if times:
-            return [self.take(kind) for _ in range(int(times))]
-        if kind == "text":
-            self.at, text = len(self.data), self.data[self.at :]
-            return text.decode("latin-1")
-        length, _, text = kind.partition("+")
-        if text:
-            n = self.take(length)
-            self.at += n
-            return self.data[self.at - n : self.at].decode("latin-1")
-        form = ">" + LETTERS[kind]
-        (value,) = struct.unpack_from(form, self.data, self.at)
-        self.at += struct.calcsize(form)
-        return value
-
-    def variable(self, codes):
-        """A value of a global variable."""
-        match codes[self.take("u8")]:
-            case "const string" | "var string":
-                return self.take("i16+text")
-            case "list":
-                return [self.variable(codes) for _ in range(self.take("i16"))]
-            case "pose":
-                return self.take("f32 x6")
-            case "bool":
-                return self.take("u8") == 1
-            case "int":
-                return self.take("i32")
-            case "num" | "float":
-                return self.take("f32")
-            case "none":
-                return None
-
-
-def package_of_30001(sock):
-    size, kind = struct.unpack(">iB", received(sock, 5))
-    return kind, Fields(received(sock, size - 5))
-
-
-def sub_packages(state, tables):
-    found = {}
-    while state.at < len(state.data):
-        size, number = state.take("i32"), state.take("u8")
-        part = Fields(state.data[state.at : state.at + size - 5])
-        state.at += size - 5
-        (name,) = [title for title in tables if title.startswith(f"{number} ")]
-        rows = [row for row in tables[name] if is_there(row["from"])]
-        if name == "1 JointData":  # joint by joint
-            joints = [
-                {row["field"]: part.take(row["type"].removesuffix(" x6")) for row in rows} for _ in range(6)
-            ]
-            found[name] = {row["field"]: [joint[row["field"]] for joint in joints] for row in rows}
-        else:
-            found[name] = values = {}
-            while rows:
-                row = rows.pop(0)
-                values[row["field"]] = part.take(row["type"])
-                if "next four fields are there" in row["meaning"] and not values[row["field"]]:
-                    del rows[:4]
-        assert part.at == len(part.data), name
-    return found
-
-
-def test_primary(box, dial):
-    page = Page("primary.md")
-    # The kinds of packages stand in a sentence.
-    state, message, variables = (
-        int(re.search(rf"(\d+) (?:is |are )?(?:a |an )?{word}", page.text)[1])
-        for word in ("state", "message", "global variables")
-    )
-    types = {row["message"]: row for row in page.tables["Messages"]}
-    codes = {
-        int(row["from 3.14 / 5.9"]): row["type"]
-        for row in page.tables["Global variables"]
-        if "from 3.14 / 5.9" in row
-    }
-    sock, said, names, values = dial("primary"), [], [], {}
-    dial("secondary").sendall(
-        b'def f():\n  global x = [1, 2]\n  global y = p[1,2,3,4,5,6]\n  global z = "a"\n  textmsg("hello")\nend\n'
-    )
-    states = []
-    while "PROGRAM_XXX_STOPPED" not in said or not states:
-        kind, fields = package_of_30001(sock)
-        if kind == state:
-            states.append(sub_packages(fields, page.tables))
-        elif kind == message:
-            _, _, number = fields.take("u64"), fields.take("i8"), fields.take("u8")
-            (row,) = [row for row in types.values() if int(row["type"]) == number]
-            for name, form, since in re.findall(
-                r"`(\w+)` (\S+?)(?: \((.*?)\))?(?:,|$)", row["fields (from software)"]
-            ):
-                if is_there(since):
-                    value = fields.take(form)
-                    said += [value] * (name in ("text", "title"))
-        elif kind == variables:
-            _, what, first = fields.take("u64"), fields.take("u8"), fields.take("u16")
-            if what == 0:
-                names += fields.take("text").splitlines()
-            while what == 1 and fields.at < len(fields.data):
-                values[names[first]] = fields.variable(codes)
-                assert fields.take("u8") == ord("\n")
-                first += 1
-    assert "hello" in said
-    assert values == {"x": [1, 2], "y": [1, 2, 3, 4, 5, 6], "z": "a"}
-    first = states[0]
-    assert first["1 JointData"]["q_actual"] == pytest.approx(box.state.q, abs=1e-3)
-    assert page.numbers("RobotMode")[first["0 RobotModeData"]["robot_mode"]] == "RUNNING"
-    assert page.numbers("ControlMode")[first["0 RobotModeData"]["control_mode"]] == "POSITION"
-    assert page.numbers("SafetyMode")[first["3 MasterboardData"]["safety_mode"]] == "NORMAL"
-    assert page.numbers("RobotType")[first["6 ConfigurationData"]["robot_type"]] == "UR3"
-    assert first["4 CartesianInfo"]["tcp_pose"] == pytest.approx(box.state.tcp_pose, abs=1e-3)
 
 
 class Rtde:
@@ -320,92 +179,6 @@ def test_rtde(box, dial):
         assert answer[0] == "U"
 
 
-def test_dashboard(other_box, dial):
-    """Every command without an argument gets an answer of its form."""
-    page = Page("dashboard.md")
-    words = {name.lower(): re.findall(r"`(\w+)`", text) for name, text in re.findall(
-        r"^- (Robot modes|Safety modes): (.*?)\.", page.text, re.MULTILINE | re.DOTALL)}  # fmt: skip
-    stream = dial("dashboard", other_box).makefile("rw", newline="\n")
-    assert stream.readline().strip() in page.text.replace("`", "")
-    (rows,) = page.tables.values()
-    asked = 0
-    for row in rows:
-        if "<" in row["command"] or row["command"] in ("shutdown", "quit") or not is_there(row["since"]):
-            continue
-        stream.write(f"{row['command']}\n")
-        stream.flush()
-        answer = stream.readline().rstrip("\n")
-        forms = [form for form in [row["reply"], *row["else"].replace("`", "").split("<br>")] if form]
-        patterns = [re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.*)", re.escape(form)) for form in forms]
-        found = [match for pattern in patterns if (match := re.fullmatch(pattern, answer))]
-        assert found, f"{row['command']}: {answer}"
-        if row["command"] in ("robotmode", "safetymode"):
-            kind = {"robotmode": "robot modes", "safetymode": "safety modes"}[row["command"]]
-            assert found[0]["mode"] in words[kind]
-        asked += 1
-    assert asked > 20
-
-
-class Modbus:
-    """A client of port 502; `ask` gives what follows the function."""
-
-    def __init__(self, sock):
-        self.sock, self.number = sock, 0
-
-    def ask(self, function, payload):
-        self.number += 1
-        self.sock.sendall(struct.pack(">HHHBB", self.number, 0, 2 + len(payload), 255, function) + payload)
-        number, zero, left = struct.unpack(">3H", received(self.sock, 6))
-        assert (number, zero) == (self.number, 0)
-        answer = received(self.sock, left)
-        assert answer[0] == 255
-        return answer[1], answer[2:]
-
-    def read(self, first, count, *, signed=False):
-        function, answer = self.ask(3, struct.pack(">HH", first, count))
-        assert (function, answer[0]) == (3, 2 * count)
-        return struct.unpack(f">{count}{'h' if signed else 'H'}", answer[1:])
-
-
-def test_modbus(box, dial):
-    page = Page("modbus.md")
-    rows = {row["content"]: int(row["address"].split(" - ")[0]) for row in page.tables["Registers"]}
-    client, state = Modbus(dial("modbus")), box.state
-    request, answer = (
-        bytes.fromhex(line) for line in re.search(r"```text\n(.*)\n(.*)\n```", page.text).groups()
-    )
-    client.sock.sendall(request)
-    assert received(client.sock, len(answer))[:9] == answer[:9]
-    angles = client.read(rows["joint angle within its turn, mrad"], 6)
-    turns = client.read(rows["turns of the joint"], 6, signed=True)
-    q = [2 * pi * turn + angle / 1000 for turn, angle in zip(turns, angles, strict=True)]
-    assert q == pytest.approx(state.q, abs=1e-3)
-    place = client.read(rows["TCP in base, 0.1 mm"], 3, signed=True)
-    rotation = client.read(rows["its rotation vector, mrad"], 3, signed=True)
-    assert [n / 10_000 for n in place] == pytest.approx(state.tcp_pose[:3], abs=1e-4)
-    assert [n / 1000 for n in rotation] == pytest.approx(state.tcp_pose[3:], abs=1e-3)
-    for content, mode in (("robot mode", "RUNNING"), ("safety mode", "NORMAL"), ("joint mode", "RUNNING")):
-        kind = {"robot mode": "RobotMode", "safety mode": "SafetyMode", "joint mode": "JointMode"}[content]
-        assert page.numbers(kind)[client.read(rows[content], 1, signed=content == "robot mode")[0]] == mode
-    for content, value in (
-        ("its domain, analogue output 0: 0 current, 1 voltage", 1),
-        ("analogue output 0, part of its range", 65535 // 2),
-        ("outputs to set", 0b1000),
-    ):
-        assert client.ask(6, struct.pack(">HH", rows[content], value))[0] == 6
-    assert box.state.analog_outputs[0] == pytest.approx(5.0, abs=1e-3)
-    assert box.state.digital_outputs["standard"][3]
-    refused = {
-        row["refused"].split(",")[0]: int(row["exception"])
-        for row in page.tables["The box as a server: port 502"]
-    }
-    assert client.ask(3, struct.pack(">HH", 5000, 1)) == (
-        0x83,
-        bytes([refused["an address that does not exist"]]),
-    )
-    assert client.ask(99, b"") == (0x80 + 99, bytes([refused["another function"]]))
-
-
 def test_robot_api(tmp_path):
     """The examples of the page, as they stand, with curl."""
     if not which("curl"):
@@ -435,34 +208,3 @@ def test_robot_api(tmp_path):
         for command, answer in re.findall(r"^\$ (.*)\n(.*)$", block, re.MULTILINE):
             assert told(command) == answer, command
         assert json.loads(told(form.replace("pick.script", "other.script")))["programName"] == "other"
-
-
-def test_gripper_variables(e_series_box, dial):
-    page = Page("gripper.md")
-    sock = dial("gripper", e_series_box)
-    stream = sock.makefile("rw", newline="\n")
-    for row in page.tables["Robotiq: variables of port 63352"]:
-        stream.write(f"GET {row['variable']}\n")
-        stream.flush()
-        if "r" not in row["access"]:
-            assert stream.readline() == "?\n"
-            continue
-        name, value = stream.readline().split()
-        assert name == row["variable"]
-        if row["range"] != "text":
-            least, most = map(int, row["range"].split(" - "))
-            assert least <= int(value) <= most
-    stream.write("SET POS 100 SPE 255 GTO 1\n")
-    stream.flush()
-    assert received(sock, 3) == b"ack"
-
-
-def test_gripper_calls(e_series_box):
-    page = Page("gripper.md")
-    address = re.search(r"`(http://HOST:41414/)`", page.text)[1]
-    address = address.replace("HOST:41414", f"{e_series_box.host}:{e_series_box.ports.onrobot}")
-    kinds = {"int": int, "double": float, "boolean": bool, "string": str, "array": list, "struct": dict}
-    with xmlrpc.client.ServerProxy(address) as gripper:
-        for row in page.tables["OnRobot: methods of port 41414"]:
-            if row["method"].startswith("rg_get") and row["arguments"] == "int":
-                assert type(getattr(gripper, row["method"])(0)) is kinds[row["result"]], row["method"]

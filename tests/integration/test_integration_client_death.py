@@ -1,27 +1,17 @@
 """A client that is lost in motion: the arm ramps to rest in 0.3 s, the program ends, the next client works.
 
-In every phase of an experiment, and in every way in which a client can be lost. Time to rest is counted in robot
-time, from the last command that the robot got. In lockstep the client dies at an exact command:
-`DyingNetwork` stands between the real client and its sockets. Killed: all sockets close, as the kernel closes
-those of a process. Frozen: the client stands still, its sockets stay open. Cut off: the client goes on, but
+Time to rest is counted in robot time, from the last command that the robot got. In lockstep the client dies at an
+exact command: `DyingNetwork` stands between the real client and its sockets. Killed: all sockets close, as the kernel
+closes those of a process. Frozen: the client stands still, its sockets stay open. Cut off: the client goes on, but
 nothing reaches the robot any more and nothing comes from it.
 """
 
-import signal
 import struct
 import threading
 from dataclasses import replace
 
 import pytest
-from integration_support import (
-    LAYOUT,
-    PERIOD,
-    Frames,
-    at,
-    finish,
-    prepare_experiment,
-    run_in_movement,
-)
+from integration_support import LAYOUT, PERIOD, Frames, prepare_experiment
 
 import ur_emulator.host.pacing as pacing
 from pc_client.control.controller import CONTROLLERS
@@ -73,11 +63,11 @@ class DyingNetwork:
         if self.is_gone():
             self.pass_time(timeout)
             raise DriverError(f"{host}:{port} does not answer")
-        return self._watched(self._tcp.connect(host, port, timeout))
+        return Dying(self, self._tcp.connect(host, port, timeout))
 
     def listen(self, address, port):
         self.is_gone()
-        return _Listener(self, self._tcp.listen(address, port))
+        return Dying(self, self._tcp.listen(address, port))
 
     # ---- death
     def die(self):
@@ -121,15 +111,16 @@ class DyingNetwork:
             if is_fast and self.programs == self.program:
                 self.die()
 
-    def _watched(self, transport):
-        self.sockets.append(transport)
-        return _Transport(self, transport)
 
+class Dying:
+    """A connection or a listener of a client that dies."""
 
-class _Transport:
     def __init__(self, network, inner):
         self._network, self._inner = network, inner
-        self.local_address, self.peer_address = inner.local_address, inner.peer_address
+        network.sockets.append(inner)
+
+    def __getattr__(self, name):
+        return getattr(self._inner, name)
 
     def send(self, data):
         self._network.before(data)
@@ -139,29 +130,17 @@ class _Transport:
 
     def receive(self, timeout):
         if self._network.is_gone():
-            self._network.pass_time(timeout)
-            return None
+            return self._network.pass_time(timeout)
         data = self._inner.receive(timeout)
         if data and len(data) % LAYOUT.size == 0:  # no package of another port has this size
             (self._network.stamp,) = struct.unpack_from(">d", data, len(data) - LAYOUT.size + 4)
         return data
 
-    def close(self):
-        if not self._network.is_gone():
-            self._inner.close()
-
-
-class _Listener:
-    def __init__(self, network, inner):
-        self._network, self._inner, self.port = network, inner, inner.port
-        network.sockets.append(inner)
-
     def accept(self, timeout):
         if self._network.is_gone():
-            self._network.pass_time(timeout)
-            return None
+            return self._network.pass_time(timeout)
         caller = self._inner.accept(timeout)
-        return None if caller is None else self._network._watched(caller)
+        return caller and Dying(self._network, caller)
 
     def close(self):
         if not self._network.is_gone():
@@ -202,42 +181,6 @@ class Bystander:
         return max(self._last_motion + PERIOD - since, 0.0)
 
 
-DECELERATION = 20.0  # rad/s^2; of the receiver's own ramp
-
-
-@pytest.mark.usefixtures("without_page")
-def test_a_killed_client_leaves_the_arm_at_rest_and_the_next_one_works(ur_client, standard_box, tmp_path):
-    with Frames(standard_box) as frames:
-        assert cut_off(standard_box, frames, tmp_path / "killed", signal.SIGKILL).code == -signal.SIGKILL
-        before = frames.next()
-        while before.runtime_state != ProgramState.STOPPED:
-            frame = frames.new()
-            assert abs(frame.target_qd - before.target_qd).max() <= DECELERATION * PERIOD * (1 + 1e-9)
-            before = frame
-        assert not frames.new().target_qd.any()  # the target of the cycle in which the program stopped
-        assert frames.lost() == 0
-    Movement.through([(0.35, -0.06, 0.25), (0.35, 0.06, 0.3)], durations=[1.5]).save(tmp_path / "next.toml")
-    done = ur_client("run", tmp_path / "next.toml", *at(standard_box), "--out", tmp_path / "next")
-    assert done.code == 0, done.err
-    assert len(list((tmp_path / "next").glob("*_r1.mcap"))) == 1
-
-
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_client_stops_the_arm_and_says_so_in_one_line(standard_box, tmp_path, end):
-    with Frames(standard_box) as frames:
-        ended = cut_off(standard_box, frames, tmp_path, end)
-        assert ended.code == 130
-        assert "interrupted; the arm rests" in ended.complaint()
-        assert frames.rest().safety_mode == SafetyMode.NORMAL
-
-
-def cut_off(box, frames, out, signal_number):
-    """Start a run, signal the client well inside the movement, return how it ended."""
-    with run_in_movement(box, frames, out) as client:
-        client.send_signal(signal_number)
-        return finish(client)
-
-
 ALLOWED = 0.3  # s
 
 # The programs of an experiment of two runs, and a speed [rad/s] that the phase reaches.
@@ -256,57 +199,51 @@ def twice(tmp_path_factory):
     return prepare_experiment([movement], repeat=2, out=tmp_path_factory.mktemp("unused"))
 
 
-class Client(threading.Thread):
-    """A client in a thread; `error` is what ended it."""
-
-    def __init__(self, box, network, experiment):
-        super().__init__()
-        self.box, self.network, self.experiment = box, network, experiment
-        self.error = None
-
-    def run(self):
-        try:
-            with UrDriver(self.box.host, self.box.ports, network=self.network) as driver:
-                ExperimentRunner(driver, self.experiment, CONTROLLERS["preview"]).run()
-        except BaseException as error:
-            self.error = error
-
-
 def lose_client(box, experiment, death, phase, monkeypatch):
     """Run an experiment until its client is lost and the arm rests, then let the client go on if it can.
 
     Returns:
         What ended the client, the time to rest [s] and the frame at rest.
     """
-    network = DyingNetwork(death, *PHASES[phase])
-    client = Client(box, network, experiment)
+    network, errors = DyingNetwork(death, *PHASES[phase]), []
+
+    def work():
+        try:
+            with UrDriver(box.host, box.ports, network=network) as driver:
+                ExperimentRunner(driver, experiment, CONTROLLERS["preview"]).run()
+        except BaseException as error:
+            errors.append(error)
+
+    client = threading.Thread(target=work)
     with Frames(box) as frames:
         bystander = Bystander(frames)
         client.start()
         try:
             bystander.until(lambda: network.dead.is_set() or not client.is_alive())
-            assert network.dead.is_set(), client.error
-            monkeypatch.setattr(
-                pacing, "HANG_LIMIT", 0.05
-            )  # s, instead of a minute: time goes on without a command
-            bystander.until_rest()
+            assert network.dead.is_set(), errors
+            with monkeypatch.context() as patched:  # s, instead of a minute: time goes on without a command
+                patched.setattr(pacing, "HANG_LIMIT", 0.05)
+                bystander.until_rest()
             time_to_rest, at_rest = bystander.time_to_rest(network.last_command), bystander.latest
-            monkeypatch.undo()
         finally:
             network.awake.set()
             bystander.until(lambda: not client.is_alive())
             network.close()
-    return client.error, time_to_rest, at_rest
+    return (errors or [None])[0], time_to_rest, at_rest
 
 
 @pytest.mark.parametrize(
     ("death", "phase"),
     [
-        *((death, "stream") for death in (KILLED, FROZEN, CUT_OFF)),
-        (KILLED, "approach"),
+        (KILLED, "stream"),
         (FROZEN, "identification"),
         (CUT_OFF, "return"),
-        *((death, "pause between runs") for death in (FROZEN, CUT_OFF)),
+        pytest.param(KILLED, "approach", marks=pytest.mark.nightly),
+        *(
+            pytest.param(death, phase, marks=pytest.mark.nightly)
+            for death in (FROZEN, CUT_OFF)
+            for phase in ("stream", "pause between runs")
+        ),
     ],
 )
 def test_the_arm_rests_in_time(lockstep_box, twice, tmp_path, death, phase, monkeypatch):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from integration_support import at, free_port_base
 
 import pc_client as ur
 from pc_client.analysis.measures import speed
@@ -13,23 +12,11 @@ from ur_emulator import ControlBox
 PERIOD = 0.002  # s
 
 
-def test_local_control_is_refused_before_anything_moves(ur_client, tmp_path):
-    line = "the robot's control is local, must be remote; in local control it ignores"
-    with ControlBox(robot="ur3e", pace="lockstep", port_base=free_port_base()) as box:
-        box.set_operational_mode("automatic")
-        box.remote_control(False)
-        doctor = ur_client("doctor", *at(box), "--seconds", 0.1)
-        run = ur_client("run", "uniform_4_1", *at(box), "--out", tmp_path / "out")
-    assert (doctor.code, run.code) == (1, 1)
-    assert line in run.complaint()
-    assert f"streaming   NOT NOW: {line}" in doctor.out
-    assert doctor.out.count("NOT OK") == 1
-
-
-def test_every_cycle_has_its_frame_and_its_command_and_the_arm_follows_better_from_run_to_run():
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_every_cycle_has_its_frame_and_its_command_and_the_arm_follows_better_from_run_to_run(times):
     movement = ur.Movement.through([(0.42, -0.08, 0.3), (0.42, 0.08, 0.35)], durations=[1.5])
     with ControlBox(robot="ur5e", pace="lockstep", port_base=None, seed=5) as box:
-        runs = ur.connect(box.host, box.ports).repeat(movement, 2, ur.Controller.best())
+        runs = ur.connect(box.host, box.ports).repeat(movement, times, ur.Controller.best())
     for run in runs:
         recording, track = run.recording, run.measured.track
         np.testing.assert_allclose(np.diff(recording.t), PERIOD, atol=1e-9)
@@ -42,19 +29,20 @@ def test_every_cycle_has_its_frame_and_its_command_and_the_arm_follows_better_fr
         assert recording.provenance.loop["gain_margin"] > 10.0
         assert abs(run.measured.snr.speed_lag_s) < 0.002
         assert run.snr > 35.0
-    assert runs[1].snr > runs[0].snr + 1.0
-    assert runs[1].recording.summary["learned_from"] == 1
+    assert times == 1 or runs[1].snr > runs[0].snr + 1.0
+    assert times == 1 or runs[1].recording.summary["learned_from"] == 1
 
 
 @pytest.mark.parametrize(
     ("software", "size", "payload"),
     [
-        ("5.0.5", 1108, None), ("5.3.0", 1108, None), ("5.4.0", 1116, None), ("5.8.0", 1116, 0.0),
-        ("5.9.4", 1140, 0.0), ("5.12.2", 1220, 0.0), ("5.25.1", 1220, 0.0),
+        ("5.0.5", 1108, None), ("5.8.0", 1116, 0.0), ("5.9.4", 1140, 0.0), ("5.25.1", 1220, 0.0),
     ],
 )  # fmt: skip
 def test_the_client_reads_every_port(software, size, payload):
-    with ControlBox(robot="ur5e", version=software, pace="lockstep", port_base=None, seed=7) as box:
+    with ControlBox(
+        robot="ur5e", version=software, in_process=True, pace="lockstep", port_base=None, seed=7
+    ) as box:
         found = probe(TcpNetwork(), box.host, box.ports, 0.02)
     assert found.obstacle == ""
     assert str(found.info.version).startswith(software.removesuffix(".0"))

@@ -73,7 +73,6 @@ def test_kinematics_of_the_arm_work_on_rows_and_stacks(arm):
     [
         (lambda arm: arm.fk([1, 2, 3]), r"q of shape \(3,\): give six finite numbers"),
         (lambda arm: arm.fk([np.nan] * 6), "six finite numbers"),
-        (lambda arm: arm.fk([[1, 2], "x"]), "six finite numbers"),
         (
             lambda arm: arm.ik([2, 0, 0.3, 0, 0, 0]),
             r"no posture of a UR3 brings the TCP to \(2.000, 0.000, 0.300\) m",
@@ -98,12 +97,6 @@ def test_a_plan_takes_the_cell_as_connect_does(arm, tmp_path):
         ur.plan(movement, "ur3", own)
     with pytest.raises(ur.ClientError, match="has its own; give it to connect"):
         ur.plan(movement, arm, path)
-
-
-def test_a_plan_and_a_movement_are_one_line():
-    movement = ur.Movement.through(POINTS, durations=[2.5])
-    assert repr(movement) == "<Movement 'through': lognormal, 2.50 s>"
-    assert repr(ur.plan(movement, "ur5e")) == "<Plan of 'through' for a UR5e: 2.50 s>"
 
 
 def test_a_run_is_judged_by_the_speed_of_its_tcp(run):
@@ -156,9 +149,7 @@ def test_a_velocity_law_moves_the_arm_and_ends(arm):
 @pytest.mark.parametrize(
     ("law", "complaint"),
     [
-        (lambda frame: [0.0] * 5, "six finite velocities"),
         (lambda frame: [np.nan] * 6, "six finite velocities"),
-        (lambda frame: "fast", "six finite velocities"),
         (lambda frame: [9.0, 0, 0, 0, 0, 0], "not safe to send"),
         (lambda frame: [0, 0.8, 0, 0, 0, 0], "comes within"),
         (lambda frame: None, "there are no signals"),
@@ -191,18 +182,6 @@ def test_a_velocity_law_that_brakes_just_before_its_refusal_cannot_coast_out_of_
     assert bodies.along([*reached, arm.frame().actual_q]).floor.least.min() > least
 
 
-@pytest.mark.parametrize("acceleration", [0.0, np.nan, 1e6])
-def test_an_acceleration_out_of_its_range_is_refused(arm, acceleration):
-    with pytest.raises(ur.ClientError, match="give a number from"):
-        arm.stream(lambda frame: None, acceleration=acceleration)
-
-
-def test_what_a_law_raises_comes_through_and_the_arm_rests(arm):
-    with pytest.raises(ZeroDivisionError):
-        arm.stream(lambda frame: [1.0 / 0.0])
-    assert np.abs(arm.frame().actual_qd).max() < 0.01
-
-
 def test_a_control_law_of_the_user_runs_a_plan_like_the_other_controllers(arm, tmp_path):
     def my_law(frame, reference):
         return reference.qd_feedforward + 5.0 * (reference.q_array - frame.actual_q)
@@ -214,22 +193,11 @@ def test_a_control_law_of_the_user_runs_a_plan_like_the_other_controllers(arm, t
     assert run.snr > 20.0
 
 
-def test_a_control_law_that_does_not_follow_ends_at_rest(arm):
-    with pytest.raises(ur.ClientError, match="off its path"):
-        arm.run(ur.Movement.through(POINTS, durations=[2.5]), lambda frame, reference: np.zeros(6))
-    assert np.abs(arm.frame().actual_qd).max() < 0.01
-
-
-class Law:
-    def __init__(self, *numbers):
-        self.numbers = numbers
-
-    def __call__(self, frame, reference):
-        return self.numbers
-
-
 MOVE = ur.Movement.through(POINTS, durations=[2.5])
-LOAD = (0.0, 0.0, 0.05)
+
+
+def law(*numbers):
+    return lambda frame, reference: numbers
 
 
 @pytest.mark.parametrize(
@@ -237,61 +205,44 @@ LOAD = (0.0, 0.0, 0.05)
     [
         *(
             (lambda arm, c=c: arm.run(MOVE, c), "controller: .*; give a Controller or a function of")
-            for c in ("preview", 5, None, ur.Controller, ur.Controller.paper, lambda frame: None, {})
+            for c in ("preview", None, ur.Controller, lambda frame: None)
         ),
-        (lambda arm: arm.run(MOVE, Law), "six finite velocities"),
         *(
-            (lambda arm, law=law: arm.run(MOVE, law), "six finite velocities")
-            for law in (
-                Law(),
-                Law(1, 2, 3),
-                Law(*[np.nan] * 6),
-                Law(*["a"] * 6),
-                lambda frame, reference: None,
-            )
+            (lambda arm, c=c: arm.run(MOVE, c), "six finite velocities")
+            for c in (law(1, 2, 3), law(*[np.nan] * 6), law(*["a"] * 6), lambda frame, reference: None)
         ),
-        (lambda arm: arm.run(MOVE, Law(9, 0, 0, 0, 0, 0)), "not safe to send"),
-        (
-            lambda arm: arm.run(MOVE, lambda frame, reference: 1 / 0),
-            "before anything has moved: ZeroDivisionError",
-        ),
-        (lambda arm: arm.run(MOVE, lambda frame, reference: frame.nothing), "has no 'nothing'"),
+        (lambda arm: arm.run(MOVE, law(9, 0, 0, 0, 0, 0)), "not safe to send"),
+        (lambda arm: arm.run(MOVE, lambda f, reference: 1 / 0), "before anything has moved: ZeroDivisionErr"),
         (
             lambda arm: arm.run(MOVE, lambda frame, reference: reference.qd_feedforward.__iadd__(1.0)),
             "ValueError: output array is read-only",
         ),
-        *(
-            (lambda arm, plan=plan: arm.run(plan), "plan: .*; give a Plan, a Movement")
-            for plan in (None, "lognorm_4_1", 5, [MOVE], ur.Movement)
-        ),
-        *((lambda arm, plan=plan: arm.approach(plan), "plan: .*; give a Plan") for plan in (None, MOVE, "x")),
+        *((lambda arm, p=p: arm.run(p), "plan: .*; give a Plan, a Movement") for p in (None, [MOVE])),
+        (lambda arm: arm.approach(MOVE), "plan: .*; give a Plan"),
         *(
             (lambda arm, n=n: arm.repeat(MOVE, n), "nothing to do|times: .*; give a whole number")
-            for n in (0, -1, 2.5, "3", None)
+            for n in (0, 2.5, "3")
         ),
         *(
             (lambda arm, out=out: arm.run(MOVE, out=out), "out: .*; give a folder|cannot use the folder")
-            for out in (5, b"x", "/proc/nothing", "a\0b", "/dev/null")
+            for out in (5, "/proc/nothing", "a\0b", "/dev/null")
         ),
         (lambda arm: arm.run(MOVE, overwrite="no"), "overwrite: 'no'; give True or False"),
         (lambda arm: arm.experiment([MOVE], 1, ur.Controller.paper(), Path("x")), "plan: .*; give a Plan"),
         (lambda arm: arm.experiment([], 1, ur.Controller.paper(), Path("x")), "nothing to do"),
         (lambda arm: arm.experiment(None, 1, ur.Controller.paper(), Path("x")), "plans: None; give a list"),
-        *(
-            (lambda arm, law=law: arm.stream(law), "law: .*; give a function of")
-            for law in (None, [0] * 6, 5, lambda: None, lambda frame, reference: None)
-        ),
+        *((lambda arm, c=c: arm.stream(c), "law: .*; give a function of") for c in (None, law(0))),
         *(
             (lambda arm, a=a: arm.stream(still, acceleration=a), "acceleration: .*; give a number from")
-            for a in (0.0, np.nan, 1e6, "5", None, True)
+            for a in (0.0, np.nan, 1e6, True)
         ),
         *(
-            (lambda arm, mass=mass: arm.set_payload(mass, LOAD), "mass: .*; give a number")
-            for mass in (-1.0, np.nan, "1", None)
+            (lambda arm, mass=mass: arm.set_payload(mass, (0.0, 0.0, 0.05)), "mass: .*; give a number")
+            for mass in (-1.0, np.nan, None)
         ),
         *(
             (lambda arm, c=c: arm.set_payload(0.0, c), "centre_of_gravity: ")
-            for c in (None, 5, (0.0, 0.0), (0.0, 0.0, np.inf), "abc")
+            for c in (None, (0.0, 0.0), (0.0, 0.0, np.inf))
         ),
     ],
 )
@@ -346,6 +297,7 @@ def test_whatever_ends_a_run_or_a_stream_names_what_is_kept_of_it(arm, end, tmp_
         calls = []
         with pytest.raises(end) as caught:
             act()
+        assert np.abs(arm.frame().actual_qd).max() < 0.01
         (note,) = caught.value.__notes__
         path = Path(note.removeprefix("recorded until then: "))
         assert path.is_relative_to(tmp_path)
@@ -382,8 +334,12 @@ def test_samples_with_orientations_turn_the_tool(arm):
 
 
 def test_a_plan_for_another_arm_or_cell_is_refused_before_it_moves(arm):
-    movement = ur.Movement.through(POINTS)
+    movement = ur.Movement.through(POINTS, durations=[2.5])
     stranger = ur.plan(movement, "ur5")
+    assert (repr(movement), repr(stranger)) == (
+        "<Movement 'through': lognormal, 2.50 s>",
+        "<Plan of 'through' for a UR5: 2.50 s>",
+    )
     for act in (arm.run, arm.approach):
         with pytest.raises(ur.ClientError, match="planned for a UR5"):
             act(stranger)
@@ -444,30 +400,30 @@ def test_an_arm_that_may_be_real_is_asked_for(box, monkeypatch):
     assert "velocity law" in shown[1]
 
 
-def move_away(box):
-    box.run_program("def p():\n  movej([1.6, -1.6, -1.9, -0.5, 1.3, 1.0])\nend\n", wait=True)
+def program(text):
+    return lambda box: box.run_program(text, wait=True)
 
 
-def another_tool(box):
-    box.run_program("def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\nend\n", wait=True)
+MOVE_AWAY = program("def p():\n  movej([1.6, -1.6, -1.9, -0.5, 1.3, 1.0])\nend\n")
 
 
 @pytest.mark.parametrize(
-    ("meddle", "said", "ends"),
+    ("act", "meddle", "said", "ends"),
     [
-        (move_away, r"the arm was moved, its base by \d+\.\d deg", ""),
+        ("run", MOVE_AWAY, r"the arm was moved, its base by \d+\.\d deg", ""),
+        ("approach", program("sec p():\n  set_payload(0.04)\nend\n"), "payload was 0.00 kg, is 0.04 kg", ""),
+        ("stream", MOVE_AWAY, r"the arm was moved, its base by \d+\.\d deg", ""),
         (
-            lambda box: box.run_program("sec p():\n  set_payload(0.04)\nend\n", wait=True),
-            "payload was 0.00 kg, is 0.04 kg",
-            "",
+            "run",
+            program("def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\nend\n"),
+            None,
+            "the robot's TCP offset is",
         ),
-        (another_tool, None, "the robot's TCP offset is"),
-        (lambda box: box.set_speed(0.5), None, "the robot's speed slider is 50 %"),
-        (lambda box: box.press_button("teach", True), None, "the robot's control mode is TEACH"),
-        (lambda box: box.emergency_stop(), None, "the robot's safety mode is ROBOT_EMERGENCY_STOP"),
+        ("approach", lambda box: box.set_speed(0.5), None, "the robot's speed slider is 50 %"),
+        ("stream", lambda box: box.press_button("teach", True), None, "the robot's control mode is TEACH"),
+        ("run", lambda box: box.emergency_stop(), None, "the robot's safety mode is ROBOT_EMERGENCY_STOP"),
     ],
 )
-@pytest.mark.parametrize("act", ["run", "approach", "stream"])
 def test_what_was_agreed_to_is_compared_with_the_robot_after_the_answer(
     lockstep_box, monkeypatch, act, meddle, said, ends
 ):
@@ -513,7 +469,6 @@ def test_nothing_is_asked_anew_of_a_robot_that_stays_as_it_was_shown(lockstep_bo
     shown = []
     monkeypatch.setattr(report, "_is_simulated", lambda *told: None)
     arm = ur.connect(lockstep_box.host, lockstep_box.ports, confirm=lambda text: not shown.append(text))
-    arm.run(MOVE)
-    arm.repeat(MOVE, 2, ur.Controller.paper())
-    assert len(shown) == 2
+    arm.repeat(MOVE, 2)
+    assert len(shown) == 1
     assert "expected SNR    at best 45.0 dB" in shown[0]

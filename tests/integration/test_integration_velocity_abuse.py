@@ -1,4 +1,4 @@
-"""What a wrong or hostile PC can send to the velocity receiver, and to a box that is already stopped.
+"""What a wrong or hostile PC can send to the velocity receiver.
 
 Whatever comes: no target beyond the limits of the joints, and in the end the arm rests and takes the next program.
 """
@@ -8,20 +8,17 @@ import struct
 
 import numpy as np
 import pytest
-from integration_support import HELLO_PROGRAM, Messages, VelocitySession, is_closed, send
+from integration_support import HELLO_PROGRAM, PERIOD, Messages, VelocitySession, is_closed, send
 
 import ur_emulator.host.pacing as pacing
-from protocol.primary.messages import (
-    ErrorCodeMessage,
-    KeyMessage,
-    SafetyModeMessage,
-    TextMessage,
-)
+from pc_client.driver.watchdog import REST_SPEED
+from protocol.primary.messages import ErrorCodeMessage, KeyMessage, SafetyModeMessage, TextMessage
 from protocol.ur_types import ProgramState, SafetyMode
 from ur_emulator.machine.models.robots import robot_by_name
 
 UR3 = robot_by_name("ur3")
 INT_MIN, INT_MAX = -(2**31), 2**31 - 1
+LONGEST_TO_REST = 0.3  # s of robot time after the last command
 RAMP_ROUNDING = 1e-3  # rad; the last cycle of a ramp is a whole one
 
 
@@ -65,13 +62,7 @@ def next_program_works(box, frames):
         assert frames.rest().target_q == pytest.approx([0.3, -1.6, -1.8, 0, 1.2, 1.5])
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        (INT_MIN, INT_MAX, INT_MIN, INT_MAX, INT_MIN, INT_MAX),
-        (3_400_000, 0, 0, 0, 0, 0),
-    ],
-)
+@pytest.mark.parametrize("values", [(INT_MIN, INT_MAX) * 3, (3_400_000, 0, 0, 0, 0, 0)])
 def test_velocities_beyond_the_limits_end_in_a_protective_stop(lockstep_box, values):
     with Messages(lockstep_box) as primary, VelocitySession(lockstep_box, acceleration=40.0) as session:
         judge = Judge(session.frames)
@@ -109,60 +100,39 @@ def test_a_joint_that_is_driven_to_the_end_of_its_range_stops_within_it(lockstep
         next_program_works(lockstep_box, session.frames)
 
 
-def test_an_unknown_mode_ends_the_program_with_a_ramp(lockstep_box):
-    with Messages(lockstep_box) as primary, VelocitySession(lockstep_box) as session:
-        session.spin_up()
-        session.send(INT_MIN, (INT_MAX,) * 6)
-        assert Judge(session.frames).until_rest().safety_mode == SafetyMode.NORMAL
-        assert primary.message(TextMessage).text == "velocity_receiver: unknown mode"
-        next_program_works(lockstep_box, session.frames)
+HALF = struct.pack(">7i", 1, *(INT_MAX,) * 6)[:27]
+BURST = b"".join(struct.pack(">7i", 1, sign * 2_000_000, 0, 0, 0, 0, 0) for sign in (1, -1) * 500)
 
 
-def test_hold_ramps_to_rest_and_keeps_the_program(lockstep_box):
-    with VelocitySession(lockstep_box) as session:
-        session.spin_up()
-        for _ in range(60):
-            session.send(2, (INT_MAX,) * 6)  # the velocities of a hold are ignored
-            frame = session.frames.new()
-        assert not frame.target_qd.any()
-        assert frame.runtime_state == ProgramState.PLAYING
-        session.spin_up()
-        session.send(0)
-        Judge(session.frames).until_rest()
-
-
-def test_half_a_message_and_silence_end_the_program_in_the_end(lockstep_box, monkeypatch):
+@pytest.mark.parametrize(
+    ("data", "closes", "said"),
+    [
+        (struct.pack(">7i", INT_MIN, *(INT_MAX,) * 6), False, "unknown mode"),
+        (HALF, False, "no message from the client"),
+        (HALF, True, "no message from the client"),
+        (BURST + bytes(28), False, "stopped by the client"),
+    ],
+    ids=["unknown mode", "half a message", "half a message and the end", "a thousand at once"],
+)
+def test_what_ends_the_program_ramps_the_arm_to_rest(lockstep_box, monkeypatch, data, closes, said):
     monkeypatch.setattr(pacing, "HANG_LIMIT", 0.1)  # s, instead of a minute
     with Messages(lockstep_box) as primary, VelocitySession(lockstep_box, read_timeout=0.2) as session:
-        session.spin_up()
-        session.reverse.sendall(struct.pack(">7i", 1, *(INT_MAX,) * 6)[:27])
-        assert Judge(session.frames).until_rest().safety_mode == SafetyMode.NORMAL
-        assert primary.message(TextMessage).text == "velocity_receiver: no message from the client"
-        assert is_closed(session.reverse)
-        next_program_works(lockstep_box, session.frames)
-
-
-def test_half_a_message_and_a_closed_socket_end_the_program(lockstep_box):
-    with VelocitySession(lockstep_box) as session:
-        session.spin_up()
-        session.reverse.sendall(b"\0\0\0\1\x7f\xff")
-        session.reverse.close()
-        Judge(session.frames).until_rest()
-        next_program_works(lockstep_box, session.frames)
-
-
-def test_a_flood_of_commands_at_once_does_not_break_the_limits(lockstep_box):
-    with VelocitySession(lockstep_box) as session:
+        last = session.spin_up().timestamp
+        session.reverse.sendall(data)
+        if closes:
+            session.reverse.close()
         judge = Judge(session.frames)
-        burst = b"".join(struct.pack(">7i", 1, sign * 2_000_000, 0, 0, 0, 0, 0) for sign in (1, -1) * 500)
-        session.reverse.sendall(burst + struct.pack(">7i", 0, 0, 0, 0, 0, 0, 0))
-        judge.until_rest()
+        at_rest = judge.until(lambda f: not f.target_qd.any() and abs(f.actual_qd).max() < REST_SPEED)
+        assert 4 * PERIOD < at_rest.timestamp - last <= LONGEST_TO_REST
+        assert judge.until_rest().safety_mode == SafetyMode.NORMAL
+        assert primary.message(TextMessage).text == f"velocity_receiver: {said}"
+        assert closes or is_closed(session.reverse)
         next_program_works(lockstep_box, session.frames)
 
 
 def test_random_messages_never_break_the_limits(lockstep_box):
     random = np.random.default_rng(3)
-    for _ in range(8):
+    for _ in range(4):
         with VelocitySession(lockstep_box) as session:
             judge = Judge(session.frames)
             frame = session.frames.next()
@@ -175,15 +145,3 @@ def test_random_messages_never_break_the_limits(lockstep_box):
             judge.until_rest()
             send(lockstep_box, "secondary", "set unlock protective stop\n")
             judge.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
-
-
-def test_a_move_that_replaces_a_motion_begins_at_rest(lockstep_box):
-    with VelocitySession(lockstep_box) as session:
-        session.spin_up()
-        before = session.frames.next()
-        send(lockstep_box, "secondary", "def m():\n  movej([0.3,-1.6,-1.8,0,1.2,1.5])\nend\n")
-        while not (before.runtime_state == ProgramState.STOPPED and not before.target_qd.any()):
-            frame = session.frames.new()
-            assert np.abs(frame.target_qd - before.target_qd).max() <= 20.0 * 0.008 * (1 + 1e-6)
-            before = frame
-        assert before.target_q == pytest.approx([0.3, -1.6, -1.8, 0, 1.2, 1.5])
