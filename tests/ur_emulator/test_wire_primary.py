@@ -33,12 +33,10 @@ from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.models.robots import robot_by_name
 
 V3_15 = SoftwareVersion(3, 15, 8)
+# Those in which a part of the greeting changes, and those before.
 VERSIONS = [
     SoftwareVersion.parse(text)
-    for text in (
-        *("3.0", "3.2", "3.3", "3.5", "3.9", "3.10", "3.14", "3.15"),
-        *("5.0.5", "5.3", "5.8", "5.9.4", "5.12", "5.25.1"),
-    )
+    for text in ("3.0", "3.2", "3.3", "3.9", "3.10", "3.15", "5.0.5", "5.9.4", "5.12", "5.26")
 ]
 
 
@@ -115,9 +113,7 @@ def test_the_greeting_of_every_version(version):
         assert state_size(version, first=True) < 2000  # python-urx holds no longer ones
 
 
-@pytest.mark.parametrize(
-    "version", [SoftwareVersion(3, 0), SoftwareVersion(3, 4), V3_15, SoftwareVersion(5, 12)], ids=str
-)
+@pytest.mark.parametrize("version", [SoftwareVersion(3, 0), V3_15, SoftwareVersion(5, 12)], ids=str)
 def test_ten_states_a_second_without_the_setup(version):
     bench = PortBench(version)
     client = Client(bench.secondary)
@@ -130,23 +126,12 @@ def test_ten_states_a_second_without_the_setup(version):
     assert all(95_000 <= b - a <= 105_000 for a, b in pairwise(stamps))
 
 
-def test_all_ports_send_the_same_states():
-    bench = PortBench()
-    clients = [Client(port) for port in bench.ports]
-    for client in clients:
-        client.take(V3_15)
-    bench.tick(50)
-    states = [[p for p, _ in client.take(V3_15) if isinstance(p, RobotState)] for client in clients]
-    assert len(states[0]) == 4
-    assert all(other == states[0] for other in states)
-
-
 def test_setup_comes_again_when_the_brakes_open():
     bench = PortBench(mode=RobotMode.POWER_OFF)
     client = Client(bench.secondary)
     client.take(V3_15)
     bench.tick(1, ReleaseBrakes())
-    bench.tick(600)
+    bench.tick(300)
     states = [state for state, _ in client.take(V3_15)]
     running = [state.find(L.RobotModeData).robot_mode == RobotMode.RUNNING for state in states]
     has_setup = [state.find(L.ConfigurationData) is not None for state in states]
@@ -178,16 +163,20 @@ def test_a_change_of_mode_and_a_state_that_shows_it_are_one_write(command, shown
         assert [type(message) for message in messages] == [M.SafetyModeMessage] * told
 
 
-def test_messages_go_to_the_primary_ports_only():
+def test_messages_go_to_the_primary_ports_and_the_same_states_to_all():
     bench = PortBench()
     clients = [Client(port) for port in bench.ports]
     for client in clients:
         client.take(V3_15)
     bench.start('def p():\n  textmsg("hello")\n  popup("text", "title", blocking=False)\nend\n')
-    bench.tick(20)
-    told = [[type(p) for p, _ in client.take(V3_15) if isinstance(p, M.RobotMessage)] for client in clients]
+    bench.tick(50)
+    taken = [[package for package, _ in client.take(V3_15)] for client in clients]
+    told = [[type(package) for package in one if isinstance(package, M.RobotMessage)] for one in taken]
     assert told[0] == told[2] == [M.KeyMessage, M.TextMessage, M.PopupMessage, M.KeyMessage]
     assert told[1] == told[3] == []
+    states = [[package for package in one if isinstance(package, RobotState)] for one in taken]
+    assert len(states[0]) == 4
+    assert all(other == states[0] for other in states)
 
 
 def test_read_only_ports_take_no_script():
