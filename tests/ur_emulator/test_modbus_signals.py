@@ -1,6 +1,6 @@
 """Modbus signals as programs see them: a controller without ports, units that answer at once.
 
-Values, names and most errors are in `chunks/modbus.script`; here is what takes many cycles and what a unit is asked.
+Values, names and errors are in `chunks/modbus.script`; here is what takes many cycles and what a unit is asked.
 """
 
 import pytest
@@ -197,34 +197,6 @@ def test_an_own_request_goes_through_the_connection_of_the_signals(bench):
 
 
 # --- errors
-
-
-@pytest.mark.parametrize("address", ["", "10.0.0.2:65536", "10.0.0.2:0", "10.0.0.2 "])
-def test_an_address_that_is_none_is_refused(bench, address):
-    assert error(bench, f'modbus_send_custom_command("{address}", 1, 6, [1])') == (
-        f'modbus_send_custom_command: "{address}" is not an address; write "ip" or "ip:port", port 1 to 65535'
-    )
-
-
-@pytest.mark.parametrize(
-    ("name", "arguments", "text"),
-    [
-        ("add_signal", '"10.0.0.2", 256, 0, 0, "s"', "Parameter 'slave_number' must be in the range 0 to 255, got 256"),
-        ("add_signal", '"10.0.0.2", 255, 65536, 0, "s"', "Parameter 'signal_address' must be in the range 0 to 65535, got 65536"),
-        ("add_signal", '"10.0.0.2", 255, 0, 0, ""', '"" is not a signal name; allowed: 1 to 20 characters'),
-        ("set_output_signal", '"x", True, False', 'there is no Modbus signal "x", add it with modbus_add_signal'),
-        ("set_output_register", '"r", -1, False', "-1 does not fit into a register; allowed: 0 to 65535"),
-        ("set_output_register", '"i", 1, False', 'signal "i" is a digital input, not a register output'),
-        ("set_signal_update_frequency", '"r", -1', "Parameter 'update_frequency' must be in the range 0 to 125, got -1"),
-        ("set_signal_update_frequency", '"r", to_num("nan")', "Parameter 'update_frequency' must be finite, got nan"),
-        ("set_digital_input_action", '"i", "dance"', "Parameter 'action' must be one of default, freedrive, got dance"),
-        ("send_custom_command", '"10.0.0.2", 1, 6, [0.5]', "data must be a list of up to 252 integers from 0 to 255"),
-    ],
-)  # fmt: skip
-def test_wrong_arguments_are_run_time_errors_of_one_line(bench, name, arguments, text):
-    run(bench, add("r", 3), add("i", 0))
-    assert error(bench, f"modbus_{name}({arguments})") == f"modbus_{name}: {text}"
-    assert set(bench.controller.state.modbus.signals) == {"r", "i"}
 
 
 def test_a_lost_signal_is_a_run_time_error_when_it_is_set_until_its_unit_answers(bench):
