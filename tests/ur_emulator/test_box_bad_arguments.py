@@ -92,7 +92,7 @@ def calls(row):
     yield ["[None]", *arguments[1:]]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_odd_arguments_do_no_harm(row):
     bench = ChunkBench(BoxChunk("", 1, ""))

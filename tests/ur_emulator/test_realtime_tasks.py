@@ -243,10 +243,7 @@ def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, mon
     assert bench.ask(operator.add, 1, 2) == 3
 
 
-@pytest.mark.parametrize(
-    ("how", "stopped"),
-    [(signal.SIGKILL, ""), (signal.SIGINT, ""), (signal.SIGKILL, "worker")],
-)
+@pytest.mark.parametrize(("how", "stopped"), [(signal.SIGINT, ""), (signal.SIGKILL, "worker")])
 def test_the_process_ends_with_the_one_that_started_it(how, stopped):
     """So do the box and the server of both: they hold the pipe for errors open as long as they live."""
     code = (
