@@ -335,6 +335,11 @@ def test_http_1_0_and_close_are_answered_and_closed(box):
         assert http.is_closed()
 
 
+def test_head_is_refused_without_a_body(http):
+    http.send(http.request("HEAD", "/v1/state"))
+    assert b"405" in http.stream.readline()
+
+
 def test_the_most_silent_client_makes_room_for_a_new_one(box):
     clients = [Http(box) for _ in range(BUDGETS.control_clients)]
     try:
