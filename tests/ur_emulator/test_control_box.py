@@ -6,7 +6,6 @@ import threading
 import time
 from dataclasses import replace
 from math import hypot
-from pathlib import Path
 
 import pytest
 from box_support import TIMEOUT, Bench, inside
@@ -46,7 +45,7 @@ LOOP = "def loop():\n  while True:\n    sync()\n  end\nend\n"
 
 @pytest.fixture
 def box():
-    with control_box(control_port=None) as box:
+    with control_box(control_port=None, in_process=True) as box:
         yield box
 
 
@@ -76,7 +75,7 @@ def test_the_state_has_what_is_to_be_drawn(tmp_path):
     scene = tmp_path / "scene.xml"
     scene.write_text(SCENE, "utf-8")
     planes = {"left": (0.0, -0.6, -0.8), "top": (0.0, 0.0, -1.0), "bottom": (0.0, 0.0, 1.0)}
-    with control_box(control_port=None, scene=scene) as box:
+    with control_box(control_port=None, in_process=True, scene=scene) as box:
         for name, normal in planes.items():
             box.set_safety_plane(name, [1.0, 2.0, 3.0], normal, "reduced")
         shapes = {shape.name: shape for shape in box.state.shapes}
@@ -106,14 +105,11 @@ def test_waiting_ends_in_the_cycle_in_which_all_holds(box):
     assert state.q == pytest.approx([0.5, -1.5, -1.8, 0, 1.2, 1.5], abs=0.01)
 
 
-def test_waiting_in_vain_says_for_what(box):
+def test_waiting_in_vain_says_for_what_and_waiting_for_nothing_is_refused(box):
     with pytest.raises(WaitTimeoutError, match="robot_mode is RUNNING, not IDLE, no log entry with 'x'"):
         box.wait_until(robot_mode="IDLE", steady=True, log="x", timeout=0.01)
     with pytest.raises(TimeoutError):
         box.wait_until(popup=True, timeout=0)
-
-
-def test_waiting_for_nothing_is_refused(box):
     with pytest.raises(ArgumentError, match="needs a condition"):
         box.wait_until()
 
@@ -138,24 +134,11 @@ def test_what_is_done_is_logged_and_what_is_asked_is_not(box):
     assert len(texts[1]) < 100
 
 
-def test_the_identity_says_what_the_box_is(box):
-    facts = box.identity
-    assert (facts["robot"], facts["software"], facts["pace"], facts["seed"]) == (
-        "UR3",
-        "3.15.8",
-        "lockstep",
-        7,
-    )
-    assert facts["ports"]["primary"] == box.ports.primary
-
-
 # --- wires
 
 
-@pytest.mark.parametrize(
-    ("group", "count", "shift"), [("standard", 8, 0), ("configurable", 8, 8), ("tool", 2, 16)]
-)
-def test_digital_inputs_are_set_one_by_one(box, group, count, shift):
+@pytest.mark.parametrize(("group", "count"), [("standard", 8), ("configurable", 8), ("tool", 2)])
+def test_digital_inputs_are_set_one_by_one(box, group, count):
     for n in range(count):
         box.set_digital_input(group, n, True)
         assert box.state.digital_inputs[group] == tuple(k == n for k in range(count))
@@ -169,14 +152,10 @@ def test_a_program_sees_inputs(box):
     box.set_analog_input("standard", 1, 2.5)
     box.set_analog_input("tool", 0, 10.0)
     box.run_program(
-        "def see():\n  textmsg(get_standard_digital_in(3), get_standard_digital_in(2))\n"
-        "  textmsg(get_standard_analog_in(1))\n  textmsg(get_tool_analog_in(0))\nend\n"
+        "textmsg(get_standard_digital_in(3), get_standard_analog_in(1))\ntextmsg(get_tool_analog_in(0))\n",
+        wait=True,
     )
-    box.wait_until(log="Program stopped")
-    texts = [entry.text for entry in box.log if entry.source == "Program"]
-    assert "TrueFalse" in texts
-    assert "2.5" in texts
-    assert "10" in "".join(texts)
+    assert {"True2.5", "10"} <= {entry.text for entry in box.log if entry.source == "Program"}
 
 
 def test_a_value_beyond_the_range_of_the_line_is_refused(box):
@@ -191,13 +170,10 @@ def test_a_value_beyond_the_range_of_the_line_is_refused(box):
 @pytest.mark.parametrize(
     ("kind", "arguments"),
     [
-        (SetDigitalInput, ("standard", 8, True)),
         (SetDigitalInput, ("tool", -1, True)),
         (SetDigitalInput, ("nowhere", 0, True)),
         (SetAnalogInput, ("standard", 2, 1.0)),
-        (SetAnalogInput, ("configurable", 0, 1.0)),
         (SetAnalogInput, ("standard", 0, float("nan"))),
-        (SetAnalogInput, ("standard", 0, -0.1)),
         (SetAnalogInput, ("tool", 0, 1e300)),
     ],
 )
@@ -220,12 +196,6 @@ def test_a_push_lasts_as_long_as_it_was_given(cycles):
     assert not bench.controller.is_active
 
 
-@pytest.mark.parametrize("duration", [-1.0, float("nan"), float("inf"), 1e9])
-def test_an_absurd_duration_is_refused(duration):
-    with pytest.raises(ArgumentError, match=r"duration .* given: allowed is 0 to 600 s"):
-        Push((1.0, 0.0, 0.0), duration=duration)
-
-
 DIRECTIONS = st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: hypot(*v) > 1e-3)
 
 
@@ -240,6 +210,8 @@ def test_what_rounding_puts_beyond_a_bound_is_on_it(force, point):
     )
     with pytest.raises(ArgumentError, match=r"force .* together at most 250 N"):
         Push([1.0001 * x for x in push])
+    with pytest.raises(ArgumentError, match=r"duration .* given: allowed is 0 to 600 s"):
+        Push(push, duration=600.1)
     assert Push(push, duration=600.0 * (1.0 + 1e-15)).duration == 600.0
 
 
@@ -289,17 +261,11 @@ def test_no_program_is_started_in_an_emergency_stop(box):
     assert state.safety_mode == "SYSTEM_EMERGENCY_STOP"
     with pytest.raises(RefusedError, match="not started"):
         box.run_program(MOVE)
-    box.release_emergency_stop()
-    box.power_on()
-    box.wait_until(robot_mode="IDLE")
-    box.release_brakes()
-    box.wait_until(robot_mode="RUNNING", safety_mode="NORMAL")
 
 
-@pytest.mark.parametrize(("name", "mode"), [("trigger_violation", "VIOLATION"), ("trigger_fault", "FAULT")])
-def test_violation_and_fault_are_left_by_a_restart(box, name, mode):
-    getattr(box, name)("the guard dog bit")
-    box.wait_until(safety_mode=mode, robot_mode="POWER_OFF", log="the guard dog bit")
+def test_a_violation_with_its_reason_is_left_by_a_restart(box):
+    box.trigger_violation("the guard dog bit")
+    box.wait_until(safety_mode="VIOLATION", robot_mode="POWER_OFF", log="the guard dog bit")
     box.restart_safety()
     box.wait_until(safety_mode="NORMAL", robot_mode="POWER_OFF")
 
@@ -342,21 +308,6 @@ def test_a_program_is_paused_resumed_and_stopped(box):
     box.stop_program()
 
 
-def test_a_program_that_is_played_is_paused_by_a_protective_stop_and_one_that_is_sent_ends(tmp_path):
-    (tmp_path / "loop.script").write_text(LOOP)
-    with control_box(programs=tmp_path) as box:
-        box.run_program(file="loop.script")
-        box.protective_stop()
-        box.wait_until(program_state="PAUSED")
-        with pytest.raises(RefusedError, match="stays paused"):
-            box.resume_program()
-        box.stop_program()
-        box.unlock_protective_stop()
-        box.run_program(LOOP)
-        box.protective_stop()
-        box.wait_until(program_state="STOPPED")
-
-
 def test_a_program_that_was_asked_for_before_one_that_has_begun_does_not_begin():
     with control_box(control_port=None, in_process=True) as box:
         inside(box)._box.newest = time.monotonic() + 3600.0
@@ -373,15 +324,19 @@ def test_a_program_can_be_waited_for_with_its_error(box):
 
 
 def test_a_program_comes_from_a_file_of_this_machine_or_of_the_box(tmp_path):
-    (tmp_path / "greet.script").write_text('textmsg("hello from a file")\n')
-    with control_box(programs=tmp_path) as box:
-        box.run_program(LOOP)
-        box.run_program(file="greet.script")
-        box.wait_until(log="hello from a file")
+    (tmp_path / "loop.script").write_text(LOOP)
+    with control_box(programs=tmp_path, in_process=True) as box:
+        box.run_program(file="loop.script")
+        box.protective_stop()
+        box.wait_until(program_state="PAUSED")  # one that is sent ends
+        with pytest.raises(RefusedError, match="stays paused"):
+            box.resume_program()
+        box.stop_program()
+        box.unlock_protective_stop()
         with pytest.raises(RefusedError, match="nowhere"):
             box.run_program(file="nowhere.script")
         (tmp_path / "sent.script").write_text('def f():\n  textmsg("sent as text")\nend\n')
-        box.run_program(Path(tmp_path / "sent.script"))
+        box.run_program(tmp_path / "sent.script")
         box.wait_until(log="sent as text")
 
 
@@ -426,7 +381,7 @@ def test_who_submits_a_command_gets_its_result(box):
 
 
 def test_a_box_that_does_not_run_says_so():
-    box = ControlBox(pace="lockstep", port_base=None)
+    box = ControlBox(pace="lockstep", port_base=None, in_process=True)
     with pytest.raises(NotRunningError, match="start it"):
         box.power_on()
     with box:
@@ -491,10 +446,10 @@ def test_many_threads_use_one_box(box):
     assert box.state.digital_inputs["standard"] == (False,) * 8
 
 
-@pytest.mark.parametrize("port", [-1, 65536])
-def test_a_control_port_that_is_none_is_refused(port):
-    with pytest.raises(EmulatorError, match=str(port)):
-        ControlBox(control_port=port)
+def test_a_control_port_that_is_none_is_refused():
+    for port in (-1, 65536):
+        with pytest.raises(EmulatorError, match=str(port)):
+            ControlBox(control_port=port)
 
 
 # --- robot time
@@ -544,14 +499,7 @@ def test_an_operation_acts_in_the_cycle_of_its_time(box):
     level = {"group": "standard", "n": 3, "level": True}
     tick = box.at(now.time + 0.5, "set_digital_input", level)
     assert tick == now.tick + 63  # 62.5 cycles on
-    program = """def watch():
-  while not get_standard_digital_in(3):
-    sync()
-  end
-  textmsg("seen")
-end
-"""
-    box.run_program(program)
+    box.run_program('while not get_standard_digital_in(3):\n  sync()\nend\ntextmsg("seen")\n')
     box.wait_until(log="seen")
     assert [entry.tick for entry in box.log if entry.text == "seen"] == [tick]
     assert box.wait_until(time=now.time + 0.5).digital_inputs["standard"][3]
@@ -567,7 +515,7 @@ def test_operations_of_one_cycle_act_in_the_order_in_which_they_were_asked_for(b
 
 def test_the_cycle_of_an_operation_does_not_depend_on_the_speed_of_the_machine():
     def run():
-        with control_box(control_port=None) as box:
+        with control_box(control_port=None, in_process=True) as box:
             box.at(box.state.time + 0.6, "protective_stop")
             box.run_program(MOVE)
             return box.wait_until(safety_mode="PROTECTIVE_STOP", steady=True).q
