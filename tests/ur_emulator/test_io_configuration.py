@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ur_emulator.machine.commands.programs import StopProgram
 from ur_emulator.machine.controller import modbus_map as port_map
-from ur_emulator.machine.controller.io.encoders import RANGES, Decoder, Encoder
+from ur_emulator.machine.controller.io.encoders import RANGES, Encoder
 from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS
 
 
@@ -48,13 +48,6 @@ def test_rows_do_not_overlap(rows):
     assert len(addresses) == len(set(addresses))
 
 
-@given(st.integers(128, 255), st.integers(-32768, 65535))
-def test_general_purpose_words(address, value):
-    state = BENCH.controller.state
-    assert port_map.write(state, False, address, value)
-    assert port_map.read_register(state, address) == value & 0xFFFF
-
-
 def test_tcp_pose_and_modes(bench):
     pose = bench.now.actual_tcp_pose
     for i in range(3):
@@ -86,16 +79,6 @@ def test_analogue_levels_are_parts_of_the_range(bench):
     port_map.write(bench.controller.state, False, 18, 0x8000)
     port_map.write(bench.controller.state, False, 19, 0)
     assert bench.controller.state.io.analog_out[1].value == pytest.approx(0.012, abs=1e-6)
-
-
-def test_register_booleans_are_shared(bench):
-    assert texts(
-        bench,
-        "write_port_bit(300, True)",
-        "textmsg(read_input_boolean_register(0))",
-        "write_output_boolean_register(127, True)",
-        "textmsg(read_port_bit(627))",
-    ) == ["True", "True"]
 
 
 def test_the_clock_stands_until_it_is_latched_again(bench):
@@ -150,9 +133,6 @@ def test_a_secondary_program_is_no_program_start(bench):
     assert bench.now.actual_digital_output_bits == 0
 
 
-QUADRATURE = ((0, 0), (1, 0), (1, 1), (0, 1))
-
-
 @given(st.sampled_from(sorted(RANGES)), st.data())
 def test_unwind_finds_the_difference_of_two_counts(range_id, data):
     low, size = RANGES[range_id]
@@ -162,32 +142,3 @@ def test_unwind_finds_the_difference_of_two_counts(range_id, data):
     way = data.draw(st.integers(-(size // 2) + 1, size // 2 - 1))
     end = (start + way - low) % size + low
     assert encoder.unwind(end - start) == way
-
-
-def pulses(decoder, steps, pins=(0, 1)):
-    bench = Bench()
-    bench.run(f"def p():\n  encoder_enable_pulse_decode(0, {decoder}, {pins[0]}, {pins[1]})\nend\n")
-    for a, b in steps:
-        bench.controller.state.io.digital_in = a << (pins[0] % 8) | b << (pins[1] % 8)
-        bench.tick()
-    return bench.controller.state.encoders[0].count
-
-
-def test_quadrature_counts_in_both_directions():
-    assert pulses(1, QUADRATURE[1:] + QUADRATURE) == 7
-    assert pulses(1, (QUADRATURE[1], QUADRATURE[2], QUADRATURE[1])) == 1
-    assert pulses(1, QUADRATURE[:0:-1]) == 65536 - 3
-    assert pulses(1, (QUADRATURE[2], QUADRATURE[0])) == 0
-
-
-def test_other_pins_and_their_later_numbers():
-    for pins in ((3, 2), (11, 10)):
-        assert pulses(3, [(1, 0), (0, 0), (1, 0)], pins) == 2
-
-
-def test_feeding_ends_decoding():
-    encoder = Encoder()
-    encoder.decode(Decoder.RISING, 0, 1, 0)
-    encoder.feed(4)
-    assert encoder.decoder is Decoder.OFF
-    assert encoder.is_enabled

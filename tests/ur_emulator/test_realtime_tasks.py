@@ -221,14 +221,6 @@ def test_a_task_that_is_dropped_does_not_hold_up_the_next(bench):
     assert has_ended(pid)
 
 
-def test_a_loop_that_ends_does_not_wait_for_its_task(bench):
-    pid = bench.ask(os.getpid)
-    bench.submit(signal.pause)
-    bench.tasks.close()
-    bench.loop.close()
-    assert has_ended(pid)
-
-
 def test_a_process_that_cannot_be_started_is_reported_and_tried_again(bench, monkeypatch):
     def fail(role):
         raise OSError("too many")
@@ -254,9 +246,8 @@ def test_the_process_ends_with_the_one_that_started_it(how, stopped):
         "    print(box.run_program('textmsg(1)'), flush=True)\n"
         "    signal.pause()\n"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as parent:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", code], **pipes) as parent:
         parent.stdout.readline()
         children = psutil.Process(parent.pid).children(recursive=True)
         if stopped:

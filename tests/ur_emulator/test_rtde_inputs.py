@@ -11,9 +11,8 @@ from protocol.rtde.codec import data_header
 from protocol.rtde.fields import INPUTS, output_fields
 from protocol.rtde.recipe import Recipe, snapshot_encoder
 from protocol.rtde.types import RtdeType
-from protocol.ur_types import ProgramState, SafetyMode, SoftwareVersion
+from protocol.ur_types import SafetyMode, SoftwareVersion
 from ur_emulator.machine.commands.client_writes import WriteInputs
-from ur_emulator.machine.commands.programs import ResumeProgram
 from ur_emulator.machine.commands.safety import TriggerProtectiveStop
 from ur_emulator.machine.controller.status_words import safety_status_bits
 
@@ -168,37 +167,6 @@ def watching(call):
     return bench
 
 
-def reports(bench):
-    return [event.text for event in bench.events if getattr(event, "code", None) == 207]
-
-
-def test_a_paused_program_is_reported_once_and_watched_again_when_it_goes_on():
-    bench = watching(f'rtde_set_watchdog("{REGISTER}", 10)')
-    bench.tick(13)  # 0.1 s are 12.5 cycles
-    assert not bench.controller.programs.is_paused
-    bench.tick(2)
-    assert bench.now.runtime_state == ProgramState.PAUSED
-    bench.tick(100)
-    assert len(reports(bench)) == 1
-    bench.tick(1, ResumeProgram())
-    for _ in range(30):
-        bench.tick(1, WRITE)
-    bench.tick(10)
-    assert bench.now.runtime_state == ProgramState.PLAYING
-    bench.tick(10)
-    assert bench.now.runtime_state == ProgramState.PAUSED
-    assert len(reports(bench)) == 2
-
-
-def test_of_two_late_variables_the_one_that_stops_counts():
-    bench = watching(
-        f'rtde_set_watchdog("{REGISTER}", 10, "pause")\n  rtde_set_watchdog("input_int_register_25", 10, "stop")'
-    )
-    bench.tick(14)
-    assert not bench.controller.programs.is_running
-    assert "input_int_register_25" in reports(bench)[0]
-
-
 @pytest.mark.parametrize(("frequency", "cycles"), [(62.5, 2), (10, 13), (200, 1)])
 def test_packages_at_the_minimum_frequency_are_enough_and_one_cycle_more_is_not(frequency, cycles):
     bench = watching(f'rtde_set_watchdog("{REGISTER}", {frequency}, "stop")')
@@ -211,12 +179,6 @@ def test_packages_at_the_minimum_frequency_are_enough_and_one_cycle_more_is_not(
     assert bench.controller.programs.is_running
     bench.tick()
     assert not bench.controller.programs.is_running
-
-
-def test_a_frequency_of_0_takes_a_watchdog_away():
-    bench = watching(f'rtde_set_watchdog("{REGISTER}", 10, "stop")\n  rtde_set_watchdog("{REGISTER}", 0)')
-    bench.tick(100)
-    assert bench.controller.programs.is_running
 
 
 # --- a force sensor whose readings come through RTDE
@@ -264,13 +226,3 @@ def test_the_zero_is_that_of_the_sensor_that_was_just_enabled():
 def test_without_a_sensor_the_input_changes_nothing_and_nonsense_is_no_force():
     assert sensed("sync()", (500.0, 0, 0, 0, 0, 0)).now.tcp_force_scalar < 100.0
     assert not any(sensed(f"{ENABLE})", (math.nan,) * 6).now.actual_tcp_force)
-
-
-def test_an_enabled_sensor_must_speak_ten_times_a_second():
-    bench = sensed("ft_rtde_input_enable(True)")
-    for _ in range(5):
-        bench.tick(12)
-        write(bench, {"external_force_torque": READING})
-    assert bench.controller.programs.is_running
-    bench.tick(14)
-    assert bench.controller.programs.is_paused
