@@ -41,25 +41,23 @@ def test_the_second_record_differs_in_every_field():
     assert not [f.name for f in fields(CB3) if getattr(SECOND, f.name) == getattr(CB3, f.name)]
 
 
-def test_every_arm_names_its_generation_and_the_box_follows_it(box):
+def test_the_box_follows_its_generation(box):
     assert UR3.generation is CB3
     assert inside(box)._box.controller.generation is SECOND
     assert box.identity["software"] == "5.1.0"
+    box.run_program("def p():\n  textmsg(get_steptime())\nend\n")
+    box.wait_until(log="0.004")
+    with pytest.raises(ArgumentError, match=MISSING_BUILTIN):
+        box.run_program(f'def p():\n  {MISSING_BUILTIN}("x")\nend\n')
 
 
-def test_the_dashboard_has_its_commands(box):
+def test_ports_have_its_commands_columns_sub_packages_and_variables(box):
     with Dashboard(box) as dashboard:
         assert dashboard.ask("PolyscopeVersion") == "second: URSoftware 5.1.0.77 (Feb 03 2031)"
         assert dashboard.ask("power on") == "could not understand: 'power on'"
-
-
-def test_frames_have_its_columns_and_its_size(box):
     with connect(box, "realtime") as sock:
         frame = FrameReader(sock).next()
     assert (frame.layout.size, frame.names[-1]) == (1060, "runtime_state")
-
-
-def test_states_have_its_sub_packages_and_configuration(box):
     with connect(box, "primary") as sock:
         reader = MessageReader(sock)
         version = reader.message(VersionMessage)
@@ -68,11 +66,7 @@ def test_states_have_its_sub_packages_and_configuration(box):
     assert state.find(MasterboardData) is not None
     assert state.find(ForceModeData) is None
     configuration = state.find(ConfigurationData)
-    assert configuration.robot_sub_type == 3
-    assert configuration.joint_max_acceleration == (55.0,) * 6
-
-
-def test_rtde_has_its_variables_and_its_rate(box):
+    assert (configuration.robot_sub_type, configuration.joint_max_acceleration) == (3, (55.0,) * 6)
     with connect(box, "rtde") as sock:
         client = RtdeClient(sock)
         assert client.ask(R.GetControllerVersion()).version == (5, 1, 0, 77)
@@ -81,18 +75,13 @@ def test_rtde_has_its_variables_and_its_rate(box):
         assert outputs.types == inputs.types == ("DOUBLE", "NOT_FOUND")
 
 
-def test_programs_have_its_builtins(box):
-    box.run_program("def p():\n  textmsg(get_steptime())\nend\n")
-    box.wait_until(log="0.004")
-    with pytest.raises(ArgumentError, match=MISSING_BUILTIN):
-        box.run_program(f'def p():\n  {MISSING_BUILTIN}("x")\nend\n')
-
-
 def test_an_arm_is_as_good_as_one_of_its_fidelities():
     bench = Bench(generation=SECOND, fidelity="exact")
     assert bench.controller.plant.fidelity.dead_time == pytest.approx(CB3.fidelity("ideal").dead_time + 0.004)
     with pytest.raises(EmulatorError, match="unknown fidelity 'poor': choose one of exact, ideal, typical"):
         ControlBox(in_process=True, fidelity="poor", generation=SECOND)
+    with pytest.raises(EmulatorError, match=r"software of the test series is 4\.x"):
+        ControlBox(in_process=True, generation=replace(CB3, name="test series", major=4))
 
 
 def test_reduced_and_recovery_mode_have_its_limits():
@@ -206,36 +195,6 @@ def test_a_stream_of_speedj_reaches_its_speed_and_goes_as_far(generation):
     assert bench.now.actual_q[0] == pytest.approx(bench.now.target_q[0], abs=0.01)
 
 
-FOLLOW = """q = get_actual_joint_positions()
-while True:
-  q[0] = q[0] + 0.2 * get_steptime()
-  servoj(q, t=get_steptime(), lookahead_time=0.1, gain=300)
-end"""
-
-
-@every_generation
-def test_a_stream_of_servoj_follows_in_the_same_time(generation):
-    bench = Bench(generation=generation, fidelity="exact")
-    q_before = bench.now.actual_q[0]
-    bench.start(body(FOLLOW))
-    bench.tick(generation.cycles(1.0))
-    # The lag is the lookahead time.
-    assert bench.now.target_q[0] - q_before == pytest.approx(0.2 * (1.0 - 0.1), abs=0.2 * SLACK)
-    assert bench.now.target_qd[0] == pytest.approx(0.2, abs=0.005)
-
-
-@every_generation
-def test_measurements_are_behind_the_target_by_the_same_time(generation):
-    bench = Bench(generation=generation)
-    bench.start(body("speedj([0.2, 0, 0, 0, 0, 0], 1, 2)"))
-    bench.tick(generation.cycles(1.0))
-    lag = (bench.now.target_q[0] - bench.now.actual_q[0]) / 0.2
-    fidelity = bench.controller.plant.fidelity
-    # The target of a package is that of a cycle before.
-    expected = fidelity.drive_lag + fidelity.feedback_age - generation.period_s
-    assert lag == pytest.approx(expected, abs=SLACK)
-
-
 @every_generation
 def test_a_watchdog_counts_seconds(generation):
     bench = Bench(generation=generation)
@@ -301,9 +260,3 @@ def test_rtde_has_whole_parts_of_the_full_rate(generation, frequency):
     # 10 of 125 a second are every twelfth.
     cycles = int(generation.cycle_rate / frequency)
     assert np.diff(stamps) == pytest.approx(cycles * generation.period_s)
-
-
-def test_a_box_of_another_generation_names_its_software():
-    other = replace(CB3, name="test series", major=4)
-    with pytest.raises(EmulatorError, match=r"software of the test series is 4\.x"):
-        ControlBox(in_process=True, generation=other)

@@ -11,6 +11,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 from box_support import MessageReader, connect, program
+from dashboard_support import Dashboard
 
 from protocol.primary.messages import TextMessage
 from ur_emulator import ControlBox
@@ -132,8 +133,9 @@ def test_sockets_calls_and_modbus_units_of_a_program_are_explained(file):
     assert_identical(file, 40)
 
 
-def test_grippers_are_explained(file):
-    with kept(file, robot="ur5e", tool="robotiq-2f85") as box:
+def test_a_gripper_a_program_file_and_what_clients_write_are_explained(file, tmp_path):
+    (tmp_path / "one.script").write_text(MOVE)
+    with kept(file, robot="ur5e", tool="robotiq-2f85", programs=tmp_path) as box:
         with connect(box, "gripper") as client:
             for words in (b"SET ACT 1\n", b"SET POS 200\n", b"SET GTO 1\n"):
                 client.sendall(words)
@@ -144,23 +146,10 @@ def test_grippers_are_explained(file):
         with connect(box, "modbus") as client:
             client.sendall(bytes.fromhex("000100000006ff0600800102"))
             assert len(client.recv(12)) == 12
+        with Dashboard(box) as dashboard:
+            assert dashboard.ask_all("load one.script", "play")[1] == "Starting program"
+        box.wait_until(program_state="STOPPED", steady=True)
     assert_identical(file, 1000)
-
-
-def test_a_program_file_and_what_clients_write_are_explained(file, tmp_path):
-    folder = tmp_path / "programs"
-    folder.mkdir()
-    (folder / "one.script").write_text(MOVE)
-    with kept(file, programs=folder) as box:
-        with connect(box, "dashboard") as client:
-            words = client.makefile("rw", newline="\n")
-            words.readline()
-            for line in ("load one.script", "play"):
-                words.write(line + "\n")
-                words.flush()
-                words.readline()
-        box.wait_until(log="Program stopped")
-    assert_identical(file, 50)
 
 
 def test_another_process_with_another_hash_seed_finds_the_same(file):
