@@ -25,7 +25,7 @@ from ur_emulator.errors import (
     WaitTimeoutError,
 )
 from ur_emulator.host import served_box
-from ur_emulator.machine.commands.programs import AnswerRequest, StopProgram
+from ur_emulator.machine.commands.programs import StopProgram
 from ur_emulator.machine.commands.surroundings import (
     FARTHEST,
     MAX_FORCE,
@@ -114,14 +114,6 @@ def test_waiting_in_vain_says_for_what_and_waiting_for_nothing_is_refused(box):
         box.wait_until()
 
 
-def test_the_log_can_be_waited_for_also_what_is_there_already(box):
-    box.add_to_log("here it is")
-    box.wait_until(log="here it")
-    seen = len(box.log)
-    with pytest.raises(WaitTimeoutError):
-        box.wait_until(log="here it", after=seen, timeout=0.01)
-
-
 def test_what_is_done_is_logged_and_what_is_asked_is_not(box):
     before = len(box.log)
     _ = box.state, box.identity
@@ -132,6 +124,9 @@ def test_what_is_done_is_logged_and_what_is_asked_is_not(box):
     assert texts[0] == "push force=(1.0, 0.0, 0.0) point=(0.0, 0.0, 0.0) duration=0.1"
     assert texts[1].startswith("run_program script=def move(): movej([0.5")
     assert len(texts[1]) < 100
+    box.wait_until(log="push force")  # also what is there already
+    with pytest.raises(WaitTimeoutError):
+        box.wait_until(log="push force", after=len(box.log), timeout=0.01)
 
 
 # --- wires
@@ -242,9 +237,9 @@ def test_an_obstacle_stands_in_the_way_until_it_is_removed(box):
 
 
 def test_what_a_program_prints_refuses_nothing(box):
-    lines = ["obstacle box: hello", "play failed: hello", "program loop not started: hello"]
-    printed = "".join(f'    textmsg("{line}")\n' for line in lines)
-    box.run_program(f"def loop():\n  while True:\n{printed}    sync()\n  end\nend\n")
+    box.run_program(
+        'def loop():\n  while True:\n    textmsg("obstacle box: hello")\n    sync()\n  end\nend\n'
+    )
     box.add_obstacle("box", "box", (0.1, 0.1, 0.1), (1, 0, 0, 0, 0, 0))
     assert box.state.obstacles == ("box",)
     with pytest.raises(RefusedError, match=r"^obstacle box: the arm is where it should stand"):
@@ -273,21 +268,17 @@ def test_a_violation_with_its_reason_is_left_by_a_restart(box):
 # --- programs
 
 
-def test_a_program_that_does_not_compile_says_where(box):
-    with pytest.raises(ArgumentError, match=r"does not compile.*\(line 2, column 7\)") as caught:
-        box.run_program("def f():\n  x = = 1\nend\n")
-    assert "\n" not in str(caught.value)
-    with pytest.raises(ArgumentError, match="either"):
-        box.run_program()
-    with pytest.raises(ArgumentError, match="either"):
-        box.run_program(MOVE, file="move")
-
-
-def test_a_program_file_in_utf_16_is_refused_as_that(box, tmp_path):
+def test_a_program_that_cannot_be_read_says_why(box, tmp_path):
     path = tmp_path / "windows.script"
     path.write_text(MOVE, encoding="utf-16")
-    with pytest.raises(ArgumentError, match="is UTF-16 text"):
-        box.run_program(path)
+    for words, options, why in (
+        (["def f():\n  x = = 1\nend\n"], {}, r"does not compile[^\n]*\(line 2, column 7\)$"),
+        ([], {}, "either"),
+        ([MOVE], {"file": "move"}, "either"),
+        ([path], {}, "is UTF-16 text"),
+    ):
+        with pytest.raises(ArgumentError, match=why):
+            box.run_program(*words, **options)
     path.write_text(MOVE, encoding="utf-8-sig")
     box.run_program(path)
 
@@ -343,21 +334,15 @@ def test_a_program_comes_from_a_file_of_this_machine_or_of_the_box(tmp_path):
 # --- the operator
 
 
-def test_answers_without_a_question_are_refused(box):
-    with pytest.raises(RefusedError, match="none is open"):
-        box.answer(1)
-    with pytest.raises(ArgumentError):
-        box.answer([1])
-
-
-def test_popups_are_seen_and_closed(box):
+def test_popups_are_seen_and_closed_and_what_cannot_be_said_is_refused(box):
     box.run_program('def pop():\n  popup("mind your head", blocking=True)\n  textmsg("closed")\nend\n')
     assert box.wait_until(popup=True).popups == ("mind your head",)
     box.close_popups()
     box.wait_until(popup=False, log="closed")
-
-
-def test_a_text_that_nobody_can_send_on_is_refused(box):
+    with pytest.raises(RefusedError, match="none is open"):
+        box.answer(1)
+    with pytest.raises(ArgumentError):
+        box.answer([1])
     for text in ("\ud800", "x" * 1001, None, 3):
         with pytest.raises(ArgumentError):
             box.add_to_log(text)
@@ -368,14 +353,10 @@ def test_a_text_that_nobody_can_send_on_is_refused(box):
 
 def test_who_submits_a_command_gets_its_result(box):
     told = queue.SimpleQueue()
-    for command in (Push((1, 0, 0), duration=0.1), RemoveObstacle("wall"), AnswerRequest(1), StopProgram()):
+    for command in (Push((1, 0, 0), duration=0.1), RemoveObstacle("wall")):
         box.submit(command, lambda result, refusal: told.put((result, refusal and str(refusal))))
-    assert [told.get(timeout=TIMEOUT) for _ in range(4)] == [
-        (None, None),
-        (None, "there is no obstacle 'wall': there is none"),
-        (None, "1 answers no question: none is open"),
-        (None, None),
-    ]
+    assert told.get(timeout=TIMEOUT) == (None, None)
+    assert told.get(timeout=TIMEOUT) == (None, "there is no obstacle 'wall': there is none")
     box.submit(RemoveObstacle("wall"))  # nobody wants to know
     assert box.state.robot_mode == "RUNNING"
 
@@ -446,20 +427,13 @@ def test_many_threads_use_one_box(box):
     assert box.state.digital_inputs["standard"] == (False,) * 8
 
 
-def test_a_control_port_that_is_none_is_refused():
-    for port in (-1, 65536):
-        with pytest.raises(EmulatorError, match=str(port)):
-            ControlBox(control_port=port)
-
-
 # --- robot time
 
 
 def test_in_lockstep_time_passes_until_the_time_that_is_waited_for(box):
     begin = box.state
-    assert box.wait_until(time=begin.time + 1.0).tick == begin.tick + 125
-    assert box.wait_until(time=begin.time).tick == begin.tick + 125  # has been
-    assert box.state.tick == begin.tick + 125
+    for moment in (begin.time + 1.0, begin.time):  # the second has been
+        assert box.wait_until(time=moment).tick == box.state.tick == begin.tick + 125
 
 
 @pytest.mark.parametrize(
@@ -506,13 +480,6 @@ def test_an_operation_acts_in_the_cycle_of_its_time(box):
     assert f"set_digital_input at {now.time + 0.5:g} s: done" in [entry.text for entry in box.log]
 
 
-def test_operations_of_one_cycle_act_in_the_order_in_which_they_were_asked_for(box):
-    time = box.state.time + 0.1
-    for fraction in (0.1, 0.7, 0.4):
-        box.at(time, "set_speed", {"fraction": fraction})
-    assert box.wait_until(time=time).speed == 0.4
-
-
 def test_the_cycle_of_an_operation_does_not_depend_on_the_speed_of_the_machine():
     def run():
         with control_box(control_port=None, in_process=True) as box:
@@ -523,10 +490,12 @@ def test_the_cycle_of_an_operation_does_not_depend_on_the_speed_of_the_machine()
     assert run() == run()
 
 
-def test_an_operation_that_is_refused_at_its_time_stands_in_the_log(box):
+def test_operations_of_one_cycle_act_in_their_order_and_a_refused_one_stands_in_the_log(box):
     time = box.state.time + 0.1
+    for fraction in (0.1, 0.7, 0.4):
+        box.at(time, "set_speed", {"fraction": fraction})
     box.at(time, "resume_program")
-    box.wait_until(time=time)
+    assert box.wait_until(time=time).speed == 0.4
     (text,) = [entry.text for entry in box.log if "resume_program at" in entry.text]
     assert "refused: there is no program to resume" in text
 

@@ -431,6 +431,12 @@ def test_a_token_that_is_none(token):
         ControlBox(control_port=0, control_token=token)
 
 
+def test_a_control_port_that_is_none_is_refused():
+    for port in (-1, 65536):
+        with pytest.raises(EmulatorError, match=str(port)):
+            ControlBox(control_port=port)
+
+
 def test_beyond_loopback_a_control_port_demands_a_token():
     for host in ("0.0.0.0", "::", "192.0.2.1", "box.example", "127.0.0.1.example"):
         with pytest.raises(EmulatorError, match="give it a token"):
