@@ -1,7 +1,7 @@
 """Programs from a folder: names and places, script files, what is loaded, External Control."""
 
 import pytest
-from box_support import FakeNetwork, FrameReader, MessageReader, connect, listening_socket
+from box_support import FakeNetwork, MessageReader, connect, listening_socket
 from dashboard_support import (
     Dashboard,
     external_control,
@@ -189,20 +189,6 @@ def test_a_program_that_was_sent_shows_the_loaded_name(box, dashboard):
         "Stopped",
         "Starting program",
     ]
-
-
-def test_a_move_of_a_program_file_goes_to_its_waypoint(box, dashboard, folder):
-    waypoint = (
-        '<Waypoint type="Fixed" name="W"><motionParameters/><position><JointAngles angles="0.3,-1.4,-1.7,0.1,1.2,1.4"/>'
-        "</position></Waypoint>"
-    )
-    (folder / "go.urp").write_bytes(
-        urp(f'<Move motionType="MoveJ" speed="1.0" acceleration="1.4"><children>{waypoint}</children></Move>')
-    )
-    with connect(box, "realtime") as sock:
-        frames = FrameReader(sock)
-        dashboard.ask_all("load go.urp", "play")
-        frames.until(lambda frame: abs(frame.target_q - [0.3, -1.4, -1.7, 0.1, 1.2, 1.4]).max() < 1e-9)
 
 
 # --- installations

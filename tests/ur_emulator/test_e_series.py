@@ -20,6 +20,7 @@ from e_series_support import ESeriesBench, program
 from plant_support import target
 
 from protocol.ur_types import SafetyMode
+from ur_emulator.host.ports.primary.robot_state import dexterity
 from ur_emulator.machine.commands.safety import UnlockProtectiveStop
 from ur_emulator.machine.controller.arm_in_space import ArmInSpace
 from ur_emulator.machine.controller.safety.limit_checks import clamping_gap
@@ -105,6 +106,9 @@ def test_jacobian():
     assert np.array(list(bench["a"])) == pytest.approx(expected, abs=1e-9)
     assert bench["b"] == bench["a"]
     assert bench["here"] == bench["measured"]
+    # What a state says; in one of the maker's simulator it is the squared determinant too, 0.0035351144.
+    here = np.linalg.det(list(bench["here"]))
+    assert dexterity(bench.controller.state.arm, bench.now) == pytest.approx(here**2, rel=1e-6)
 
 
 def test_jacobian_time_derivative():

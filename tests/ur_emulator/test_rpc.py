@@ -26,60 +26,36 @@ from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.scripting import rpc_builtins
 
 
-class FakeCall:
-    """A call that ends when the test says so."""
-
-    def __init__(self, network, number, method, arguments):
-        self._network, self._number = network, number
-        self.method = method
-        self.arguments = arguments
-
-    def answer(self, value):
-        self._network.answer(CallEnded(self._number, value, ""))
-
-
-class FakeServer:
-    """A server whose procedures are the test."""
-
-    def __init__(self):
-        self.calls = []
-        self.closed = 0
-
-
 class RpcNetwork(FakeNetwork):
-    """Knows servers, by their numbers."""
+    """Keeps the calls: (number, server, method, arguments), and the servers whose connection was closed."""
 
     def __init__(self):
         super().__init__()
-        self.servers = {}
+        self.calls, self.closed = [], []
 
     def call(self, request, method, arguments):
-        server = self.servers.setdefault(request.server, FakeServer())
-        server.calls.append(FakeCall(self, request.call, method, arguments))
+        self.calls.append((request.call, request.server, method, arguments))
 
     def close_server(self, server):
-        self.servers[server].closed += 1
-
-    def answer(self, arrival):
-        self._arrivals.append(arrival)
+        self.closed.append(server)
 
 
 class RpcBench(Bench):
-    """A bench whose network knows servers."""
+    """A bench whose remote procedures are the test."""
 
     def __init__(self, **kwargs):
         super().__init__(network=RpcNetwork(), **kwargs)
-
-    @property
-    def servers(self):
-        return list(self.network.servers.values())
 
     def call(self, arguments=""):
         self.start(
             f'def p():\n  h = rpc_factory("xmlrpc", "http://x:1")\n  x = h.work({arguments})\n'
             '  textmsg("got ", x)\nend\n'
         )
-        return self.servers[-1].calls[-1]
+
+    def answer(self, value):
+        """End the last call, and give the program a cycle."""
+        self.network._arrivals.append(CallEnded(self.network.calls[-1][0], value, ""))
+        self.tick()
 
     @property
     def texts(self):
@@ -88,37 +64,35 @@ class RpcBench(Bench):
 
 def test_a_text_is_utf_8_in_a_program():
     bench = RpcBench()
-    call = bench.call('"\xc3\xa9", "\xe9"')
-    assert call.arguments == ["\u00e9", "\xe9"]  # what is none goes out byte by byte
-    call.answer("\u00e9")
-    bench.tick()
+    bench.call('"\xc3\xa9", "\xe9"')
+    assert bench.network.calls[0][3] == ["\u00e9", "\xe9"]  # what is none goes out byte by byte
+    bench.answer("\u00e9")
     assert bench.texts[-1] == "got \xc3\xa9"
 
 
 def test_a_result_without_counterpart_ends_the_program_and_its_connection():
     bench = RpcBench()
-    bench.call().answer(object())
-    bench.tick()
+    bench.call()
+    bench.answer(object())
     assert any("the result" in text for text in bench.texts)
     assert not bench.controller.programs.is_running
-    assert bench.servers[0].closed == 1
+    assert bench.network.closed == [bench.network.calls[0][1]]
 
 
 @pytest.mark.parametrize(("n", "told"), [(255, "got {"), (256, "has no counterpart in a script")])
 def test_members_of_a_struct_have_names_of_a_script(n, told):
     bench = RpcBench(robot="ur5e", generation=E_SERIES)
-    bench.call().answer({"m" * n: 1})
-    bench.tick()
+    bench.call()
+    bench.answer({"m" * n: 1})
     assert told in bench.texts[-1]
 
 
 def test_a_program_that_is_stopped_closes_what_it_opened():
     bench = RpcBench()
-    call = bench.call()
+    bench.call()
     bench.tick(1, StopProgram())
-    assert bench.servers[0].closed == 1
-    call.answer(1)
-    bench.tick(3)
+    assert bench.network.closed == [bench.network.calls[0][1]]
+    bench.answer(1)
     assert not any(text.startswith("got") for text in bench.texts)
 
 
@@ -132,13 +106,10 @@ def test_so_many_values_are_sent_in_8_ms_and_a_longer_call_takes_the_room_of_the
         'def p():\n  thread t():\n    h.second([1])\n  end\n  h = rpc_factory("xmlrpc", "http://10.0.0.1/")\n'
         "  x = [0" + ", 0" * 98 + "]\n  sync()\n  run t()\n  h.first(x)\nend\n"
     )
+    bench.tick(cycles)
+    assert [method for _, _, method, _ in bench.network.calls] == ["first"]
     bench.tick()
-    [server] = bench.servers
-    assert [call.method for call in server.calls] == ["first"]
-    bench.tick(cycles - 1)
-    assert len(server.calls) == 1
-    bench.tick()
-    assert [call.method for call in server.calls] == ["first", "second"]
+    assert [method for _, _, method, _ in bench.network.calls] == ["first", "second"]
 
 
 # --- over real sockets

@@ -2,7 +2,6 @@
 
 from itertools import pairwise
 
-import numpy as np
 import pytest
 from box_support import Bench, FakeConnection
 
@@ -15,7 +14,7 @@ from protocol.primary.values import ProgramStateMessage
 from protocol.script_channel import CONTROLLER_WORDS
 from protocol.ur_types import SIMULATED_MASTERBOARD, RobotMode, SafetyMode, SoftwareVersion
 from ur_emulator.host.ports.primary.port import PrimaryPort, message_for
-from ur_emulator.host.ports.primary.robot_state import StateEncoder, dexterity, setup_records
+from ur_emulator.host.ports.primary.robot_state import StateEncoder, setup_records
 from ur_emulator.host.ports.script_intake import SPEED_WORD, WORDS, Sender
 from ur_emulator.machine.commands.power import PowerOff, ReleaseBrakes
 from ur_emulator.machine.commands.safety import (
@@ -240,31 +239,7 @@ def test_every_word_of_the_table_is_known_to_the_box():
 # --- what states say of the arm
 
 
-def dh_jacobian(rows, q):
-    """Jacobian of the flange by the textbook, from a table of DhRow."""
-    T, frames = np.eye(4), [np.eye(4)]
-    for row, angle in zip(rows, q, strict=True):
-        ct, st = np.cos(angle + row.theta), np.sin(angle + row.theta)
-        ca, sa = np.cos(row.alpha), np.sin(row.alpha)
-        T = T @ [[ct, -st * ca, st * sa, row.a * ct], [st, ct * ca, -ct * sa, row.a * st], [0, sa, ca, row.d],
-                 [0, 0, 0, 1]]  # fmt: skip
-        frames.append(T)
-    columns = [np.r_[np.cross(F[:3, 2], T[:3, 3] - F[:3, 3]), F[:3, 2]] for F in frames[:6]]
-    return np.array(columns).T
-
-
-def test_dexterity_is_the_squared_determinant_of_the_jacobian():
-    """As in a state of the maker's simulator of a UR5e: 0.0035351144 at its joint angles."""
-    bench = Bench()
-    arm = bench.controller.state.arm
-    rows = arm.dh
-    expected = np.linalg.det(dh_jacobian(rows, bench.now.actual_q)) ** 2
-    assert dexterity(arm, bench.now) == pytest.approx(expected, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "robot_type", "box_type"), [("ur3", 3, 6), ("ur5", 1, 4), ("ur10", 2, 5), ("ur5e", 1, 4)]
-)
+@pytest.mark.parametrize(("name", "robot_type", "box_type"), [("ur3", 3, 6), ("ur10", 2, 5), ("ur5e", 1, 4)])
 def test_configuration_is_that_of_the_model(name, robot_type, box_type):
     robot = robot_by_name(name)
     configuration = next(
