@@ -255,17 +255,13 @@ def test_a_program_that_fails_is_a_failure_of_the_command_that_waits_for_it(ctl)
 
 def test_the_whole_log_comes_although_the_box_gives_some_entries_at_a_time(box, ctl):
     texts = [f"entry {k} of many" for k in range(2 * BUDGETS.log_entries + 1)]
-    for text in texts:
+    for text in (*texts, "\x1b[2J\r\x9b\u202e"):
         box.add_to_log(text)
     code, out, _ = ctl("log")
     assert code == 0
+    assert r"Control: \x1b[2J\r\x9b\u202e" in out  # it is shown and not obeyed
     assert [line.partition("Control: ")[2] for line in out.splitlines() if "of many" in line] == texts
     assert len(json.loads(ctl("log", "--json")[1])["entries"]) == len(out.splitlines())
-
-
-def test_what_others_have_said_is_shown_and_not_obeyed(box, ctl):
-    box.add_to_log("\x1b[2J\r\x9b\u202e")
-    assert r"Control: \x1b[2J\r\x9b\u202e" in ctl("log")[1]
 
 
 def test_a_program_that_is_too_long_is_not_sent_and_the_message_says_where_to(ctl, tmp_path):
@@ -301,16 +297,12 @@ def test_a_mistake_is_one_line_and_its_exit_code(ctl, words, code, says):
     assert err.count("\n") == 1
 
 
-def test_no_box_is_one_line_and_exit_1(capsys):
-    assert main(["state", "--control-port", "1"]) == 1
-    err = capsys.readouterr().err
-    assert "no box answers at 127.0.0.1:1" in err
-    assert err.count("\n") == 1
-
-
-def test_another_server_is_no_box(box, capsys):
-    assert main(["state", "--control-port", str(box.ports.dashboard)]) == 1
-    assert "no box answers" in capsys.readouterr().err
+def test_nobody_and_another_server_are_no_box(box, capsys):
+    for port in (1, box.ports.dashboard):
+        assert main(["state", "--control-port", str(port)]) == 1
+        err = capsys.readouterr().err
+        assert f"no box answers at 127.0.0.1:{port}" in err
+        assert err.count("\n") == 1
 
 
 def test_the_log_is_followed_until_the_box_ends(tmp_path):

@@ -191,18 +191,6 @@ def test_what_was_written_is_read_back_at_once(client):
     assert client.read_holding_registers(129, count=5).registers == [0, 1, 2, 65535, 0]
 
 
-def test_outputs_by_coils_and_words(client):
-    client.write_register(1, 0)
-    assert client.write_coil(17, True).bits[0]
-    assert client.read_holding_registers(1).registers == [0b10]
-    assert client.write_coils(20, [True, False, True]).count == 3
-    assert client.read_holding_registers(1).registers == [0b1010010]
-    client.write_coil(49, True)  # clear output 1
-    client.write_register(2, 0b1)  # set output 0
-    assert client.read_coils(16, count=8).bits == [True, False, False, False, True, False, True, False]
-    client.write_register(1, 0)
-
-
 def test_scripts_and_clients_share_words_and_booleans(box, client):
     client.write_register(140, 4711)
     client.write_coils(364, [True, False, True])

@@ -103,12 +103,6 @@ def test_a_frequency_that_nobody_lives_to_see(bench):
 # --- life
 
 
-def test_a_signal_that_is_replaced_is_forgotten_and_its_unit_is_not(bench):
-    run(bench, add("s", 2), "sync()", add("s", 2, 6))
-    assert (5, "forgotten") in unit(bench).log
-    assert not unit(bench).is_released
-
-
 def test_adding_the_same_signal_again_keeps_its_value_but_not_its_settings(bench):
     unit(bench).memory[0, 5] = 1
     texts = run(
@@ -126,8 +120,9 @@ def test_adding_the_same_signal_again_keeps_its_value_but_not_its_settings(bench
     assert (signal.action, signal.frequency) == ("default", 10.0)
 
 
-def test_a_unit_is_released_with_its_last_signal(bench):
-    run(bench, add("a", 0), add("b", 0))
+def test_a_signal_that_is_replaced_is_forgotten_and_a_unit_released_with_its_last_one(bench):
+    run(bench, add("a", 2), "sync()", add("a", 2, 6), add("b", 0))
+    assert (5, "forgotten") in unit(bench).log
     run(bench, 'modbus_delete_signal("a")')
     assert not unit(bench).is_released
     run(bench, 'modbus_delete_signal("b")')

@@ -149,7 +149,7 @@ def procedures(**functions):
 
 @pytest.fixture(scope="module")
 def box():
-    with ControlBox(in_process=True, pace="lockstep", port_base=None) as running:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, control_port=0) as running:
         yield running
 
 
@@ -174,12 +174,6 @@ def fail(box, port, body=("h.work()",)):
         reader = MessageReader(sock)
         send(sock, port, body)
         return reader.message(RuntimeExceptionMessage)
-
-
-def test_a_server_that_does_not_run(box):
-    with listening_socket() as server:
-        port = server.getsockname()[1]
-    assert "does not answer" in fail(box, port).text
 
 
 def http(body=b"", *headers, status="200 OK", length=None):
@@ -296,15 +290,15 @@ def test_an_address_that_is_none_is_a_run_time_error(box, url):
     assert "is not an address" in message.text or "does not answer" in message.text
 
 
-def test_the_control_port_is_closed_to_remote_procedures():
-    with ControlBox(in_process=True, pace="lockstep", port_base=None, control_port=0) as box:
-        assert "control API" in fail(box, box.control_port).text
+def test_the_control_port_is_closed_to_remote_procedures(box):
+    assert "control API" in fail(box, box.control_port).text
 
 
-def test_a_text_with_a_control_character_is_not_sent(box):
+def test_a_text_with_a_control_character_is_not_sent_and_who_does_not_run_does_not_answer(box):
     with answering(http(value(""))) as (port, served):
         assert "XML does not have it" in fail(box, port, ('h.work("\x1b")',)).text
         assert not served
+    assert "does not answer" in fail(box, port).text
 
 
 def test_an_answer_that_nobody_asked_for_is_not_taken_for_that_of_the_next_call(box):
