@@ -27,60 +27,43 @@ def suite(pytester, monkeypatch):
     return run
 
 
-def test_a_test_gets_a_fresh_box_in_lockstep_on_free_ports(suite):
-    result = suite(
-        """
-        ports = []
-        def test_one(ur_box):
-            assert ur_box.identity["pace"] == "lockstep"
-            assert ur_box.identity["robot"] == "UR3"
-            ports.append(ur_box.ports)
-            ur_box.set_speed(0.5)
-        def test_two(ur_box):
-            assert ur_box.state.speed == 1.0
-            assert ur_box.ports.primary != 30001
-        """
-    )
-    result.assert_outcomes(passed=2)
-
-
-def test_a_mark_says_how_the_box_shall_be_and_the_nearest_wins(suite, pytester):
+def test_fixtures_give_fresh_boxes_as_marks_say_the_nearest_first(suite, pytester):
     pytester.mkdir("programs").joinpath("hello.script").write_text('textmsg("hello")\n')
     result = suite(
         """
         import pytest
+        from ur_emulator.errors import NotRunningError
         pytestmark = pytest.mark.ur(seed=5, version="3.4.0")
+        boxes = []
+
+        def test_one(ur_box):
+            facts = ur_box.identity
+            assert [facts[name] for name in ("robot", "software", "seed", "pace")] == ["UR3", "3.4.0", 5, "lockstep"]
+            assert ur_box.ports.primary != 30001
+            ur_box.set_speed(0.5)
 
         @pytest.mark.ur(robot="ur5", seed=6, pace="realtime", fidelity="ideal", programs="programs")
         def test_marked(ur_box):
             facts = ur_box.identity
             assert (facts["robot"], facts["software"], facts["seed"]) == ("UR5", "3.4.0", 6)
             assert (facts["pace"], facts["fidelity"]) == ("realtime", "ideal")
+            assert ur_box.state.speed == 1.0
             ur_box.run_program(file="hello.script")
             ur_box.wait_until(log="hello")
-        """,
-        "--strict-markers",
-    )
-    result.assert_outcomes(passed=1)
 
-
-def test_the_factory_makes_as_many_as_are_wanted_and_ends_them(suite):
-    result = suite(
-        """
-        boxes = []
         def test_three(ur_box_factory):
             boxes.extend(ur_box_factory(seed=k) for k in range(3))
             assert len({box.serial_number for box in boxes}) == 3
             assert len({box.ports.primary for box in boxes}) == 3
+
         def test_they_have_ended():
-            import pytest
-            from ur_emulator.errors import NotRunningError
             for box in boxes:
                 with pytest.raises(NotRunningError):
                     box.power_on()
-        """
+        """,
+        "--strict-markers",
     )
-    result.assert_outcomes(passed=2)
+    result.assert_outcomes(passed=4)
 
 
 @pytest.mark.parametrize("mark", ["ur()", "ur(in_process=True)"])
