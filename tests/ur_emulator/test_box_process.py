@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from box_support import TIMEOUT, connect
+from box_support import TIMEOUT
 from control_support import control_box
 from dashboard_support import Dashboard
 
@@ -113,7 +113,7 @@ def test_what_cannot_be_sent_is_an_argument_error():
 
 @pytest.fixture(scope="module")
 def served():
-    with control_box(control_token=TOKEN) as box:
+    with control_box(control_token=TOKEN, in_process=True) as box:
         yield box
 
 
@@ -165,9 +165,3 @@ def test_whom_nobody_serves_cannot_be_attached(served):
         port = nobody.getsockname()[1]
     with pytest.raises(ControlError, match=f"no box answers at 127.0.0.1:{port}"):
         ControlBox.attach(port=port)
-
-
-def test_the_box_goes_on_without_who_was_attached(served, attached):
-    del attached
-    with connect(served, "dashboard") as sock:
-        assert sock.recv(100).startswith(b"Connected")

@@ -13,7 +13,6 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import EmulatorError
 from ur_emulator.host.box_options import MAX_TOKEN
 from ur_emulator.host.control_api.operations import OPERATIONS
-from ur_emulator.host.ports.http import MAX_HEADER
 
 JSON = "Content-Type: application/json"
 
@@ -43,30 +42,19 @@ def the_box_answers_afterwards(box):
 # --- what it is for
 
 
-def test_the_state_is_that_of_the_box(box, http):
+def test_the_state_and_the_operations_describe_themselves(box, http):
     status, state = http.ask("GET", "/v1/state")
-    assert status == 200
-    assert http.headers["content-type"] == "application/json"
-    assert state["q"] == pytest.approx(box.state.q)
-    assert state["tick"] == box.state.tick
-    assert state["digital_inputs"]["tool"] == [False, False]
-
-
-def test_operations_describe_themselves(http):
+    assert (status, http.headers["content-type"]) == (200, "application/json")
+    assert (state["q"], state["tick"]) == (pytest.approx(box.state.q), box.state.tick)
     status, table = http.ask("GET", "/v1/operations")
-    assert status == 200
-    assert [row["name"] for row in table["operations"]] == list(OPERATIONS)
+    assert (status, [row["name"] for row in table["operations"]]) == (200, list(OPERATIONS))
 
 
 def test_an_operation_is_done_when_it_is_answered(box, http):
-    status, result = http.ask("POST", "/v1/set_digital_input", {"group": "tool", "n": 1, "level": True})
-    assert status == 200
-    assert result == {"tick": box.state.tick}
+    done = http.ask("POST", "/v1/set_digital_input", {"group": "tool", "n": 1, "level": True})
+    assert done == (200, {"tick": box.state.tick})
     assert box.state.digital_inputs["tool"] == (False, True)
-
-
-def test_without_a_body_all_defaults_are_taken(box, http):
-    assert http.ask("POST", "/v1/close_popups")[0] == 200
+    assert http.ask("POST", "/v1/close_popups")[0] == 200  # all defaults are taken without a body
     assert http.ask("POST", "/v1/close_popups", b"", headers=[JSON])[0] == 200
 
 
@@ -108,13 +96,6 @@ def test_a_wait_is_answered_when_it_is_over_and_others_are_served_meanwhile(box,
     assert http.answer()[0] == 200
 
 
-def test_a_whole_program_goes_through(http):
-    script = "def f():\n" + "  # " + "x" * 1000 + "\n  textmsg(1)\n" * 20 + "end\n"
-    status, result = http.ask("POST", "/v1/run_program", {"script": script})
-    assert (status, result["program"]) == (200, "f")
-    assert http.ask("POST", "/v1/wait_until", {"program_state": "STOPPED"})[0] == 200
-
-
 # --- errors
 
 
@@ -124,7 +105,6 @@ def test_a_whole_program_goes_through(http):
         ("POST", "/v1/push", {}, 400, "needs force"),
         ("POST", "/v1/push", b'{"force": [0, 0, NaN]}', 400, "NaN is not a number"),
         ("POST", "/v1/push", b'{"force": [0, 0, 1e999]}', 400, "three numbers"),
-        ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 4000 + b"]}", 400, "three numbers"),
         ("POST", "/v1/push", b'{"force": [0, 0, 1' + b"0" * 5000 + b"]}", 400, "not JSON"),
         ("POST", "/v1/push", b"force=1", 400, "not JSON"),
         ("POST", "/v1/push", b"[1, 2]", 400, "JSON object"),
@@ -139,16 +119,12 @@ def test_a_whole_program_goes_through(http):
         ("GET", "/v1/log?" + "a=1&" * 50, None, 400, "too many"),
         ("GET", "/v1/state?x=1", None, 400, "it takes none"),
         ("GET", "/", None, 404, "/v1/operations"),
-        ("GET", "/v1/", None, 404, "no"),
         ("GET", "/v1/nope", None, 404, "nope"),
         ("GET", "/v2/state", None, 404, "v2"),
-        ("GET", "/v1/../state", None, 404, "state"),
-        ("GET", "/v1/%00", None, 404, "no"),
         ("GET", "*", None, 404, "no"),
         ("GET", "http://[/v1/state", None, 404, "http://["),
         ("GET", "/v1/push", None, 405, "POST"),
         ("POST", "/v1/state", {}, 405, "GET"),
-        ("DELETE", "/v1/state", None, 405, "GET"),
         ("OPTIONS", "/v1/push", None, 405, "POST"),
         ("X" * 200, "/v1/push", None, 405, "POST"),
     ],
@@ -178,11 +154,6 @@ def test_what_the_box_does_not_do_is_answered_with_409(box, http):
     assert http.ask("POST", "/v1/power_on", {})[0] == 200  # it has its power
 
 
-def test_head_is_refused_without_a_body(http):
-    http.send(http.request("HEAD", "/v1/state"))
-    assert b"405" in http.stream.readline()
-
-
 def test_a_body_must_say_that_it_is_json(http):
     for kind in ("text/plain", "application/x-www-form-urlencoded", ""):
         status, answer = http.ask("POST", "/v1/power_off", {}, headers=[f"Content-Type: {kind}"])
@@ -200,22 +171,10 @@ def test_a_body_must_say_that_it_is_json(http):
 @pytest.mark.parametrize(
     "host",
     [
-        "evil.example",
-        "evil.example:80",
-        "127.0.0.1.evil.example",
-        "localhost.evil.example",
-        "0.0.0.0",
-        "127.0.0.2",
-        "",
-        "[",
-        "[::1]",
-        "evil.example@127.0.0.1",
-        "localhost:80@evil.example",
-        "localhost:80:80",
-        "localhost/evil.example",
-        "localhost evil.example",
+        "evil.example:80", "127.0.0.1.evil.example", "0.0.0.0", "127.0.0.2", "", "[", "[::1]", "localhost:80@evil.example",
+        "localhost:80:80", "localhost/evil.example", "localhost evil.example",
     ],
-)
+)  # fmt: skip
 def test_a_foreign_name_that_resolves_to_this_machine_is_refused(http, host):
     status, answer = http.ask("POST", "/v1/power_off", {}, host=host)
     assert status == 403
@@ -223,9 +182,11 @@ def test_a_foreign_name_that_resolves_to_this_machine_is_refused(http, host):
     assert http.ask("GET", "/v1/state", host=host)[0] == 403
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "LOCALHOST:1234", "127.0.0.1:80"])
-def test_the_own_address_and_localhost_are_taken(http, host):
-    assert http.ask("GET", "/v1/state", host=host)[0] == 200
+def test_the_own_address_and_localhost_and_what_a_browser_itself_asks_are_taken(http):
+    for host in ("127.0.0.1", "localhost", "LOCALHOST:1234", "127.0.0.1:80"):
+        assert http.ask("GET", "/v1/state", host=host)[0] == 200
+    for site in ("none", "same-origin"):
+        assert http.ask("GET", "/v1/state", headers=[f"Sec-Fetch-Site: {site}"])[0] == 200
 
 
 def test_a_box_on_all_addresses_takes_any_address_but_no_name():
@@ -235,30 +196,21 @@ def test_a_box_on_all_addresses_takes_any_address_but_no_name():
         assert http.ask("GET", "/v1/state", host="evil.example", headers=token)[0] == 403
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1:1", "http://[", ""])
-def test_a_page_of_another_origin_is_refused(http, origin):
-    status, answer = http.ask("POST", "/v1/power_off", headers=[f"Origin: {origin}"])
-    assert status == 403
-    assert "pages" in answer["error"]
-
-
-@pytest.mark.parametrize("site", ["cross-site", "same-site", "", "Cross-Site", "none, cross-site"])
-def test_a_page_of_another_site_is_refused(http, site):
+@pytest.mark.parametrize(
+    "header",
+    [
+        *(f"Origin: {it}" for it in ("http://evil.example", "null", "https://127.0.0.1:1", "http://[", "")),
+        *(
+            f"Sec-Fetch-Site: {it}"
+            for it in ("cross-site", "same-site", "", "Cross-Site", "none, cross-site")
+        ),
+    ],
+)
+def test_a_page_of_another_origin_or_site_is_refused(http, header):
     for method, path in (("POST", "/v1/power_off"), ("GET", "/v1/state")):
-        status, answer = http.ask(method, path, headers=[f"Sec-Fetch-Site: {site}"])
+        status, answer = http.ask(method, path, headers=[header])
         assert status == 403
         assert "pages" in answer["error"]
-
-
-def test_what_a_browser_itself_asks_is_answered(http):
-    for site in ("none", "same-origin"):
-        assert http.ask("GET", "/v1/state", headers=[f"Sec-Fetch-Site: {site}"])[0] == 200
-
-
-def test_a_request_without_a_host_is_refused(http):
-    http.send(b"GET /v1/state HTTP/1.1\r\n\r\n")
-    assert http.answer()[0] == 400
-    assert http.is_closed()
 
 
 # --- bytes
@@ -268,10 +220,9 @@ def test_a_request_without_a_host_is_refused(http):
     "data",
     [
         b"\x00" * 100,
-        b"hello\r\n\r\n",
         b"GET /v1/state\r\n\r\n",
+        b"GET /v1/state HTTP/1.1\r\n\r\n",  # without a host
         b"GET /v1/state HTTP/9.9\r\nHost: localhost\r\n\r\n",
-        b"GET  /v1/state HTTP/1.1\r\nHost: localhost\r\n\r\n",
         b"GET /v1/state HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n",
         b"GET /v1/state HTTP/1.1\r\nHost : localhost\r\n\r\n",
         b"POST /v1/push HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n",
@@ -287,12 +238,6 @@ def test_what_is_no_http_is_answered_and_closed(http, data):
     status, answer = http.answer()
     assert status in (400, 501, 505)
     assert "HTTP " in answer["error"] or answer["error"].startswith("not understood")
-    assert http.is_closed()
-
-
-def test_a_huge_header_is_refused_although_it_is_complete(http):
-    http.send(b"GET /v1/state HTTP/1.1\r\nHost: localhost\r\nX: " + b"x" * MAX_HEADER + b"\r\n\r\n")
-    assert http.answer()[0] == 431
     assert http.is_closed()
 
 
@@ -317,21 +262,15 @@ def test_a_request_that_trickles_in_is_understood_and_holds_up_nobody(box, http)
     assert http.ask("POST", "/v1/set_speed", {"fraction": 1})[0] == 200
 
 
-def test_who_says_no_more_still_gets_its_answers(http):
-    http.send(http.request("GET", "/v1/state") + http.request("POST", "/v1/close_popups", {}))
-    http.sock.shutdown(socket.SHUT_WR)
-    assert http.answer()[0] == 200
-    assert http.answer()[0] == 200
-    assert http.is_closed()
-
-
 def test_requests_sent_ahead_are_answered_in_order(box, http):
     start = inside(box)._box.log.count
     texts = [f"line {n}" for n in range(50)]
     http.send(b"".join(http.request("POST", "/v1/add_to_log", {"text": text}) for text in texts))
+    http.sock.shutdown(socket.SHUT_WR)  # who says no more still gets its answers
     assert [http.answer()[0] for _ in texts] == [200] * 50
-    _, log = http.ask("GET", f"/v1/log?after={start}")
-    assert [e["text"] for e in log["entries"] if e["text"].startswith("line ")] == texts
+    assert http.is_closed()
+    written = [entry.text for entry in inside(box)._box.log.since(start)]
+    assert [text for text in written if text.startswith("line ")] == texts
 
 
 def test_who_sends_ahead_is_read_when_its_answer_has_been_sent(box, http):
@@ -361,20 +300,6 @@ def test_who_goes_while_it_waits_is_forgotten(box):
     raise AssertionError("they are waited for still")
 
 
-def test_a_client_that_reads_nothing_does_not_hold_up_time(box):
-    with Http(box) as http:
-        http.sock.settimeout(2)
-        asked = http.request("GET", "/v1/operations")
-        try:
-            for _ in range(200):
-                http.send(asked * 20)
-        except OSError:
-            pass
-        before = box.state.tick
-        box.run_program("def f():\n  sleep(1)\nend\n")
-        assert box.wait_until(program_state="STOPPED").tick > before + 100
-
-
 def test_a_client_asks_before_it_sends_its_body(http):
     body = json.dumps({"fraction": 1}).encode()
     head = http.request("POST", "/v1/set_speed", body, headers=["Expect: 100-continue", JSON])
@@ -394,10 +319,9 @@ def test_http_1_0_and_close_are_answered_and_closed(box):
         assert http.is_closed()
 
 
-def test_other_protocols_are_not_offered(http):
-    upgrade = ["Connection: Upgrade", "Upgrade: websocket"]
-    assert http.ask("GET", "/v1/state", headers=upgrade)[0] == 200
-    assert http.ask("CONNECT", "localhost:22")[0] in (404, 405)
+def test_head_is_refused_without_a_body(http):
+    http.send(http.request("HEAD", "/v1/state"))
+    assert b"405" in http.stream.readline()
 
 
 def test_the_most_silent_client_makes_room_for_a_new_one(box):
@@ -438,7 +362,7 @@ TOKEN = "correct-horse"
 
 @pytest.fixture(scope="module")
 def guarded_box():
-    with control_box(control_token=TOKEN) as box:
+    with control_box(in_process=True, control_token=TOKEN) as box:
         yield box
 
 
@@ -461,18 +385,10 @@ def test_every_operation_needs_the_token(guarded):
 @pytest.mark.parametrize(
     "shown",
     [
-        "",
-        "Bearer",
-        "Bearer ",
-        TOKEN,
-        f"Basic {TOKEN}",
-        f"Bearer {TOKEN}x",
-        f"Bearer {TOKEN[:-1]}",
-        f"Bearer {TOKEN.upper()}",
-        f"Bearer x {TOKEN}",
-        f"Bearer {TOKEN}\xe9",
+        "", "Bearer", "Bearer ", TOKEN, f"Basic {TOKEN}", f"Bearer {TOKEN}x", f"Bearer {TOKEN[:-1]}",
+        f"Bearer {TOKEN.upper()}", f"Bearer x {TOKEN}", f"Bearer {TOKEN}\xe9",
     ],
-)
+)  # fmt: skip
 def test_another_token_does_not_do(guarded_box, guarded, shown):
     asked = guarded.request("POST", "/v1/trigger_fault", headers=[f"Authorization: {shown}"])
     guarded.send(asked.decode().encode("latin-1"))
@@ -485,26 +401,25 @@ def test_with_the_token_all_is_done_on_the_same_connection(guarded):
     for scheme in ("Bearer", "bearer", "BEARER "):
         assert guarded.ask("GET", "/v1/state", headers=[f"Authorization: {scheme} {TOKEN}"])[0] == 200
     assert guarded.ask("GET", "/v1/state")[0] == 401
-
-
-def test_pages_are_refused_also_with_the_token(guarded):
-    shown = f"Authorization: Bearer {TOKEN}"
+    shown = f"Authorization: Bearer {TOKEN}"  # pages are refused also with it
     assert guarded.ask("GET", "/v1/state", headers=[shown, "Origin: http://evil.example"])[0] == 403
     assert guarded.ask("GET", "/v1/state", headers=[shown], host="evil.example")[0] == 403
 
 
-@pytest.mark.parametrize("token", ["", "two words", "a\nb", "caf\xe9", "x" * (MAX_TOKEN + 1)])
-def test_a_token_that_is_none(token):
-    with pytest.raises(EmulatorError, match="1 to 200 printed characters of ASCII"):
-        ControlBox(control_port=0, control_token=token)
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        *(({"control_token": it}, "1 to 200 printed characters of ASCII") for it in ("", "two words", "a\nb", "caf\xe9", "x" * (MAX_TOKEN + 1))),
+        *(({"host": it}, "give it a token") for it in ("0.0.0.0", "::", "192.0.2.1", "box.example", "127.0.0.1.example")),
+        ({"control_port": -1}, "-1"),
+        ({"control_port": 65536}, "65536"),
+    ],
+)  # fmt: skip
+def test_a_control_port_that_cannot_be_is_refused(options, told):
+    with pytest.raises(EmulatorError, match=told):
+        ControlBox(**{"control_port": 0, "port_base": None, **options})
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "box.example", "127.0.0.1.example"])
-def test_beyond_loopback_a_control_port_demands_a_token(host):
-    with pytest.raises(EmulatorError, match="give it a token"):
-        ControlBox(host=host, control_port=0, port_base=None)
-
-
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "localhost", "::1"])
+@pytest.mark.parametrize("host", ["127.9.9.9", "localhost", "::1"])
 def test_on_loopback_a_control_port_demands_no_token(host):
-    ControlBox(host=host, control_port=0, port_base=None).close()
+    ControlBox(host=host, control_port=0, port_base=None, in_process=True).close()

@@ -16,77 +16,54 @@ pytest_plugins = ["pytester"]
 
 @pytest.fixture
 def suite(pytester, monkeypatch):
-    """Run the tests of a text, those in parallel in a process of their own."""
+    """Run the tests of a text."""
     monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
 
     def run(text, *words):
         pytester.makepyfile(text)
-        options = ["-p", "no:cacheprovider", *words]
-        if "-n" in words:
-            monkeypatch.setenv(
-                "PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1"
-            )  # each of three processes would pay for all
-            return pytester.runpytest_subprocess("-p", "xdist", "-p", "ur_emulator.pytest_plugin", *options)
-        return pytester.runpytest_inprocess(*options)
+        return pytester.runpytest_inprocess("-p", "no:cacheprovider", *words)
 
     return run
 
 
-def test_a_test_gets_a_fresh_box_in_lockstep_on_free_ports(suite):
-    result = suite(
-        """
-        ports = []
-        def test_one(ur_box):
-            assert ur_box.identity["pace"] == "lockstep"
-            assert ur_box.identity["robot"] == "UR3"
-            ports.append(ur_box.ports)
-            ur_box.set_speed(0.5)
-        def test_two(ur_box):
-            assert ur_box.state.speed == 1.0
-            assert ur_box.ports.primary != 30001
-        """
-    )
-    result.assert_outcomes(passed=2)
-
-
-def test_a_mark_says_how_the_box_shall_be_and_the_nearest_wins(suite, pytester):
+def test_fixtures_give_fresh_boxes_as_marks_say_the_nearest_first(suite, pytester):
     pytester.mkdir("programs").joinpath("hello.script").write_text('textmsg("hello")\n')
     result = suite(
         """
         import pytest
+        from ur_emulator.errors import NotRunningError
         pytestmark = pytest.mark.ur(seed=5, version="3.4.0")
+        boxes = []
+
+        def test_one(ur_box):
+            facts = ur_box.identity
+            assert [facts[name] for name in ("robot", "software", "seed", "pace")] == ["UR3", "3.4.0", 5, "lockstep"]
+            assert ur_box.ports.primary != 30001
+            ur_box.set_speed(0.5)
 
         @pytest.mark.ur(robot="ur5", seed=6, pace="realtime", fidelity="ideal", programs="programs")
         def test_marked(ur_box):
             facts = ur_box.identity
             assert (facts["robot"], facts["software"], facts["seed"]) == ("UR5", "3.4.0", 6)
             assert (facts["pace"], facts["fidelity"]) == ("realtime", "ideal")
+            assert ur_box.state.speed == 1.0
             ur_box.run_program(file="hello.script")
             ur_box.wait_until(log="hello")
-        """,
-        "--strict-markers",
-    )
-    result.assert_outcomes(passed=1)
 
-
-def test_the_factory_makes_as_many_as_are_wanted_and_ends_them(suite):
-    result = suite(
-        """
-        boxes = []
         def test_three(ur_box_factory):
             boxes.extend(ur_box_factory(seed=k) for k in range(3))
             assert len({box.serial_number for box in boxes}) == 3
             assert len({box.ports.primary for box in boxes}) == 3
+
         def test_they_have_ended():
-            import pytest
-            from ur_emulator.errors import NotRunningError
             for box in boxes:
                 with pytest.raises(NotRunningError):
                     box.power_on()
-        """
+        """,
+        "--strict-markers",
     )
-    result.assert_outcomes(passed=2)
+    result.assert_outcomes(passed=4)
 
 
 @pytest.mark.parametrize("mark", ["ur()", "ur(in_process=True)"])
@@ -136,30 +113,21 @@ def test_one_line_makes_a_test_of_several_robots(suite):
     result.stdout.fnmatch_lines(["*UR3 3.15.8* 5*", "*UR5 3.4.0 5*", "*UR5e 5.12.* 3*"])
 
 
-@pytest.mark.parametrize(
-    ("mark", "words"),
-    [
-        ('robot="ur9"', "*no box: *ur9*"),
-        ("colour=1", "*a box has no colour: choose from robot, version*"),
-        ('"ur5"', "*takes keywords only*"),
-        ('programs="nowhere"', "*no box: *nowhere*"),
-    ],
-)
-def test_a_wrong_mark_is_one_line(suite, mark, words):
-    result = suite(
-        f"""
-        import pytest
-        @pytest.mark.ur({mark})
-        def test_never(ur_box):
-            pass
-        """
-    )
-    result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines([words])
+def test_a_wrong_mark_is_one_line(suite):
+    marks = {
+        'robot="ur9"': "*no box: *ur9*",
+        "colour=1": "*a box has no colour: choose from robot, version*",
+        '"ur5"': "*takes keywords only*",
+        'programs="nowhere"': "*no box: *nowhere*",
+    }
+    tests = (f"@pytest.mark.ur({mark})\ndef test_{k}(ur_box):\n    pass\n" for k, mark in enumerate(marks))
+    result = suite("import pytest\n" + "".join(tests))
+    result.assert_outcomes(errors=len(marks))
+    result.stdout.fnmatch_lines([*marks.values()])
     result.stdout.no_fnmatch_line("*Traceback*")
 
 
-def test_the_command_line_names_defaults(suite):
+def test_the_command_line_names_defaults_and_the_software_is_for_the_arms_that_run_it(suite):
     result = suite(
         """
         import pytest
@@ -168,38 +136,21 @@ def test_the_command_line_names_defaults(suite):
         @pytest.mark.ur(robot="ur3")
         def test_named(ur_box):
             assert (ur_box.identity["robot"], ur_box.identity["software"]) == ("UR3", "3.5.0")
+        @pytest.mark.ur(robot="ur5e")
+        def test_other_generation(ur_box):
+            assert ur_box.identity["software"].startswith("5.")
         """,
         "--ur-robot=ur10",
         "--ur-version=3.5.0",
     )
-    result.assert_outcomes(passed=2)
+    result.assert_outcomes(passed=3)
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (["--ur-robot=ur5e", "--ur-version=3.5.0"], "*version 3.5.0 given: software of the e-Series is 5.x*"),
-        (["--ur-robot=ur9"], "*unknown robot 'ur9'*"),
-    ],
-)
-def test_defaults_that_cannot_be_are_one_line(suite, words, text):
-    result = suite("def test_never(ur_box): pass\n" * 3, *words)
+def test_defaults_that_cannot_be_are_one_line(suite):
+    result = suite("def test_never(ur_box): pass\n" * 3, "--ur-robot=ur5e", "--ur-version=3.5.0")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([text])
+    result.stderr.fnmatch_lines(["*version 3.5.0 given: software of the e-Series is 5.x*"])
     assert len(result.errlines) <= 2
-
-
-def test_the_default_software_is_for_the_arms_that_run_it(suite):
-    result = suite(
-        """
-        import pytest
-        @pytest.mark.parametrize("ur_box", ["ur3", "ur5e"], indirect=True)
-        def test_all(ur_box):
-            assert ur_box.identity["software"][:2] in ("3.", "5.")
-        """,
-        "--ur-version=3.5.0",
-    )
-    result.assert_outcomes(passed=2)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has all of 127.0.0.0/8")
@@ -208,8 +159,7 @@ def test_boxes_with_standard_ports_have_addresses_of_their_own(suite):
         """
         import socket, pytest
         @pytest.mark.ur(standard_ports=True)
-        @pytest.mark.parametrize("k", range(2))
-        def test_standard(ur_box, ur_box_factory, k):
+        def test_standard(ur_box, ur_box_factory):
             other = ur_box_factory(standard_ports=True)
             assert ur_box.host != other.host
             for box in (ur_box, other):
@@ -218,7 +168,7 @@ def test_boxes_with_standard_ports_have_addresses_of_their_own(suite):
                     assert sock.recv(100).startswith(b"Connected")
         """
     )
-    result.assert_outcomes(passed=2)
+    result.assert_outcomes(passed=1)
 
 
 def test_workers_look_for_addresses_in_blocks_of_their_own(monkeypatch):

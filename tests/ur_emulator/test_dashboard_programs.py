@@ -1,7 +1,7 @@
 """Programs from a folder: names and places, script files, what is loaded, External Control."""
 
 import pytest
-from box_support import FakeNetwork, FrameReader, MessageReader, connect, listening_socket
+from box_support import FakeNetwork, MessageReader, connect, listening_socket
 from dashboard_support import (
     Dashboard,
     external_control,
@@ -34,7 +34,7 @@ def folder(tmp_path):
 @pytest.fixture
 def box(folder, request):
     robot = getattr(request, "param", "ur3")
-    with ControlBox(robot=robot, pace="lockstep", port_base=None, seed=7, programs=folder) as box:
+    with ControlBox(robot, in_process=True, pace="lockstep", port_base=None, seed=7, programs=folder) as box:
         yield box
 
 
@@ -44,23 +44,24 @@ def dashboard(box):
         yield dashboard
 
 
+@pytest.fixture
+def messages(box):
+    """What a client of the primary port gets."""
+    with connect(box, "primary") as sock:
+        reader = MessageReader(sock)
+        reader.next()
+        yield reader
+
+
 # --- names
 
 
 @pytest.mark.parametrize(
-    ("name", "path"),
-    [
-        ("hello.urp", "hello.urp"),
-        ("/programs/hello.urp", "hello.urp"),
-        ("/ursim/programs/hello.urp", "hello.urp"),
-        ("cell/count me.script", "cell/count me.script"),
-        ("/programs/cell/count me.script", "cell/count me.script"),
-        ('"cell/count me.script"', "cell/count me.script"),
-        ("./hello.urp", "hello.urp"),
-    ],
+    "name", ["{}", "/programs/{}", "/ursim/programs/{}", '"{}"', "./{}"], ids=lambda name: name.format("name")
 )
-def test_names_of_programs(folder, name, path):
-    found = ProgramFolder(folder).find(name)
+def test_names_of_programs(folder, name):
+    path = "cell/count me.script"
+    found = ProgramFolder(folder).find(name.format(path))
     assert (str(found), ProgramFolder.wire_path(found)) == (path, f"/programs/{path}")
 
 
@@ -114,69 +115,50 @@ def test_a_script_file_is_one_program(text, program):
 
 
 @pytest.mark.parametrize(
-    ("data", "problem"),
+    ("name", "data", "problem"),
     [
-        (b"x = 1\0", "is not text"),
-        ("x = 1".encode("utf-16"), "is UTF-16 text: a controller reads UTF-8, save it as that"),
-        (b"#" * (5 << 20), "more than 4194304 bytes"),
-        (b"#" * (40 << 20), "more than 4194304 bytes"),
+        ("p.script", b"x = 1\0", "is not text"),
+        ("p.script", "x = 1".encode("utf-16"), "is UTF-16 text: a controller reads UTF-8, save it as that"),
+        ("p.script", b"#" * (5 << 20), "more than 4194304 bytes"),
+        (
+            "notes.txt",
+            b"x = 1",
+            r"notes\.txt is not a program: its name must end in \.urp, \.script or \.urpx",
+        ),
     ],
-    ids=["zeros", "utf-16", "long", "huge"],
+    ids=["zeros", "utf-16", "long", "other kind"],
 )
-def test_script_files_that_are_none(tmp_path, data, problem):
-    (tmp_path / "p.script").write_bytes(data)
+def test_files_that_are_no_programs(tmp_path, name, data, problem):
+    (tmp_path / name).write_bytes(data)
     with pytest.raises(ProgramFileError, match=problem):
-        load_program(ProgramFolder(tmp_path), "p.script")
+        load_program(ProgramFolder(tmp_path), name)
 
 
-def test_files_of_other_kinds_are_no_programs(tmp_path):
-    (tmp_path / "notes.txt").write_text("x = 1")
-    with pytest.raises(
-        ProgramFileError, match=r"notes\.txt is not a program: its name must end in \.urp, \.script or \.urpx"
-    ):
-        load_program(ProgramFolder(tmp_path), "notes.txt")
+def test_a_script_program_carries_the_name_of_its_file(dashboard, messages):
+    assert dashboard.ask("load cell/count me.script") == "Loading program: /programs/cell/count me.script"
+    assert dashboard.ask_all("programState", "play") == ["STOPPED count me.script", "Starting program"]
+    assert messages.message(KeyMessage).text == "count_me"
+    assert messages.message(TextMessage).text == "counted 3"
 
 
-def test_a_script_program_carries_the_name_of_its_file(box, dashboard):
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        reader.next()
-        assert dashboard.ask("load cell/count me.script") == "Loading program: /programs/cell/count me.script"
-        assert dashboard.ask_all("programState", "play") == ["STOPPED count me.script", "Starting program"]
-        assert reader.message(KeyMessage).text == "count_me"
-        assert reader.message(TextMessage).text == "counted 3"
-
-
-def test_a_program_that_does_not_compile_is_reported_when_it_is_played(box, dashboard):
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        reader.next()
-        assert dashboard.ask_all("load broken.script", "programState", "play", "programState") == [
-            "Loading program: /programs/broken.script", "STOPPED broken.script", "Failed to execute: play",
-            "STOPPED broken.script",
-        ]  # fmt: skip
-        told = reader.message(RuntimeExceptionMessage)
-        assert (told.line, told.text) == (2, "syntax_error_on_line:2:  x = = 1:")
+def test_a_program_that_does_not_compile_is_reported_when_it_is_played(dashboard, messages):
+    assert dashboard.ask_all("load broken.script", "play", "programState") == [
+        "Loading program: /programs/broken.script", "Failed to execute: play", "STOPPED broken.script",
+    ]  # fmt: skip
+    told = messages.message(RuntimeExceptionMessage)
+    assert (told.line, told.text) == (2, "syntax_error_on_line:2:  x = = 1:")
 
 
 # --- what is loaded
 
 
-def test_play_starts_at_the_top_each_time(box, dashboard):
-    with connect(box, "primary") as sock:
-        reader = MessageReader(sock)
-        reader.next()
-        dashboard.ask("load hello.urp")
-        for _ in range(3):
-            assert dashboard.ask("play") == "Starting program"
-            assert reader.message(TextMessage).text == "hello"
-            dashboard.until("programState", "STOPPED hello.urp")
-
-
-def test_a_loaded_program_is_in_memory(box, dashboard, folder):
+def test_a_loaded_program_is_in_memory_and_starts_at_the_top_each_time(dashboard, messages, folder):
     dashboard.ask("load hello.urp")
     (folder / "hello.urp").unlink()
-    assert dashboard.ask("play") == "Starting program"
+    for _ in range(2):
+        assert dashboard.ask("play") == "Starting program"
+        assert messages.message(TextMessage).text == "hello"
+        dashboard.until("programState", "STOPPED hello.urp")
 
 
 def test_what_is_loaded_stays_when_another_cannot_be_loaded(box, dashboard):
@@ -207,20 +189,6 @@ def test_a_program_that_was_sent_shows_the_loaded_name(box, dashboard):
         "Stopped",
         "Starting program",
     ]
-
-
-def test_a_move_of_a_program_file_goes_to_its_waypoint(box, dashboard, folder):
-    waypoint = (
-        '<Waypoint type="Fixed" name="W"><motionParameters/><position><JointAngles angles="0.3,-1.4,-1.7,0.1,1.2,1.4"/>'
-        "</position></Waypoint>"
-    )
-    (folder / "go.urp").write_bytes(
-        urp(f'<Move motionType="MoveJ" speed="1.0" acceleration="1.4"><children>{waypoint}</children></Move>')
-    )
-    with connect(box, "realtime") as sock:
-        frames = FrameReader(sock)
-        dashboard.ask_all("load go.urp", "play")
-        frames.until(lambda frame: abs(frame.target_q - [0.3, -1.4, -1.7, 0.1, 1.2, 1.4]).max() < 1e-9)
 
 
 # --- installations
@@ -268,63 +236,54 @@ SENT = 'textmsg("from the PC")\n'
 
 @pytest.mark.parametrize("box", ["ur3", "ur5e"], indirect=True)
 @pytest.mark.parametrize("keep_open", [False, True])
-def test_external_control_plays_what_the_pc_sends(box, dashboard, folder, keep_open):
-    with pc_with_script(SENT, keep_open=keep_open) as (port, asked), connect(box, "primary") as sock:
+def test_external_control_plays_what_the_pc_sends(dashboard, messages, folder, keep_open):
+    with pc_with_script(SENT, keep_open=keep_open) as (port, asked):
         (folder / "pc.urp").write_bytes(
             urp(external_control("127.0.0.1", port) + script_line('textmsg("behind it")'))
         )
-        reader = MessageReader(sock)
         loaded, started = dashboard.ask_all("load pc.urp", "play")
         assert loaded.startswith("Loading program: /programs/pc.urp")
         assert started == "Starting program"
-        assert [reader.message(TextMessage).text for _ in range(2)] == ["from the PC", "behind it"]
+        assert [messages.message(TextMessage).text for _ in range(2)] == ["from the PC", "behind it"]
     assert asked == [b"request_program\n"]
 
 
-def test_external_control_asks_each_time_it_is_played(box, dashboard, folder):
-    with pc_with_script(SENT, 'textmsg("again")\n') as (port, asked), connect(box, "primary") as sock:
+def test_external_control_asks_each_time_it_is_played(dashboard, messages, folder):
+    with pc_with_script(SENT, 'textmsg("again")\n') as (port, asked):
         (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
-        reader = MessageReader(sock)
         dashboard.ask_all("load pc.urp", "play")
-        assert reader.message(TextMessage).text == "from the PC"
+        assert messages.message(TextMessage).text == "from the PC"
         dashboard.until("programState", "STOPPED pc.urp")
         dashboard.ask("play")
-        assert reader.message(TextMessage).text == "again"
+        assert messages.message(TextMessage).text == "again"
     assert len(asked) == 2
 
 
-@pytest.mark.parametrize("where", ["installation", "client"])
-def test_where_external_control_finds_its_pc(box, dashboard, folder, where):
+@pytest.mark.parametrize("where", ["installation", "installation loaded later", "client"])
+def test_where_external_control_finds_its_pc(dashboard, messages, folder, where):
     """The node names a PC, or the installation does, or it is the one that plays the program."""
-    with pc_with_script(SENT) as (port, _), connect(box, "primary") as sock:
+    with pc_with_script(SENT) as (port, _):
+        node, in_program = external_control(), installation()
         if where == "installation":
-            (folder / "pc.installation").write_bytes(installation("127.0.0.1", port))
-            node = external_control()
-        else:
-            (folder / "pc.installation").write_bytes(installation())
+            in_program = installation("127.0.0.1", port)
+        elif where == "client":
             node = external_control("", port)
-        (folder / "pc.urp").write_bytes(urp(node, installation="pc"))
-        reader = MessageReader(sock)
-        assert dashboard.ask_all("load pc.urp", "play")[1] == "Starting program"
-        assert reader.message(TextMessage).text == "from the PC"
-
-
-def test_an_installation_that_is_loaded_later_counts(box, dashboard, folder):
-    with pc_with_script(SENT) as (port, _), connect(box, "primary") as sock:
-        (folder / "pc.urp").write_bytes(urp(external_control()))
+        (folder / "pc.installation").write_bytes(in_program)
         (folder / "late.installation").write_bytes(installation("127.0.0.1", port))
-        reader = MessageReader(sock)
-        dashboard.ask_all("load pc.urp", "load installation late.installation", "play")
-        assert reader.message(TextMessage).text == "from the PC"
+        (folder / "pc.urp").write_bytes(urp(node, installation="pc"))
+        dashboard.ask("load pc.urp")
+        if where == "installation loaded later":
+            dashboard.ask("load installation late.installation")
+        assert dashboard.ask("play") == "Starting program"
+        assert messages.message(TextMessage).text == "from the PC"
 
 
-def test_two_nodes_share_the_header(box, dashboard, folder):
+def test_two_nodes_share_the_header(dashboard, messages, folder):
     sent = "# HEADER_BEGIN\nglobal n = 0\ndef count():\n  n = n + 1\nend\n# HEADER_END\ncount()\ntextmsg(n)\n"
-    with pc_with_script(sent) as (port, asked), connect(box, "primary") as sock:
+    with pc_with_script(sent) as (port, asked):
         (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port) * 2))
-        reader = MessageReader(sock)
         dashboard.ask_all("load pc.urp", "play")
-        assert [reader.message(TextMessage).text for _ in range(2)] == ["1", "2"]
+        assert [messages.message(TextMessage).text for _ in range(2)] == ["1", "2"]
     assert len(asked) == 1
 
 
@@ -334,30 +293,27 @@ def test_a_program_without_a_whole_header_is_not_split(text):
 
 
 @pytest.mark.parametrize(("sent", "problem"), [(None, "cannot be reached"), ("", "sends nothing")])
-def test_a_pc_that_does_not_answer_gives_a_program_that_says_so(box, dashboard, folder, sent, problem):
-    with pc_with_script(*([] if sent is None else [sent])) as (port, _), connect(box, "primary") as sock:
+def test_a_pc_that_does_not_answer_gives_a_program_that_says_so(dashboard, messages, folder, sent, problem):
+    with pc_with_script(*([] if sent is None else [sent])) as (port, _):
         if sent is None:
             with listening_socket() as closed:
                 port = closed.getsockname()[1]
         (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
-        reader = MessageReader(sock)
         assert dashboard.ask_all("load pc.urp", "play")[1] == "Starting program"
-        popup = reader.message(PopupMessage)
+        popup = messages.message(PopupMessage)
         assert problem in popup.text
-        assert popup.is_error
-        assert popup.is_blocking
+        assert (popup.is_error, popup.is_blocking) == (True, True)
         assert dashboard.ask_all("programState", "close popup")[0] == "PLAYING pc.urp"
         dashboard.until("programState", "STOPPED pc.urp")
 
 
-def test_a_pc_that_sends_nonsense_is_informed_on_the_primary_port(box, dashboard, folder):
-    with pc_with_script("x = = 1\n") as (port, _), connect(box, "primary") as sock:
+def test_a_pc_that_sends_nonsense_is_informed_on_the_primary_port(dashboard, messages, folder):
+    with pc_with_script("x = = 1\n") as (port, _):
         (folder / "pc.urp").write_bytes(urp(external_control("127.0.0.1", port)))
-        reader = MessageReader(sock)
         assert dashboard.ask_all("load pc.urp", "play", "running") == [
             "Loading program: /programs/pc.urp", "Failed to execute: play", "Program running: false",
         ]  # fmt: skip
-        assert "syntax_error_on_line" in reader.message(RuntimeExceptionMessage).text
+        assert "syntax_error_on_line" in messages.message(RuntimeExceptionMessage).text
 
 
 def request(sends, step=1.0):

@@ -3,18 +3,15 @@
 What each builtin does to them is shown by the chunks `io_*`, `ioconfiguration`, `encoders` and `registers`.
 """
 
-import math
-
 import pytest
 from box_support import Bench
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ur_emulator.machine.commands.programs import StopProgram
-from ur_emulator.machine.commands.safety import TriggerProtectiveStop
 from ur_emulator.machine.controller import modbus_map as port_map
-from ur_emulator.machine.controller.io.encoders import RANGES, Decoder, Encoder
-from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS, MapAddressError
+from ur_emulator.machine.controller.io.encoders import RANGES, Encoder
+from ur_emulator.machine.controller.modbus_map import COILS, REGISTERS
 
 
 @pytest.fixture
@@ -51,51 +48,12 @@ def test_rows_do_not_overlap(rows):
     assert len(addresses) == len(set(addresses))
 
 
-@pytest.mark.parametrize(
-    ("rows", "read_one", "largest"),
-    [(REGISTERS, port_map.read_register, 0xFFFF), (COILS, port_map.read_coil, 1)],
-)
-def test_every_address_of_the_tables_can_be_read(rows, read_one, largest):
-    for row in rows:
-        for address in range(row.first, row.first + row.count):
-            assert 0 <= read_one(BENCH.controller.state, address) <= largest
-
-
-@pytest.mark.parametrize("address", [259, 267, 276, 1023, 65535])
-def test_addresses_without_anything(address):
-    with pytest.raises(MapAddressError):
-        port_map.read_register(BENCH.controller.state, address)
-
-
-@given(st.integers(128, 255), st.integers(-32768, 65535))
-def test_general_purpose_words(address, value):
-    state = BENCH.controller.state
-    assert port_map.write(state, False, address, value)
-    assert port_map.read_register(state, address) == value & 0xFFFF
-
-
-def test_joint_angles_count_up_from_zero_beside_their_turns(bench):
-    q = bench.now.actual_q
-    for joint in range(6):
-        angle, turns = read(bench, 270 + joint) / 1e3, signed(read(bench, 320 + joint))
-        assert 0.0 <= angle <= 6.284
-        assert angle + turns * 2.0 * math.pi == pytest.approx(q[joint], abs=1e-3)
-    assert any(x < 0.0 for x in q)
-
-
 def test_tcp_pose_and_modes(bench):
     pose = bench.now.actual_tcp_pose
     for i in range(3):
         assert signed(read(bench, 400 + i)) == pytest.approx(pose[i] * 1e4, abs=0.6)
         assert signed(read(bench, 403 + i)) == pytest.approx(pose[3 + i] * 1e3, abs=0.6)
     assert [read(bench, 256), read(bench, 257), read(bench, 258), read(bench, 310)] == [3, 15, 7, 253]
-
-
-def test_flags_of_a_protective_stop(bench):
-    assert [read(bench, address) for address in range(260, 267)] == [1, 0, 0, 0, 0, 0, 1]
-    bench.tick(1, TriggerProtectiveStop())
-    assert [read(bench, address) for address in range(260, 267)] == [1, 1, 0, 0, 0, 1, 3]
-    assert port_map.read_coil(bench.controller.state, 261)
 
 
 def test_outputs_by_word_mask_and_bit(bench):
@@ -115,32 +73,12 @@ def test_outputs_by_word_mask_and_bit(bench):
     assert [port_map.read_coil(state, 16 + i) for i in range(4)] == [False, True, True, False]
 
 
-def test_inputs_ignore_writes(bench):
-    bench.controller.state.io.digital_in = 1 << 3 | 1 << 9 | 1 << 16
-    assert texts(bench, "write_port_bit(3, False)", "textmsg(read_port_bit(3))") == ["True"]
-    assert read(bench, 0) == 1 << 3 | 1 << 8
-    assert [read(bench, 21), read(bench, 30)] == [1, 2]
-    for address in (0, 4, 10):
-        assert not port_map.write(bench.controller.state, False, address, 1)
-    assert read(bench, 4) == 0
-
-
 def test_analogue_levels_are_parts_of_the_range(bench):
     texts(bench, "set_analog_outputdomain(0, 1)", "set_standard_analog_out(0, 1)")
     assert [read(bench, 16), read(bench, 17)] == [65535, 1]
     port_map.write(bench.controller.state, False, 18, 0x8000)
     port_map.write(bench.controller.state, False, 19, 0)
     assert bench.controller.state.io.analog_out[1].value == pytest.approx(0.012, abs=1e-6)
-
-
-def test_register_booleans_are_shared(bench):
-    assert texts(
-        bench,
-        "write_port_bit(300, True)",
-        "textmsg(read_input_boolean_register(0))",
-        "write_output_boolean_register(127, True)",
-        "textmsg(read_port_bit(627))",
-    ) == ["True", "True"]
 
 
 def test_the_clock_stands_until_it_is_latched_again(bench):
@@ -195,22 +133,6 @@ def test_a_secondary_program_is_no_program_start(bench):
     assert bench.now.actual_digital_output_bits == 0
 
 
-QUADRATURE = ((0, 0), (1, 0), (1, 1), (0, 1))
-
-
-@pytest.mark.parametrize(("range_id", "low", "high"), [(0, -(2**31), 2**31 - 1), (1, 0, 255), (2, 0, 65535)])
-def test_counts_outside_the_range_are_refused(bench, range_id, low, high):
-    for count in (low, high, low - 1.0, high + 1.0):
-        texts(
-            bench,
-            f"encoder_enable_set_tick_count(0, {range_id})",
-            f"encoder_set_tick_count(0, {float(count)})",
-        )
-    errors = [event.text for event in bench.events if type(event).__name__ == "ScriptFailed"]
-    assert len(errors) == 2
-    assert all(f"allowed: {low} to {high}" in text for text in errors)
-
-
 @given(st.sampled_from(sorted(RANGES)), st.data())
 def test_unwind_finds_the_difference_of_two_counts(range_id, data):
     low, size = RANGES[range_id]
@@ -220,32 +142,3 @@ def test_unwind_finds_the_difference_of_two_counts(range_id, data):
     way = data.draw(st.integers(-(size // 2) + 1, size // 2 - 1))
     end = (start + way - low) % size + low
     assert encoder.unwind(end - start) == way
-
-
-def pulses(decoder, steps, pins=(0, 1)):
-    bench = Bench()
-    bench.run(f"def p():\n  encoder_enable_pulse_decode(0, {decoder}, {pins[0]}, {pins[1]})\nend\n")
-    for a, b in steps:
-        bench.controller.state.io.digital_in = a << (pins[0] % 8) | b << (pins[1] % 8)
-        bench.tick()
-    return bench.controller.state.encoders[0].count
-
-
-def test_quadrature_counts_in_both_directions():
-    assert pulses(1, QUADRATURE[1:] + QUADRATURE) == 7
-    assert pulses(1, (QUADRATURE[1], QUADRATURE[2], QUADRATURE[1])) == 1
-    assert pulses(1, QUADRATURE[:0:-1]) == 65536 - 3
-    assert pulses(1, (QUADRATURE[2], QUADRATURE[0])) == 0
-
-
-def test_other_pins_and_their_later_numbers():
-    for pins in ((3, 2), (11, 10)):
-        assert pulses(3, [(1, 0), (0, 0), (1, 0)], pins) == 2
-
-
-def test_feeding_ends_decoding():
-    encoder = Encoder()
-    encoder.decode(Decoder.RISING, 0, 1, 0)
-    encoder.feed(4)
-    assert encoder.decoder is Decoder.OFF
-    assert encoder.is_enabled

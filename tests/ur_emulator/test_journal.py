@@ -11,6 +11,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 from box_support import MessageReader, connect, program
+from dashboard_support import Dashboard
 
 from protocol.primary.messages import TextMessage
 from ur_emulator import ControlBox
@@ -52,8 +53,9 @@ def assert_identical(file, at_least=1):
 # --- sessions
 
 
-@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
-@pytest.mark.parametrize(("robot", "fidelity"), [("ur3", "typical"), ("ur5e", "poor")])
+@pytest.mark.parametrize(
+    ("pace", "robot", "fidelity"), [("realtime", "ur3", "typical"), ("lockstep", "ur5e", "poor")]
+)
 def test_a_session_of_operations_is_explained_by_its_inputs(file, pace, robot, fidelity):
     with kept(file, pace=pace, robot=robot, fidelity=fidelity) as box:
         box.run_program(MOVE, wait=True)
@@ -131,8 +133,9 @@ def test_sockets_calls_and_modbus_units_of_a_program_are_explained(file):
     assert_identical(file, 40)
 
 
-def test_grippers_are_explained(file):
-    with kept(file, robot="ur5e", tool="robotiq-2f85") as box:
+def test_a_gripper_a_program_file_and_what_clients_write_are_explained(file, tmp_path):
+    (tmp_path / "one.script").write_text(MOVE)
+    with kept(file, robot="ur5e", tool="robotiq-2f85", programs=tmp_path) as box:
         with connect(box, "gripper") as client:
             for words in (b"SET ACT 1\n", b"SET POS 200\n", b"SET GTO 1\n"):
                 client.sendall(words)
@@ -143,23 +146,10 @@ def test_grippers_are_explained(file):
         with connect(box, "modbus") as client:
             client.sendall(bytes.fromhex("000100000006ff0600800102"))
             assert len(client.recv(12)) == 12
+        with Dashboard(box) as dashboard:
+            assert dashboard.ask_all("load one.script", "play")[1] == "Starting program"
+        box.wait_until(program_state="STOPPED", steady=True)
     assert_identical(file, 1000)
-
-
-def test_a_program_file_and_what_clients_write_are_explained(file, tmp_path):
-    folder = tmp_path / "programs"
-    folder.mkdir()
-    (folder / "one.script").write_text(MOVE)
-    with kept(file, programs=folder) as box:
-        with connect(box, "dashboard") as client:
-            words = client.makefile("rw", newline="\n")
-            words.readline()
-            for line in ("load one.script", "play"):
-                words.write(line + "\n")
-                words.flush()
-                words.readline()
-        box.wait_until(log="Program stopped")
-    assert_identical(file, 50)
 
 
 def test_another_process_with_another_hash_seed_finds_the_same(file):
@@ -185,10 +175,18 @@ def write(file, lines):
     file.write_text("".join(json.dumps(line) + "\n" for line in lines))
 
 
-@pytest.fixture
-def session(file):
-    with kept(file) as box:
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    file = tmp_path_factory.mktemp("session") / "session.journal"
+    with kept(file, in_process=True) as box:
         box.run_program(MOVE, wait=True)
+    return file.read_text()
+
+
+@pytest.fixture
+def session(file, recorded):
+    """The journal of a short session, to be spoilt."""
+    file.write_text(recorded)
     return file
 
 
@@ -213,16 +211,12 @@ def test_a_sensor_that_differs_in_one_bit_is_found(session):
 
 
 def test_a_journal_is_read_after_its_process_was_killed(file):
-    process = subprocess.Popen(
-        [sys.executable, "-m", "ur_emulator", "serve", "--port-base", "21000", "--host", "127.7.7.7",
-         "--journal", str(file)], stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    assert "ready" in process.stdout.readline()
-    while not file.exists() or file.read_text().count("\n") < 20:
-        pass
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    process.stdout.close()
+    box = kept(file).__enter__()
+    box.wait_until(time=box.state.time + 0.2)
+    box._rack._child.look()
+    os.kill(box._rack._child.pid, signal.SIGKILL)
+    with pytest.raises(EmulatorError, match="SIGKILL"):
+        box.__exit__(None, None, None)
     assert_identical(file, 18)
     file.write_text(file.read_text()[:-7])  # a line that was cut off
     assert_identical(file, 17)
@@ -318,11 +312,9 @@ def test_the_journal_of_the_box_before_is_kept(file):
         with ControlBox(journal=file, port_base=None, pace="lockstep", in_process=True) as box:
             box.set_digital_input("standard", n, True)
     kept = file.with_name(f"{file.name}.old")
-    assert [f'"n":{n}' in path.read_text() for path in (kept, file) for n in (1, 2)] == [
-        True,
-        False,
-        False,
-        True,
+    assert [[f'"n":{n}' in path.read_text() for n in (1, 2)] for path in (kept, file)] == [
+        [True, False],
+        [False, True],
     ]
 
 

@@ -95,7 +95,7 @@ ROWS = {
     "RTDE recipe": ("cb3", "rtde", rtde("I", b"speed_slider_mask," * (MAX_NAMES_SIZE // 18 + 1)), b",NOT_FOUND"),
     "RTDE text": ("cb3", "rtde", rtde("M", b"t" * (MAX_TEXT + 1), version=1), "t" * (MAX_TEXT - 10) + "..."),
     "Modbus frame": ("cb3", "modbus", struct.pack(">HHHB", 1, 0, 255, 0), IS_CLOSED),
-    "control head": ("cb3", "control", head(b"GET /v1/state HTTP/1.1\r\nHost: "), b" 431 "),
+    "control head": ("cb3", "control", b"GET /v1/state HTTP/1.1\r\nHost: " + head(b"x") + b"\r\n\r\n", b" 431 "),
     "control path": ("cb3", "control", head(b"GET /v1/"), b" 431 "),
     "control body": (
         "cb3", "control", http("POST", "/v1/set_speed", bytes(BUDGETS.body_bytes + 1)), b" 413 "

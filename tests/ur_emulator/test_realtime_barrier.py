@@ -51,8 +51,9 @@ def open_port(box, name):
     return connect(box, name)
 
 
-@pytest.mark.parametrize("method", ["opened", "received"])
-@pytest.mark.parametrize("name", ["primary", "rtde", "control"])
+@pytest.mark.parametrize(
+    ("name", "method"), [("primary", "received"), ("rtde", "opened"), ("control", "received")]
+)
 def test_an_error_of_a_port_ends_the_connection_that_has_caused_it(box, name, method, monkeypatch):
     port, connections = inside(box)._port_set._ports[name], inside(box)._port_set._listeners[name].connections
     with open_port(box, name) as other:

@@ -189,7 +189,6 @@ def test_a_program_that_fills_the_memory_ends_and_its_neighbour_goes_on(boxes):
             break
         assert boxes[0].state.program_state == "STOPPED"
     assert process.memory_info().rss - at_rest < 40 * MIB
-    assert [entry.text.partition(": ")[2] for entry in boxes[0].log if "Runtime error" in entry.text] == [
-        ENDED
-    ]
+    errors = [entry.text for entry in boxes[0].log if "Runtime error" in entry.text]
+    assert [text.partition(": ")[2] for text in errors] == [ENDED]
     assert boxes[1].state.program_state == "PLAYING"

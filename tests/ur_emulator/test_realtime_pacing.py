@@ -68,12 +68,6 @@ def test_realtime_catches_up_short_delays_but_starts_anew_after_long_ones():
     assert box.cycles_behind == pytest.approx(10 * MAX_BACKLOG / PERIOD, abs=2)
 
 
-def test_speed_divides_the_period():
-    pacer = RealtimePacer(PERIOD, speed=4.0)
-    pacer.may_tick(0.0, Box())
-    assert pacer.next_call(0.0) == PERIOD / 4
-
-
 def test_a_cycle_may_be_computed_a_little_before_its_deadline_without_moving_the_next():
     pacer = RealtimePacer(PERIOD, lead=0.0004)
     assert pacer.may_tick(10.0, Box())
@@ -88,6 +82,7 @@ def test_a_cycle_may_be_computed_a_little_before_its_deadline_without_moving_the
 def test_the_lead_is_at_most_a_quarter_of_a_short_period():
     pacer = RealtimePacer(PERIOD, speed=100.0, lead=0.0004)
     pacer.may_tick(0.0, Box())
+    assert pacer.next_call(0.0) == PERIOD / 100
     assert not pacer.may_tick(0.70 * PERIOD / 100, Box())
     assert pacer.may_tick(0.76 * PERIOD / 100, Box())
 
@@ -201,9 +196,9 @@ def test_the_limits_count_from_the_beginning_of_each_wait():
     for begin in (0.0, HANG_LIMIT, 2 * HANG_LIMIT):
         assert wait(pacer, Box(waits_outside=True), 0.6 * HANG_LIMIT, begin) is None
         assert pacer.may_tick(begin + 0.7 * HANG_LIMIT, Box())
-    assert wait(pacer, Box(readers_full=True), 0.6 * READER_LIMIT) is None
-    assert pacer.may_tick(0.7 * READER_LIMIT, Box())
-    assert wait(pacer, Box(readers_full=True), 0.6 * READER_LIMIT, READER_LIMIT) is None
+    for begin in (0.0, READER_LIMIT):
+        assert wait(pacer, Box(readers_full=True), 0.6 * READER_LIMIT, begin) is None
+        assert pacer.may_tick(begin + 0.7 * READER_LIMIT, Box())
 
 
 @pytest.mark.parametrize("waiting", [{"waits_outside": True}, {"readers_full": True}])
@@ -211,13 +206,6 @@ def test_a_box_that_was_stopped_does_not_lose_patience_with_its_clients(waiting)
     pacer, box = LockstepPacer(PERIOD), Box(**waiting)
     for hour in range(4):
         assert wait(pacer, box, 1.0, 3600.0 * hour) is None
-    assert box.given_up == 0
-
-
-@pytest.mark.parametrize("readers_full", [False, True])
-def test_a_client_that_is_stopped_for_half_a_minute_while_a_script_waits_for_it_loses_nothing(readers_full):
-    box = Box(waits_outside=True, readers_full=readers_full)
-    assert wait(LockstepPacer(PERIOD), box, 40.0) is None
     assert box.given_up == 0
 
 

@@ -26,60 +26,36 @@ from ur_emulator.machine.models.generations import CB3, E_SERIES
 from ur_emulator.machine.scripting import rpc_builtins
 
 
-class FakeCall:
-    """A call that ends when the test says so."""
-
-    def __init__(self, network, number, method, arguments):
-        self._network, self._number = network, number
-        self.method = method
-        self.arguments = arguments
-
-    def answer(self, value):
-        self._network.answer(CallEnded(self._number, value, ""))
-
-
-class FakeServer:
-    """A server whose procedures are the test."""
-
-    def __init__(self):
-        self.calls = []
-        self.closed = 0
-
-
 class RpcNetwork(FakeNetwork):
-    """Knows servers, by their numbers."""
+    """Keeps the calls: (number, server, method, arguments), and the servers whose connection was closed."""
 
     def __init__(self):
         super().__init__()
-        self.servers = {}
+        self.calls, self.closed = [], []
 
     def call(self, request, method, arguments):
-        server = self.servers.setdefault(request.server, FakeServer())
-        server.calls.append(FakeCall(self, request.call, method, arguments))
+        self.calls.append((request.call, request.server, method, arguments))
 
     def close_server(self, server):
-        self.servers[server].closed += 1
-
-    def answer(self, arrival):
-        self._arrivals.append(arrival)
+        self.closed.append(server)
 
 
 class RpcBench(Bench):
-    """A bench whose network knows servers."""
+    """A bench whose remote procedures are the test."""
 
     def __init__(self, **kwargs):
         super().__init__(network=RpcNetwork(), **kwargs)
-
-    @property
-    def servers(self):
-        return list(self.network.servers.values())
 
     def call(self, arguments=""):
         self.start(
             f'def p():\n  h = rpc_factory("xmlrpc", "http://x:1")\n  x = h.work({arguments})\n'
             '  textmsg("got ", x)\nend\n'
         )
-        return self.servers[-1].calls[-1]
+
+    def answer(self, value):
+        """End the last call, and give the program a cycle."""
+        self.network._arrivals.append(CallEnded(self.network.calls[-1][0], value, ""))
+        self.tick()
 
     @property
     def texts(self):
@@ -88,58 +64,35 @@ class RpcBench(Bench):
 
 def test_a_text_is_utf_8_in_a_program():
     bench = RpcBench()
-    call = bench.call('"\xc3\xa9", "\xe9"')
-    assert call.arguments == ["\u00e9", "\xe9"]  # what is none goes out byte by byte
-    call.answer("\u00e9")
-    bench.tick()
+    bench.call('"\xc3\xa9", "\xe9"')
+    assert bench.network.calls[0][3] == ["\u00e9", "\xe9"]  # what is none goes out byte by byte
+    bench.answer("\u00e9")
     assert bench.texts[-1] == "got \xc3\xa9"
 
 
-@pytest.mark.parametrize("result", [2**31, [[1], [1, 2]], {"x": "a"}, object()])
-def test_a_result_without_counterpart_ends_the_program_and_its_connection(result):
+def test_a_result_without_counterpart_ends_the_program_and_its_connection():
     bench = RpcBench()
-    bench.call().answer(result)
-    bench.tick()
-    assert any("the result" in text or "rows of equal length" in text for text in bench.texts)
+    bench.call()
+    bench.answer(object())
+    assert any("the result" in text for text in bench.texts)
     assert not bench.controller.programs.is_running
-    assert bench.servers[0].closed == 1
+    assert bench.network.closed == [bench.network.calls[0][1]]
 
 
 @pytest.mark.parametrize(("n", "told"), [(255, "got {"), (256, "has no counterpart in a script")])
 def test_members_of_a_struct_have_names_of_a_script(n, told):
     bench = RpcBench(robot="ur5e", generation=E_SERIES)
-    bench.call().answer({"m" * n: 1})
-    bench.tick()
+    bench.call()
+    bench.answer({"m" * n: 1})
     assert told in bench.texts[-1]
-
-
-def test_only_the_calling_thread_waits():
-    bench = RpcBench()
-    bench.start(
-        'def p():\n  h = rpc_factory("xmlrpc", "http://x:1")\n  thread t():\n    sleep(0.1)\n    textmsg("alive")\n'
-        "  end\n  run t()\n  h.work()\n  textmsg(1)\nend\n"
-    )
-    bench.tick(20)
-    assert bench.texts[-1] == "alive"
-    assert bench.controller.waits_outside
-
-
-def test_the_handle_closes_its_connection_itself():
-    bench = RpcBench()
-    bench.run(
-        'def p():\n  h = rpc_factory("xmlrpc", "http://x:1")\n  h.closeXMLRPCClientConnection()\n  textmsg("on")\nend\n'
-    )
-    assert bench.texts == ["on"]
-    assert bench.servers == []  # nothing was called: there is no connection
 
 
 def test_a_program_that_is_stopped_closes_what_it_opened():
     bench = RpcBench()
-    call = bench.call()
+    bench.call()
     bench.tick(1, StopProgram())
-    assert bench.servers[0].closed == 1
-    call.answer(1)
-    bench.tick(3)
+    assert bench.network.closed == [bench.network.calls[0][1]]
+    bench.answer(1)
     assert not any(text.startswith("got") for text in bench.texts)
 
 
@@ -153,13 +106,10 @@ def test_so_many_values_are_sent_in_8_ms_and_a_longer_call_takes_the_room_of_the
         'def p():\n  thread t():\n    h.second([1])\n  end\n  h = rpc_factory("xmlrpc", "http://10.0.0.1/")\n'
         "  x = [0" + ", 0" * 98 + "]\n  sync()\n  run t()\n  h.first(x)\nend\n"
     )
+    bench.tick(cycles)
+    assert [method for _, _, method, _ in bench.network.calls] == ["first"]
     bench.tick()
-    [server] = bench.servers
-    assert [call.method for call in server.calls] == ["first"]
-    bench.tick(cycles - 1)
-    assert len(server.calls) == 1
-    bench.tick()
-    assert [call.method for call in server.calls] == ["first", "second"]
+    assert [method for _, _, method, _ in bench.network.calls] == ["first", "second"]
 
 
 # --- over real sockets
@@ -199,7 +149,7 @@ def procedures(**functions):
 
 @pytest.fixture(scope="module")
 def box():
-    with ControlBox(in_process=True, pace="lockstep", port_base=None) as running:
+    with ControlBox(in_process=True, pace="lockstep", port_base=None, control_port=0) as running:
         yield running
 
 
@@ -212,9 +162,7 @@ def test_calls_go_there_and_back_on_one_connection(box):
         with connect(box, "primary") as sock:
             reader = MessageReader(sock)
             send(
-                sock,
-                port,
-                ("textmsg(h.add(1, 2))", "q = h.shift(p[1, 0, 0, 0, 0, 0], 0.5)", "textmsg(q[0])"),
+                sock, port, ("textmsg(h.add(1, 2))", "q = h.shift(p[1, 0, 0, 0, 0, 0], 0.5)", "textmsg(q[0])")
             )
             assert [reader.message(TextMessage).text for _ in range(2)] == ["3", "1.5"]
             assert reader.message(KeyMessage).title.endswith(("STARTED", "STOPPED"))
@@ -226,12 +174,6 @@ def fail(box, port, body=("h.work()",)):
         reader = MessageReader(sock)
         send(sock, port, body)
         return reader.message(RuntimeExceptionMessage)
-
-
-def test_a_server_that_does_not_run(box):
-    with listening_socket() as server:
-        port = server.getsockname()[1]
-    assert "does not answer" in fail(box, port).text
 
 
 def http(body=b"", *headers, status="200 OK", length=None):
@@ -286,15 +228,12 @@ def answering(answer, then=b"", closes=True):
         (b"", "closed the connection"),
         (http(value("<array><data>" + "<value/>" * 6000 + "</data></array>")), "too many values"),
         (http(gzip.compress(bytes(1 << 20)), "Content-Encoding: gzip"), "packed with gzip"),
-        (http(b"\x1f\x8b\x08broken", "Content-Encoding: gzip"), "packed with gzip"),
         (http(gzip.compress(value(""))), "not XML"),
         (http(length=1 << 30), "longer than 262144 bytes"),
         (http(length="-1"), "makes no sense"),
-        (http(length="9" * 5000), "makes no sense"),
         (http(value(""), length=5000), "makes no sense"),
         (http(status="301 Moved"), "answered 301 Moved"),
         (http(status="500 \x1b[2J"), "remote procedure call failed"),
-        (http(value("<i8>9223372036854775807</i8>")), "no counterpart"),
         (http(FAULT), "\xe2\x82\xac 1"),
         (b"HTTP/1.1 100 Continue\r\n\r\n" * 20_000, "longer than"),
         (b"HTTP/1.1 200 OK\r\nX: " + b"x" * 100_000, "makes no sense"),
@@ -351,15 +290,15 @@ def test_an_address_that_is_none_is_a_run_time_error(box, url):
     assert "is not an address" in message.text or "does not answer" in message.text
 
 
-def test_the_control_port_is_closed_to_remote_procedures():
-    with ControlBox(in_process=True, pace="lockstep", port_base=None, control_port=0) as box:
-        assert "control API" in fail(box, box.control_port).text
+def test_the_control_port_is_closed_to_remote_procedures(box):
+    assert "control API" in fail(box, box.control_port).text
 
 
-def test_a_text_with_a_control_character_is_not_sent(box):
+def test_a_text_with_a_control_character_is_not_sent_and_who_does_not_run_does_not_answer(box):
     with answering(http(value(""))) as (port, served):
         assert "XML does not have it" in fail(box, port, ('h.work("\x1b")',)).text
         assert not served
+    assert "does not answer" in fail(box, port).text
 
 
 def test_an_answer_that_nobody_asked_for_is_not_taken_for_that_of_the_next_call(box):
@@ -376,13 +315,8 @@ def test_handles_in_a_loop_share_a_few_connections(box, monkeypatch):
     monkeypatch.setattr(network, "BUDGETS", replace(BUDGETS, remote_connections=3))
     with procedures(one=lambda: 1) as port, connect(box, "primary") as sock:
         most = 0
-        loop = (
-            "i = 0",
-            "while i < 30:",
-            f'  k = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")',
-            "  k.one()",
-        )
-        send(sock, port, (*loop, "  i = i + 1", "end", 'textmsg("done")'))
+        make = f'k = rpc_factory("xmlrpc", "http://127.0.0.1:{port}/RPC2")'
+        send(sock, port, ("i = 0", "while i < 30:", make, "k.one()", "i = i + 1", "end", 'textmsg("done")'))
         while not [entry for entry in box.log if entry.text == "done"]:
             most = max(most, len(inside(box)._network._remotes._servers))
         MessageReader(sock).message(TextMessage)

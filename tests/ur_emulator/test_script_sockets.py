@@ -11,7 +11,6 @@ from box_support import (
     TIMEOUT,
     Bench,
     FakeNetwork,
-    FrameReader,
     MessageReader,
     connect,
     inside,
@@ -25,7 +24,7 @@ from hypothesis import strategies as st
 from protocol.primary.messages import RuntimeExceptionMessage, TextMessage
 from ur_emulator import ControlBox
 from ur_emulator.budgets import BUDGETS
-from ur_emulator.host.script_network import addresses, loop_network, sockets
+from ur_emulator.host.script_network import addresses, loop_network, modbus_units, sockets
 from ur_emulator.host.script_network.addresses import LookUp, LookUps
 from ur_emulator.machine.controller.io import network
 from ur_emulator.machine.controller.io.network import ScriptSocket
@@ -177,25 +176,6 @@ def test_beyond_the_queue_and_without_threads_a_look_up_is_refused(monkeypatch):
     assert not LookUps().start(asked[0])
 
 
-def test_two_hundred_scripts_that_wait_for_names_take_two_threads(monkeypatch):
-    resolver = Resolver(monkeypatch)
-    text = "def p():\n" + "".join(
-        f'  thread t{i}():\n    socket_open("name{i}.example", 80, "s{i}")\n  end\n  run t{i}()\n'
-        for i in range(180)
-    )
-    with ControlBox(in_process=True, port_base=None) as box, connect(box, "secondary") as sock:
-        sock.sendall((text + "  sleep(9)\nend\n").encode())
-        resolver.wait_for(2)
-        with connect(box, "realtime") as stream:
-            reader = FrameReader(stream)
-            for _ in range(20):
-                reader.next()
-        sock.sendall(b"stop program\n")
-        assert printed_by(box, 'textmsg("next")') == ["next"]
-        resolver.end()
-    assert len(resolver.asked) <= BUDGETS.look_ups_at_once
-
-
 # --- bytes
 
 
@@ -214,38 +194,39 @@ def flood(server, n, data):
     return senders
 
 
+COUNT_LINES = """k = 0
+while k < {n}:
+  i = 0
+  while i < {lines}:
+    if to_num(socket_read_line(str_cat("s", to_str(k)))) != i:
+      textmsg("wrong ", i)
+      halt
+    end
+    i = i + 1
+  end
+  k = k + 1
+end
+textmsg("all")"""
+
+
 def test_an_inbox_is_bounded_and_held_back_is_not_lost(box, monkeypatch):
-    lower(monkeypatch, inbox_bytes=50_000)
-    n, lines = 2, 8_000
+    lower(monkeypatch, inbox_bytes=20_000)
+    n, lines = 2, 2_000
     data = b"".join(b"%07d\n" % i for i in range(lines))
     network = inside(box)._network
     with listening_socket() as server, connect(box, "primary") as sock:
         opens = [f'socket_open("127.0.0.1", {server.getsockname()[1]}, "s{i}")' for i in range(n)]
-        check = (
-            "k = 0",
-            f"while k < {n}:",
-            '  name = str_cat("s", to_str(k))',
-            "  i = 0",
-            f"  while i < {lines}:",
-            "    if to_num(socket_read_line(name)) != i:",
-            '      textmsg("wrong ", i)',
-            "      halt",
-            "    end",
-            "    i = i + 1",
-            "  end",
-            "  k = k + 1",
-            "end",
-            'textmsg("all")',
+        sock.sendall(
+            program(*opens, 'textmsg("open")', "sleep(1)", COUNT_LINES.format(n=n, lines=lines)).encode()
         )
-        sock.sendall(program(*opens, 'textmsg("open")', "sleep(1)", *check).encode())
         senders = flood(server, n, data)
         reader = MessageReader(sock)
         assert reader.message(TextMessage).text == "open"
         most = 0
         while not (said := log_lines(box, "all") + log_lines(box, "wrong")):
-            most = max([most, *(len(one._inbox) for one in tuple(network._buffers.connections))])
+            most = max([most, *(one._unread for one in tuple(network._buffers.connections))])
         assert said == ["all"]
-        assert most < 50_000 + sockets._READ_SIZE
+        assert most < 20_000 + sockets._READ_SIZE
         for sender in senders:
             sender.join(TIMEOUT)
 
@@ -255,14 +236,7 @@ def test_all_outboxes_together_are_bounded(box, monkeypatch):
     n = 8
     with listening_socket() as server, connect(box, "primary") as sock:
         opens = [f'socket_open("127.0.0.1", {server.getsockname()[1]}, "s{i}")' for i in range(n)]
-        double = (
-            's = "0123456789abcdef"',
-            "i = 0",
-            "while i < 10:",
-            "  s = s + s",
-            "  i = i + 1",
-            "end",
-        )
+        double = ('s = "0123456789abcdef"', "i = 0", "while i < 10:", "s = s + s", "i = i + 1", "end")
         fill = [f'while socket_send_string(s, "s{i}"):\n    sync()\n  end' for i in range(n)]
         sock.sendall(program(*opens, *double, *fill, 'textmsg("full")', "sleep(5)").encode())
         with ExitStack() as peers:
@@ -354,13 +328,13 @@ def test_a_line_that_comes_byte_by_byte_is_looked_at_once():
     peer.inbox = CountingInbox()
     bench.tick()
     CountingInbox.searched = 0
-    for _ in range(2000):
+    for _ in range(300):
         peer.inbox += b"z"
         bench.tick()
     peer.inbox += b"\n"
     bench.tick(2)
-    assert [event.text for event in bench.events if hasattr(event, "text")][-1] == "2000"
-    assert CountingInbox.searched <= 2 * 2001
+    assert bench.texts == ["300"]
+    assert CountingInbox.searched <= 2 * 301
 
 
 # --- the control API
@@ -383,7 +357,8 @@ def test_nor_to_that_of_another_box_of_the_process_until_it_is_closed(box):
         assert printed_by(box, f'textmsg(socket_open("127.0.0.1", {port}))') == ["True"]
 
 
-def test_nor_through_a_modbus_unit(box):
+def test_nor_through_a_modbus_unit(box, monkeypatch):
+    monkeypatch.setattr(modbus_units, "TOLERANCE", 0.05)
     with connect(box, "primary") as sock:
         add = f'modbus_add_signal("127.0.0.1:{box.control_port}", 255, 1, 2, "s")'
         wait = ("while True:", '  modbus_get_signal_status("s", False)', "  sync()", "end")
