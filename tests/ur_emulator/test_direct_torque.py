@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from e_series_support import DT, ESeriesBench, program
 
-from protocol.ur_types import ControlMode
 from ur_emulator.machine.commands.surroundings import Push
 
 ALL = "viscous_scale=[1,1,1,1,1,1], coulomb_scale=[1,1,1,1,1,1]"
@@ -22,14 +21,6 @@ def endless(torque, more=ALL):
 
 def truth(bench):
     return bench.controller.plant.q_true.copy()
-
-
-def rest(bench):
-    """Whether the arm stands, and position control holds it."""
-    bench.tick(400)
-    before = truth(bench)
-    bench.tick(100)
-    return np.abs(truth(bench) - before).max() < 1e-5 and bench.now.control_mode == ControlMode.POSITION
 
 
 @pytest.mark.parametrize(("joint", "torque"), [(0, 20.0), (1, -30.0), (2, 15.0), (3, 2.0), (5, -2.0)])
