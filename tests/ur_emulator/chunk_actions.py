@@ -16,6 +16,7 @@ push 0 0 -20          push the flange, base axes, N; with three more numbers at 
 SafeguardStop True    any command by its name, with its arguments
 """
 
+import shlex
 from ast import literal_eval
 
 from ur_emulator.machine.commands import power, programs, safety, surroundings
@@ -102,7 +103,7 @@ def act(bench, catalogue, action):
             force, point = (numbers := [float(x) for x in rest.split()])[:3], numbers[3:]
             bench.controller.plant.push(force, *([point] if point else []))
         case _ if word in _COMMANDS:
-            return [_COMMANDS[word](*map(_argument, rest.split()))]
+            return [_COMMANDS[word](*map(_argument, shlex.split(rest)))]
         case _:
             assert action in _PLAIN, f"there is no action {action!r}"
             return [_PLAIN[action]()]
