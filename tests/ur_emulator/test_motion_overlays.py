@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from motion_support import DT, HOME, START, TOOL, Swing, at, line, run_cycles
 
@@ -177,7 +177,6 @@ def test_a_move_on_a_running_belt_is_a_move_in_the_frame_of_the_belt(motion, spe
     assert TOOL.pose(motion.path.q) == pytest.approx(at(0.03, 0.0, -0.02), abs=1e-9)
 
 
-@settings(max_examples=15)
 @given(st.floats(-0.15, 0.15), st.sampled_from([200.0, 1000.0, 20000.0]))
 def test_the_arm_catches_up_with_bounded_acceleration_and_without_a_jump(speed, density):
     motion = ArmMotion(HOME, 20.0)
