@@ -156,9 +156,14 @@ def sends_half_a_message(arm):
 
 # Others are the same arm twice.
 ARMS = ("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "ur16e", "ur8long", "ur15", "ur18", "ur20", "ur30")
-# The joints that are hardest to stop, and the fastest one; of an arm of each generation all.
+# The joints that are hardest to stop, and the fastest one; of an arm of each generation all. At night of every arm.
+DAILY = ("ur3", "ur10", "ur5e", "ur20")
 CASES = [
-    *((robot, joint, falls_silent) for robot in ARMS for joint in (0, 1, 5)),
+    *(
+        pytest.param(robot, joint, falls_silent, marks=() if robot in DAILY else pytest.mark.nightly)
+        for robot in ARMS
+        for joint in (0, 1, 5)
+    ),
     *((robot, joint, falls_silent) for robot in ("ur3", "ur5e") for joint in (2, 3, 4)),
     *((robot, 0, end) for robot in ("ur3", "ur10") for end in (closes, sends_half_a_message)),
 ]
