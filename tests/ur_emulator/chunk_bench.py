@@ -9,6 +9,7 @@ from box_support import Bench
 from chunk_actions import act
 from chunk_peers import ChunkNetwork
 
+from protocol.primary.messages import ReportLevel
 from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, StartProgram
 from ur_emulator.machine.models.generations import CB3, E_SERIES
@@ -141,7 +142,9 @@ class ChunkRun:
             case "ScriptFailed":
                 self.errors.append((event.secondary, event.line, event.column, event.text))
             case "ErrorReported":
-                self.events.append(f"C{event.code}A{event.argument} {event.text}")
+                is_grave = event.level in (ReportLevel.VIOLATION, ReportLevel.FAULT)
+                level = f"{event.level.name.lower()} " if is_grave else ""
+                self.events.append(f"{level}C{event.code}A{event.argument} {event.text}")
             case "SafetyModeChanged":
                 self.events.append(f"safety {_mode_name(event.safety_mode)}")
             case "PopupShown":
