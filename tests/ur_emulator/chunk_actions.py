@@ -12,11 +12,14 @@ run PROGRAM           start a one-line program, primary or `sec`
 stop / unlock / power_off / close_popup / protective_stop / pause / resume
 answer 5              to the oldest question of that type
 slider 0.5            the speed slider
-push 0 0 -20          push the flange, base axes, N; zeros end it
+push 0 0 -20          push the flange, base axes, N; with three more numbers at a point in flange axes, m; zeros end it
+SafeguardStop True    any command by its name, with its arguments
 """
 
+import shlex
 from ast import literal_eval
 
+from ur_emulator.machine.commands import power, programs, safety, surroundings
 from ur_emulator.machine.commands.client_writes import WriteInputs
 from ur_emulator.machine.commands.power import PowerOff
 from ur_emulator.machine.commands.programs import (
@@ -36,6 +39,7 @@ from ur_emulator.machine.controller.io.lines import CONFIGURABLE, TOOL
 from ur_emulator.program_files.compiling import compile_line
 from urscript import compile_program
 
+_COMMANDS = {**vars(power), **vars(programs), **vars(safety), **vars(surroundings)}
 _SHIFTS = {"c": CONFIGURABLE.first, "t": TOOL.first}
 _WORDS = {"skipbuffer": SkipStatements, "abort": AbortMove}
 _PLAIN = {
@@ -96,11 +100,21 @@ def act(bench, catalogue, action):
         case "slider":
             return [SetSpeedSlider(float(rest))]
         case "push":
-            bench.controller.plant.push([float(x) for x in rest.split()])
+            force, point = (numbers := [float(x) for x in rest.split()])[:3], numbers[3:]
+            bench.controller.plant.push(force, *([point] if point else []))
+        case _ if word in _COMMANDS:
+            return [_COMMANDS[word](*map(_argument, shlex.split(rest)))]
         case _:
             assert action in _PLAIN, f"there is no action {action!r}"
             return [_PLAIN[action]()]
     return []
+
+
+def _argument(text):
+    try:
+        return literal_eval(text)
+    except (ValueError, SyntaxError):
+        return text
 
 
 def _switch_input(io, line, level):

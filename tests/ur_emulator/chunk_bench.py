@@ -4,11 +4,13 @@ import re
 from ast import literal_eval
 from functools import cache
 
+import numpy as np
 from box_support import Bench
 from chunk_actions import act
 from chunk_peers import ChunkNetwork
 
-from protocol.ur_types import ProgramState, SafetyMode
+from protocol.primary.messages import ReportLevel
+from protocol.ur_types import ControlMode, ProgramState, RobotMode, SafetyMode, SafetyStatus
 from ur_emulator.machine.commands.programs import AnswerRequest, ClosePopup, StartProgram
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 from urscript import compile_program
@@ -17,6 +19,28 @@ from urscript.check.checking import check_program
 from urscript.errors import ScriptCompileError
 
 MAX_CYCLES = 6_000
+_NAMED = {
+    "safety_mode": SafetyMode,
+    "safety_status": SafetyStatus,
+    "robot_mode": RobotMode,
+    "runtime_state": ProgramState,
+    "control_mode": ControlMode,
+}
+# What snapshots do not tell: the true state of the arm.
+_TRUE = {
+    "place": lambda box: box.plant.physics.flange_position,
+    "contact": lambda box: box.plant.physics.contact_wrench[:3],
+    "q_true": lambda box: box.plant.q_true,
+    "qd_true": lambda box: box.plant.qd_true,
+}
+_OVER_CYCLES = {
+    "": lambda values: values,
+    "mean": lambda values: values.mean(axis=0),
+    "most": lambda values: np.abs(values).max(),
+    "span": lambda values: np.ptp(values, axis=0).max(),
+    "step": lambda values: np.abs(np.diff(values, axis=0)).max(),
+    "gain": lambda values: values[-1] - values[0],
+}
 
 
 @cache
@@ -31,7 +55,8 @@ class ChunkBench(Bench):
     def __init__(self, chunk):
         robot, generation = ("ur3", CB3) if chunk.software.startswith("3.") else ("ur5e", E_SERIES)
         super().__init__(
-            robot=robot,
+            robot=chunk.robot or robot,
+            mode=RobotMode[chunk.mode],
             generation=generation,
             fidelity=chunk.fidelity,
             seed=chunk.seed,
@@ -52,11 +77,18 @@ class ChunkRun:
         self.events = []
         self.life = []
         self.cycles = 0
+        self.seen = {look.name: {} for look in chunk.looks}
+        self._last_look = max((look.cycles[-1] for look in chunk.looks), default=-1)
         self._answers = list(chunk.answers)
         self._due = []
+        if chunk.before:
+            self.bench.tick(1, StartProgram(compiled(chunk.before, self.catalogue)))
+            while self.bench.controller.programs.has_work or self.bench.controller.state.motion.is_moving:
+                self.bench.tick()
+            self.bench.events.clear()
 
     def start(self, text, cycles_of_actions):
-        """Start a program and run until it and the arm have come to rest."""
+        """Start a program and run until it and the arm have come to rest, and to the last cycle looked at."""
         program = compiled(text, self.catalogue)
         actions = sorted(cycles_of_actions, key=lambda action: action[0])
         for cycle, action in actions:
@@ -71,7 +103,8 @@ class ChunkRun:
             commands = []
             while actions and actions[0][0] == cycle:
                 commands += act(self.bench, self.catalogue, actions.pop(0)[1])
-            if not actions and not commands and not self._due and self._is_over():
+            if not actions and not commands and not self._due and cycle > self._last_look and self._is_over():
+                self._last_look = -1
                 return
             self._tick(cycle, commands)
             if self.bench.controller.programs.has_work:
@@ -80,6 +113,8 @@ class ChunkRun:
 
     def _is_over(self):
         programs = self.bench.controller.programs
+        if self.chunk.endless:
+            return True
         if programs.is_running:
             return programs.runtime_state is ProgramState.PAUSED
         return not self.bench.controller.state.motion.is_moving
@@ -93,6 +128,10 @@ class ChunkRun:
         due, self._due = self._due, []
         self.bench.tick(1, *commands, *due)
         self.bench.snapshots.clear()
+        if 0 <= cycle <= self._last_look:
+            for name, values in self.seen.items():
+                true = _TRUE.get(name)
+                values[cycle] = np.array(true(self.bench.controller) if true else getattr(self.bench.now, name))
         for event in self.bench.events[first:]:
             self._take(cycle, event)
 
@@ -103,7 +142,9 @@ class ChunkRun:
             case "ScriptFailed":
                 self.errors.append((event.secondary, event.line, event.column, event.text))
             case "ErrorReported":
-                self.events.append(f"C{event.code}A{event.argument} {event.text}")
+                is_grave = event.level in (ReportLevel.VIOLATION, ReportLevel.FAULT)
+                level = f"{event.level.name.lower()} " if is_grave else ""
+                self.events.append(f"{level}C{event.code}A{event.argument} {event.text}")
             case "SafetyModeChanged":
                 self.events.append(f"safety {_mode_name(event.safety_mode)}")
             case "PopupShown":
@@ -165,9 +206,22 @@ def run_box_chunk(chunk):
         assert found == value, f"{chunk}: {found} at {kind} {address}"
     assert not any(socket.is_open for socket in run.network.sockets), f"{chunk}: left a socket open"
     assert run.bench.controller.programs.is_paused == chunk.paused, f"{chunk}: paused"
+    for look in chunk.looks:
+        _compare_look(chunk, look, run.seen[look.name])
     for name, value, tolerance in chunk.states:
         _compare_value(chunk, name, getattr(run.bench.now, name), value, tolerance)
     return run
+
+
+def _compare_look(chunk, look, seen):
+    values = np.array([seen[cycle] for cycle in look.cycles], dtype=float)
+    found = _OVER_CYCLES[look.how](values if look.index is None else values[:, look.index])
+    wanted = _NAMED[look.name][look.value] if look.value.isupper() else literal_eval(look.value)
+    if look.relation:
+        fits = found < wanted if look.relation == "<" else found > wanted
+    else:
+        fits = np.abs(found - np.array(wanted, dtype=float)) <= look.tolerance
+    assert np.all(fits), f"{chunk}: {look.how} {look.name} in {look.cycles} is {found}"
 
 
 def _mode_name(mode):

@@ -9,19 +9,28 @@ Chunks stand apart by a line `---`; lines count from the first of the chunk. A l
                         several: all compile errors in order
     #sec! 1:5 text      the same of a secondary program
     #~ wire text        what the first error puts into the runtime-exception message
-    #event text         the next thing the box reports beside texts: `C204A0 Protective Stop: ...`,
+    #event text         the next thing the box reports beside texts: `C204A0 Protective Stop: ...` (`violation`, `fault`
+                        before those of that level),
                         `safety PROTECTIVE_STOP`, `popup title: text`, `asks integer: text`,
                         `log source: text` (all, in order)
     #life text          the next thing that happens to the program: `started p`, `stopped p` (all, if any)
     #cycles 25          how many cycles the program runs
     #paused             the program is left paused at the end
     #state name value   a value of the last snapshot, optionally with a tolerance
+    #see 60 name value  a value of the snapshot of cycle 60; `#see 60..80 name value` in each of them; `< value`, `> value`;
+                        `~ 0.1` for a tolerance; `name[2]` for one of several numbers; before the name `mean`, `most`
+                        (the greatest size), `span` (greatest minus least), `step` (the greatest change from one cycle to
+                        the next) or `gain` (last minus first); the chunk goes on to the last of these cycles
+    #endless            the program is not waited for, nor the arm
     #sent "text"        all that the program sent, through all sockets, in order
     #called f [1, 2]    the next remote procedure called, with its arguments (all, in order)
     #modbus 3 6 100     what stands in a Modbus unit at the end: type of signal, address, value
     #custom 255 6 [0]   the next request sent to a unit as it is: its number, function code, data (all)
 
     what the box is and what is done to it
+    #robot ur20         the arm
+    #mode POWER_OFF     the robot mode at the beginning
+    #before PROGRAM     a one-line program that has run before, what it reports is not compared
     #fidelity typical   ideal, if not given
     #seed 3             7, if not given
     #loaded             the program was loaded from a file; otherwise it came through a socket
@@ -45,9 +54,32 @@ from ast import literal_eval
 from dataclasses import dataclass, field
 
 _MARK = re.compile(
-    r"#(\d*>|!|sec!|~|event|life|cycles|paused|state|sent|called|modbus|custom|fidelity|seed|loaded|do|at|then|answer|peer"
-    r"|reply|rpc|software)(?: (.*))?$"
+    r"#(\d*>|!|sec!|~|event|life|cycles|paused|state|see|endless|sent|called|modbus|custom|robot|mode|before|fidelity|seed"
+    r"|loaded|do|at|then|answer|peer|reply|rpc|software)(?: (.*))?$"
 )
+_LOOK = re.compile(
+    r"(\d+)(?:\.\.(\d+))? (?:(mean|most|span|step|gain) )?(\w+)(?:\[(\d+)\])? (?:([<>]) )?(.+?)(?: ~ (\S+))?"
+)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a quantity has in some cycles, as `#see` says."""
+
+    cycles: range
+    how: str
+    name: str
+    index: int | None
+    relation: str
+    value: str
+    tolerance: float
+
+    @classmethod
+    def parse(cls, text):
+        first, last, how, name, index, relation, value, tolerance = _LOOK.fullmatch(text).groups()
+        cycles = range(int(first), int(last or first) + 1)
+        place = None if index is None else int(index)
+        return cls(cycles, how or "", name, place, relation or "", value, float(tolerance or 0.0))
 
 
 @dataclass
@@ -65,10 +97,15 @@ class BoxChunk:
     cycles: int | None = None
     paused: bool = False
     states: list[tuple[str, object, float]] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
+    endless: bool = False
     sent: bytes | None = None
     called: list[str] = field(default_factory=list)
     modbus: list[tuple[int, int, int]] = field(default_factory=list)
     custom: list[str] = field(default_factory=list)
+    robot: str = ""
+    mode: str = "RUNNING"
+    before: str = ""
     fidelity: str = "ideal"
     seed: int = 7
     loaded: bool = False
@@ -129,11 +166,15 @@ def _take(chunk, kind, rest):
             chunk.life.append(rest)
         case "cycles":
             chunk.cycles = int(rest)
-        case "paused":
-            chunk.paused = True
         case "state":
             name, value, tolerance = re.fullmatch(r"(\w+) (.+?)(?: ~ (\S+))?", rest).groups()
             chunk.states.append((name, literal_eval(value), float(tolerance or 0.0)))
+        case "see":
+            chunk.looks.append(Look.parse(rest))
+        case "endless" | "paused" | "loaded":
+            setattr(chunk, kind, True)
+        case "robot" | "mode" | "before" | "fidelity" | "software":
+            setattr(chunk, kind, rest)
         case "sent":
             chunk.sent = (chunk.sent or b"") + latin(rest)
         case "called":
@@ -142,12 +183,8 @@ def _take(chunk, kind, rest):
             chunk.modbus.append(tuple(map(int, rest.split())))
         case "custom":
             chunk.custom.append(rest)
-        case "fidelity":
-            chunk.fidelity = rest
         case "seed":
             chunk.seed = int(rest)
-        case "loaded":
-            chunk.loaded = True
         case "do":
             chunk.actions.append((-1, rest))
         case "at":
@@ -165,8 +202,6 @@ def _take(chunk, kind, rest):
         case "rpc":
             name, result = rest.split(" ", 1)
             chunk.procedures[name] = result
-        case "software":
-            chunk.software = rest
         case _:
             cycle = kind.rstrip(">")
             chunk.messages.append((int(cycle) if cycle else None, rest))

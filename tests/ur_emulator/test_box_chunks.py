@@ -61,7 +61,7 @@ def test_the_box_offers_nothing_that_the_language_does_not_know():
 
 
 SCRIPTING = Path(ur_emulator.machine.scripting.__file__).parent
-FILES = sorted(Path(__file__).parent.glob("chunks/*.script"))
+FILES = sorted(Path(__file__).parent.glob("chunks/**/*.script"))
 CHUNKS = load_box_chunks(*FILES)
 
 

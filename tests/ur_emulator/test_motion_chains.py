@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from box_support import Bench
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from motion_support import (
@@ -23,8 +22,6 @@ from motion_support import (
     tool_velocities,
 )
 
-from protocol.ur_types import SafetyMode
-from ur_emulator.machine.controller.events import ErrorReported, ScriptFailed
 from ur_emulator.machine.controller.safety.limit_checks import SetpointCheck
 from ur_emulator.machine.controller.safety.safety_state import limits_of
 from ur_emulator.machine.models.robot_model import ZERO6
@@ -81,8 +78,7 @@ def speeds(targets):
 # --- many waypoints
 
 
-@pytest.mark.parametrize("process", [False, True])
-@pytest.mark.parametrize("spacing", [0.002, 0.005])
+@pytest.mark.parametrize(("spacing", "process"), [(0.002, False), (0.005, True)])
 def test_waypoints_close_together_do_not_slow_the_tool_down(spacing, process):
     corners = [at(spacing * k, 0.0, 0.0) for k in range(1, round(0.12 / spacing) + 1)]
     makers = [straight(p, r=0.4 * spacing, process=process) for p in corners[:-1]]
@@ -112,28 +108,6 @@ def test_a_polygon_that_is_nearly_a_circle_has_the_speed_of_one():
         assert np.linalg.norm(points - leg.goal_pose[:3], axis=1).min() < 0.45 * side
 
 
-def test_a_program_with_waypoints_close_together_runs_ahead_but_not_far():
-    bench = Bench(fidelity="exact")
-    place = "p[0.25,-0.25,0.25,2.2,-2.2,0]"
-    bench.run(f"movej({place}, a=8, v=3)\n")
-    bench.snapshots.clear()
-    bench.run(
-        "def f():\n  i = 1\n  while i <= 50:\n"
-        f"    movel(pose_add({place}, p[0.002 * i,0,0,0,0,0]), a=1.2, v=0.25, r=0.0008)\n"
-        "    write_output_integer_register(0, i)\n    i = i + 1\n  end\n"
-        f"  movel(pose_add({place}, p[0.104,0,0,0,0,0]))\nend\n"
-    )
-    x = np.array([s.target_tcp_pose[0] for s in bench.snapshots]) - 0.25
-    known = np.array([s.registers.output_integers[0] for s in bench.snapshots]) * 0.002
-    speed = np.array([s.target_tcp_speed[0] for s in bench.snapshots])
-    assert speed.max() == pytest.approx(V, abs=1e-6)
-    # Known is what is needed to stop, the blend in the waypoint, two cycles and the move that was just told.
-    running = (known > 0.0) & (known < 0.1)
-    ahead = (known - x)[running]
-    assert ahead.max() <= V * V / (2 * A) + 0.001 + 4 * V * DT + 2 * 0.002
-    assert not [e for e in bench.events if isinstance(e, ErrorReported)]
-
-
 def test_waypoints_whose_blends_overlap_are_left_out_without_a_stop():
     corners = [at(0.003 * k, 0.0, 0.0) for k in range(1, 41)]
     makers = [straight(p, r=0.004) for p in corners]
@@ -159,13 +133,6 @@ def test_an_arc_begins_at_the_waypoint_before_it_also_where_blends_overlap(fixed
     assert np.linalg.norm(points - near[:3], axis=1).min() < 0.015
     on_arc = points[np.linalg.norm(points - via[:3], axis=1) < 0.03]
     assert np.linalg.norm(on_arc - at(0.08, 0.06, 0.0)[:3], axis=1) == pytest.approx(0.03, abs=1e-6)
-
-
-def test_a_program_that_only_moves_to_one_place_with_a_blend_still_takes_time():
-    bench = Bench(fidelity="exact")
-    bench.start("def f():\n  p0 = get_target_tcp_pose()\n  while True:\n    movel(p0, r=0.01)\n  end\nend\n")
-    bench.tick(20)
-    assert bench.controller.programs.is_running
 
 
 @pytest.mark.parametrize("t", [0.3, 1.0])
@@ -415,34 +382,3 @@ def test_the_waypoint_is_that_of_the_move_under_way_also_when_more_are_known():
     order = [np.abs(np.subtract(goals, q)).max(axis=1).argmin() for q in seen]
     assert order == sorted(set(order))
     assert order[-1] == len(corners) - 1
-
-
-@pytest.mark.parametrize("first", ["movej", "movel"])
-@pytest.mark.parametrize(
-    "second", ["movel(pose_add(p0,p[2,0,0,0,0,0]))", "movec(p0,pose_add(p0,p[0,3,0,0,0,0]))"]
-)
-def test_a_path_out_of_reach_after_a_blend_is_a_protective_stop_and_no_more(first, second):
-    bench = Bench(fidelity="exact")
-    bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
-    bench.events.clear()
-    bench.start(
-        f"def f():\n  p0 = get_target_tcp_pose()\n  {first}(pose_add(p0,p[0.05,0,0,0,0,0]), r=0.02)\n  {second}\nend\n"
-    )
-    bench.tick(1000)
-    assert bench.now.safety_mode == SafetyMode.PROTECTIVE_STOP
-    assert [e.code for e in bench.events if isinstance(e, ErrorReported)] == [204]
-    assert not [e for e in bench.events if isinstance(e, ScriptFailed)]
-
-
-def test_another_tool_does_not_join_a_chain():
-    bench = Bench(fidelity="exact")
-    bench.run("movej(p[0.25,-0.25,0.25,2.2,-2.2,0], a=8, v=3)\n")
-    bench.snapshots.clear()
-    bench.run(
-        "def f():\n  p0 = get_target_tcp_pose()\n  movel(pose_add(p0,p[0.05,0,0,0,0,0]), r=0.02)\n"
-        "  set_tcp(p[0,0.05,0.05,0,0,0])\n  movel(pose_add(get_target_tcp_pose(),p[0,0.05,0,0,0,0]))\nend\n"
-    )
-    qd = np.array([s.target_qd for s in bench.snapshots])
-    assert np.abs(np.diff(qd, axis=0)).max() / DT < 20.0
-    still = np.nonzero(np.abs(qd).max(axis=1) == 0.0)[0]
-    assert any(20 < k < len(qd) - 40 for k in still)  # at rest at the waypoint

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from motion_support import START, at, line
 
@@ -90,7 +90,6 @@ def test_points_that_differ_by_rounding_only_give_a_line(twin):
     assert path.at(path.length)[0] == points[2]
 
 
-@settings(max_examples=30)
 @given(
     st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),
     st.tuples(*[st.floats(-0.08, 0.08)] * 3, *[st.floats(-0.4, 0.4)] * 3),

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from motion_support import ARM, DT, HOME, START, TOOL, tool_accelerations, tool_velocities
 
@@ -62,7 +62,6 @@ def test_servoj_follows_a_slow_sine_with_the_lag_of_its_lookahead_time(lookahead
     assert math.hypot(sine, cosine) == pytest.approx(size, abs=0.01)
 
 
-@settings(max_examples=30)
 @given(st.floats(0.03, 0.2), st.floats(100, 2000), st.floats(-1, 1))
 def test_servoj_settles_at_its_goal_for_every_gain_and_lookahead(lookahead, gain, goal):
     targets = run(ServoJ((goal,) * 6, lookahead, gain, FAST), JointTarget(ZERO6), 800)
@@ -96,7 +95,6 @@ def test_a_servoj_that_is_not_renewed_stops():
     assert before - motion.target.qd[0] == pytest.approx(LOST_DECELERATION * DT)
 
 
-@settings(max_examples=20)
 @given(twists, st.floats(0.2, 2.0), st.floats(0.2, 3.0))
 def test_speedl_gives_the_tool_the_twist_it_asks_for(twist, a, a_rot):
     targets = run(SpeedL(twist, a, a_rot, TOOL), JointTarget(HOME), 70)
@@ -139,7 +137,6 @@ def test_speedl_stays_on_its_line_for_ten_seconds_and_through_the_stop(renewed):
         assert moved[3:] == pytest.approx(v[3:] * along, abs=1e-3)
 
 
-@settings(max_examples=20)
 @given(twists, st.floats(0.2, 2.0))
 def test_stopl_decelerates_the_tool_at_a_and_ends_at_exact_rest(twist, a):
     moving = JointTarget(HOME, TOOL.rates(HOME, twist))

@@ -29,14 +29,9 @@ from ur_emulator.host.ports.primary.robot_state import StateEncoder
 from ur_emulator.machine.commands.programs import ResumeProgram, StartProgram
 from ur_emulator.machine.commands.safety import UnlockProtectiveStop
 from ur_emulator.machine.controller import events
-from ur_emulator.machine.controller.events import ErrorReported, ProgramStarted, ProgramStopped, ScriptFailed
+from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.models.generations import CB3
 from urscript import compile_program
-
-BUDGET = (
-    "The program used too much time without instructing the robot what to do. "
-    "Consider using a Wait or sync() to split long program sequences that do not move the robot."
-)
 
 # Program, line, column, text. The chunks of the language and of the box have all texts.
 PRIMARY = {
@@ -176,87 +171,24 @@ def test_on_the_wire_a_code_has_its_argument(box):
             pass
 
 
-# --- how programs end (urscript.md sections 1.2 and 4)
-
-THREADS = (
-    "def f():\n  thread t():\n    while True:\n      write_output_integer_register(0, read_output_integer_register(0) + 1)\n"
-    '      sync()\n    end\n  end\n  socket_open("10.0.0.1", 1)\n  force = 1\n  run t()\n  sleep(0.04)\n  {end}\nend\n'
-)
-
-
-@pytest.mark.parametrize(
-    ("end", "error"),
-    [
-        ("x = 0", None),
-        ("halt", None),
-        ("return False", None),
-        ("x = 1 / 0", "division by zero"),
-        ("while True:\n  end", BUDGET),
-    ],
-)
-def test_with_the_main_thread_everything_ends(end, error):
-    bench = Bench(fidelity="exact")
-    bench.start(THREADS.replace("{end}", end))
-    bench.tick(10)
-    count = bench.controller.state.registers.outputs.integers[0]
-    assert count in (5, 6)
-    bench.tick(20)
-    assert bench.controller.state.registers.outputs.integers[0] == count
-    assert bench.now.runtime_state == ProgramState.STOPPED
-    assert not bench.network.sockets[0].is_open
-    kinds = [type(e) for e in bench.events]
-    assert kinds == [ProgramStarted, *([ScriptFailed] if error else []), ProgramStopped]
-    if error:
-        assert next(e for e in bench.events if isinstance(e, ScriptFailed)).text == error
-
-
-def test_what_a_program_leaves_and_what_it_does_not():
-    """Flags, TCP, payload and registers stay; watchdogs, sockets and pause codes go."""
-    bench = Bench(fidelity="exact")
-    bench.run(
-        "def f():\n  set_flag(3, True)\n  set_tcp(p[0,0,0.1,0,0,0])\n  set_payload(1.5, [0,0,0.1])\n"
-        "  write_output_float_register(2, 0.5)\n  pause_on_error_code(153)\n"
-        '  rtde_set_watchdog("input_int_register_24", 1)\n  socket_open("10.0.0.1", 1)\nend\n'
-    )
-    state = bench.controller.state
-    assert not state.watchdogs
-    assert not state.error_settings.pause_codes
-    assert not bench.network.sockets[0].is_open
-    assert bench.run("def g():\n  textmsg(get_flag(3), read_output_float_register(2))\nend\n") == ["True0.5"]
-    assert bench.now.tcp_offset[2] == 0.1
-    assert bench.now.payload == 1.5
-
-
 # --- the log
 
 
 @pytest.fixture
-def new_box():
-    """A box with an empty log."""
-    with ControlBox(pace="lockstep", port_base=None) as box:
-        yield box
+def log(box):
+    """What is noted from now on."""
+    n_before = len(box.log)
+    return lambda: box.log[n_before:]
 
 
-def texts(entries, source=None):
-    return [entry.text for entry in entries if source in (None, entry.source)]
-
-
-def run(new_box, program):
+def run(box, program):
     """Send a program and wait for its end."""
-    with connect(new_box, "primary") as sock:
+    with connect(box, "primary") as sock:
         reader = MessageReader(sock)
         reader.state()
         sock.sendall(program.encode("latin-1"))
         while reader.message(KeyMessage).title != "PROGRAM_XXX_STOPPED":
             pass
-
-
-def test_the_life_of_a_program(new_box):
-    run(new_box, 'def hello():\n  textmsg("x = ", 5)\nend\n')
-    assert texts(new_box.log, "Program") == ["Starting program: hello", "x = 5", "Program stopped: hello"]
-    (started, *_) = [entry for entry in new_box.log if entry.source == "Program"]
-    assert started.level is ReportLevel.INFO
-    assert started.time == started.tick * 0.008 >= 60
 
 
 @pytest.mark.parametrize(
@@ -266,66 +198,73 @@ def test_the_life_of_a_program(new_box):
         ("sec s():\n  x = [1][2]\nend\n", "Secondary program: Runtime error (2:7)"),
     ],
 )
-def test_errors_have_the_words_of_a_log(new_box, program, line):
-    with connect(new_box, "primary") as sock:
+def test_errors_have_the_words_of_a_log(box, log, program, line):
+    with connect(box, "primary") as sock:
         sock.sendall(program.encode())
         MessageReader(sock).message((KeyMessage, RuntimeExceptionMessage))
-    (fault,) = [entry for entry in new_box.log if entry.level is ReportLevel.FAULT]
+    (fault,) = [entry for entry in log() if entry.level is ReportLevel.FAULT]
     assert fault.text.startswith(line)
 
 
-def test_a_protective_stop_and_what_follows(new_box):
-    with connect(new_box, "realtime") as frames:
+def test_a_protective_stop_and_what_follows(box, log):
+    with connect(box, "realtime") as frames:
         reader = FrameReader(frames)
-        program = compile_program("def f():\n  protective_stop()\n  sleep(1)\nend\n")
-        new_box.submit(StartProgram(program, loaded=True))
+        program = compile_program('def f():\n  textmsg("x = ", 5)\n  protective_stop()\n  sleep(1)\nend\n')
+        box.submit(StartProgram(program, loaded=True))
         reader.until(lambda f: f.runtime_state == ProgramState.PAUSED)
-        new_box.submit(UnlockProtectiveStop())
+        box.submit(UnlockProtectiveStop())
         reader.until(lambda f: f.safety_mode == SafetyMode.NORMAL)
-        new_box.submit(ResumeProgram())
+        box.submit(ResumeProgram())
         reader.until(lambda f: f.runtime_state == ProgramState.STOPPED)
-    found = [(e.source, e.code, e.text) for e in new_box.log if e.source != "Client"]
-    assert found == [
-        ("Program", "", "Starting program: f"),
-        ("Controller", "C209A0", "Protective stop requested"),
-        ("Safety", "", "Safety mode: PROTECTIVE_STOP"),
-        ("Program", "", "Program paused: f"),
-        ("Safety", "", "Safety mode: NORMAL"),
-        ("Program", "", "Program resumed: f"),
-        ("Program", "", "Program stopped: f"),
+    found = [entry for entry in log() if entry.source != "Client"]
+    warning, info = ReportLevel.WARNING, ReportLevel.INFO
+    assert [(e.source, e.code, e.text, e.level) for e in found] == [
+        ("Program", "", "Starting program: f", info),
+        ("Program", "", "x = 5", info),
+        ("Controller", "C209A0", "Protective stop requested", warning),
+        ("Safety", "", "Safety mode: PROTECTIVE_STOP", warning),
+        ("Program", "", "Program paused: f", info),
+        ("Safety", "", "Safety mode: NORMAL", info),
+        ("Program", "", "Program resumed: f", info),
+        ("Program", "", "Program stopped: f", info),
     ]
-    assert [e.level for e in new_box.log if e.code] == [ReportLevel.WARNING]
-    ticks = [e.tick for e in new_box.log]
+    ticks = [entry.tick for entry in found]
     assert ticks == sorted(ticks)
+    assert all(entry.time == entry.tick * 8 / 1000 >= 60 for entry in found)
 
 
-def test_modes_and_clients_are_noted(new_box):
-    with Dashboard(new_box) as dashboard:
+def test_modes_and_clients_are_noted(box, log):
+    with Dashboard(box) as dashboard:
         dashboard.ask("power off")
         dashboard.until("robotmode", "Robotmode: POWER_OFF")
-    assert "Robot mode: POWER_OFF" in texts(new_box.log, "Controller")
-    (first, *_) = texts(new_box.log, "Client")
-    assert first.endswith(f"connected to dashboard port {new_box.ports.dashboard}")
-
-
-def test_who_leaves_is_noted(new_box):
-    with connect(new_box, "secondary") as sock:
+        dashboard.ask("brake release")
+        dashboard.until("robotmode", "Robotmode: RUNNING")
+    assert "Robot mode: POWER_OFF" in [entry.text for entry in log()]
+    with connect(box, "secondary") as sock:
         mine = "{}:{}".format(*sock.getsockname())
         MessageReader(sock).state()
-    run(new_box, "textmsg(1)\n")
-    notes = [text for text in texts(new_box.log, "Client") if text.startswith(mine)]
-    port = new_box.ports.secondary
-    assert notes == [
+    run(box, "textmsg(1)\n")
+    port = box.ports.secondary
+    assert [entry.text for entry in log() if entry.text.startswith(mine)] == [
         f"{mine} connected to secondary port {port}",
         f"{mine} disconnected from secondary port {port}",
     ]
 
 
-def test_a_socket_that_does_not_open_is_noted(new_box):
-    run(new_box, 'def f():\n  socket_open("127.0.0.1", 1, "peer")\nend\n')
-    assert "Not able to open socket [peer] to host: 127.0.0.1 at port: 1: Connection refused" in texts(
-        new_box.log, "Program"
-    )
+def test_followers_hear_what_happens_such_as_a_socket_that_does_not_open(box, log):
+    heard, done = [], threading.Event()
+
+    def follower(entry: LogEntry):
+        heard.append(entry)
+        if entry.text.startswith("Program stopped"):
+            done.set()
+
+    box.follow_log(follower)
+    run(box, 'def f():\n  socket_open("127.0.0.1", 1, "peer")\nend\n')
+    assert done.wait(TIMEOUT)
+    assert heard[-1] in log()
+    refused = "Not able to open socket [peer] to host: 127.0.0.1 at port: 1: Connection refused"
+    assert refused in [entry.text for entry in heard]
 
 
 def test_the_log_forgets_the_oldest_and_cuts_long_lines():
@@ -366,17 +305,3 @@ def test_lines_of_events(event, line):
     log.note(event, 7500)
     assert str(log.entries[0]) == f"60.000 {line}"
     assert heard == list(log.entries)
-
-
-def test_followers_hear_what_happens(new_box):
-    heard, done = [], threading.Event()
-
-    def follower(entry: LogEntry):
-        heard.append(entry)
-        if entry.text.startswith("Program stopped"):
-            done.set()
-
-    new_box.follow_log(follower)
-    run(new_box, "textmsg(1)\n")
-    assert done.wait(TIMEOUT)
-    assert heard[-len(new_box.log) :][-1] in new_box.log

@@ -240,7 +240,7 @@ VALUES = [
 ]
 
 
-@pytest.mark.parametrize("version", ["3.2.0", "3.4.5", "3.13.0", "3.15.8"])
+@pytest.mark.parametrize("version", ["3.2.0", "3.15.8"])
 def test_values_of_all_types(version):
     version = SoftwareVersion.parse(version)
     bench = PortBench(version)

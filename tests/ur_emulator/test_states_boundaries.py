@@ -1,28 +1,19 @@
-"""Safety planes and the cone of the tool: what they hold, what they trigger, and how the arm gets out again."""
+"""Safety planes and the cone of the tool beside what chunks show (`chunks/watched/boundaries.script`)."""
 
 import math
-import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from box_support import Bench
 from hypothesis import given
 from hypothesis import strategies as st
-from states_support import BRAKING, modes, power_up
+from states_support import modes
 
 from protocol.pose import rotvec_to_matrix
 from protocol.primary.messages import ReportLevel
-from protocol.ur_types import RobotMode, SafetyMode
+from protocol.ur_types import SafetyMode
 from ur_emulator.errors import ArgumentError, RefusedError
-from ur_emulator.machine.commands.power import PowerOn, ReleaseBrakes
-from ur_emulator.machine.commands.safety import (
-    LimitToolDirection,
-    ReducedMode,
-    RestartSafety,
-    SetSafetyPlane,
-    UnlockProtectiveStop,
-)
+from ur_emulator.machine.commands.safety import LimitToolDirection, SetSafetyPlane
 from ur_emulator.machine.controller.events import ErrorReported
 from ur_emulator.machine.controller.safety.boundaries import (
     DIRECTION_TOLERANCE,
@@ -75,19 +66,6 @@ def gap(command, snapshot, of="actual"):
 # --- strict limits
 
 
-@GENERATIONS
-@pytest.mark.parametrize("speed", [0.3, 3.0])
-def test_a_program_ends_before_the_tool_reaches_a_plane(arm, speed):
-    bench = Bench(**arm)
-    wall = plane(*ahead(bench, 0.15))
-    bench.tick(1, wall)
-    bench.run(turn(1.0, speed))
-    assert modes(bench) == ["PROTECTIVE_STOP"]
-    assert codes(bench) == [(152, 0, ReportLevel.WARNING)]
-    least = min(gap(wall, snapshot) for snapshot in bench.snapshots)
-    assert 0.95 * PLANE_TOLERANCE < least < 1.5 * PLANE_TOLERANCE
-
-
 @pytest.mark.parametrize(
     ("robot", "seed", "kind"),
     [("ur10", 1, "movej"), ("ur10", 1, "servoj"), ("ur20", 2, "movej"), ("ur20", 2, "speedj"), ("ur20", 4, "servoj"), ("ur5e", 3, "speedj")],
@@ -115,66 +93,6 @@ def test_a_heavy_arm_on_a_curved_path_ends_before_a_plane(robot, seed, kind):
     assert codes(bench) == [(152, 0, ReportLevel.WARNING)]
     assert min(gap(wall, snapshot, "target") for snapshot in bench.snapshots) > 0.9 * PLANE_TOLERANCE
     assert min(gap(wall, snapshot) for snapshot in bench.snapshots) > 0.0
-
-
-def test_the_arm_may_go_back_from_a_plane_and_along_it():
-    bench = Bench()
-    wall = plane(*ahead(bench, 0.1))
-    bench.tick(1, wall)
-    bench.run(turn(1.0, 0.3))
-    bench.tick(1, UnlockProtectiveStop())
-    bench.run(turn(-0.3, 0.3))
-    assert modes(bench) == ["PROTECTIVE_STOP", "NORMAL"]
-    assert gap(wall, bench.now) > 0.05
-
-
-@pytest.mark.parametrize(
-    ("mode", "is_reduced", "stops"),
-    [
-        ("disabled", False, False),
-        ("disabled", True, False),
-        ("normal", False, True),
-        ("normal", True, False),
-        ("reduced", False, False),
-        ("reduced", True, True),
-        ("normal and reduced", False, True),
-        ("normal and reduced", True, True),
-    ],
-)
-def test_a_plane_is_a_limit_in_its_mode_only(mode, is_reduced, stops):
-    bench = Bench(fidelity="exact")
-    bench.tick(1, plane(*ahead(bench, 0.05), mode), ReducedMode(is_reduced))
-    bench.run(turn(0.5))
-    assert ("PROTECTIVE_STOP" in modes(bench)) is stops
-
-
-@GENERATIONS
-def test_a_tool_beyond_a_plane_is_a_violation_that_ends_in_recovery(arm):
-    bench = Bench(**arm)
-    wall = plane(*ahead(bench, -0.03))
-    bench.tick(2, wall)
-    assert codes(bench) == [(191, 4, ReportLevel.VIOLATION)]
-    (text,) = (e.text for e in bench.events if isinstance(e, ErrorReported))
-    assert re.search(r"TCP position limit violated: TCP (29|30)\.\d mm beyond plane 'wall'", text)
-    bench.tick(BRAKING * 4)
-    assert (bench.now.safety_mode, bench.now.robot_mode) == (SafetyMode.VIOLATION, RobotMode.POWER_OFF)
-    bench.tick(1, RestartSafety())
-    a_second = round(1.0 / bench.controller.period_s)
-    bench.tick(2 * a_second, PowerOn())
-    bench.tick(a_second, ReleaseBrakes())
-    assert (bench.now.robot_mode, bench.now.safety_mode) == (RobotMode.RUNNING, SafetyMode.RECOVERY)
-
-
-def test_recovery_ends_when_the_tool_is_back():
-    bench = Bench()
-    bench.tick(2, plane(*ahead(bench, -0.03)))
-    bench.tick(BRAKING)
-    bench.tick(1, RestartSafety())
-    power_up(bench)
-    assert bench.now.safety_mode == SafetyMode.RECOVERY
-    bench.run(turn(-0.4, 0.3))  # CB3: programs run in recovery
-    assert modes(bench)[-2:] == ["RECOVERY", "NORMAL"]
-    assert bench.now.robot_mode == RobotMode.RUNNING
 
 
 @pytest.mark.parametrize("restricts", [False, True])
@@ -210,26 +128,6 @@ def test_a_plane_triggers_reduced_mode_and_gives_it_back_20_mm_behind_it(arm):
     assert TRIGGER_BAND - 0.001 < gap(wall, left) < TRIGGER_BAND + 0.02
 
 
-def test_reduced_mode_of_a_plane_ends_when_the_plane_goes_and_stays_for_an_input():
-    bench = Bench()
-    beyond = plane(*ahead(bench, -0.05), "trigger reduced mode")
-    bench.tick(2, beyond)
-    assert bench.now.safety_mode == SafetyMode.REDUCED
-    bench.tick(1, ReducedMode(True))
-    bench.tick(2, replace(beyond, mode="disabled"))
-    assert bench.now.safety_mode == SafetyMode.REDUCED
-    bench.tick(1, ReducedMode(False))
-    assert bench.now.safety_mode == SafetyMode.NORMAL
-
-
-def test_beyond_the_trigger_the_arm_is_slow():
-    bench = Bench(fidelity="exact")
-    bench.tick(2, plane(*ahead(bench, -0.05), "trigger reduced mode"))
-    bench.run(turn(2.0, 3.0))
-    assert bench.now.safety_mode == SafetyMode.REDUCED
-    assert max(abs(s.target_qd[0]) for s in bench.snapshots) <= math.pi / 2
-
-
 # --- the tool's direction
 
 
@@ -252,26 +150,7 @@ def test_a_program_ends_before_the_tool_leaves_its_cone(arm):
     assert 0.5 - 2.0 * DIRECTION_TOLERANCE < max(angles) < 0.5
 
 
-def test_a_tool_outside_its_cone_is_a_violation():
-    bench = Bench()
-    bench.tick(2, LimitToolDirection((-axis_of(bench)).tolist(), 0.5))
-    assert codes(bench) == [(191, 5, ReportLevel.VIOLATION)]
-    assert bench.now.safety_mode == SafetyMode.VIOLATION
-
-
 # --- programs, costs, arguments
-
-
-def test_programs_can_ask_whether_a_pose_is_within_the_boundaries():
-    bench = Bench()
-    bench.tick(1, plane(*ahead(bench, 0.1)))
-    x, y, z = ahead(bench, 0.15)[0]
-    said = bench.run(
-        "p = get_actual_tcp_pose()\n"
-        "textmsg(is_within_safety_limits(p))\n"
-        f"textmsg(is_within_safety_limits(p[{x}, {y}, {z}, p[3], p[4], p[5]]))\n"
-    )
-    assert said == ["True", "False"]
 
 
 def test_a_box_without_boundaries_computes_nothing_for_them(monkeypatch):

@@ -1,29 +1,20 @@
-"""Operational modes of an e-Series box: who chooses them, the enabling device, safeguards, limits."""
+"""Operational modes of an e-Series box beside what chunks show (`chunks/watched/operational.script`): choice, device, limits."""
 
 from math import hypot
 
 import pytest
 from box_support import Bench
-from states_support import BRAKING, ENDLESS, failures, infos
+from states_support import failures
 
-from protocol.rtde.types import SafetyStatusBits
-from protocol.ur_types import ProgramState, RobotMode, SafetyMode, SafetyStatus
+from protocol.ur_types import ProgramState, RobotMode, SafetyMode
 from ur_emulator.errors import RefusedError
 from ur_emulator.machine.commands.power import (
     ChooseModeByDashboard,
     MoveEnablingDevice,
     ReleaseBrakes,
     SetOperationalMode,
-    StartFreedrive,
 )
-from ur_emulator.machine.commands.safety import (
-    AssignSafetyInput,
-    PressButton,
-    ReducedMode,
-    RequireSafeguardReset,
-    ResetSafeguard,
-    SafeguardStop,
-)
+from ur_emulator.machine.commands.safety import AssignSafetyInput, ReducedMode, SafeguardStop
 from ur_emulator.machine.commands.surroundings import SetDigitalInput
 from ur_emulator.machine.controller.safety.inputs import (
     OPERATIONAL_MODES,
@@ -38,11 +29,8 @@ from ur_emulator.machine.controller.safety.modes import SafetyEvent
 from ur_emulator.machine.models.generations import CB3, E_SERIES
 
 MANUAL, AUTOMATIC = SetOperationalMode("manual"), SetOperationalMode("automatic")
-PRESS, RELEASE = MoveEnablingDevice("pressed"), MoveEnablingDevice("released")
-FULLY = MoveEnablingDevice("fully pressed")
-OPEN, CLOSE = SafeguardStop(True, "automatic mode"), SafeguardStop(False, "automatic mode")
-# Long enough for an arm to come to rest at 500 Hz.
-REST = 4 * BRAKING
+PRESS = MoveEnablingDevice("pressed")
+OPEN = SafeguardStop(True, "automatic mode")
 FAST = (
     "def fast():\n  q = get_actual_joint_positions()\n"
     "  movej([q[0] + 2, q[1], q[2], q[3], q[4], q[5]], a=8, v=3)\nend\n"
@@ -52,16 +40,6 @@ FAST = (
 @pytest.fixture
 def bench():
     return Bench(robot="ur5e", generation=E_SERIES, fidelity="exact")
-
-
-def run(bench):
-    bench.start(ENDLESS)
-    bench.tick(100)
-    assert any(bench.now.target_qd)
-
-
-def status(bench):
-    return SafetyStatus(bench.now.safety_status).name
 
 
 # --- who chooses
@@ -139,96 +117,6 @@ def test_states_of_the_enabling_device(acts, then):
     assert device.state is then
 
 
-def test_a_device_that_is_not_held_stops_the_arm_in_manual_mode_only(bench):
-    run(bench)
-    for mode in (SetOperationalMode("none"), AUTOMATIC):
-        bench.tick(REST, RELEASE, mode)
-        assert (status(bench), any(bench.now.target_qd)) == ("NORMAL", True)
-    bench.tick(REST, MANUAL)
-    assert status(bench) == "SYSTEM_THREE_POSITION_ENABLING_STOP"
-    assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
-    assert bench.now.robot_mode == RobotMode.RUNNING
-    assert bench.now.runtime_state == ProgramState.PAUSED
-    assert not any(bench.now.target_qd)
-    bench.tick(REST, PRESS)
-    assert (status(bench), any(bench.now.target_qd)) == ("NORMAL", True)
-    bench.tick(REST, FULLY)
-    assert (status(bench), any(bench.now.target_qd)) == ("SYSTEM_THREE_POSITION_ENABLING_STOP", False)
-
-
-def test_a_device_that_is_held_when_manual_mode_begins_must_be_released_first(bench):
-    bench.tick(1, AUTOMATIC, PRESS)
-    bench.tick(1, MANUAL)
-    assert status(bench) == "SYSTEM_THREE_POSITION_ENABLING_STOP"
-    bench.tick(1, ResetSafeguard(), PRESS)
-    assert status(bench) == "SYSTEM_THREE_POSITION_ENABLING_STOP"
-    bench.tick(1, RELEASE, PRESS)
-    assert status(bench) == "NORMAL"
-
-
-def test_the_device_on_configurable_inputs_and_its_status_bit(bench):
-    bit = SafetyStatusBits.THREE_POSITION_ENABLING_INPUT_ACTIVE
-    bench.tick(1, MANUAL, AssignSafetyInput(2, "three-position enabling"))
-    assert status(bench) == "SYSTEM_THREE_POSITION_ENABLING_STOP"
-    assert not bench.now.safety_status_bits & bit
-    bench.tick(1, SetDigitalInput("configurable", 4, True))
-    assert not bench.now.safety_status_bits & bit  # one channel of two
-    bench.tick(1, SetDigitalInput("configurable", 5, True))
-    assert status(bench) == "NORMAL"
-    assert bench.now.safety_status_bits == bit | SafetyStatusBits.NORMAL_MODE
-    bench.tick(1, AssignSafetyInput(2, "none"))
-    assert bench.now.safety_status_bits == SafetyStatusBits.NORMAL_MODE
-
-
-# --- the safeguard of automatic mode
-
-
-def test_the_automatic_safeguard_acts_in_automatic_mode_only(bench):
-    run(bench)
-    bench.tick(REST, OPEN)
-    assert (status(bench), any(bench.now.target_qd)) == ("NORMAL", True)
-    bench.tick(REST, AUTOMATIC)
-    assert status(bench) == "AUTOMATIC_MODE_SAFEGUARD_STOP"
-    assert bench.now.safety_mode == SafetyMode.SAFEGUARD_STOP
-    bits = SafetyStatusBits.SAFEGUARD_STOPPED | SafetyStatusBits.STOPPED_DUE_TO_SAFETY
-    assert bench.now.safety_status_bits == bits
-    assert not any(bench.now.target_qd)
-    bench.tick(REST, MANUAL)
-    assert (status(bench), any(bench.now.target_qd)) == ("NORMAL", True)
-    bench.tick(REST, CLOSE, AUTOMATIC)
-    assert (status(bench), any(bench.now.target_qd)) == ("NORMAL", True)
-
-
-def test_it_has_a_reset_of_its_own(bench):
-    bench.tick(1, AUTOMATIC, RequireSafeguardReset(True, "automatic mode"), OPEN)
-    bench.tick(1, CLOSE, ResetSafeguard())
-    assert status(bench) == "AUTOMATIC_MODE_SAFEGUARD_STOP"
-    bench.tick(1, ResetSafeguard("automatic mode"))
-    assert status(bench) == "NORMAL"
-
-
-def test_it_and_its_reset_on_configurable_inputs(bench):
-    bench.tick(
-        1,
-        AUTOMATIC,
-        RequireSafeguardReset(True, "automatic mode"),
-        AssignSafetyInput(0, "automatic-mode safeguard"),
-        AssignSafetyInput(1, "automatic-mode safeguard reset"),
-    )
-    assert status(bench) == "AUTOMATIC_MODE_SAFEGUARD_STOP"
-    bench.tick(1, *(SetDigitalInput("configurable", n, True) for n in (0, 1)))
-    assert status(bench) == "AUTOMATIC_MODE_SAFEGUARD_STOP"
-    bench.tick(1, *(SetDigitalInput("configurable", n, True) for n in (2, 3)))
-    assert status(bench) == "NORMAL"
-
-
-def test_a_permanent_safeguard_comes_first(bench):
-    bench.tick(1, AUTOMATIC, OPEN, SafeguardStop(True))
-    assert status(bench) == "SAFEGUARD_STOP"
-    bench.tick(1, SafeguardStop(False))
-    assert status(bench) == "AUTOMATIC_MODE_SAFEGUARD_STOP"
-
-
 # --- limits
 
 
@@ -249,16 +137,6 @@ def test_tcp_and_elbow_keep_the_limit_of_the_mode(bench, commands, limit):
         assert 0.9 * limit < max(speeds) <= limit
         assert min(now.speed_scaling for now in bench.snapshots) < 1.0
     assert bench.now.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED)
-
-
-def test_a_mode_that_begins_slows_a_moving_arm_down(bench):
-    bench.start(FAST)
-    bench.tick(300)
-    assert hypot(*bench.now.target_tcp_speed[:3]) > 0.5
-    bench.tick(200, MANUAL)
-    assert hypot(*bench.now.target_tcp_speed[:3]) <= 0.25
-    assert bench.now.runtime_state == ProgramState.PLAYING
-    assert bench.now.safety_mode == SafetyMode.NORMAL
 
 
 def test_no_program_starts_in_recovery_mode():
@@ -292,25 +170,3 @@ def test_force_and_power_are_limited_in_recovery_mode(bench, wrench, moment, cod
     bench.now.space.wrench_at_flange = wrench
     error = limiter.find_violation(sensed, bench.now.space, 0.6).error
     assert (error.code, text in error.text) == (code, True)
-
-
-# --- rights
-
-
-def test_people_may_not_guide_the_arm_in_automatic_mode(bench):
-    bench.tick(5, PressButton("teach", True))
-    assert bench.now.control_mode == 1
-    bench.tick(5, AUTOMATIC)
-    assert bench.now.control_mode == 0
-    bench.tick(5, StartFreedrive())
-    assert bench.now.control_mode == 0
-    assert "freedrive refused" in infos(bench)[-1]
-    bench.tick(5, MANUAL)
-    assert bench.now.control_mode == 1
-
-
-def test_a_program_may_go_into_freedrive_in_automatic_mode(bench):
-    bench.tick(1, AUTOMATIC)
-    bench.start("def f():\n  freedrive_mode()\n  sleep(1)\nend\n")
-    bench.tick(10)
-    assert bench.now.control_mode == 1

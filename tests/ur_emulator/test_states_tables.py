@@ -12,11 +12,7 @@ from docs.generate import states_page
 from protocol.ur_types import JointMode, ProgramState, RobotMode, SafetyMode
 from ur_emulator.machine.commands.power import PowerOff, PowerOn, ReleaseBrakes
 from ur_emulator.machine.commands.programs import PauseProgram, ResumeProgram, StartProgram, StopProgram
-from ur_emulator.machine.commands.safety import (
-    PressEmergencyStop,
-    SafeguardStop,
-    TriggerProtectiveStop,
-)
+from ur_emulator.machine.commands.safety import PressEmergencyStop, SafeguardStop, TriggerProtectiveStop
 from ur_emulator.machine.controller.robot_mode import (
     JOINT_MODES,
     POWERED,
