@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 import pytest
+from codec_ways import in_pieces, taken_by
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -97,12 +98,8 @@ def test_a_client_asks_and_takes_the_answer_whole_bytewise_and_before_others(req
     for others in (b"", b"ack", b"STA 3\n"):
         inbox = bytearray(answer + others)
         assert (take_answer(inbox, request_), inbox) == (value, others)
-    inbox = bytearray()
-    for byte in answer[:-1]:
-        inbox.append(byte)
-        assert take_answer(inbox, request_) is None
-    inbox.append(answer[-1])
-    assert take_answer(inbox, request_) == value
+    take = taken_by(lambda inbox: take_answer(inbox, request_))
+    assert in_pieces(take, answer, 1) == [value]
 
 
 @given(st.binary(max_size=3000), st.sampled_from([request for request, *_ in ASKED]))
@@ -129,17 +126,10 @@ REQUESTS = (
 def test_requests_of_the_serial_line_are_taken_whole_bytewise_and_with_others_behind_them():
     frames = [bytes.fromhex(text) for text in REQUESTS]
     for frame in frames:
-        inbox, taken = bytearray(), []
-        for byte in frame:
-            assert not taken
-            inbox.append(byte)
-            if (request := take_request(inbox)) is not None:
-                taken.append(request)
-        assert taken == [(9, frame[1:-2])]
-        assert encode_rtu(*taken[0]) == frame
-    inbox = bytearray(b"".join(frames))
-    assert [take_request(inbox) for _ in frames] == [(9, frame[1:-2]) for frame in frames]
-    assert not inbox
+        request = (9, frame[1:-2])
+        assert encode_rtu(*request) == frame
+        assert in_pieces(taken_by(take_request), frame, 1) == [request]
+    assert taken_by(take_request)(b"".join(frames)) == [(9, frame[1:-2]) for frame in frames]
 
 
 @pytest.mark.parametrize(
