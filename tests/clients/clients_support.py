@@ -19,9 +19,12 @@ import pytest
 from protocol.ur_types import Ports
 
 TIMEOUT = 20.0  # s
+E_SERIES = ("--robot", "ur5e", "--software", "5.25.1")
 # Parameters of `box`: of a CB3, and of an e-Series box.
 BOTH_GENERATIONS = pytest.mark.parametrize(
-    "box", [(), ("--robot", "ur5e", "--software", "5.25.1")], indirect=True, ids=["cb3", "e-series"]
+    "box",
+    [pytest.param((), id="cb3"), pytest.param(E_SERIES, id="e-series", marks=pytest.mark.nightly)],
+    indirect=True,
 )
 
 

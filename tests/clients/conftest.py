@@ -1,7 +1,12 @@
 """Boxes in processes of their own, for clients that hard-code the ports."""
 
+import sys
+from pathlib import Path
+
 import pytest
 from clients_support import served_box
+
+sys.path.append(str(Path(__file__).parents[1] / "ur_emulator"))  # its program files are of use here too
 
 
 @pytest.fixture(scope="module", params=[()], ids=["cb3"])

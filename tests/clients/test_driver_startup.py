@@ -31,18 +31,9 @@ from ur_emulator.machine.models.robots import ROBOTS
 
 # What a driver is started for: type code and series of the arm.
 UR_TYPES = {
-    "ur3e": (3, "E"),
-    "ur5e": (1, "E"),
-    "ur7e": (1, "E"),
-    "ur10e": (2, "E"),
-    "ur12e": (2, "E"),
-    "ur16e": (4, "E"),
-    "ur8long": (6, "UR"),
-    "ur15": (9, "UR"),
-    "ur18": (5, "UR"),
-    "ur20": (7, "UR"),
-    "ur30": (8, "UR"),
-}
+    "ur3e": (3, "E"), "ur5e": (1, "E"), "ur7e": (1, "E"), "ur10e": (2, "E"), "ur12e": (2, "E"), "ur16e": (4, "E"),
+    "ur8long": (6, "UR"), "ur15": (9, "UR"), "ur18": (5, "UR"), "ur20": (7, "UR"), "ur30": (8, "UR"),
+}  # fmt: skip
 # The recipes of the ROS 2 driver.
 DRIVER_OUTPUTS = (
     "timestamp", "actual_q", "actual_qd", "speed_scaling", "target_speed_fraction", "runtime_state",
@@ -64,7 +55,9 @@ SINCE = {"payload_inertia": (5, 11)}
 # What the reader holds at most of a package.
 READER_SIZE = 4096
 # The oldest software that the library takes, and a new one.
-FOR_DRIVERS = pytest.mark.parametrize("box", ["5.9.4", "5.25.1"], indirect=True)
+FOR_DRIVERS = pytest.mark.parametrize(
+    "box", [pytest.param("5.9.4", marks=pytest.mark.nightly), "5.25.1"], indirect=True
+)
 
 
 @pytest.fixture(scope="module")
@@ -105,12 +98,8 @@ def read_setup(box, version):
     with PrimaryWire(box) as wire:
         check_version(wire.message(VERSION_MESSAGE)[1], version)
         parts = wire.state()
-    sizes = {
-        MODE: 42,
-        MASTERBOARD: 70,
-        KINEMATICS: 220,
-        CONFIGURATION: 444 if version >= (5, 25, 1) else 440,
-    }
+    configuration = 444 if version >= (5, 25, 1) else 440
+    sizes = {MODE: 42, MASTERBOARD: 70, KINEMATICS: 220, CONFIGURATION: configuration}
     assert {part: len(parts[part]) for part in sizes} == sizes
     assert 5 + sum(5 + len(body) for body in parts.values()) < READER_SIZE
     assert parts[MASTERBOARD][62] == 0  # no Euromap67 board, so its fields are absent
@@ -168,6 +157,7 @@ def test_a_program_sent_at_once_runs_at_500_hz(box):
     ]
 
 
+@pytest.mark.nightly
 def test_a_driver_for_a_cb3_sets_up_rtde_and_writes_into_the_log(tmp_path):
     text, source = b"written by a client", b"driver"
     with served_box(tmp_path) as box:

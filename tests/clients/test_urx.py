@@ -56,16 +56,6 @@ def at_rest(robot):
     return np.array(last[-1])
 
 
-def test_it_believes_that_the_robot_runs(robot):
-    assert robot.is_running()
-    assert not robot.is_program_running()
-    robot_data = robot.secmon.get_all_data()["RobotModeData"]
-    assert robot_data["robotMode"] == 7
-    assert robot_data["isPowerOnRobot"]
-    assert not robot_data["isEmergencyStopped"]
-    assert not robot_data["isSecurityStopped"]
-
-
 def test_joint_moves(robot):
     start = at_rest(robot)
     robot.movej(np.add(start, [0.3, 0, 0, 0, 0, 0]), acc=ACCELERATION, vel=SPEED)
@@ -102,14 +92,6 @@ def test_stops(robot):
     here = at_rest(robot)
     assert 0.05 < here[0] - start[0] < 1.0
     robot.movej(start, acc=ACCELERATION, vel=SPEED)
-
-
-def test_speeds_with_t_min_are_refused(robot, old_box):
-    """urx writes `t_min=`, which 3.x does not know: no motion, one error, and the client lives on."""
-    start = at_rest(robot)
-    robot.speedj([0.3, 0, 0, 0, 0, 0], 1.0, 1.0)
-    wait_until(lambda: "unexpected keyword argument 't_min'" in old_box.log.read_text())
-    assert np.allclose(at_rest(robot), start, atol=CLOSE_Q)
 
 
 def test_inputs_and_outputs(robot):
