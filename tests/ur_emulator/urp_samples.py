@@ -1,5 +1,6 @@
 """Nodes of program files of our own making, in the forms that PolyScope gives them: helpers, and the samples of a file."""
 
+import gzip
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -67,7 +68,7 @@ class Sample(NamedTuple):
     def file(self):
         """Return the program file."""
         if "file" in self.words:
-            return self.nodes.encode()
+            return gzip.compress(self.nodes.encode(), mtime=0)
         return urp(self.nodes, saved_in=NEW if "e-series" in self.words else OLD)
 
 
