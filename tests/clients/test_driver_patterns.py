@@ -9,11 +9,10 @@ the manner of ur_modern_driver: an unnamed socket, messages of 7 integers, local
 import socket
 import struct
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
-from clients_support import BOTH_GENERATIONS, TIMEOUT, connect, receive_exactly
+from clients_support import BOTH_GENERATIONS, PROGRAMS, TIMEOUT, connect, receive_exactly
 from strict_clients import VERSION_MESSAGE, PrimaryWire, StrictRtde
 
 SCALE = 1_000_000
@@ -21,7 +20,6 @@ STOP, UNINITIALIZED, IDLE, SERVOJ, SPEEDJ, TRAJECTORY, SPEEDL = -2, -1, 0, 1, 2,
 TRAJECTORY_START = 1
 DONE, CANCELLED, FAILED = 0, 1, 2
 MOVEJ = 0
-PROGRAMS = Path(__file__).parents[1] / "programs"
 OUTPUTS = (
     "timestamp", "target_q", "target_qd", "target_TCP_pose", "target_TCP_speed", "actual_q", "runtime_state", "payload",
 )  # fmt: skip

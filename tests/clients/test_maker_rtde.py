@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from clients_support import served_box, submit
+from clients_support import PROGRAMS, served_box, submit
 from urpy.rtde import rtde, rtde_config
 
 # The recipe of the maker's recorder (examples/record_configuration.xml), and what later ones add to it.
@@ -66,37 +66,6 @@ CONTROL_LOOP = {
     "setp": {f"input_double_register_{n}": "DOUBLE" for n in range(6)},
     "watchdog": {"input_int_register_0": "INT32"},
 }
-# The robot's side of the maker's control loop.
-WATCHDOG_PROGRAM = """def example():
-  rtde_set_watchdog("input_int_register_0", 1, "PAUSE")
-  global setp = p[0,0,0,0,0,0]
-  thread copy():
-    while True:
-      local tmp = p[0,0,0,0,0,0]
-      i = 0
-      while i < 6:
-        tmp[i] = read_input_float_register(i)
-        i = i + 1
-      end
-      setp = tmp
-      sync()
-    end
-  end
-  h = run copy()
-  write_output_integer_register(0, 1)
-  while True:
-    if (read_input_integer_register(0) == 1) and (setp != p[0,0,0,0,0,0]):
-      movel(setp, a=3, v=0.5)
-      write_output_integer_register(0, 0)
-      while read_input_integer_register(0) == 1:
-        sync()
-      end
-      write_output_integer_register(0, 1)
-    end
-    sync()
-  end
-end
-"""
 # Robot, software, control cycle [s].
 BOXES = [
     pytest.param(("ur3", "3.15.8", 0.008), id="3.15.8"),
@@ -223,7 +192,7 @@ def test_the_control_loop(box, recipes):
         assert client.send_start()
         assert watcher.send_output_setup(["timestamp", "target_TCP_pose", "runtime_state"])
         assert watcher.send_start()
-        submit(box, WATCHDOG_PROGRAM)
+        submit(box, (PROGRAMS / "maker_control_loop.script").read_text())
         start = newest(watcher).target_TCP_pose
         goals = [[*start[:2], start[2] + lift, *start[3:]] for lift in (0.03, 0.0)]
         watchdog.input_int_register_0 = 0

@@ -1,5 +1,7 @@
 """Grippers whose fingers move as they are driven, boxes with tools, and a client's question."""
 
+from pathlib import Path
+
 from ur_emulator import ControlBox
 from ur_emulator.machine.controller.io.lines import InputOutput
 from ur_emulator.machine.plant.hand import FingerState
@@ -31,6 +33,11 @@ class DrivenFingers:
 def tool_box(tool, robot="ur5e", **options):
     """A box in this process, in lockstep, with tools."""
     return ControlBox(robot, in_process=True, pace="lockstep", port_base=None, seed=7, tool=tool, **options)
+
+
+def program_file(name):
+    """The text of a program of `tests/programs`."""
+    return (Path(__file__).parents[1] / "programs" / f"{name}.script").read_text()
 
 
 def ask(client, text):

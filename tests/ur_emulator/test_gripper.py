@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from box_support import BareBox, FakeConnection
 from e_series_support import ESeriesBench
-from finger_support import PERIOD, DrivenFingers, ask, tool_box
+from finger_support import PERIOD, DrivenFingers, ask, program_file, tool_box
 
 from protocol.robotiq import Fault, Objects, Status
 from protocol.ur_types import SoftwareVersion
@@ -358,40 +358,9 @@ def test_a_client_activates_calibrates_and_moves_it(client):
     assert ask(client, "GET POS\n") == "POS ?\n"
 
 
-PROGRAM = """
-def p():
-  socket_open("127.0.0.1", 63352, "g")
-  socket_send_string("GET SID", "g")
-  textmsg("sid ", socket_read_byte_list(5, "g", 0.1))
-  socket_set_var("ACT", 1, "g")
-  textmsg("ack ", socket_read_byte_list(3, "g"))
-  while socket_get_var("STA", "g") != 3:
-    sync()
-  end
-  socket_send_string("SET POS", "g")
-  socket_send_byte(32, "g")
-  socket_send_string(255, "g")
-  socket_send_line(" GTO 1", "g")
-  socket_read_byte_list(3, "g")
-  still = get_tool_current()
-  sleep(0.3)
-  textmsg("mA ", floor(1000 * (get_tool_current() - still) + 0.5))
-  sleep(1.0)
-  socket_send_string("GET PRE", "g")
-  textmsg("pre ", socket_read_byte_list(3, "g"))
-  textmsg("pos ", socket_get_var("POS", "g"))
-  set_tool_voltage(0)
-  sleep(0.1)
-  socket_send_string("GET SID", "g")
-  textmsg("sid ", socket_read_byte_list(2, "g"))
-  set_tool_voltage(24)
-end
-"""
-
-
 def test_a_program_reaches_it_at_its_usual_port(box):
     said = len(box.log)
-    box.run_program(PROGRAM, wait=True)
+    box.run_program(program_file("gripper_socket"), wait=True)
     texts = [entry.text for entry in box.log[said:] if entry.source == "Program"]
     assert [text for text in texts if text[:3] in ("sid", "ack", "mA ", "pre", "pos")] == [
         "sid [3,91,57,93,-1,-1]",
@@ -512,37 +481,13 @@ def test_an_exact_arm_moves_its_fingers_and_has_no_things():
 # --- a cup
 
 
-CUP_PROGRAM = """
-def p():
-  set_tcp(p[0, 0, 0.12, 0, 0, 0])
-  set_payload(0.5, [0, 0, 0.04])
-  there = p[0.5, 0.2, 0.022, 3.14159, 0, 0]
-  above = pose_trans(there, p[0, 0, -0.1, 0, 0, 0])
-  movej(get_inverse_kin(above), a=1.0, v=0.8)
-  set_tool_digital_out(0, True)
-  sleep(0.5)
-  textmsg("in the air ", get_tool_digital_in(0))
-  movel(there, a=0.5, v=0.1)
-  while not get_tool_digital_in(0):
-    sync()
-  end
-  movel(above, a=0.5, v=0.2)
-  sleep(0.5)
-  textmsg("carried ", get_tool_digital_in(0))
-  set_tool_digital_out(0, False)
-  sleep(0.5)
-  textmsg("let go ", get_tool_digital_in(0))
-end
-"""
-
-
 @pytest.mark.parametrize(
     ("mass", "carried"), [(0.5, "True"), pytest.param(8.0, "False", marks=pytest.mark.nightly)]
 )
 def test_a_cup_lifts_what_it_can_hold_and_reports_its_vacuum(mass, carried):
     with tool_box("vacuum") as box:
         box.add_thing("plate", "box", (0.1, 0.1, 0.04), mass, (0.5, 0.2, 0.0, 0.0, 0.0, 0.0))
-        box.run_program(CUP_PROGRAM, wait=True)
+        box.run_program(program_file("gripper_cup"), wait=True)
         texts = [entry.text for entry in box.log if entry.source == "Program"]
         assert texts[1:4] == ["in the air False", f"carried {carried}", "let go False"]
         assert box.state.things[0].pose[2] < 0.01

@@ -5,7 +5,7 @@ import socket
 import xmlrpc.client
 
 import pytest
-from finger_support import PERIOD, DrivenFingers, tool_box
+from finger_support import PERIOD, DrivenFingers, program_file, tool_box
 from pymodbus.client import ModbusTcpClient
 
 from protocol.modbus_rtu import encode_rtu
@@ -292,25 +292,6 @@ def test_other_requests_are_refused(box):
         assert b"-503" in post(box, body)
 
 
-PROGRAM = """
-def p():
-  rg = rpc_factory("xmlrpc", "http://localhost:41414")
-  textmsg("says ", rg.rg_grip(0, 40 + .0, 20 + .0))
-  while rg.rg_get_busy(0):
-    sync()
-  end
-  textmsg("width ", floor(rg.rg_get_width(0) + 0.5))
-  set_tool_voltage(0)
-  sleep(0.1)
-  textmsg("without ", [rg.rg_get_width(0), rg.rg_get_status(0)])
-  textmsg("busy ", rg.rg_get_busy(0))
-  textmsg("grip ", rg.rg_grip(0, 40.0, 20.0))
-  set_tool_voltage(24)
-  sleep(0.1)
-end
-"""
-
-
 def said(box, program):
     before = len(box.log)
     box.run_program(program, wait=True)
@@ -318,7 +299,11 @@ def said(box, program):
 
 
 def test_a_program_reaches_it_at_its_usual_port(box):
-    texts = [text for text in said(box, PROGRAM) if text[:4] in ("says", "widt", "with", "busy", "grip")]
+    texts = [
+        text
+        for text in said(box, program_file("onrobot_rpc"))
+        if text[:4] in ("says", "widt", "with", "busy", "grip")
+    ]
     assert texts == ["says 0", "width 40", "without [-999,-1]", "busy True", "grip -4"]
 
 
@@ -356,58 +341,14 @@ def test_the_serial_line_has_even_parity_from_the_start(box, server):
 # --- programs of the old software
 
 
-OLD_PROGRAM = """
-def p():
-  def bit(input):
-    msb = 65536
-    local i = 0
-    while i < 17:
-      set_digital_out(8, True)
-      if input >= msb:
-        input = input - msb
-        set_digital_out(9, False)
-      else:
-        set_digital_out(9, True)
-      end
-      sync()
-      set_digital_out(8, False)
-      sync()
-      input = input * 2
-      i = i + 1
-    end
-  end
-  def RG2(width, force):
-    while get_digital_in(9) == False:
-      sync()
-    end
-    bit(32768 + floor(width + 9.2) * 4 + floor(force / 2) * 444)
-    local n = 0
-    while get_digital_in(9) == True:
-      n = n + 1
-      if n > 20:
-        break
-      end
-      sync()
-    end
-    textmsg("began ", n <= 20)
-    while get_digital_in(9) == False:
-      sync()
-    end
-    local angle = (get_analog_in(2) - 0.026) / 2.976 * 1.57079633 - 0.087266462
-    textmsg("width ", floor(5 + 110 * sin(angle) - 9.2 + 0.5))
-    textmsg("grip ", get_digital_in(8))
-  end
-  set_analog_inputrange(2, 1)
-  RG2(80, 40)
-  RG2(0, 10)
-end
-"""
-
-
 @pytest.mark.parametrize("robot", ["ur5", pytest.param("ur5e", marks=pytest.mark.nightly)])
 def test_a_program_of_the_old_software(robot):
     with tool_box("onrobot-rg2", robot) as old:
-        texts = [text for text in said(old, OLD_PROGRAM) if text[:5] in ("began", "width", "grip ")]
+        texts = [
+            text
+            for text in said(old, program_file("onrobot_words"))
+            if text[:5] in ("began", "width", "grip ")
+        ]
         assert texts == ["began True", "width 80", "grip False", "began True", "width 0", "grip True"]
 
 
