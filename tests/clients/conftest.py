@@ -20,21 +20,6 @@ def box(tmp_path_factory, request):
 
 
 @pytest.fixture(scope="module")
-def old_box(tmp_path_factory):
-    """A CB3 with software 3.4 and a gripper."""
-    options = ("--software", "3.4.0", "--tool", "robotiq-2f85")
-    with served_box(tmp_path_factory.mktemp("old_box"), *options) as served:
-        yield served
-
-
-@pytest.fixture
-def lockstep_box(tmp_path):
-    """A box whose time stands still while a program waits for its PC."""
-    with served_box(tmp_path, "--pace", "lockstep") as served:
-        yield served
-
-
-@pytest.fixture(scope="module")
 def home_q():
     """Joint angles where tests of ur_rtde begin [rad]."""
     from ur_rtde_support import HOME

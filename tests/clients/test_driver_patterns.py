@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 
 import numpy as np
 import pytest
-from clients_support import BOTH_GENERATIONS, PROGRAMS, TIMEOUT, connect, receive_exactly
+from clients_support import BOTH_GENERATIONS, PROGRAMS, TIMEOUT, connect, receive_exactly, served_box
 from strict_clients import VERSION_MESSAGE, PrimaryWire, StrictRtde
 
 SCALE = 1_000_000
@@ -267,10 +267,14 @@ def test_a_secondary_program_sets_outputs_while_another_moves(box):
         rtde.until(lambda v: not any(v["target_qd"]) and v["runtime_state"] == STOPPED)
 
 
-def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(lockstep_box):
+@pytest.mark.nightly
+def test_a_reverse_program_follows_points_that_come_four_times_a_cycle(tmp_path):
     """In lockstep: the arm brakes in every cycle without a fresh point, and this PC may be late."""
-    box = lockstep_box
-    with StrictRtde(box) as rtde, socket.create_server(("127.0.0.1", 0)) as server:
+    with (
+        served_box(tmp_path, "--pace", "lockstep") as box,
+        StrictRtde(box) as rtde,
+        socket.create_server(("127.0.0.1", 0)) as server,
+    ):
         server.settimeout(TIMEOUT)
         rtde.want(*OUTPUTS)
         rtde.start()
