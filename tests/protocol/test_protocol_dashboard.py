@@ -6,12 +6,7 @@ import pytest
 from codec_ways import events_of, in_pieces
 
 from protocol.dashboard.commands import COMMANDS, commands_of, match_command, unknown_command_reply
-from protocol.dashboard.connection import (
-    MAX_LINE,
-    CommandReceived,
-    DashboardConnection,
-    UnknownCommand,
-)
+from protocol.dashboard.connection import MAX_LINE, CommandReceived, DashboardConnection, UnknownCommand
 from protocol.errors import LocalProtocolError, RemoteProtocolError
 from protocol.ur_types import SoftwareVersion
 

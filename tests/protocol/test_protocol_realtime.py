@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from protocol.errors import LocalProtocolError, RemoteProtocolError
-from protocol.realtime.layout import (
-    COLUMNS,
-    SNAPSHOT_FIELDS,
-    layout_for_size,
-    layout_for_version,
-)
+from protocol.realtime.layout import COLUMNS, SNAPSHOT_FIELDS, layout_for_size, layout_for_version
 from protocol.ur_types import SoftwareVersion
 
 SIZES = [1044, 1060, 1108, 1116, 1140, 1220]

@@ -10,15 +10,7 @@ from hypothesis import strategies as st
 from protocol import modbus, robotiq
 from protocol.errors import RemoteProtocolError
 from protocol.modbus_rtu import crc16, decode_read_write, encode_rtu, take_request
-from protocol.robotiq import (
-    Get,
-    GripperConnection,
-    Malformed,
-    Set,
-    encode_request,
-    encode_value,
-    take_answer,
-)
+from protocol.robotiq import Get, GripperConnection, Malformed, Set, encode_request, encode_value, take_answer
 
 STREAM = (
     (b"SET POS 100 SPE 255 FOR 10 GTO 1\n", Set((("POS", 100), ("SPE", 255), ("FOR", 10), ("GTO", 1)))),

@@ -7,13 +7,7 @@ from codec_ways import check_reading, in_pieces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol.script_channel import (
-    MAX_LINE,
-    ControlLine,
-    Overflow,
-    ProgramText,
-    ScriptChannel,
-)
+from protocol.script_channel import MAX_LINE, ControlLine, Overflow, ProgramText, ScriptChannel
 
 NESTED = """\
 def outer():
