@@ -284,6 +284,10 @@ def test_a_tool_of_a_file(tmp_path):
     path.write_text('based_on = "robotiq-2f85"\nmass = 0.5\nstroke = 0.04\n')
     (tool,) = tools_by_name(str(path), ModelError)
     assert (tool.name, tool.mass, tool.stroke, tool.counts) == ("small", 0.5, 0.04, (3, 230))
+    with pytest.raises(
+        ModelError, match=r"unknown tool 'hand': choose one of none, robotiq-2f85, .* or give FILE"
+    ):
+        tools_by_name("hand", ModelError)
 
 
 @pytest.mark.parametrize(
@@ -300,13 +304,6 @@ def test_a_wrong_file_of_a_tool_is_one_line(tmp_path, text, said):
     path.write_text(text)
     with pytest.raises(ModelError, match=said):
         tools_by_name(str(path), ModelError)
-
-
-def test_an_unknown_tool_is_named_with_those_that_are():
-    with pytest.raises(
-        ModelError, match=r"unknown tool 'hand': choose one of none, robotiq-2f85, .* or give FILE"
-    ):
-        tools_by_name("hand", ModelError)
 
 
 # --- from outside, and from programs

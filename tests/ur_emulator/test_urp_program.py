@@ -27,8 +27,6 @@ from ur_emulator.budgets import BUDGETS
 from ur_emulator.errors import ProgramFileError
 from ur_emulator.machine.controller.events import ErrorReported, PopupShown, ScriptFailed
 from ur_emulator.machine.controller.io.network import SignalType
-from ur_emulator.machine.kinematics.arm_model import ArmModel
-from ur_emulator.machine.models.cb3_arms import UR5
 from ur_emulator.machine.models.robot_model import ZERO6
 from ur_emulator.program_files import urp_nodes
 from ur_emulator.program_files.folder import ProgramFolder
@@ -136,16 +134,6 @@ def test_a_script_file_of_a_node_is_read_where_it_lies(tmp_path):
 
 
 # --- positions of e-Series software
-
-
-def test_a_taught_pose_is_that_of_the_angles_and_the_tool(tmp_path):
-    lines = script_of(
-        tmp_path, urp(move("MoveL", waypoint("W", FIXED), CARTESIAN), saved_in=NEW)
-    ).splitlines()
-    assert lines[1].startswith("  global W_p=p[")
-    found = [float(one) for one in lines[1].partition("[")[2].rstrip("]").split(",")]
-    assert found == pytest.approx(ArmModel(UR5).fk(Q, OFFSET), abs=1e-11)
-    assert lines[2] == f"  global W_q=[{JOINTS}]"
 
 
 def test_a_path_goes_on_where_the_program_begins_again(tmp_path):
@@ -274,20 +262,6 @@ def taught(bench, name, *step):
     return waypoint(name, f"<motionParameters/>{inside}"), pose
 
 
-@pytest.mark.parametrize(("value", "said"), [("1", "one"), ("2", "two"), ("3", "default")])
-def test_the_default_case_runs_when_no_other_one_does(run, value, said):
-    cases = "".join(
-        f'<Case caseValue="{number}"><children>{say(text)}</children></Case>'
-        for number, text in (("1", "one"), ("2147483647", "default"), ("2", "two"))
-    )
-    assert run(f"<Switch>{expression(value)}<children>{cases}</children></Switch>") == [said]
-
-
-def test_a_loop_counts_with_its_variable(run):
-    loop = '<Loop type="Counting" count="3"><loopVariable name="Loop_1"/><children>{}</children></Loop>'
-    assert run(loop.format(script_line('textmsg("turn ", Loop_1)'))) == ["turn 0", "turn 1", "turn 2"]
-
-
 @pytest.mark.parametrize(("value", "said"), [("1", ["through"]), ("2", ["else"])])
 def test_a_watched_condition_breaks_its_branch_off(run, value, said):
     watched = branch("If", script_line(f"x={value}") + REST + say("through"), "x≤1", watched=True)
@@ -314,14 +288,6 @@ def test_a_timer_counts_seconds_while_it_is_started(run):
 def test_a_popup_that_halts_is_shown_and_ends_the_program(run, bench):
     assert run('<Popup type="Message" haltProgram="true" message="enough"/>' + say("never")) == []
     assert [event.text for event in bench.events if isinstance(event, PopupShown)] == ["enough"]
-
-
-def test_threads_run_after_the_statements_before_the_start(run):
-    around = (
-        f'<SpecialSequence type="BeforeStart"><children>{assignment("n", "1")}{REST}{say("before")}</children></SpecialSequence>'
-        f'<Thread name="Watch" runOnlyOnce="true"><children>{say("thread")}</children></Thread>'
-    )
-    assert run(REST + say("main"), around=around) == ["before", "thread", "main"]
 
 
 def test_a_direction_ends_after_its_distance(run, bench):
