@@ -216,6 +216,29 @@ def test_a_second_upload_replaces_the_first(box):
 # --- the older driver
 
 
+def test_its_reads_hold_the_version_and_whole_realtime_packages(box):
+    """One read of 512 bytes: the message comes first and whole."""
+    with connect(box, "primary") as sock:
+        data = sock.recv(512)
+        size, kind = struct.unpack_from(">iB", data)
+        assert kind == 20
+        assert size <= len(data)
+        data = data[:size]
+        _, _, number, length = struct.unpack_from(">QbBB", data, 5)
+        assert number == VERSION_MESSAGE
+        name = data[16 : 16 + length]
+        assert name == b"URControl"
+        major, minor, bugfix = struct.unpack_from(">BBi", data, 16 + length)
+        assert (major, minor, bugfix) == (3, 15, 8)
+        assert len(data[16 + length + 10 :]) <= 20
+    with connect(box, "realtime") as sock:
+        for _ in range(50):
+            # A read that comes late finds more than one package, but always whole ones.
+            data = sock.recv(1 << 16)
+            assert len(data) % 1140 == 0
+            assert struct.unpack_from(">i", data)[0] == 1140
+
+
 def test_a_stream_of_one_line_programs_is_one_motion(box):
     """`speedj` once a cycle on the realtime port: no braking between them, and none while a busy machine waits."""
     with StrictRtde(box) as rtde, connect(box, "realtime") as script:

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import select
+import shutil
 import socket
 import subprocess
 import sys
@@ -193,6 +194,8 @@ def test_pyrobotiqgripper(box, line, capsys):
     assert gripper.maxSpeedMmSecond() == pytest.approx(149.1, abs=0.1)
     gripper.move_mm(60)
     assert gripper.position_mm() == pytest.approx(60, abs=0.4)
+    gripper.realTimePositionMove(0.9)
+    gripper.realTimeSpeedMove(-0.5)
     gripper.open()
     with block_between_pads(box):
         gripper.close(force=100)
@@ -204,7 +207,12 @@ def test_pyrobotiqgripper(box, line, capsys):
     del status["time"]
     assert list(status) == ["gOBJ", "gSTA", "gGTO", "gACT", "kFLT", "gFLT", "gPR", "gPO", "gCU"]
     assert list(status.values()) == [3, 3, 1, 1, 0, 0, 0, 3, 0]
-    assert "stopped due to a contact while closing" in capsys.readouterr().out
+    gripper.printStatus()
+    said = capsys.readouterr().out
+    assert "stopped due to a contact while closing" in said
+    assert "Activation is completed" in said
+    columns = *client.COMMAND_HISTORY_COLUMNS_ID_2_NAME, *client.STATUS_HISTORY_COLUMNS_ID_2_NAME
+    assert gripper.historyNumpy().shape[1] == len(columns) - 1
     gripper.disconnect()
 
 
@@ -274,3 +282,28 @@ def test_minimalmodbus(line):
         with pytest.raises(client.SlaveReportedException, match="illegal data address"):
             gripper.read_register(0)
         gripper.serial.close()
+
+
+@pytest.mark.nightly
+def test_minimalmodbus_through_socat(line, tmp_path):
+    """As the maker's script for tool communication does it: a serial port that socat makes of a connection."""
+    client = pytest.importorskip("minimalmodbus")
+    if shutil.which("socat") is None:
+        pytest.skip("needs socat")
+    port, (host, number) = tmp_path / "ttyUR", line
+    socat = ["socat", f"pty,link={port},raw,ignoreeof,waitslave", f"tcp:{host}:{number}"]
+    with subprocess.Popen(socat) as process:
+        try:
+            wait_until(port.exists, "the serial port")
+            gripper = client.Instrument(str(port), 9)
+            gripper.serial.baudrate, gripper.serial.timeout = 115200, TIMEOUT
+            gripper.write_registers(0x03E8, [0, 0, 0])
+            gripper.write_registers(0x03E8, [0x0100, 0, 0])
+            while gripper.read_register(0x07D0, functioncode=4) != 0x3100:
+                pass
+            gripper.write_registers(0x03E8, [0x0900, 0x00FF, 0xFFFF])
+            while gripper.read_registers(0x07D0, 3, functioncode=4) != [0xF900, 0x00FF, 0xE600]:
+                pass
+            gripper.serial.close()
+        finally:
+            process.terminate()

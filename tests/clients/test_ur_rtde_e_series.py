@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from clients_support import served_box, wait_until
-from ur_rtde_support import Dashboard, servo_along_a_sine, shifted
+from ur_rtde_support import RTDEIO, Dashboard, connected, servo_along_a_sine, shifted
 
 pytestmark = pytest.mark.nightly
 
@@ -49,7 +49,11 @@ def test_servo_j_streams_at_500_hz(arm):
     assert np.abs(actual - target).max() < 2e-3
 
 
-def test_jogging(arm):
+def test_speed_j_and_jogging(arm):
+    assert arm.control.speedJ([0.4, 0, 0, 0, 0, 0], 4.0)
+    arm.until(lambda r: r.getTargetQ()[0] - HOME[0] > 0.1)
+    assert arm.control.speedStop(8.0)
+    arm.still()
     start = arm.receive.getTargetTCPPose()
     assert arm.control.jogStart([0, 0, 0.05, 0, 0, 0], 0)
     arm.until(lambda r: r.getTargetTCPPose()[2] - start[2] > 0.01)
@@ -91,8 +95,6 @@ def test_payload_history_and_contact_questions(arm):
     assert control.setPayload(0.0, [0, 0, 0])
     wait_until(lambda: np.allclose(control.getActualJointPositionsHistory(10), HOME, atol=5e-4), "the answer")
     wait_until(lambda: control.toolContact([0, 0, 1, 0, 0, 0]) == 0, "the answer")
-    pose = receive.getTargetTCPPose()
-    wait_until(lambda: np.allclose(control.getActualToolFlangePose(), pose, atol=1e-3), "the answer")
 
 
 def test_contact_detection_and_freedrive(arm):
@@ -121,6 +123,25 @@ def test_dynamics(arm):
     # The client's script asks for those of the moment: the arm rests.
     zeros = [0.0] * 6
     wait_until(lambda: control.getCoriolisAndCentrifugalTorques(list(HOME), zeros) == zeros, "the answer")
+
+
+def test_kinematics_of_a_tool_and_the_flange(arm):
+    control, pose, tool = arm.control, arm.receive.getTargetTCPPose(), [0, 0, 0.1, 0, 0, 0]
+    with_tool = control.poseTrans(pose, tool)
+    assert control.getForwardKinematics(list(HOME), tool) == pytest.approx(with_tool, abs=1e-6)
+    assert control.getInverseKinematics(pose, list(HOME)) == pytest.approx(HOME, abs=1e-6)
+    assert control.getInverseKinematicsHasSolution(pose, list(HOME))
+    assert not control.getInverseKinematicsHasSolution([3.0, 0, 0, 0, 0, 0], list(HOME))
+    wait_until(lambda: np.allclose(control.getActualToolFlangePose(), pose, atol=1e-3), "the answer")
+
+
+def test_an_output_and_the_speed_slider(arm):
+    with connected(RTDEIO, arm.box.host) as io:
+        assert io.setStandardDigitalOut(3, True)
+        arm.until(lambda r: r.getDigitalOutState(3))
+        assert io.setSpeedSlider(0.5)
+        arm.until(lambda r: r.getTargetSpeedFraction() == 0.5)
+        assert io.setSpeedSlider(1.0)
 
 
 def test_dashboard(box):

@@ -1,6 +1,7 @@
 """ur_rtde's interfaces for control, I/O and receiving: moves, stops, set-points, answers, programs, outputs, registers."""
 
 import csv
+import time
 from contextlib import ExitStack
 
 import numpy as np
@@ -182,6 +183,74 @@ def test_the_box_fetches_the_control_script_itself(tmp_path):
         dashboard.disconnect()
 
 
+@pytest.mark.nightly
+def test_steadiness_and_torques(arm):
+    arm.still()
+    wait_until(arm.control.isSteady, "steadiness")
+    # The client reads the register before the script has answered: the first answer is an older one.
+    for ask, wanted, close in (
+        (arm.control.getJointTorques, [0.0] * 6, 3.0),
+        (arm.control.getActualToolFlangePose, arm.receive.getActualTCPPose(), CLOSE_X),
+    ):
+        ask()
+        arm.after(0.05)
+        assert np.allclose(ask(), wanted, atol=close)
+    assert arm.control.getRobotStatus() == 0b11
+
+
+STOP = 255  # the client's command for its script to end
+
+
+@pytest.mark.nightly
+def test_custom_functions_scripts_and_files(arm, tmp_path):
+    function = (
+        f"movej({home(0.2)}, a=12, v=3)\n"
+        "q = get_actual_joint_positions()\n"
+        "write_output_float_register(12, q[0])\n"
+        "write_output_integer_register(12, 4711)\n"
+    )
+    assert arm.control.sendCustomScriptFunction("mine", function)
+    arm.until(lambda r: r.getOutputIntRegister(12) == 4711)
+    arm.until(lambda r: r.getOutputDoubleRegister(12) == pytest.approx(HOME[0] + 0.2, abs=0.01))
+    # Whether the client still sees its custom program or the control script again is a matter of a moment.
+    wait_until(lambda: arm.control.moveJ(list(HOME), 3.0, 12.0))
+    script = (
+        "def whole():\n  write_output_integer_register(13, {})\n  write_output_integer_register(0, 2)\nend\n"
+    )
+    assert arm.control.sendCustomScript(script.format(11))
+    arm.until(lambda r: r.getOutputIntRegister(13) == 11)
+    path = tmp_path / "whole.script"
+    path.write_text(script.format(12))
+    assert arm.control.sendCustomScriptFile(str(path))
+    arm.until(lambda r: r.getOutputIntRegister(13) == 12)
+    path.write_text(
+        "def rtde_control():\n"
+        "  write_output_integer_register(14, 77)\n"
+        "  write_output_integer_register(0, 1)\n"
+        f"  while read_input_integer_register(0) != {STOP}:\n    sync()\n  end\nend\n"
+    )
+    wait_until(arm.control.isProgramRunning)
+    arm.control.setCustomScriptFile(str(path))
+    arm.until(lambda r: r.getOutputIntRegister(14) == 77)
+    wait_until(arm.control.isProgramRunning)
+    arm.control.setCustomScriptFile("")
+    wait_until(lambda: arm.control.isProgramRunning() and arm.control.moveJ(home(0.05), 3.0, 12.0))
+
+
+@pytest.mark.nightly
+def test_a_second_control_interface_in_the_upper_range(arm):
+    """Its registers belong to nobody, the force input does: it connects, and its script replaces the first one's."""
+    flags = RTDEControl.FLAG_UPPER_RANGE_REGISTERS | RTDEControl.FLAG_UPLOAD_SCRIPT
+    with pytest.raises(RuntimeError, match="in use"):
+        RTDEControl(arm.box.host, -1.0, flags)
+    with connected(RTDEControl, arm.box.host, -1.0, flags | RTDEControl.FLAG_NO_EXT_FT) as second:
+        assert second.moveJ(home(0.1), 3.0, 12.0)
+        assert arm.is_at(home(0.1))
+        second.stopScript()
+    arm.get_ready()
+    assert arm.is_at(HOME)
+
+
 # --- inputs and outputs
 
 
@@ -353,6 +422,73 @@ def test_a_protective_stop_and_the_way_out(arm):
     arm.restart()
     assert arm.control.moveJ(home(0.1), 2.0, 8.0)
     assert arm.is_at(home(0.1))
+
+
+@pytest.mark.nightly
+def test_an_asynchronous_path_reports_its_waypoints(arm):
+    path = [[*home(0.2 * (1 + n % 2)), 2.0, 8.0, 0.0] for n in range(3)]
+    assert arm.control.moveJ(path, True)
+    seen = []
+
+    def is_over():
+        seen.append(arm.control.getAsyncOperationProgress())
+        return seen[-1] < 0 and max(seen) == 2
+
+    wait_until(is_over, "the third waypoint")
+    steps = [n for n in seen if n >= 0]
+    assert steps == sorted(steps)
+    assert set(steps) == {0, 1, 2}
+    assert arm.is_at(home(0.2))
+
+
+@pytest.mark.nightly
+def test_jogging(arm):
+    for speed, feature in ((50, arm.control.FEATURE_BASE), (-50, arm.control.FEATURE_TOOL)):
+        start = np.array(arm.receive.getTargetTCPPose()[:3])
+        assert arm.control.jogStart([0, 0, speed, 0, 0, 0], feature)
+        arm.until(lambda r, start=start: np.linalg.norm(r.getTargetTCPPose()[:3] - start) > 0.01)
+        assert arm.control.jogStop()
+        arm.still()
+        if feature == arm.control.FEATURE_BASE:
+            assert np.allclose(arm.receive.getTargetTCPPose()[:2], start[:2], atol=1e-3)
+
+
+@pytest.mark.nightly
+def test_hand_guiding(arm):
+    assert arm.control.teachMode()
+    arm.after(0.3)
+    assert arm.control.isProgramRunning()
+    assert arm.control.endTeachMode()
+    arm.still()
+    assert np.allclose(arm.receive.getActualQ(), HOME, atol=0.1)
+
+
+@pytest.mark.nightly
+def test_a_watchdog_that_is_kicked_lets_the_script_live(arm):
+    """Then it is not kicked any more and the script ends, 2 s later: a busy machine may kick late."""
+    assert arm.control.setWatchdog(0.5)
+    start = arm.receive.getTimestamp()
+    while arm.receive.getTimestamp() < start + 0.6:
+        assert arm.control.kickWatchdog()
+        time.sleep(0.02)
+    assert arm.control.isProgramRunning()
+    wait_until(lambda: not arm.control.isProgramRunning(), "the end of the script")
+    # The two interfaces have a connection each: the same cycle comes to the other one a little later.
+    wait_until(lambda: arm.receive.getRuntimeState() == 1, "the end of the script in the other connection")
+    arm.restart()
+
+
+@pytest.mark.nightly
+def test_a_package_that_is_too_short_is_survived(arm):
+    """The client sends external forces with a recipe that has no place for them and needs four bytes more."""
+    for _ in range(5):
+        assert arm.control.setExternalForceTorque([0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+    assert arm.control.isProgramRunning()
+    # The client takes the script's answer to the lost command for that to the next one.
+    arm.after(0.1)
+    arm.control.isSteady()
+    wait_until(lambda: arm.control.moveJ(home(0.05), 2.0, 8.0))
+    assert arm.is_at(home(0.05))
 
 
 # --- RTDEReceiveInterface: every getter, rates, recordings, recipes

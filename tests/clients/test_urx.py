@@ -100,6 +100,15 @@ def test_stops(robot):
     robot.movej(start, acc=ACCELERATION, vel=SPEED)
 
 
+@pytest.mark.nightly
+def test_speeds_with_t_min_are_refused(robot, old_box):
+    """urx writes `t_min=`, which 3.x does not know: no motion, one error, and the client lives on."""
+    start = at_rest(robot)
+    robot.speedj([0.3, 0, 0, 0, 0, 0], 1.0, 1.0)
+    wait_until(lambda: "unexpected keyword argument 't_min'" in old_box.log.read_text())
+    assert np.allclose(at_rest(robot), start, atol=CLOSE_Q)
+
+
 def test_inputs_and_outputs(robot):
     for n in (0, 7):
         robot.set_digital_out(n, True)
