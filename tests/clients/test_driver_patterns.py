@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 import numpy as np
 import pytest
 from clients_support import BOTH_GENERATIONS, PROGRAMS, TIMEOUT, connect, receive_exactly, served_box
-from strict_clients import PrimaryWire, StrictRtde
+from strict_clients import VERSION_MESSAGE, PrimaryWire, StrictRtde
 
 SCALE = 1_000_000
 STOP, UNINITIALIZED, IDLE, SERVOJ, SPEEDJ, TRAJECTORY, SPEEDL = -2, -1, 0, 1, 2, 3, 4

@@ -2,7 +2,9 @@
 
 import gzip
 import math
+import re
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from box_support import Bench, MessageReader, connect, inside
@@ -65,43 +67,13 @@ def dashboard(box):
 
 
 def test_the_header_has_what_polyscope_writes():
-    lines = list(header_lines(CELL))
-    counter = next(line for line in lines if line.startswith("step_count_")).removesuffix(" = 0.0")
-    thread = "Step_Counter_Thread_" + counter.removeprefix("step_count_")
-    assert lines == [
-        "set_standard_analog_input_domain(0, 1)",
-        "set_standard_analog_input_domain(1, 1)",
-        "set_tool_analog_input_domain(0, 1)",
-        "set_tool_analog_input_domain(1, 1)",
-        "set_analog_outputdomain(0, 0)",
-        "set_analog_outputdomain(1, 0)",
-        "set_tool_voltage(24)",
-        "set_input_actions_to_default()",
-        'set_tool_digital_input_action(1, "freedrive")',
-        "set_runstate_standard_digital_outputs([1])",
-        "set_runstate_standard_digital_output_to_value(1, 1)",
-        "set_runstate_standard_digital_output_to_value(2, 3)",
-        "set_safety_mode_transition_hardness(1)",
-        "set_tcp(p[0.0, 0.0, 0.12, 0.0, 0.0, 0.5])",
-        "set_payload(1.25, [0.0, 0.01, 0.05])",
-        "set_gravity([0.0, 0.0, 9.82])",
-        f"{counter} = 0.0",
-        f"thread {thread}():",
-        "  while (True):",
-        f"    {counter} = {counter} + 1.0",
-        "    sync()",
-        "  end",
-        "end",
-        f"run {thread}()",
-        'modbus_add_signal("10.0.0.9", 255, 7, 1, "LAMP", False)',
-        'modbus_set_signal_update_frequency("LAMP", 5)',
-        'modbus_set_runstate_dependent_choice("LAMP",1)',
-        "global count=7",
-        'global names=["a", "b"]',
-        "global Box=p[0.0, 0.0, 0.0, 0.0, 0.0, 0.0]",
-        "global table=p[0.1, 0.2, 0.3, 0.0, 0.0, 0.0]",
-    ]
-    compile_program("def p():\n" + "\n".join(lines) + "\nend\n")
+    text = "\n".join(header_lines(CELL))
+    golden = (Path(__file__).parents[1] / "programs" / "installation_header.script").read_text()
+    assert (
+        re.sub(r"(?<=step_count)_\w+|(?<=Step_Counter_Thread)_\w+", "", text)
+        == golden.partition("\n")[2].rstrip()
+    )
+    compile_program(f"def p():\n{text}\nend\n")
 
 
 def test_an_installation_takes_back_what_the_one_before_has_set_up():

@@ -17,33 +17,6 @@ CALIBRATION = GripperCalibration(90.2, 1.18, 0.0, 85.0)
 CALIBRATED = Installation("/programs/cell.installation", grippers=GripperSetup(True, True, {1: CALIBRATION}))
 
 
-def check(*, detects=True, **data):
-    branches = gripper_node("If", script_line('textmsg("held")')) + gripper_node(
-        "Else", script_line('textmsg("nothing")')
-    )
-    return gripper_node("Grip Check", branches, ObjectDetectedKey=str(detects).lower(), **data)
-
-
-def test_a_motion_is_guarded_and_waits(tmp_path):
-    assert lines_of(tmp_path, gripper_move(50, speed=10, force=1)) == [
-        "# begin: URCap Program Node",
-        "#   Source: Robotiq_Grippers, Robotiq Inc.",
-        "#   Type: Gripper",
-        '$ 2 "Gripper Move50% (1)"',
-        "if not(gripper_connected[0]):",
-        'popup("Gripper 1 does not answer.", "No connection", False, True, True)',
-        "end",
-        'if not(rq_is_gripper_activated("1")):',
-        'popup("Gripper 1 must be activated first.", "Not activated", False, True, True)',
-        "end",
-        'rq_set_pos_spd_for(128, 26, 3, "1")',
-        'rq_wait_pos_spe_for_request(128, 26, 3, "1")',
-        'rq_go_to("1")',
-        'rq_wait("1")',
-        "# end: URCap Program Node",
-    ]
-
-
 @pytest.mark.parametrize(
     ("node", "installed", "label"),
     [
@@ -52,62 +25,10 @@ def test_a_motion_is_guarded_and_waits(tmp_path):
         (gripper_move(40, slaveIds="[2]"), CALIBRATED, "Gripper Move40% (2)"),
         (gripper_move(60, slaveIds="[9]"), CALIBRATED, "Gripper Move29mm (1)"),
         (gripper_move(99), CALIBRATED, "Gripper Move0mm (1)"),
-        (gripper_node("Gripper Activate"), NEW_BOX, "Gripper Activate"),
-        (gripper_node("Gripper Activate", ResetAndActivateKey="true"), NEW_BOX, "Gripper Reset and Activate"),
     ],
 )
 def test_labels(tmp_path, node, installed, label):
     assert lines_of(tmp_path, node, installed)[3] == f'$ 2 "{label}"'
-
-
-def test_a_motion_that_does_not_block_is_not_waited_for(tmp_path):
-    lines = lines_of(tmp_path, gripper_move(0, blocking="false", slaveIds="[3]"))
-    assert lines[-2:] == ['rq_go_to("3")', "# end: URCap Program Node"]
-
-
-def test_several_grippers_have_their_targets_before_the_first_one_moves(tmp_path):
-    lines = lines_of(tmp_path, gripper_move(100, slaveIds="[9, 2]"))
-    assert lines[3] == '$ 2 "Gripper Close (1, 2)"'
-    calls = [line for line in lines if line.startswith("rq_")]
-    assert [(call.partition("(")[0], call[-3:-1]) for call in calls] == [
-        ("rq_set_pos_spd_for", '1"'),
-        ("rq_wait_pos_spe_for_request", '1"'),
-        ("rq_set_pos_spd_for", '2"'),
-        ("rq_wait_pos_spe_for_request", '2"'),
-        ("rq_go_to", '1"'),
-        ("rq_go_to", '2"'),
-        ("rq_wait", '1"'),
-        ("rq_wait", '2"'),
-    ]
-    assert lines.count("if not(gripper_connected[1]):") == 1
-
-
-@pytest.mark.parametrize(
-    ("node", "label", "condition"),
-    [
-        (check(), "If object detected", 'rq_is_object_detected("1")'),
-        (check(detects=False), "If object not detected", 'not rq_is_object_detected("1")'),
-        (
-            check(GripperIdKey="2", DimensionValidationKey="true", DimensionKey="50", DimensionNegativeGapKey="10",
-                  DimensionDimensionPositiveGapKey="5"),
-            "If grip validated",
-            'rq_is_object_detected("2") and rq_current_pos("2") >= 102.00 and rq_current_pos("2") <= 140.25',
-        ),
-    ],
-)  # fmt: skip
-def test_a_check_of_the_grip_has_two_branches(tmp_path, node, label, condition):
-    assert lines_of(tmp_path, node)[3:-1] == [
-        '$ 2 "Grip Check"',
-        f'$ 3 "{label}          " "noBreak"',
-        f"if ({condition}):",
-        "$ 4 \"textmsg('held')\"",
-        'textmsg("held")',
-        "else:",
-        '$ 5 "Else" "noBreak"',
-        "$ 6 \"textmsg('nothing')\"",
-        'textmsg("nothing")',
-        "end",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -177,12 +98,16 @@ def test_the_installation_gives_calibrations_and_the_voltage(tmp_path):
 # --- what the script does
 
 
+BRANCHES = "".join(
+    gripper_node(name, script_line(f'textmsg("{text}")'))
+    for name, text in (("If", "held"), ("Else", "nothing"))
+)
 GRIP = (
     gripper_node("Gripper Activate", ResetAndActivateKey="true")
     + gripper_move(0)
     + script_line('textmsg("open ", rq_current_pos_norm())')
     + gripper_move(100)
-    + check()
+    + gripper_node("Grip Check", BRANCHES, ObjectDetectedKey="true")
     + script_line('textmsg("wide ", rq_current_pos_mm())')
     + gripper_move(0)
 )
